@@ -39,12 +39,10 @@ class _Widened:
 def chosen_box(
     reference: str | ShipModel | None, particulars: Particulars, trials: Sequence[Trial]
 ) -> tuple[GreyBox, dict[str, float]]:
-    """The grey box of a named reference ship, or of the one most like the target.
+    """The grey box of a reference ship, and the correlations of the candidates where she was not named.
 
-    `reference`: a model, its name or file; "auto" chooses by `select_reference`; `particulars`: of the
-    target; `trials`: of the target; whether its shaft speed and roll are known. Returns `correlations`: of
-    the candidates, empty where the ship was named. Raises InputError for no reference, or one that does not
-    exist.
+    `reference`: a model, its name or file; "auto" chooses the one most like the target by `select_reference`;
+    the target's trials tell whether its shaft speed and roll are known.
     """
     if reference is None:
         raise InputError(

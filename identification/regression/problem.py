@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -54,11 +54,7 @@ class Problem:
 def pose(
     trials: Sequence[Trial], options: Options, particulars: Given, steering: SteeringGear | None
 ) -> Problem:
-    """Check what was given and make the regression; arguments as in `identify`.
-
-    Raises InputError for trials that excite nothing, lack channels or samples or are of another ship, and for
-    particulars that do not suffice.
-    """
+    """Check what was given and make the regression; arguments and errors as in `identify`."""
     everything, sea = in_still_water(held_out(trials, options.hold_out), options, particulars)
     if not isinstance(steering, SteeringGear | None):
         raise InputError(
@@ -66,32 +62,20 @@ def pose(
         )
     used = [repaired(trial) if options.repair else trial for trial in _used(everything)]
     table, similarity = _table(options.structure, options.reference_model, particulars, used)
-    used, everything = (
-        [_at_constant_speed(one, table, particulars) for one in group] for group in (used, everything)
-    )
+    used, everything = _both(used, everything, lambda one: _at_constant_speed(one, table, particulars))
     check_trials(used, table)
     ship = _ship(particulars, used, table)
     for trial in used:
         check_scale(trial, ship, f"trial {trial.name!r}")
     shaft = _shaft_speed(options.service_shaft_speed, used, table)
     smooth = options.preprocessing or options.smooth
-    sampling: dict[str, Any] = {
-        "samples": options.samples,
-        "window": options.window,
-        "gear": steering,
-        "smooth": smooth,
-    }
-
-    def regress(trials: Sequence[Trial]) -> Samples:
-        return structure_samples(trials, table, ship, shaft_speed=shaft, **sampling)
-
-    regression = regress(used)
+    sampling = dict[str, Any](samples=options.samples, window=options.window, gear=steering, smooth=smooth)
+    regression = structure_samples(used, table, ship, shaft_speed=shaft, **sampling)
     if options.wind == "constant":
         constants = constant_wind(used, regression, options.structure)
-        used, everything = (
-            [with_constant_wind(trial, constants) for trial in group] for group in (used, everything)
-        )
-        regression, sea["wind"] = regress(used), {"option": "constant", "accelerations": constants}
+        used, everything = _both(used, everything, lambda one: with_constant_wind(one, constants))
+        regression = structure_samples(used, table, ship, shaft_speed=shaft, **sampling)
+        sea["wind"] = {"option": "constant", "accelerations": constants}
     check_samples(regression, used, table)
     gear = steering or (estimated_gear(used) if table.has_rudder else SteeringGear())
     blank = _blank(options.name or ship["name"], table, ship, gear, shaft, used)
@@ -99,13 +83,18 @@ def pose(
     return Problem(tuple(everything), tuple(used), blank, table, regression, similarity, sea, sampling, call)
 
 
+def _both(
+    used: Sequence[Trial], everything: Sequence[Trial], changed: Callable[[Trial], Trial]
+) -> tuple[list[Trial], list[Trial]]:
+    return [changed(trial) for trial in used], [changed(trial) for trial in everything]
+
+
 def _at_constant_speed(trial: Trial, table: Structure, particulars: Given) -> Trial:
     """A trial of heading and rudder at the service speed, for a structure of the yaw rate alone."""
     speed = (particulars or {}).get("speed")
     if {"u", "v"} & trial.channels.keys() or set(table.symbols) > {"r", "delta"} or speed is None:
         return trial
-    still = {"u": np.full(len(trial), float(speed)), "v": np.zeros(len(trial))}
-    return trial.with_channels(still)
+    return trial.with_channels({"u": np.full(len(trial), float(speed)), "v": np.zeros(len(trial))})
 
 
 def _blank(
@@ -125,18 +114,13 @@ def _blank(
     )
 
 
-def _check_list(trials: Any) -> None:
-    """Refuse what is not a list of trials."""
+def held_out(trials: Any, names: Sequence[str]) -> Sequence[Trial]:
+    """The trials, those named marked to validate only; InputError for what is not a list of trials."""
     wrong = [trials] if isinstance(trials, Trial | str) else [t for t in trials if not isinstance(t, Trial)]
     if wrong:
         raise InputError(
             f"trials: {wrong[0]!r} found, expected a list of Trials, such as ship.trials() of a ship file"
         )
-
-
-def held_out(trials: Sequence[Trial], names: Sequence[str]) -> Sequence[Trial]:
-    """The trials, those named marked to validate only."""
-    _check_list(trials)
     known = [trial.name for trial in trials]
     wanted = [names] if isinstance(names, str) else list(names)
     for name in wanted:
@@ -157,8 +141,9 @@ def _table(
                 "structure 'grey-box'; or leave it out (to pull coefficients to a ship's, give prior)"
             )
         return structure if isinstance(structure, Structure) else get_structure(structure), {}
-    check_trials(used, get_structure("linear-steering"))
-    return chosen_box(reference, _ship(particulars, used, get_structure("linear-steering")), used)
+    steering = get_structure("linear-steering")
+    check_trials(used, steering)
+    return chosen_box(reference, _ship(particulars, used, steering), used)
 
 
 def _used(trials: Sequence[Trial]) -> list[Trial]:

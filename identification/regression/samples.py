@@ -176,12 +176,12 @@ class _Sampling:
         last = first + window
         features, targets = {}, {}
         for q, steps in integrals.items():
-            summed = np.concatenate([np.zeros((1, steps.shape[1])), np.cumsum(steps, axis=0)])
+            summed = np.pad(np.cumsum(steps, axis=0), ((1, 0), (0, 0)))
             features[q] = steps if window == 1 else summed[last] - summed[first]
             targets[q] = channels[q][last] - channels[q][first]
             if f"wind_{q}dot" in trial:
                 by_wind = integral(t, trial[f"wind_{q}dot"])
-                targets[q] = targets[q] - (by_wind[last] - by_wind[first])
+                targets[q] -= by_wind[last] - by_wind[first]
         part = Samples(features, targets, t[first], t[last] - t[first], np.full(len(first), index), window)
         return without_memory(part) if "q" in equations else part
 
@@ -202,9 +202,8 @@ def between_gaps(trial: Trial, particulars: Particulars, fewest: int = FEWEST_SA
     """Cut a trial where samples are missing; the trial itself if it has no gap.
 
     A gap is a time step of more than 5 usual ones, the median of the trial or of those around, and more than
-    0.15 of the time to sail one ship length. With a usual step of up to a twentieth of that time no step of
-    the regression is longer than a quarter of it. Pieces shorter than `fewest`, or 10, samples are left out.
-    Raises InputError where no piece is left.
+    0.15 of the time to sail one ship length. Pieces shorter than `fewest`, or 10, samples are left out;
+    InputError where no piece is left.
     """
     steps = np.diff(trial.t)
     usual = np.maximum(np.median(steps), median_filter(steps, NEIGHBOURS, mode="mirror"))
@@ -226,10 +225,7 @@ def between_gaps(trial: Trial, particulars: Particulars, fewest: int = FEWEST_SA
 
 
 def default_window(trial: Trial, particulars: Particulars) -> int:
-    """Sampling steps over which a trial's velocities change by much more than their noise.
-
-    1 without noise; at most a third of the time to sail one ship length.
-    """
+    """Sampling steps over which a trial's velocities change by much more than their noise; 1 without."""
     step = float(np.median(np.diff(trial.t)))
     longest = max(int(LONGEST_WINDOW * particulars["length"] / particulars["speed"] / step), 1)
     longest = min(longest, max(len(trial) // 20, 1))
@@ -250,8 +246,7 @@ def without_memory(part: Samples) -> Samples:
     integrated from the start of the trial, stand on the right; so their difference is free of it. That is the
     regression of the second-order equation weighted by two boxes convolved, a modulating function (Shinbrot
     1957, On the analysis of linear and nonlinear systems, Trans. ASME 79): no derivative of a measured
-    channel is formed. The rows returned are those with a window after theirs. Raises InputError for a trial
-    of fewer than two windows.
+    channel is formed. The rows returned are those with a window after theirs.
     """
     end = part.start + part.duration
     following = np.searchsorted(part.start, end - 1e-9 * part.duration)

@@ -24,9 +24,8 @@ LONGEST_LEG = 2.0  # times the measured one; a heading that is not reached by th
 def closed_loop(model: ShipModel, trial: Trial) -> Trial | None:
     """A zigzag with the measured rudder angles, reversed at the measured headings by the model's gear.
 
-    `trial`: with u, v, r, psi and the rudder, from whose first sample the model starts (`with_start`). None
-    where the model runs away or a heading is never reached, without a reversal, and for a model whose state
-    is not recorded.
+    None where the model runs away or a heading is never reached, without a reversal, and for a model whose
+    state is not recorded.
     """
     if not set(model.state_names) <= {*trial.channels, "x", "y"}:
         return None
@@ -63,12 +62,9 @@ def _leg(
     time: tuple[float, float],
     target: float | None,
 ) -> tuple[Floats, Floats]:
-    """Times and states of a leg from its begin and measured duration, up to a heading where one is given.
-
-    Neither holds a row where it is never reached.
-    """
+    """Times and states of a leg of some begin and measured duration; none where a target is not reached."""
     begin, duration = time
-    dt = STEP * model.particulars["length"] / model.particulars["speed"]
+    dt = STEP * model.travel_time
     count = max(int(np.ceil((duration if target is None else LONGEST_LEG * duration) / dt)), 2)
     t = begin + dt * np.arange(count + 1)
     commands = np.tile(model.service_command, (count, 1))

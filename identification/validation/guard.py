@@ -23,12 +23,9 @@ from shipgym.ships.particulars import Particulars
 from shipgym.ships.simulate import open_loop
 from shipgym.trials.trial import Trial
 
-#: Rudder angles of the trial manoeuvres, degrees; the first is cut to the rudder's limit.
-RUDDERS_DEG = (35.0, 10.0)
-#: Ship lengths sailed at service speed between reversals of the rudder.
-REVERSALS = (2.5, 5.0, 10.0, 20.0)
-#: Length of a trial manoeuvre, ship lengths at service speed.
-DURATION_LENGTHS = 50.0
+RUDDERS_DEG = (35.0, 10.0)  # of the trial manoeuvres; the first is cut to the rudder's limit
+REVERSALS = (2.5, 5.0, 10.0, 20.0)  # ship lengths sailed at service speed between those of the rudder
+DURATION_LENGTHS = 50.0  # of a trial manoeuvre, at service speed
 STEP = 0.02  # of the time to sail one ship length
 
 #: A full ship's steady hard turn: speed by service speed, drift angle, yaw rate r L / U, rudder. KVLCC2 of
@@ -63,8 +60,7 @@ def hard_turn_features(
         q: np.abs(structure.features(q, channels, particulars, shaft_speed)[0]) for q in structure.equations
     }
     if "q" in sizes:
-        memory = sizes.pop("q") * particulars["length"] / speed
-        sizes["r"] = np.concatenate([sizes["r"], memory])
+        sizes["r"] = np.append(sizes["r"], sizes.pop("q") * particulars["length"] / speed)
     return sizes
 
 
@@ -93,10 +89,8 @@ def reasons_unstable(model: ShipModel, trials: Sequence[Trial]) -> list[str]:
         for gap in REVERSALS
     )
     for kind in (predictions, turns, reversals):
-        reasons = [
-            f"{name}: {cause}" for name, run, least in kind if (cause := _runs_away(model, run, least))
-        ]
-        if reasons:
+        tried = ((name, _runs_away(model, run, least)) for name, run, least in kind)
+        if reasons := [f"{name}: {cause}" for name, cause in tried if cause]:
             return reasons
     return []
 
@@ -106,7 +100,7 @@ def _reversed(model: ShipModel, rudder_deg: float, interval: float) -> Trial:
     steps = np.arange(round(DURATION_LENGTHS / STEP))
     commands = np.tile(model.service_command, (len(steps), 1))
     commands[:, 0] = np.where(steps // round(interval / STEP) % 2 == 0, 1.0, -1.0) * np.radians(rudder_deg)
-    return model.simulate(commands, STEP * model.particulars["length"] / model.particulars["speed"])
+    return model.simulate(commands, STEP * model.travel_time)
 
 
 def _runs_away(model: ShipModel, run: Callable[[], Trial], least_surge: float) -> str | None:
@@ -141,10 +135,9 @@ def guarded_fit(
 ) -> GuardedFit:
     """Fit by a method; if the model runs away, with the weakest penalty under which it does not.
 
-    Not stable, and without a penalty, where none helped or it is not `guarded`. Raises InputError for
-    settings that the method does not know.
+    Not stable, and without a penalty, where none helped or it is not `guarded`.
     """
-    samples, blank, trials = task.samples, task.blank, task.trials
+    blank, trials = task.blank, task.trials
     estimators = method.fitted(settings, task)
     model = with_coefficients(blank, estimators)
     reasons = reasons_unstable(model, trials)
@@ -155,7 +148,7 @@ def guarded_fit(
         return GuardedFit(model, estimators, False, {"decision": "runs away, not guarded", **rejected})
     sizes = hard_turn_features(blank.table, blank.particulars, blank.service_shaft_speed)
     for strength in STRENGTHS:
-        held = fit_held(samples, sizes, strength)
+        held = fit_held(task.samples, sizes, strength)
         candidate = with_coefficients(blank, held)
         if not reasons_unstable(candidate, trials):
             report = {"decision": "penalised by hard turn", "strength": strength, **rejected}

@@ -28,10 +28,9 @@ def median(t: ArrayLike, values: ArrayLike, width: int = MEDIAN_WIDTH) -> Floats
 def savitzky_golay(t: ArrayLike, values: ArrayLike, width: int | None = None) -> Floats:
     """Local cubic polynomials by least squares (Savitzky & Golay 1964, Analytical Chemistry 36(8)).
 
-    Records with uneven steps are filtered on an even grid with as many samples. `t`, `values`: s and the unit
-    of the channel, shape (n_samples,); `width`: samples, odd, at least 5; by default the one that generalised
-    cross-validation picks, of at most a fifth of the record. Returns the values themselves where they are
-    free of noise (`noise.NOISY`) or fewer than 25, the width not being given, shape (n_samples,).
+    Records with uneven steps are filtered on an even grid with as many samples. `width`: samples, odd, at
+    least 5; by default the one that generalised cross-validation picks, of at most a fifth of the record.
+    Without a width, values that are free of noise (`noise.NOISY`) or fewer than 25 are returned as they are.
     """
     t, values = np.asarray(t, dtype=float), np.asarray(values, dtype=float)
     longest = int(LONGEST_FILTER * len(t))

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import minimize_scalar
 
-from identification.regression.preprocess.noise import NOISY, noise_level, noise_ratio
+from identification.regression.preprocess.noise import is_noisy, noise_level
 from shipgym.arrays import Floats
 from shipgym.errors import InputError
 from shipgym.trials.trial import Trial
@@ -21,13 +21,11 @@ LEAST_NOISE = 1e-4  # of the range of a channel: resolution, and channels withou
 
 
 def smooth_kinematics(trial: Trial) -> Trial:
-    """Smooth heading and yaw rate, then positions and velocities at that heading.
+    """Smooth heading and yaw rate, then positions and velocities at that heading, as far as recorded.
 
     Accelerations are random walks whose roughness is that of greatest likelihood; with the heading known,
-    positions and velocities are linear in each other, so that two linear smoothers do. `trial`: with at least
-    r or psi; u and v, or x, y and psi, are smoothed together as far as recorded. Channels that are not
-    recorded are not added. `raw` is the trial as it was. Raises InputError for a trial with neither psi nor
-    r.
+    positions and velocities are linear in each other, so that two linear smoothers do. Raises InputError for
+    a trial with neither psi nor r.
     """
     if not {"psi", "r"} & trial.channels.keys():
         raise InputError(
@@ -44,7 +42,7 @@ def smooth_kinematics(trial: Trial) -> Trial:
 def _smooth_heading(trial: Trial) -> dict[str, Floats]:
     """Heading (from 0 where it is not recorded) and yaw rate."""
     names = [name for name in HEADING if name in trial]
-    if not _noisy(trial, names) and "psi" in names:
+    if "psi" in names and not is_noisy(trial.t, (trial[name] for name in names)):
         return {name: trial[name] for name in names}
     h = np.diff(trial.t)
     motion = _Motion((*HEADING, "rdot"), _integrators(h), _random_walk(h), (1.0, 1e-2, 1.0))
@@ -55,7 +53,7 @@ def _smooth_heading(trial: Trial) -> dict[str, Floats]:
 def _smooth_plane(trial: Trial, psi: Floats) -> dict[str, Floats]:
     """Position, surge and sway at a known heading."""
     names = [name for name in PLANE if name in trial]
-    if not _noisy(trial, names):
+    if not is_noisy(trial.t, (trial[name] for name in names)):
         return {name: trial[name] for name in names}
     h = np.diff(trial.t)
     walk, process = _random_walk(h), np.zeros((len(h), 6, 6))
@@ -81,7 +79,9 @@ class _Motion:
         observation = np.eye(len(self.columns))[[self.columns.index(name) for name in names]]
         start = np.array([trial[name][0] if name in names else 0.0 for name in self.columns])
         measured, variances = np.column_stack([trial[name] for name in names]), _variances(trial, names)
-        guess = _first_guess(trial, guessed_by)
+        # variance by time of the acceleration's random walk, from how much a velocity changes
+        size = float(np.ptp(trial[guessed_by])) or 1.0
+        guess = size**2 / max(trial.duration / 20.0, 1e-9) ** 3
 
         def run(decade: float, rows: int, quick: bool) -> tuple[Floats, float]:
             process = guess * 10.0**decade * self.process[: rows - 1]
@@ -97,22 +97,9 @@ class _Motion:
         return dict(zip(self.columns, run(float(best.x), len(trial), False)[0].T, strict=True))
 
 
-def _first_guess(trial: Trial, channel: str) -> float:
-    """Variance by time of the acceleration's random walk, from how much a velocity changes."""
-    size = float(np.ptp(trial[channel])) or 1.0
-    return size**2 / max(trial.duration / 20.0, 1e-9) ** 3
-
-
-def _noisy(trial: Trial, names: Sequence[str]) -> bool:
-    return any(noise_ratio(trial.t, trial[name]) > NOISY for name in names)
-
-
 def _variances(trial: Trial, names: Sequence[str]) -> Floats:
-    levels = [
-        max(noise_level(trial.t, trial[name]), LEAST_NOISE * float(np.ptp(trial[name])), 1e-9)
-        for name in names
-    ]
-    return np.array(levels) ** 2
+    levels = [[noise_level(trial.t, trial[c]), LEAST_NOISE * np.ptp(trial[c]), 1e-9] for c in names]
+    return np.max(levels, axis=1) ** 2
 
 
 def _integrators(h: Floats) -> Floats:
