@@ -21,30 +21,16 @@ Objective = Callable[[Floats], Floats]
 
 @dataclass(frozen=True, eq=False)
 class SearchResult:
-    """The outcome of a search.
+    """The outcome of a search."""
 
-    Attributes
-    ----------
-    x : array of shape (n_dimensions,)
-        The best candidate.
-    value : float
-        Its objective.
-    history : array of shape (n_rounds,)
-        Best objective after each round; the first is that of the starting candidates.
-    course : array of shape (n_rounds, n_dimensions)
-        Best candidate after each round.
-    evaluations : int
-        Candidates evaluated.
-    variable : str
-        What a candidate holds: the logarithm of the weight C, or an insensitive band.
-    """
-
-    x: Floats
-    value: float
+    x: Floats  # the best candidate, shape (n_dimensions,)
+    value: float  # its objective
+    #: best objective after each round, first of the starting candidates, shape (n_rounds,), and the candidate
+    #: that has it, shape (n_rounds, n_dimensions)
     history: Floats
     course: Floats
-    evaluations: int
-    variable: str = LOG_C
+    evaluations: int  # candidates evaluated
+    variable: str = LOG_C  # what a candidate holds: the logarithm of the weight C, or an insensitive band
 
     def of(self, dimension: int, variable: str = LOG_C) -> SearchResult:
         """What was found of one dimension."""
