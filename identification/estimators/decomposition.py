@@ -33,11 +33,10 @@ class Decomposition:
     projections: Floats  # targets in the left singular vectors, shape (n_directions,)
     outside: float  # squared norm of the targets that no direction reaches
     n_free: int  # samples, less one where there is an intercept
-    #: what was subtracted from the features, and what they were divided by, shape (n_features,)
-    centre: Floats
+    centre: Floats  # what was subtracted from the features, shape (n_features,)
     mean: float  # what was subtracted from the targets
-    scale: Floats
-    n_samples: int  # number of samples
+    scale: Floats  # what the features were divided by, shape (n_features,)
+    n_samples: int
 
     @property
     def numerical_rank(self) -> int:

@@ -50,11 +50,11 @@ EVERY_CENTRE_NEEDS = 3  # rows of the regression
 
 @dataclass(frozen=True, eq=False)
 class KernelFit:
-    """A kernel fitted to what a reference ship leaves."""
+    """A kernel fitted to what a reference ship leaves, or before that, without estimators and report."""
 
     model: ShipModel
     samples: Samples
-    estimators: Estimators = field(default_factory=dict)  # none where it is not fitted yet
+    estimators: Estimators = field(default_factory=dict)
     report: dict[str, Any] = field(default_factory=dict)  # for the provenance
 
 
@@ -145,9 +145,8 @@ def _kernels(search: _Search, options: Options) -> dict[float, Kernel]:
     channels = [smoothed_channels(trial, names, smooth) for trial in search.trials]
     x = np.concatenate([kernel_inputs(one, search.blank.particulars) for one in channels])
     offset, scale, centres = chosen_centres(x, number)
-    lengths: tuple[float, ...] = LENGTHS
-    if options.kernel_length is not None:
-        lengths = (check_number(options.kernel_length, "kernel_length", above=0.0),)
+    given = options.kernel_length
+    lengths = LENGTHS if given is None else (check_number(given, "kernel_length", above=0.0),)
     return {
         length: principal(Kernel(offset, scale * length, centres / length, np.eye(len(centres))), x)
         for length in lengths
@@ -174,12 +173,10 @@ def chosen_centres(x: Floats, number: int) -> tuple[Floats, Floats, Floats]:
 
 def principal(kernel: Kernel, x: Floats) -> Kernel:
     """The kernel with the leading principal components of the samples x in feature space as features."""
-    both = _thinned((x - kernel.offset) / kernel.scale)
-    both = np.concatenate([both, both * MIRROR])
-    values = gaussians(both, kernel.centres)
+    z = _thinned((x - kernel.offset) / kernel.scale)
+    values = gaussians(np.concatenate([z, z * MIRROR]), kernel.centres)
     own = gaussians(kernel.centres, kernel.centres)
-    moment = values.T @ values / len(values)
-    _, vectors = eigh(moment, own + 1e-9 * np.eye(len(own)))
+    _, vectors = eigh(values.T @ values / len(values), own + 1e-9 * np.eye(len(own)))
     return replace(kernel, basis=np.ascontiguousarray(vectors[:, ::-1][:, :MOST_FEATURES]))
 
 
@@ -199,15 +196,13 @@ class _Search:
 
     def stage(self, kernel: Kernel) -> KernelFit:
         """The regression, and the model but for its coefficients."""
-        table = kernel_box(self.box, kernel)
+        table, ship = kernel_box(self.box, kernel), self.blank.particulars
         blank = replace(
             self.blank, structure=table.name, own_table=table, covariance=None, provenance=None,
             coefficients=dict.fromkeys(table.coefficient_names, 0.0),
         )  # fmt: skip
-        samples = structure_samples(
-            self.trials, table, blank.particulars, shaft_speed=blank.service_shaft_speed, **self.sampling
-        )
-        return KernelFit(blank, samples)
+        given = {"shaft_speed": blank.service_shaft_speed, **self.sampling}
+        return KernelFit(blank, structure_samples(self.trials, table, ship, **given))
 
     def unit(self, samples: Samples) -> float:
         """What the weight of the errors, by ship length and in the prime system, is in SI units by row."""

@@ -52,7 +52,11 @@ def chosen_box(
     recorded = set.intersection(*(set(trial.channels) for trial in trials)) if trials else set()
     found: dict[str, float] = {}
     if reference == AUTO:
-        reference, found = select_reference(_with_block_coefficient(particulars), recorded)
+        try:  # with what can be estimated
+            ship = particulars.completed()
+        except InputError:  # too little is known for that
+            ship = particulars
+        reference, found = select_reference(ship, recorded)
         check_alike(reference, found[reference], 'choose structure "abkowitz" or "cubic"')
     box = grey_box(reference)
     return replace(box, shaft=box.shaft and "n" in recorded), found
@@ -61,10 +65,9 @@ def chosen_box(
 def structure_samples(
     trials: Sequence[Trial], structure: Structure, particulars: Particulars, **sampling: Any
 ) -> Samples:
-    """The regression of any structure; arguments as in `build_samples`.
+    """The regression of any structure, as `build_samples`.
 
-    For a grey box the target is what the reference ship's acceleration, converted to the target and
-    integrated over the same window, leaves of the change of velocity.
+    Of a grey box it is that of what the reference ship's converted acceleration leaves of the changes.
     """
     if not isinstance(structure, GreyBox):
         return build_samples(trials, structure, particulars, **sampling)
@@ -97,19 +100,8 @@ def explained_samples(
     return own, estimators
 
 
-def _with_block_coefficient(particulars: Particulars) -> Particulars:
-    """Particulars with what can be estimated; as they are where too little is known for that."""
-    try:
-        return particulars.completed()
-    except InputError:
-        return particulars
-
-
 def bare_metrics(model: ShipModel, trials: Sequence[Trial]) -> dict[str, Any]:
-    """How well the reference ship of a grey box alone predicts trials.
-
-    Its name, and `trial_metrics` by trial.
-    """
+    """Name of the reference ship of a grey box, and how well she alone predicts trials (`trial_metrics`)."""
     assert isinstance(model.table, GreyBox)
     bare = replace(model, coefficients=dict.fromkeys(model.coefficients, 0.0), covariance=None)
     return {

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -62,7 +62,9 @@ def pose(
         )
     used = [repaired(trial) if options.repair else trial for trial in _used(everything)]
     table, similarity = _table(options.structure, options.reference_model, particulars, used)
-    used, everything = _both(used, everything, lambda one: _at_constant_speed(one, table, particulars))
+    used, everything = (
+        [_at_constant_speed(one, table, particulars) for one in group] for group in (used, everything)
+    )
     check_trials(used, table)
     ship = _ship(particulars, used, table)
     for trial in used:
@@ -73,7 +75,9 @@ def pose(
     regression = structure_samples(used, table, ship, shaft_speed=shaft, **sampling)
     if options.wind == "constant":
         constants = constant_wind(used, regression, options.structure)
-        used, everything = _both(used, everything, lambda one: with_constant_wind(one, constants))
+        used, everything = (
+            [with_constant_wind(one, constants) for one in group] for group in (used, everything)
+        )
         regression = structure_samples(used, table, ship, shaft_speed=shaft, **sampling)
         sea["wind"] = {"option": "constant", "accelerations": constants}
     check_samples(regression, used, table)
@@ -81,12 +85,6 @@ def pose(
     blank = _blank(options.name or ship["name"], table, ship, gear, shaft, used)
     call = whole_call(options, everything, particulars, steering)
     return Problem(tuple(everything), tuple(used), blank, table, regression, similarity, sea, sampling, call)
-
-
-def _both(
-    used: Sequence[Trial], everything: Sequence[Trial], changed: Callable[[Trial], Trial]
-) -> tuple[list[Trial], list[Trial]]:
-    return [changed(trial) for trial in used], [changed(trial) for trial in everything]
 
 
 def _at_constant_speed(trial: Trial, table: Structure, particulars: Given) -> Trial:

@@ -21,18 +21,12 @@ __all__ = [
 ]  # fmt: skip
 
 OPTIMISERS: dict[str, Callable[..., Optimiser]] = {
-    "abc": ArtificialBeeColony,
-    "pso": ParticleSwarm,
-    "grid": GridSearch,
-    "de": DifferentialEvolution,
-}
+    "abc": ArtificialBeeColony, "pso": ParticleSwarm, "grid": GridSearch, "de": DifferentialEvolution,
+}  # fmt: skip
 
 
 def get_optimiser(optimiser: str | Mapping[str, Any] | Optimiser) -> Optimiser:
-    """An optimiser by name with its usual settings, as a table `{"name": "abc", "rounds": 60}`, or as given.
-
-    Raises InputError for a name or a setting that is not known.
-    """
+    """An optimiser by name, as a table with settings, `{"name": "abc", "rounds": 60}`, or as given."""
     if hasattr(optimiser, "minimise"):
         return optimiser
     settings = dict(optimiser) if isinstance(optimiser, Mapping) else {"name": optimiser}

@@ -33,7 +33,7 @@ def closed_loop(model: ShipModel, trial: Trial) -> Trial | None:
     delta, edges = rudder(trial), [float(trial.t[0]), start, *turns, float(trial.t[-1])]
     begun = with_start(model, trial)
     state = np.array([begun[c][0] if c in trial.channels else 0.0 for c in model.state_names])
-    t, states, orders = [edges[0]], [state], []
+    t, states, orders = np.array(edges[:1]), state[None], []
     for leg, (begin, end) in enumerate(pairwise(edges)):
         held = (trial.t >= 0.5 * (begin + end)) & (trial.t <= end)
         if end <= begin or not held.any():
@@ -46,12 +46,11 @@ def closed_loop(model: ShipModel, trial: Trial) -> Trial | None:
             return None
         if not len(times):
             return None
-        t += times.tolist()
-        states += list(sailed)
+        t, states = np.append(t, times), np.vstack([states, sailed])
         orders += [order] * len(times)
-    channels = dict(zip(model.state_names, np.array(states).T, strict=True))
+    channels = dict(zip(model.state_names, states.T, strict=True))
     channels["delta_command"] = np.array([*orders, orders[-1]])
-    return Trial(np.array(t), channels, name=trial.name, kind=trial.kind, length=model.particulars["length"])
+    return Trial(t, channels, name=trial.name, kind=trial.kind, length=model.particulars["length"])
 
 
 def _leg(
