@@ -7,10 +7,12 @@ from typing import Any
 
 from numpy.typing import ArrayLike
 
-from identification.search.bee_colony import ArtificialBeeColony
-from identification.search.differential_evolution import DifferentialEvolution
-from identification.search.grid_search import GridSearch
-from identification.search.particle_swarm import ParticleSwarm
+from identification.search.optimisers import (
+    ArtificialBeeColony,
+    DifferentialEvolution,
+    GridSearch,
+    ParticleSwarm,
+)
 from identification.search.search import Objective, Optimiser, SearchResult
 from shipgym.checks import check_choice
 from shipgym.errors import InputError
