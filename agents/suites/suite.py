@@ -42,8 +42,8 @@ from shipgym.checks import (
     quoted,
 )
 from shipgym.envs.engine import Engine
+from shipgym.envs.environment import read_options
 from shipgym.envs.randomisation import Randomisation
-from shipgym.envs.ship_env import read_options
 from shipgym.errors import InputError
 from shipgym.files import parse_toml
 from shipgym.sea.conditions import Weather
