@@ -118,6 +118,8 @@ class Controller:
     gain_names: ClassVar[tuple[str, ...]] = ()
     #: What it reads of the ship beside her heading, where that does not follow from `feedback`.
     reads: ClassVar[tuple[str, ...]] = ("yaw_rate", "sway", "surge", "rudder")
+    #: Numbers that it remembers of each ship, by name (`agents.controllers.memory.records`).
+    record: ClassVar[np.dtype[Any]] = np.dtype([])
     #: Whether it leads another controller, its `autopilot`, which the file holds too.
     has_autopilot: ClassVar[bool] = False
     has_ship: ClassVar[bool] = False  # whether the file holds its design model, its `ship`, too
@@ -184,8 +186,13 @@ class Controller:
 
     def loop(self) -> Compensator:
         """The controller for small motions, without limits: what its margins are computed from."""
+        return Compensator.static(self.row[None])
+
+    @property
+    def row(self) -> Floats:
+        """Feedback of the deviations in the order of `linear_loop.SIGNALS`, shape (5,)."""
         by_signal = {signal: sign * self.gains[gain] for gain, (signal, sign) in self.feedback.items()}
-        return Compensator.static(np.array([[by_signal.get(signal, 0.0) for signal in SIGNALS]]))
+        return np.array([by_signal.get(signal, 0.0) for signal in SIGNALS])
 
     def margins_on(self, model: ShipModel) -> Margins:
         """Margins and bandwidth of the same controller on another ship.
@@ -222,14 +229,18 @@ class Controller:
         memory, begins = begun(state if size else None, episode_start, shape, size)
         seen = dict(zip(self.observation_names, rows.T, strict=True))
         order, kept = self.steer(seen, memory.reshape(len(rows), size), begins.reshape(-1))
-        limit = self.observation_scales[self.observation_names.index("rudder")]
-        action = np.clip(order / limit, -1.0, 1.0)[:, None].astype(np.float32)
+        action = np.clip(order / self.rudder_limit, -1.0, 1.0)[:, None].astype(np.float32)
         return action.reshape(*shape, 1), kept.reshape(*shape, size) if size else state
 
     @property
+    def rudder_limit(self) -> float:
+        """Largest rudder angle, rad."""
+        return self.observation_scales[self.observation_names.index("rudder")]
+
+    @property
     def memory_size(self) -> int:
-        """How many numbers it remembers of each ship."""
-        return 0
+        """How many numbers it remembers of each ship: in the state, never in the controller itself."""
+        return self.record.itemsize // np.dtype(np.float64).itemsize
 
     def steer(self, seen: dict[str, Floats], memory: Floats, begins: Flags) -> tuple[Floats, Floats]:
         """Commanded rudder and what is remembered next.
@@ -250,11 +261,7 @@ class Controller:
         memory : array of shape (n, memory_size)
         """
         found = deviations(seen, self.neutral_rudder, self.neutral_sway)
-        by_signal = dict(zip(SIGNALS, np.moveaxis(found, -1, 0), strict=True))
-        order = np.full(found.shape[:-1], self.neutral_rudder)
-        for gain, (signal, sign) in self.feedback.items():
-            order = order + sign * self.gains[gain] * by_signal[signal]
-        return order, memory
+        return self.neutral_rudder + np.einsum("ij,j->i", found, self.row), memory
 
     def check_fits(self, names: Sequence[str], scales: Sequence[float], where: str = "observations") -> None:
         """Refuse to steer what shows other quantities first, or in other scales, than those designed for.

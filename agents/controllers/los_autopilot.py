@@ -22,12 +22,11 @@ from numpy.typing import ArrayLike
 from agents.controllers.controller import NUMBERS, Action, Controller, Policy, Range
 from agents.controllers.linear_loop import Compensator, Margins, length_time
 from agents.controllers.lq import LQ
-from agents.controllers.memory import Floats, begun, checked_observation, heading_error
+from agents.controllers.memory import Floats, begun, checked_observation, gathered, heading_error, on_course
 from shipgym.checks import check_number
 from shipgym.errors import InputError
 from shipgym.ships import ShipModel
 from shipgym.tasks.guidance import PathPosition, integral_line_of_sight, wrapped
-from shipgym.tasks.steering import INTEGRAL_ZONE
 from shipgym.tasks.task import OBSERVATION_NAMES, Task, path_following_task
 
 N_HEADING = len(OBSERVATION_NAMES)
@@ -104,7 +103,7 @@ class Guided(Controller):
         self, observation: ArrayLike, state: Any = None, episode_start: Any = None, deterministic: bool = True
     ) -> tuple[Action, Any]:
         """See `Policy.predict`; it observes the path-following environment, and the state is a pair."""
-        given = checked_observation(observation, self.observation_names).copy()
+        given = checked_observation(observation, self.observation_names)
         own, inner = (None, None) if state is None else state
         memory, begins = begun(own, episode_start, given.shape[:-1], self.remembers + 1)
         first = (given[..., : len(self.observation_names)] * self.observation_scales).T
@@ -114,12 +113,10 @@ class Guided(Controller):
         shown = -np.arctan2(seen["cross_track"], self.gains["task_lookahead"])
         error = wrapped(seen["heading_error"] + wanted - shown)
         reach = self.observation_scales[N_HEADING - 1]
-        gathered = np.where((np.abs(error) > INTEGRAL_ZONE) | begins, 0.0, error * self.design["dt"])
-        integral = np.clip(memory[..., -1] + gathered, -reach, reach)
-        helm = given[..., :N_HEADING]
-        helm[..., 0], helm[..., 1], helm[..., N_HEADING - 1] = np.sin(error), np.cos(error), integral / reach
+        integral = gathered(memory[..., -1], error, begins, self.design["dt"], reach)
+        helm = on_course(given[..., :N_HEADING], error, integral, reach)
         starts = None if inner is None else np.atleast_1d(begins)
-        action, inner = self.autopilot.predict(helm.astype(np.float32), inner, starts, deterministic)
+        action, inner = self.autopilot.predict(helm, inner, starts, deterministic)
         return action, (np.concatenate([kept, integral[..., None]], axis=-1), inner)
 
     def loop(self) -> Compensator:

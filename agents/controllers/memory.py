@@ -9,9 +9,17 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from shipgym.errors import InputError
+from shipgym.tasks.steering import INTEGRAL_ZONE
+from shipgym.tasks.task import OBSERVATION_NAMES
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
+Records = NDArray[np.void]
+
+
+def records(memory: Floats, record: np.dtype[Any]) -> Records:
+    """Memories of ships as records of named numbers, a view: (n, size) as (n,), (size,) as ()."""
+    return np.ascontiguousarray(memory).view(record)[..., 0]
 
 
 def checked_observation(
@@ -73,6 +81,23 @@ def heading_error(seen: dict[str, Floats]) -> Floats:
     """Heading error of each ship, rad, in (-pi, pi]."""
     error: Floats = np.arctan2(seen["heading_error_sin"], seen["heading_error_cos"])
     return error
+
+
+def on_course(seen: NDArray[Any], error: Floats, integral: Floats, reach: float) -> NDArray[np.float32]:
+    """Observations of ships with another heading error, rad, and its integral of at most `reach`, rad s."""
+    shown = seen.astype(np.float32)
+    values = np.sin(error), np.cos(error), integral / reach
+    for name, value in zip(
+        ("heading_error_sin", "heading_error_cos", "heading_error_integral"), values, strict=True
+    ):
+        shown[..., OBSERVATION_NAMES.index(name)] = value
+    return shown
+
+
+def gathered(integral: Floats, error: Floats, begins: Any, dt: float, reach: float) -> Floats:
+    """Integral of the heading error, rad s, an interval later, as environments have it."""
+    more = np.where((np.abs(error) > INTEGRAL_ZONE) | begins, 0.0, error * dt)
+    return np.clip(integral + more, -reach, reach)
 
 
 def deviations(seen: dict[str, Floats], rudder: Any, sway: Any) -> Floats:

@@ -155,9 +155,7 @@ class _Log:
         self.costs = np.zeros(engine.num_envs)
         self.failure, self.error, self.seconds, self.asked = "", "", 0.0, 0
         self.sailed: list[Flags] = []
-        self.actions: list[NDArray[np.float32]] = []
-        self.rewards: list[Floats] = []
-        self.shielded: list[Flags] = []
+        self.intervals: list[tuple[NDArray[np.float32], Floats, Flags]] = []  # actions, rewards, shielded
         self.states: list[dict[str, Floats]] = []
         self.infos: list[list[Floats]] = []
 
@@ -206,11 +204,8 @@ class _Log:
         except (TypeError, ValueError):
             return nothing, self.sailing, f"actions of type {type(actions).__name__} {at}, expected numbers"
         if found.shape != expected:
-            seen = self.engine.observations.shape
-            said = (
-                f"actions of shape {found.shape} {at}, expected {expected} for observations of shape {seen}"
-            )
-            return nothing, self.sailing, said
+            seen = f"for observations of shape {self.engine.observations.shape}"
+            return nothing, self.sailing, f"actions of shape {found.shape} {at}, expected {expected} {seen}"
         wrong = self.sailing[:, None] & ~np.isfinite(found)
         bad: Flags = np.any(wrong, axis=1)
         if not bad.any():
@@ -232,15 +227,15 @@ class _Log:
         self.truncated = self.truncated | self.sailing & truncated
         if self.record:
             shield = isinstance(memory, ShieldState)
-            self.actions.append(command)
-            self.rewards.append(rewards)
-            self.shielded.append(interventions(memory).steering if shield else np.zeros_like(terminated))
+            shielded = interventions(memory).steering if shield else np.zeros_like(terminated)
+            self.intervals.append((command, rewards, shielded))
         self.look()
         self.sailing = self.sailing & ~(terminated | truncated)
 
     def rollout(self, seeds: NDArray[np.int64]) -> Rollout:
         """All that was noted."""
         engine, n = self.engine, self.engine.num_envs
+        actions, rewards, shielded = zip(*self.intervals, strict=True) if self.intervals else ((), (), ())
         return Rollout(
             task=engine.task,
             model=engine.model,
@@ -253,9 +248,9 @@ class _Log:
             failed=self.failed,
             failure=self.failure,
             seconds_per_action=self.seconds / max(self.asked, 1),
-            actions=np.array(self.actions, dtype=np.float32).reshape(-1, n, len(engine.command)),
-            rewards=np.array(self.rewards).reshape(-1, n),
-            shielded=np.array(self.shielded, dtype=np.bool_).reshape(-1, n),
+            actions=np.array(actions, dtype=np.float32).reshape(-1, n, len(engine.command)),
+            rewards=np.array(rewards).reshape(-1, n),
+            shielded=np.array(shielded, dtype=np.bool_).reshape(-1, n),
             states={name: np.array([one[name] for one in self.states]) for name in (self.states or [{}])[0]},
             infos={name: np.array([one[k] for one in self.infos]) for k, name in enumerate(self.names)},
         )

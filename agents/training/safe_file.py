@@ -18,6 +18,8 @@ Arrays = dict[str, Any]
 #: Entries of the file's metadata: what is not an array, as JSON, and the SHA-256 of all.
 CONTENT, SHA256 = "content", "sha256"
 DEEPEST = 20  # values within values
+#: What reading anything else raises.
+MALFORMED = (OSError, LookupError, TypeError, ValueError, AttributeError, RecursionError)
 TYPES = ("BOOL", "U8", "U32", "U64", "I32", "I64", "F32", "F64")  # of arrays
 
 
@@ -53,15 +55,7 @@ def read_values(path: Path, what: str) -> Any:
         if about.get(SHA256, sha256 := _hash(about[CONTENT], arrays)) != sha256:  # older files have none
             raise ValueError("its SHA-256 is not that of its content")
         return _unpacked(json.loads(about[CONTENT]), arrays)
-    except (
-        SafetensorError,
-        OSError,
-        LookupError,
-        TypeError,
-        ValueError,
-        AttributeError,
-        RecursionError,
-    ) as error:
+    except (SafetensorError, *MALFORMED) as error:
         raise InputError(f"{path}: not a {what}, or one that is cut short ({error})") from None
 
 

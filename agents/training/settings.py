@@ -93,9 +93,8 @@ class Settings:
 
     def to_dict(self) -> dict[str, Any]:
         """The settings by name, ready for JSON."""
-        return {
-            name: list(value) if isinstance(value, tuple) else value for name, value in asdict(self).items()
-        }
+        pairs = asdict(self).items()
+        return {name: list(value) if isinstance(value, tuple) else value for name, value in pairs}
 
 
 @dataclass(frozen=True)
@@ -265,24 +264,27 @@ def load_settings(
     InputError
         For an unknown algorithm or setting, with the nearest known one, or a value out of its range.
     """
-    kind = ALGORITHMS[check_choice(algorithm, ALGORITHMS, "algorithm")]
+    settings_of(algorithm)
     check_choice(environment, ENVIRONMENTS, "environment")
     check_choice(action, ACTIONS, "action")
-    where = f"hyperparameters/{algorithm}.toml"
-    text = files("agents.training").joinpath("hyperparameters", f"{algorithm}.toml").read_text("utf-8")
-    content = parse_toml(text, f"{where}:")
-    check_keys(content, ("defaults", "residual", "suites", "tasks"), where)
-    chosen = _settings(content.get("defaults", {}), kind, f"{where}: defaults")
+    content = hyperparameters(algorithm)
+    chosen = dict(content["defaults"])
     if action == "rudder" and (given or {}).get("base") != "none":
         followed = environment.removesuffix("-v1")
-        for table, name in (("residual", followed), ("suites", suite_of(task) or ""), ("tasks", task)):
-            chosen |= _settings(_of(content, table, name, where), kind, f"{where}: {table}.{name}")
+        for table, name in (("residual", followed), ("suites", suite_of(task)), ("tasks", task)):
+            chosen |= content.get(table, {}).get(name, {})
     return make_settings(algorithm, chosen | dict(given or {}))
 
 
-def _of(content: Mapping[str, Any], table: str, name: str, where: str) -> Any:
-    """A table's table of that name."""
-    return check_table(content.get(table, {}), f"{where}: {table}").get(name, {})
+def hyperparameters(name: str) -> dict[str, Any]:
+    """The content of a file of `hyperparameters/`."""
+    file = files("agents.training").joinpath("hyperparameters", f"{name}.toml")
+    return parse_toml(file.read_text("utf-8"), f"{file}:")
+
+
+def settings_of(algorithm: str) -> type[Settings]:
+    """The class of an algorithm's settings; InputError for an unknown one, with the nearest known one."""
+    return ALGORITHMS[check_choice(algorithm, ALGORITHMS, "algorithm")]
 
 
 def make_settings(algorithm: str, values: Mapping[str, Any]) -> Settings:
@@ -290,11 +292,9 @@ def make_settings(algorithm: str, values: Mapping[str, Any]) -> Settings:
 
     Raises InputError for an unknown one, one that is missing, or a value out of its range.
     """
-    kind = ALGORITHMS[check_choice(algorithm, ALGORITHMS, "algorithm")]
-    table = _settings(values, kind, f"settings of {algorithm}")
-    for one in fields(kind):
-        if one.name not in table and one.default is MISSING:
-            raise InputError(f"settings of {algorithm}: '{one.name}' is missing")
+    kind, where = settings_of(algorithm), f"settings of {algorithm}"
+    table = _settings(values, kind, where)
+    check_keys(table, table, where, [one.name for one in fields(kind) if one.default is MISSING])
     return kind(**table)
 
 
@@ -311,8 +311,7 @@ def read_settings_file(path: Path, algorithm: str) -> dict[str, Any]:
 
     Raises InputError if it cannot be read, or names an unknown setting.
     """
-    kind = ALGORITHMS[check_choice(algorithm, ALGORITHMS, "algorithm")]
-    return _settings(read_toml(path, "settings file"), kind, str(path))
+    return _settings(read_toml(path, "settings file"), settings_of(algorithm), str(path))
 
 
 def parsed_settings(texts: Sequence[str], where: str = "--set") -> dict[str, Any]:

@@ -127,13 +127,14 @@ def train(
     if resume and folder is None:
         raise InputError("resume: found without a folder, expected the one of the run")
     with _torch_threads(plan.threads), nullcontext() if folder is None else in_use(folder):
-        if folder is not None:
-            run_folder.check_resumable(folder, plan) if resume else run_folder.check_new(folder)
+        if folder is None:
+            return _Training(plan, None, tell, max_seconds).run()
+        run_folder.check_resumable(folder, plan) if resume else run_folder.check_new(folder)
         training = _Training(plan, folder, tell, max_seconds)
-        if folder is not None and not resume:
-            run_folder.begin_folder(folder, plan, command or f"train({plan.algorithm!r})")
-        if folder is not None and resume:
+        if resume:
             training.restore(folder / run_folder.CHECKPOINT)
+        else:
+            run_folder.begin_folder(folder, plan, command or f"train({plan.algorithm!r})")
         return training.run()
 
 
