@@ -130,16 +130,20 @@ class MPC(Controller):
 
     def steer(self, seen: dict[str, Floats], memory: Floats, begins: Flags) -> tuple[Floats, Floats]:
         """LQ's command where its plan keeps to the limits, else the first of the nearest plan that does."""
-        limit = self.rudder_limit
+        change = self.design["rudder_rate_rad_s"] * self.design["dt"]
+        low, high = -self.rudder_limit - self.neutral_rudder, self.rudder_limit - self.neutral_rudder
         state = deviations(seen, self.neutral_rudder, self.neutral_sway)
-        rudder = np.clip(state[:, RUDDER], -limit - self.neutral_rudder, limit - self.neutral_rudder)
-        state[:, RUDDER] = rudder
+        rudder = state[:, RUDDER] = np.clip(state[:, RUDDER], low, high)
         orders: Floats = np.einsum("ij,j->i", state, self.row)
-        lowest, highest = self._bounds(limit)
+        steps = int(self.design["horizon_steps"])
+        lowest, highest = np.repeat((low, -change), steps), np.repeat((high, change), steps)
         planned = np.einsum("ij,kj->ik", state, self.plan.by_state)
+        stays, moves = self.transition[RUDDER, RUDDER], self.effect[RUDDER]
         for ship in np.flatnonzero(np.any((planned < lowest) | (planned > highest), axis=1)):
-            orders[ship] += self._correction(lowest - planned[ship], highest - planned[ship])
-            orders[ship] = self._within(orders[ship], rudder[ship], limit)
+            self._solver.update(l=lowest - planned[ship], u=highest - planned[ship])
+            order = orders[ship] + self._solver.solve(raise_error=False).x[0]  # the smallest correction
+            least, most = ((rudder[ship] * (1.0 - stays) + way) / moves for way in (-change, change))
+            orders[ship] = min(max(order, least, low), most, high)  # to the last bit
         return self.neutral_rudder + orders, memory
 
     @cached_property
@@ -160,23 +164,6 @@ class MPC(Controller):
         later = np.subtract.outer(np.arange(steps), np.arange(steps))
         by_correction = np.where(later >= 0, answer[:, np.maximum(later, 0)], 0.0)
         return Plan(by_state.reshape(2 * steps, -1), by_correction.reshape(2 * steps, steps))
-
-    def _bounds(self, limit: float) -> tuple[Floats, Floats]:
-        """Of what is limited, shape (2 * horizon,) each."""
-        steps = int(self.design["horizon_steps"])
-        change = self.design["rudder_rate_rad_s"] * self.design["dt"]
-        neutral = self.neutral_rudder
-        low, high = (-limit - neutral, -change), (limit - neutral, change)
-        return np.repeat(low, steps), np.repeat(high, steps)
-
-    def _within(self, order: float, rudder: float, limit: float) -> float:
-        """A command within the limits to the last bit."""
-        change = self.design["rudder_rate_rad_s"] * self.design["dt"]
-        stays, moves = self.transition[RUDDER, RUDDER], self.effect[RUDDER]
-        lower, upper = ((rudder * (1.0 - stays) + way) / moves for way in (-change, change))
-        lower = max(lower, -limit - self.neutral_rudder)
-        upper = min(upper, limit - self.neutral_rudder)
-        return float(min(max(order, lower), upper))
 
     @cached_property
     def _solver(self) -> Any:
@@ -201,11 +188,6 @@ class MPC(Controller):
             warm_starting=False,
         )
         return solver
-
-    def _correction(self, lowest: Floats, highest: Floats) -> float:
-        """First correction of the smallest ones that bring LQ's plan within its limits."""
-        self._solver.update(l=lowest, u=highest)
-        return float(self._solver.solve(raise_error=False).x[0])
 
     def __getstate__(self) -> dict[str, Any]:
         """Everything but the solver, which another process sets up again."""

@@ -179,13 +179,11 @@ def own_turn(model: ShipModel, share: float = TURN_RUDDER) -> tuple[float, float
     Half the tactical diameter, and the advance less that, means of both sides. `share`: of the rudder limit.
     Raises InputError if the ship does not turn round.
     """
-    length, speed, rudder = (
-        model.particulars["length"], model.particulars["speed"], np.degrees(share * model.steering.limit),
-    )  # fmt: skip
+    length, speed = model.particulars["length"], model.particulars["speed"]
     time, step = TURN_LENGTHS * length / speed, TURN_STEP * length / speed
-    found = [
-        turning_indices(turning_circle(model, side * rudder, time, step), length) for side in (1.0, -1.0)
-    ]
+    rudder = np.degrees(share * model.steering.limit)
+    turns = [turning_circle(model, side * rudder, time, step) for side in (1.0, -1.0)]
+    found = [turning_indices(turn, length) for turn in turns]
     across = [one.tactical_diameter_lengths for one in found]
     ahead = [one.advance_lengths for one in found]
     if None in (*across, *ahead):

@@ -134,7 +134,9 @@ def _network(agent: Any) -> Network:
     """The layers from observation to command."""
     policy = agent.policy
     actor: Any = getattr(policy, "actor", None)
-    _check_features(policy if actor is None else actor)
+    name = type(getattr(policy if actor is None else actor, "features_extractor", None)).__name__
+    if name not in ("FlattenExtractor", "NoneType"):
+        raise InputError(f"agent: features extractor {name} found, expected none: use 'MlpPolicy' as it is")
     if getattr(agent, "use_sde", False):
         raise InputError(f"agent: {SDE}")
     what = f"{type(agent).__name__} with {type(policy).__name__}"
@@ -161,12 +163,6 @@ def actor_network(weights: Mapping[str, Any], activation: str | None, what: str)
         raise InputError(f"agent: weights {quoted(sorted(odd))} missing or not known, expected {DENSE}")
     pairs = tuple((_array(weights[weight]), _array(weights[bias])) for weight, bias in layers)
     return Network(pairs, ACTIVATION_OF[between], output)
-
-
-def _check_features(owner: Any) -> None:
-    name = type(getattr(owner, "features_extractor", None)).__name__
-    if name not in ("FlattenExtractor", "NoneType"):
-        raise InputError(f"agent: features extractor {name} found, expected none: use 'MlpPolicy' as it is")
 
 
 def _array(parameter: Any) -> NDArray[np.float32]:

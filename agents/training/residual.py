@@ -19,8 +19,7 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from agents.controllers.controller import Policy
-from agents.policies.policy import NO_LIMIT, toward
-from shipgym.checks import check_number, check_whole
+from agents.policies.policy import NO_LIMIT, check_part, toward
 from shipgym.errors import InputError
 
 try:
@@ -78,16 +77,14 @@ class ResidualVecEnv(VecEnvWrapper):  # type: ignore[misc]  # stable-baselines3 
         action_repeat: int = 1,
         rate_limit: float = NO_LIMIT,
     ) -> None:
-        self.base = base
-        self.authority = check_number(authority, "authority", above=0.0, at_most=2.0)
-        self.frame_stack = check_whole(frame_stack, "frame_stack", at_least=1)
-        self.action_repeat = check_whole(action_repeat, "action_repeat", at_least=1)
-        self.rate_limit = check_number(rate_limit, "rate_limit", above=0.0, at_most=NO_LIMIT)
-        low, high = (np.tile(bound, self.frame_stack) for bound in _bounds(venv))
-        if base is None:
-            if self.authority != 1.0:
-                raise InputError(f"authority: {authority:g} found without a base, expected 1, or a base")
-        else:
+        self.base, self.authority, self.frame_stack = base, authority, frame_stack
+        self.action_repeat, self.rate_limit = action_repeat, rate_limit
+        check_part(self)
+        space = venv.observation_space
+        if not isinstance(space, spaces.Box) or len(space.shape) != 1:
+            raise InputError(f"venv: observations in {space} found, expected a flat Box of numbers")
+        low, high = (np.tile(bound, frame_stack) for bound in (space.low, space.high))
+        if base is not None:
             _check_base(venv, base)
             low, high = np.append(low, venv.action_space.low), np.append(high, venv.action_space.high)
         super().__init__(venv, observation_space=spaces.Box(low.astype(np.float32), high.astype(np.float32)))
@@ -134,11 +131,10 @@ class ResidualVecEnv(VecEnvWrapper):  # type: ignore[misc]  # stable-baselines3 
         observations, rewards, dones, infos = self.venv.step_wait()
         self._in_force[dones] = 0.0
         self._past[:, :-1] = self._past[:, 1:]
+        self._past[:, -1] = observations
         ended = np.flatnonzero(dones)
         if len(ended) == 0:
-            self._past[:, -1] = observations
             return self._shown(None), rewards, dones, infos
-        self._past[:, -1] = observations
         for row in ended:
             self._past[row, -1] = infos[row]["terminal_observation"]
         kept = copy.deepcopy(self._state)  # a base may write into its state
@@ -185,14 +181,6 @@ class ResidualVecEnv(VecEnvWrapper):  # type: ignore[misc]  # stable-baselines3 
         return np.concatenate([seen, self._proposed], axis=1)
 
 
-def _bounds(venv: VecEnv) -> tuple[NDArray[Any], NDArray[Any]]:
-    """Least and largest observation of the ships inside."""
-    space = venv.observation_space
-    if not isinstance(space, spaces.Box) or len(space.shape) != 1:
-        raise InputError(f"venv: observations in {space} found, expected a flat Box of numbers")
-    return space.low, space.high
-
-
 def _check_base(venv: VecEnv, base: Policy) -> None:
     """Refuse commands that cannot be added to, and a controller of another ship."""
     space = venv.action_space
@@ -204,7 +192,6 @@ def _check_base(venv: VecEnv, base: Policy) -> None:
         raise InputError(
             f"base: {type(base).__name__} found, expected a controller, such as LQ.from_model(model)"
         )
-    check_fits = getattr(base, "check_fits", None)
-    if check_fits is not None:
+    if (check_fits := getattr(base, "check_fits", None)) is not None:
         names, scales = venv.get_attr("observation_names", 0)[0], venv.get_attr("observation_scales", 0)[0]
         check_fits(names, scales, "base")

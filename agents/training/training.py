@@ -16,10 +16,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from agents.agent_file import load_agent
+from agents.controllers.designs import design_base
 from agents.output import in_use
 from agents.policies.policy import LearnedPolicy
 from agents.training import run_folder
-from agents.training.bases import design_base
 from agents.training.evaluation import HeldOut
 from agents.training.plan import EVALUATION_SEED, N_EVALUATIONS, Plan
 from agents.training.safe_file import read_values, write_values

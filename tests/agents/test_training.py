@@ -14,10 +14,10 @@ from typer.testing import CliRunner
 
 from agents import load_agent
 from agents.cli import app
+from agents.controllers.designs import design_base
 from agents.rollouts.rollout import episode_costs
 from agents.training import training
 from agents.training.algorithms import make_agent, make_ships, set_deviation
-from agents.training.bases import design_base
 from agents.training.plan import EVALUATION_SEED, Given, make_plan, training_options
 from agents.training.training import train
 from shipgym.errors import InputError

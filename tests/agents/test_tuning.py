@@ -9,9 +9,17 @@ from typer.testing import CliRunner
 from agents.cli import app
 from agents.engines.jobs import JobEngine
 from agents.training.plan import Given, make_plan
-from agents.training.search_space import search_space, with_parameters
 from agents.training.settings import ALGORITHMS, load_settings
-from agents.training.tuning import Trial, allowed, evaluated_evenly, limits, train_trial, tune
+from agents.training.tuning import (
+    Trial,
+    allowed,
+    evaluated_evenly,
+    limits,
+    search_space,
+    train_trial,
+    tune,
+    with_parameters,
+)
 from shipgym.errors import InputError
 
 optuna = pytest.importorskip("optuna", reason="optuna is not installed")
