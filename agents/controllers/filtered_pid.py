@@ -67,8 +67,7 @@ class FilteredPID(Controller):
 
         Parameters
         ----------
-        model : ShipModel
-        dt, frequency, damping, integral_lengths
+        model, dt, frequency, damping, integral_lengths
             As in `PID.from_model`.
         reference_share : float
             Natural frequency of the reference model over that of the loop. Less turns slower and with less

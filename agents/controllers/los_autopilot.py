@@ -62,9 +62,7 @@ class Guided(Controller):
         `design`: how they were found. Raises InputError if the autopilot was designed for another ship.
         """
         dt = task.interval(model)
-        pilot = LQ.from_model(model, dt=dt) if autopilot is None else autopilot
-        known = isinstance(pilot, Controller)
-        like = pilot if isinstance(pilot, Controller) else LQ.from_model(model, dt=dt)
+        like = autopilot if isinstance(autopilot, Controller) else LQ.from_model(model, dt=dt)
         like.check_fits_model(model)
         scales = {quantity.name: quantity.scale for quantity in task.observed(model)}
         names = next((some for some in cls.alternatives if scales.keys() >= {*some}), cls.observes)
@@ -72,13 +70,15 @@ class Guided(Controller):
             gains={**gains, "task_lookahead": task.lookahead * model.particulars["length"]},
             neutral_rudder=like.neutral_rudder,
             neutral_sway=like.neutral_sway,
-            margins=like.margins if known else Margins(np.inf, np.inf, np.inf, np.inf),
+            margins=like.margins
+            if autopilot is None or like is autopilot
+            else Margins(np.inf, np.inf, np.inf, np.inf),
             observation_scales=tuple(scales[name] for name in names),
             model_name=like.model_name,
             model_sha256=like.model_sha256,
             design={"dt": dt, **design},
             observation_names=names,
-            autopilot=pilot,
+            autopilot=like if autopilot is None else autopilot,
             **({"ship": model} if cls.has_ship else {}),
         )
 
@@ -186,17 +186,12 @@ class LineOfSight(Guided):
         """
         asked = task or path_following_task()
         length = model.particulars["length"]
-        if lookahead_lengths is None:
-            lookahead_lengths = asked.lookahead
-        check_number(lookahead_lengths, "lookahead_lengths", above=0.0)
-        if integral_lengths is None:
-            integral_lengths = CRITICAL * lookahead_lengths
-        check_number(integral_lengths, "integral_lengths", above=0.0)
-        gains = {
-            "lookahead": lookahead_lengths * length,
-            "integral": 1.0 / (integral_lengths * length_time(model)),
-        }
-        return cls.leading(model, autopilot, asked, gains, {"integral_lengths": float(integral_lengths)})
+        ahead = asked.lookahead if lookahead_lengths is None else lookahead_lengths
+        check_number(ahead, "lookahead_lengths", above=0.0)
+        integral = CRITICAL * ahead if integral_lengths is None else integral_lengths
+        check_number(integral, "integral_lengths", above=0.0)
+        gains = {"lookahead": ahead * length, "integral": 1.0 / (integral * length_time(model))}
+        return cls.leading(model, autopilot, asked, gains, {"integral_lengths": float(integral)})
 
     def course(self, seen: Mapping[str, Floats], memory: Floats) -> tuple[Floats, Floats]:
         """See `Guided.course`; nothing is remembered."""

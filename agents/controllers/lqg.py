@@ -104,9 +104,7 @@ class LQG(Controller):
 
         Parameters
         ----------
-        model : ShipModel
-            Stable or unstable on its course.
-        dt, integral_lengths, rudder_weight, rate_weight_s2
+        model, dt, integral_lengths, rudder_weight, rate_weight_s2
             As in `LQ.from_model`.
         noise : float
             Of heading and yaw rate, in multiples of a sea trial's sensors (`SEA_TRIAL`).
@@ -198,10 +196,9 @@ class LQG(Controller):
 
 
 def rudder_response(model: ShipModel, about: StraightRunning, dt: float) -> tuple[Floats, Floats]:
-    """Sway, yaw rate and heading error with the rudder held over an interval.
+    """Sway, yaw rate and heading error with the rudder held over an interval of `dt`, s.
 
-    `about`: where small motions are about; `dt`: s. Returns `transition`: shape (3, 3); `effect`: of the
-    rudder angle, per rad, shape (3,).
+    Returns their transition, shape (3, 3), and the effect of the rudder angle, per rad, shape (3,).
     """
     A, B = sampled_ships(np.column_stack(linearise(model, about))[None], 0.0, dt)
     return A[0, :RUDDER, :RUDDER], B[0, :RUDDER]
@@ -227,10 +224,9 @@ def wave_model(period: float, deviation: float, dt: float) -> tuple[Floats, Floa
 def kalman_gain(transition: Floats, process: Floats, output: Floats, noise: Floats) -> tuple[Floats, Floats]:
     """Stationary Kalman gain on the innovation, for the estimate at the time of the measurement.
 
-    `transition`: shape (n, n); `process`: covariance of what disturbs the states in an interval, shape (n,
-    n); `output`: shape (m, n); `noise`: covariance of the measurements' noise, shape (m, m). Returns `gain`:
-    `transition @ gain` is the predictor's gain, that of `control.dlqe`, shape (n, m); `deviation`: standard
-    deviation of the innovations, shape (m,).
+    `transition`: shape (n, n); `process`: covariance of what disturbs the states in an interval; `output`:
+    shape (m, n); `noise`: covariance of the measurements' noise. Returns `gain`, shape (n, m), which is that
+    of `control.dlqe` times the inverse transition, and the standard deviation of the innovations.
     """
     import control
 

@@ -91,11 +91,7 @@ class MPC(Controller):
 
         Parameters
         ----------
-        model : ShipModel
-            Stable or unstable on its course.
-        dt : float, optional
-            Control interval, s; by default that of the environment.
-        integral_lengths, rudder_weight : float
+        model, dt, integral_lengths, rudder_weight
             As in `LQ.from_model`.
         horizon_lengths : float
             How far it plans within the limits, in times to travel one ship length; beyond, LQ's cost without

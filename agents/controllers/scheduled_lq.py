@@ -73,9 +73,7 @@ class ScheduledLQ(Controller):
 
         Parameters
         ----------
-        model : ShipModel
-            Stable or unstable on its course.
-        dt, integral_lengths, rudder_weight, rate_weight_s2
+        model, dt, integral_lengths, rudder_weight, rate_weight_s2
             As in `LQ.from_model`, at each speed.
         speeds : sequence of float, optional
             m/s, rising, at least two; by default 0.6 to 1.1 times service speed. They should not leave the

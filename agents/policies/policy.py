@@ -124,10 +124,13 @@ class LearnedPolicy(Agent):
                 raise InputError(f"action: '{self.action}' found beside a base, expected 'rudder'")
             self.base.check_fits(self.observation_names, self.observation_scales, "base")
         n_in = self.frame_stack * n + (self.base is not None)
-        _check_size(
-            "inputs", self.network.sizes[0], n_in, f"{self.frame_stack} x {n} observations and the base's"
-        )
-        _check_size("outputs", self.network.sizes[-1], OUTPUTS[self.action], f"for action '{self.action}'")
+        n_out, has = OUTPUTS[self.action], self.network.sizes
+        if has[0] != n_in:
+            why = f"{self.frame_stack} x {n} observations and the base's"
+            raise InputError(f"network: {has[0]} inputs found, expected {n_in}: {why}")
+        if has[-1] != n_out:
+            why = f"for action '{self.action}'"
+            raise InputError(f"network: {has[-1]} outputs found, expected {n_out}: {why}")
 
     @classmethod
     def from_sb3(cls, agent: Any, env: Any = None, training: Mapping[str, Any] | None = None) -> Self:
@@ -297,8 +300,3 @@ def order_numbers(action: ArrayLike) -> NDArray[np.int64]:
     given = np.asarray(action, dtype=np.float32)
     numbers: NDArray[np.int64] = np.abs(given - ORDERS).argmin(axis=-1)
     return numbers
-
-
-def _check_size(what: str, found: int, expected: int, why: str) -> None:
-    if found != expected:
-        raise InputError(f"network: {found} {what} found, expected {expected}: {why}")

@@ -119,23 +119,10 @@ class Given:
 
 
 def make_plan(given: Given, stored: Plan | None = None) -> Plan:
-    """The run that a user asks for.
+    """The run that a user asks for; what is not given is as in `stored`, the run that is resumed.
 
-    Parameters
-    ----------
-    given : Given
-    stored : Plan, optional
-        The run that is resumed: what is not given is as it was.
-
-    Returns
-    -------
-    Plan
-
-    Raises
-    ------
-    InputError
-        For an unknown algorithm, environment, task, model, option or setting, with the nearest known one,
-        or a value out of its range.
+    Raises InputError for an unknown algorithm, environment, task, model, option or setting, with the nearest
+    known one, or a value out of its range.
     """
     check_choice(given.algorithm, ALGORITHMS, "algorithm")
     task = _task(given, stored)

@@ -47,18 +47,8 @@ class ResidualVecEnv(VecEnvWrapper):  # type: ignore[misc]  # stable-baselines3 
     ----------
     venv : VecEnv
         Ships, such as `shipgym.ShipVecEnv`.
-    base : Policy, optional
-        Any controller with or without a memory, in the signature of `Controller.predict`; None: the agent's
-        output is the action.
-    authority : float
-        Share of the action's range by which the agent may differ from the base, above 0, at most 2; without a
-        base it has to be 1.
-    frame_stack : int
-        Number of observations that are shown, the newest last.
-    action_repeat : int
-        Control intervals of a step.
-    rate_limit : float
-        Largest change of the output in force in a control interval, above 0; 2 does not limit it.
+    base, authority, frame_stack, action_repeat, rate_limit
+        As in `LearnedPolicy`; the base is any controller in the signature of `Controller.predict`.
 
     Raises
     ------

@@ -245,24 +245,12 @@ def load_settings(
     given: Mapping[str, Any] | None = None,
     action: str = "rudder",
 ) -> Settings:
-    """The tuned settings of an algorithm, with those that are given in their place.
+    """The tuned settings of an algorithm, with those that are given, by name, in their place.
 
-    Parameters
-    ----------
-    algorithm : {"ppo", "sac", "td3", "tqc"}
-    environment : {"course-keeping", "path-following"}
-    task : str
-        Name of a suite's task; one without settings of its own has those of its environment.
-    given : mapping of str to Any, optional
-        Settings by name that go before the tuned ones.
-    action : {"rudder", "rudder-discrete", "rudder-shaft"}
-        What is commanded. With others than the rudder, or `base` given as "none", a policy learns from
-        scratch.
-
-    Raises
-    ------
-    InputError
-        For an unknown algorithm or setting, with the nearest known one, or a value out of its range.
+    `environment`: "course-keeping" or "path-following"; `task`: name of a suite's task; one without settings
+    of its own has those of its environment; `action`: what is commanded. With other actions than the rudder,
+    or `base` given as "none", a policy learns from scratch. Raises InputError for an unknown algorithm or
+    setting, with the nearest known one, or a value out of its range.
     """
     settings_of(algorithm)
     check_choice(environment, ENVIRONMENTS, "environment")
