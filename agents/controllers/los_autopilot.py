@@ -63,6 +63,7 @@ class Guided(Controller):
         """
         dt = task.interval(model)
         like = autopilot if isinstance(autopilot, Controller) else LQ.from_model(model, dt=dt)
+        own = autopilot is None or autopilot is like
         like.check_fits_model(model)
         scales = {quantity.name: quantity.scale for quantity in task.observed(model)}
         names = next((some for some in cls.alternatives if scales.keys() >= {*some}), cls.observes)
@@ -70,9 +71,7 @@ class Guided(Controller):
             gains={**gains, "task_lookahead": task.lookahead * model.particulars["length"]},
             neutral_rudder=like.neutral_rudder,
             neutral_sway=like.neutral_sway,
-            margins=like.margins
-            if autopilot is None or like is autopilot
-            else Margins(np.inf, np.inf, np.inf, np.inf),
+            margins=like.margins if own else Margins(np.inf, np.inf, np.inf, np.inf),
             observation_scales=tuple(scales[name] for name in names),
             model_name=like.model_name,
             model_sha256=like.model_sha256,

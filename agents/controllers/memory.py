@@ -25,7 +25,7 @@ def records(memory: Floats, record: np.dtype[Any]) -> Records:
 def checked_observation(
     observation: ArrayLike, names: Sequence[str], dtype: type[np.generic] = np.float64
 ) -> NDArray[Any]:
-    """Observations as an array of shape (n_ships, n_observations) or (n_observations,), no fewer than names."""
+    """Observations as an array of shape (n_ships, n) or (n,), with no fewer than there are names."""
     given, n = np.asarray(observation, dtype=dtype), len(names)
     if given.ndim not in (1, 2) or given.shape[-1] < n:
         raise InputError(

@@ -96,10 +96,10 @@ def _residual(stack: Sequence[Any]) -> dict[str, Any]:
             base = wrapper.base
             if base is not None and not isinstance(base, Controller):
                 kind = type(base).__name__
-                raise InputError(
-                    f"base: {kind} found, expected a controller of shipgym, which a file can hold"
-                )
-            return {name: getattr(wrapper, name) for name in RESIDUAL}
+                raise InputError(f"base: {kind} found, expected a controller of shipgym, for its file")
+            whole = {name: int(getattr(wrapper, name)) for name in ("frame_stack", "action_repeat")}
+            parts = {name: float(getattr(wrapper, name)) for name in ("authority", "rate_limit")}
+            return {"base": base, **whole, **parts}
     return {}
 
 
