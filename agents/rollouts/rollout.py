@@ -114,15 +114,12 @@ def rollout(
     log = _Log(engine, record, tolerant)
     seen, memory, starts = engine.reset(seeds), None, log.sailing
     log.look()
-    while True:
-        actions, memory = log.ask(policy, seen if show is None else show(seen), memory, starts)
-        command = log.checked(actions, type(policy).__name__)
-        if not log.sailing.any():
+    while log.sailing.any():
+        command, memory = log.ask(policy, seen if show is None else show(seen), memory, starts)
+        if not log.sailing.any():  # the policy has failed in all episodes
             break
-        seen, rewards, terminated, truncated = engine.step(command)
-        log.note(command, rewards, memory, terminated, truncated)
-        if not log.sailing.any():
-            break
+        seen, *outcome = engine.step(command)
+        log.note(command, memory, *outcome)
         starts = np.zeros(engine.num_envs, dtype=np.bool_)
     return log.rollout(np.asarray(seeds))
 
@@ -153,7 +150,7 @@ class _Log:
         self.sailing = np.ones(engine.num_envs, dtype=np.bool_)
         self.terminated = self.truncated = self.failed = ~self.sailing
         self.costs = np.zeros(engine.num_envs)
-        self.failure, self.error, self.seconds, self.asked = "", "", 0.0, 0
+        self.failure, self.seconds, self.asked = "", 0.0, 0
         self.sailed: list[Flags] = []
         self.intervals: list[tuple[NDArray[np.float32], Floats, Flags]] = []  # actions, rewards, shielded
         self.states: list[dict[str, Floats]] = []
@@ -169,30 +166,25 @@ class _Log:
             self.states.append({name: values for name, values in state.items() if self._keeps(name)})
             self.infos.append([self.engine.info(name).copy() for name in self.names])
 
-    def ask(self, policy: Policy, shown: Any, memory: Any, starts: Flags) -> tuple[Any, Any]:
-        """A policy's answer; what goes wrong is its own failure."""
-        began = time.process_time()
-        self.error = ""
+    def ask(self, policy: Policy, shown: Any, memory: Any, starts: Flags) -> tuple[NDArray[np.float32], Any]:
+        """A policy's commands, 0 for ships that do not sail; episodes without a command have failed."""
+        began, why = time.process_time(), ""
         try:
             actions, memory = policy.predict(shown, memory, starts, True)
         except Exception as error:  # whatever a user's policy raises
             if not self.tolerant:
                 raise
-            actions, self.error = None, f"{type(error).__name__}: {error} (at step {len(self.sailed)})"
+            actions, why = None, f"{type(error).__name__}: {error} (at step {len(self.sailed)})"
         self.seconds += time.process_time() - began
         self.asked += int(self.sailing.sum())
-        return actions, memory
-
-    def checked(self, actions: Any, who: str) -> NDArray[np.float32]:
-        """The commands, 0 for ships that do not sail any more; episodes without a command have failed."""
-        command, bad, why = self._commands(actions)
+        command, bad, found = self._commands(actions)
         if bad.any():
             if not self.tolerant:
-                raise InputError(f"{who}.predict: {why}")
-            self.failure = self.failure or self.error or why
+                raise InputError(f"{type(policy).__name__}.predict: {found}")
+            self.failure = self.failure or why or found
             self.failed, self.sailing = self.failed | bad, self.sailing & ~bad
         command[~self.sailing] = 0.0
-        return command
+        return command, memory
 
     def _commands(self, actions: Any) -> tuple[NDArray[np.float32], Flags, str]:
         """Commands, of which ships that sail there is none, and why."""
@@ -218,7 +210,7 @@ class _Log:
         return found, bad, said
 
     def note(
-        self, command: NDArray[np.float32], rewards: Floats, memory: Any, terminated: Flags, truncated: Flags
+        self, command: NDArray[np.float32], memory: Any, rewards: Floats, terminated: Flags, truncated: Flags
     ) -> None:
         """Note what came of an interval."""
         self.sailed.append(self.sailing)

@@ -33,6 +33,7 @@ N_EVALUATIONS = 100
 SPEED_RANGE = (0.8, 1.1)
 SEAS = ("calm", "slight", "moderate", "rough")
 NO_TASK = ""
+RUN = ("seed", "randomise", "threads")  # of a plan, whatever is learned
 
 
 @dataclass(frozen=True)
@@ -132,10 +133,9 @@ def make_plan(given: Given, stored: Plan | None = None) -> Plan:
         settings = load_settings(given.algorithm, task.environment, task.name, own, task.task.action)
     else:
         settings = changed(stored.settings, own)
-    before = (0, False, 1) if stored is None else (stored.seed, stored.randomise, stored.threads)
-    asked = (given.seed, given.randomise, given.threads)
-    seed, randomise, threads = (old if new is None else new for new, old in zip(asked, before, strict=True))
-    return Plan(given.algorithm, task, settings, int(seed), bool(randomise), int(threads))
+    kept = {} if stored is None else {name: getattr(stored, name) for name in RUN}
+    asked = {name: value for name in RUN if (value := getattr(given, name)) is not None}
+    return Plan(given.algorithm, task, settings, **kept | asked)
 
 
 def _task(given: Given, stored: Plan | None) -> BenchmarkTask:

@@ -214,9 +214,9 @@ def _proposed(
 
 def _frozen(trial: Trial, space: Mapping[str, Any]) -> optuna.trial.FrozenTrial:
     """A trial as Optuna knows it."""
-    finished = trial.cost is not None
+    states = optuna.trial.TrialState
     return optuna.trial.create_trial(
-        state=optuna.trial.TrialState.COMPLETE if finished else optuna.trial.TrialState.PRUNED,
+        state=states.PRUNED if trial.cost is None else states.COMPLETE,
         value=trial.cost,
         params=dict(trial.parameters),
         distributions={name: space[name] for name in trial.parameters},
