@@ -75,10 +75,8 @@ class TurnRate(Controller):
 
         Parameters
         ----------
-        model : ShipModel
-            Stable or unstable on its course.
-        dt : float, optional
-            Control interval, s; by default that of the environment.
+        model, dt
+            As in `LQ.from_model`.
         frequency : float, optional
             Natural frequency of the pair of poles of the yaw rate, rad/s; by default as the lag of the
             steering gear and the ship's length allow.

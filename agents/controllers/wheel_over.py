@@ -77,12 +77,8 @@ class WheelOver(Guided):
 
         Parameters
         ----------
-        model : ShipModel
-            The ship.
-        autopilot : Policy, optional
-            Any heading autopilot, also one that was learned; by default `LQ.from_model(model)`.
-        task : Task, optional
-            Its lookahead, corridor and control interval are used; by default the environment's own.
+        model, autopilot, task
+            As in `LineOfSight.from_model`.
         lookahead_lengths, turn_lookahead_lengths : float, optional
             Lookahead on a leg, and towards the next leg in a turn, ship lengths; by default the task's.
         radius_lengths, reach_lengths : float, optional

@@ -1,12 +1,4 @@
-"""What a learned policy sees and does in training: past observations, a classical controller to add to.
-
-The network acts on what `LearnedPolicy` gives it when it steers: the last observations, oldest
-first, then the base controller's action. The rudder is that action and the network's part of it, which may
-be repeated for several control intervals while the base goes on with its feedback.
-
-Sources: Silver, Allen, Tenenbaum & Kaelbling 2018, Residual policy learning, arXiv:1812.06298; Johannink et
-al. 2019, Residual reinforcement learning for robot control, ICRA.
-"""
+"""What a policy sees and does while it learns: the same as when it steers (`agents.policies.policy`)."""
 
 from __future__ import annotations
 
@@ -36,12 +28,9 @@ Flags = NDArray[np.bool_]
 class ResidualVecEnv(VecEnvWrapper):  # type: ignore[misc]  # stable-baselines3 is not type-checked here
     """Ships steered by a base controller to which an agent adds; the agent remembers observations.
 
-    The agent sees `[observation(t - frame_stack + 1), ..., observation(t), base action(t)]`; where an episode
-    begins the first observation fills the stack. The command is
-    `clip(base action + authority * clip(output, -1, 1), -1, 1)`, with the same output for `action_repeat`
-    control intervals, approached by at most `rate_limit` in each of them. A step is these intervals, its
-    reward their sum. Where an episode ends among them, the rest of the step is not counted: the next episode
-    begins with the base alone (without base: the output).
+    What it sees, and what becomes of its output, stands in `agents.policies.policy`. A step is `action_repeat`
+    control intervals, its reward their sum. Where an episode ends among them, the rest of the step is not
+    counted: the next episode begins with the base alone (without base: the output).
 
     Parameters
     ----------

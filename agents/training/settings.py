@@ -224,18 +224,17 @@ def _checked(value: Any, one: Field[Any]) -> Any:
 def _number_or_word(value: Any, name: str, allowed: dict[str, Any]) -> Any:
     """A number, or a word; one that ends in an underscore has a positive number after it, or neither."""
     word = allowed.pop("word")
-    start, sign, number = value.partition("_") if isinstance(value, str) else ("", "", "")
-    if value == word.rstrip("_"):
+    alone = word.rstrip("_")
+    if value == alone:
         return value
-    if sign and word == f"{start}_":
+    if word != alone and isinstance(value, str) and value.startswith(word):
         try:
-            check_number(float(number), name, above=0.0)
+            check_number(float(value.removeprefix(word)), name, above=0.0)
         except (ValueError, InputError):
-            raise InputError(
-                f"{name}: {value!r} found, expected a number, '{start}' or such as '{start}_0.1'"
-            ) from None
+            said = f"{name}: {value!r} found, expected a number, '{alone}' or such as '{word}0.1'"
+            raise InputError(said) from None
         return value
-    return check_number(value, name, **allowed, hint=f"or '{word.rstrip('_')}'")
+    return check_number(value, name, **allowed, hint=f"or '{alone}'")
 
 
 def load_settings(
