@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -207,25 +207,30 @@ def step_response(
     steps = int(np.ceil(duration / asked.interval(fleet[0])))
     straight = asked.changed(course_change_deg=0.0, episode_steps=steps)
     engine = Engine(fleet, len(fleet), straight, allow_unstable=allow_unstable)
-    reach, integral = observation_scales(engine.model)[-1], np.zeros(len(fleet))
-    begins = True
-
-    def shown(observations: NDArray[np.float32]) -> NDArray[np.float32]:
-        """What ships that keep their course in the engine observe of the other one."""
-        nonlocal integral, begins
-        state = engine.physical_state()
-        error = np.radians(step_deg) - (state["psi"] - state["set_point"])
-        integral, begins = gathered(integral, error, begins, engine.dt, reach), False
-        return on_course(observations, error, integral, reach)
-
     seeds = np.zeros(len(fleet), dtype=np.int64)
-    states = rollout(controller, engine, seeds, record=RECORDED, show=shown).states
+    states = rollout(
+        controller, engine, seeds, record=RECORDED, show=_other_course(engine, np.radians(step_deg))
+    ).states
     left = ((0, steps + 1 - len(states["psi"])), (0, 0))  # after all were lost, if they were
     heading, rudder = (
         np.pad(values, left, mode="edge").T
         for values in (states["psi"] - states["set_point"], states["delta"])
     )
     return StepResponses(np.arange(steps + 1) * engine.dt, heading, rudder)
+
+
+def _other_course(engine: Engine, step: float) -> Callable[[NDArray[np.float32]], NDArray[np.float32]]:
+    """What ships that keep their course in the engine observe of another one, a step away, rad."""
+    reach, integral, begins = observation_scales(engine.model)[-1], np.zeros(engine.num_envs), True
+
+    def shown(observations: NDArray[np.float32]) -> NDArray[np.float32]:
+        nonlocal integral, begins
+        state = engine.physical_state()
+        error = step - (state["psi"] - state["set_point"])
+        integral, begins = gathered(integral, error, begins, engine.dt, reach), False
+        return on_course(observations, error, integral, reach)
+
+    return shown
 
 
 def _fleet(models: ShipModel | Sequence[ShipModel]) -> list[ShipModel]:

@@ -28,9 +28,9 @@ Flags = NDArray[np.bool_]
 class ResidualVecEnv(VecEnvWrapper):  # type: ignore[misc]  # stable-baselines3 is not type-checked here
     """Ships steered by a base controller to which an agent adds; the agent remembers observations.
 
-    What it sees, and what becomes of its output, stands in `agents.policies.policy`. A step is `action_repeat`
-    control intervals, its reward their sum. Where an episode ends among them, the rest of the step is not
-    counted: the next episode begins with the base alone (without base: the output).
+    What it sees, and what becomes of its output, stands in `agents.policies.policy`. A step has
+    `action_repeat` control intervals, its reward is their sum. Where an episode ends among them, the rest of
+    the step is not counted: the next episode begins with the base alone (without base: the output).
 
     Parameters
     ----------

@@ -129,9 +129,7 @@ def tune(
             ]
             results = replace(where, keep=folder / KEPT).run(training or train_trial, jobs, tell)
             for k, ((parameters, settings), result) in enumerate(zip(proposed, results, strict=True)):
-                check_shape(result, TRIAL, f"trial {first + k}")
-                curve = tuple((int(steps), float(cost)) for steps, cost in result["curve"])
-                found.append(Trial(first + k, parameters, settings, result["cost"], curve, result["ended"]))
+                found.append(_trial(first + k, parameters, settings, result))
             _record(study, found, plan, fixed)
             if all(trial.ended == "diverged" for trial in found):
                 raise InputError(f"every trial diverged, the first: {results[0]['why']}")
@@ -192,6 +190,12 @@ def allowed(limits: Curve, steps: int) -> float:
 
 def _best_until(curve: Curve, steps: int) -> float:
     return min((cost for mark, cost in curve if mark <= steps), default=np.inf)
+
+
+def _trial(number: int, parameters: Mapping[str, Any], settings: Mapping[str, Any], result: Any) -> Trial:
+    check_shape(result, TRIAL, f"trial {number}")
+    curve = tuple((int(steps), float(cost)) for steps, cost in result["curve"])
+    return Trial(number, parameters, settings, result["cost"], curve, result["ended"])
 
 
 def _best(trials: Sequence[Trial]) -> Trial:
