@@ -10,6 +10,7 @@ from typing import Any
 from identification.estimators.methods import METHODS, Method, get_method
 from identification.options import name_of
 from identification.pipeline import identify
+from identification.progress import counted
 from identification.regression.problem import held_out
 from identification.report.comparison import comparison_page
 from identification.result import IdentificationResult
@@ -91,7 +92,7 @@ def compare_methods(
     left_out = _left_out([get_method(method) for _, method in pairs], arguments)
     found: list[tuple[Standing, IdentificationResult]] = []
     refused: dict[str, str] = {}
-    for structure, method in pairs:
+    for structure, method in counted("structures and methods", pairs):
         name = get_method(method).name
         own = {key: value for key, value in arguments.items() if key not in left_out.get(name, ())}
         if several:

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from identification.options import Options
+from identification.progress import counted
 from identification.result import IdentificationResult
 from identification.simulation_error.maximum_a_posteriori import MAP
 from identification.simulation_error.similarity import AUTO
@@ -62,7 +63,7 @@ def select(
         except InputError as error:
             refused[named(structure, MAP if structure == MMG else method)] = str(error)
 
-    for structure in STRUCTURES:
+    for structure in counted("structures", STRUCTURES):
         attempt(structure, methods_of(structure, options.method)[0] if free else options.method)
     if not found:
         raise InputError(next(iter(refused.values())))
