@@ -102,4 +102,5 @@ def test_ships_that_run_away_come_last_then_unstable_ones_then_by_error() -> Non
     often = replace(lost, ran_away=2)
     unknown = replace(good, error=None)
     in_order = [good, worse, unknown, unstable, lost, often]
-    assert sorted(reversed(in_order), key=lambda one: one.rank) == in_order
+    shuffled = [often, unknown, good, lost, unstable, worse]
+    assert sorted(shuffled, key=lambda one: one.rank) == in_order
