@@ -52,34 +52,17 @@ class TrialInformation:
 
 @dataclass(frozen=True, eq=False)
 class Advice:
-    """Which manoeuvres to run next.
+    """Which manoeuvres to run next."""
 
-    Attributes
-    ----------
-    criterion : str
-        "c", "D" or "E".
-    coefficient : str
-        That which "c" shrinks.
-    trials : tuple of TrialInformation
-        Of the trials so far.
-    before : dict of str to float
-        Relative standard error of each coefficient from the trials so far.
-    steps : tuple of dict of str to float
-        Of each choice the gain of all candidates, the largest is best: by what factor the standard error
-        ("c"), the mean axis ("D") or the longest axis ("E") of the relative errors shrinks.
-    chosen : tuple of str
-        The candidates to run, in this order.
-    after : dict of str to float
-        Relative standard errors with them.
-    """
-
-    criterion: str
-    coefficient: str
-    trials: tuple[TrialInformation, ...]
-    before: dict[str, float]
+    criterion: str  # "c", "D" or "E"
+    coefficient: str  # that which "c" shrinks
+    trials: tuple[TrialInformation, ...]  # so far
+    before: dict[str, float]  # relative standard error of each coefficient from the trials so far
+    #: of each choice the gain of all candidates, the largest is best: by what factor the standard error
+    #: ("c"), the mean axis ("D") or the longest axis ("E") of the relative errors shrinks
     steps: tuple[dict[str, float], ...]
-    chosen: tuple[str, ...]
-    after: dict[str, float]
+    chosen: tuple[str, ...]  # the candidates to run, in this order
+    after: dict[str, float]  # relative standard errors with them
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values, ready for JSON; of each trial's information the diagonal."""
@@ -143,8 +126,7 @@ def fisher_information(model: ShipModel, samples: Samples, noise: Mapping[str, f
     for q, rows in _table(model).regression_rows.items():
         X = samples.features[q]
         moments[rows, rows] = X.T @ X / noise[q]
-    information: Floats = matrix.T @ moments @ matrix
-    return information
+    return np.asarray(matrix.T @ moments @ matrix)
 
 
 def standard_candidates(model: ShipModel) -> dict[str, Manoeuvre]:
@@ -320,8 +302,7 @@ def _covariance(information: Floats, size: Floats) -> Floats:
     """Covariance of the relative errors; what is not excited gets a large one instead of an infinite."""
     values, vectors = np.linalg.eigh(information * np.outer(size, size))
     values = np.maximum(values, FLOOR * max(values[-1], np.finfo(float).tiny))
-    covariance: Floats = (vectors / values) @ vectors.T
-    return covariance
+    return np.asarray((vectors / values) @ vectors.T)
 
 
 def _errors(information: Floats, size: Floats) -> Floats:

@@ -19,24 +19,12 @@ from shipgym.trials.trial import Trial
 
 @dataclass(frozen=True, eq=False)
 class ReducedIdentification:
-    """A structure reduced on its trials, and both models.
+    """A structure reduced on its trials, and both models."""
 
-    Attributes
-    ----------
-    full : IdentificationResult
-        With all terms.
-    reductions : dict of str to Reduction
-        By equation, the path and the terms chosen.
-    structure : Structure
-        Of the terms chosen, registered by its name.
-    reduced : IdentificationResult
-        With it.
-    """
-
-    full: IdentificationResult
-    reductions: dict[str, Reduction]
-    structure: Structure
-    reduced: IdentificationResult
+    full: IdentificationResult  # with all terms
+    reductions: dict[str, Reduction]  # by equation, the path and the terms chosen
+    structure: Structure  # of the terms chosen, registered by its name
+    reduced: IdentificationResult  # with it
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values, ready for JSON."""

@@ -47,18 +47,10 @@ class ReductionStep:
 
 @dataclass(frozen=True)
 class Reduction:
-    """The whole path of a reduction and the model that it chose.
+    """The whole path of a reduction and the model that it chose."""
 
-    Attributes
-    ----------
-    path : tuple of ReductionStep
-        In the order in which terms were dropped or added.
-    chosen : int
-        Which of them.
-    """
-
-    path: tuple[ReductionStep, ...]
-    chosen: int
+    path: tuple[ReductionStep, ...]  # in the order in which terms were dropped or added
+    chosen: int  # which of them
 
     @property
     def terms(self) -> tuple[str, ...]:
@@ -117,7 +109,8 @@ def backward_elimination(
         For shapes that do not fit and fewer samples than terms.
     """
     features, targets, labels = _checked(X, y, names)
-    _check_tolerances(tolerance, threshold)
+    check_number(tolerance, "tolerance", at_least=0.0)
+    check_number(threshold, "threshold", at_least=0.0)
     kept = list(range(len(labels)))
     path = [_step(features, targets, labels, kept, "", 0.0)]
     best = path[0].held_out
@@ -158,7 +151,7 @@ def forward_selection(
         The path goes on beyond the chosen model.
     """
     features, targets, labels = _checked(X, y, names)
-    _check_tolerances(tolerance, 1.0)
+    check_number(tolerance, "tolerance", at_least=0.0)
     rest = features / np.sqrt(np.mean(features**2, axis=0))
     left, power = targets.copy(), float(targets @ targets)
     chosen: list[int] = []
@@ -324,8 +317,3 @@ def _checked(X: ArrayLike, y: ArrayLike, names: Sequence[str]) -> tuple[Floats, 
     if silent or not targets.any():
         raise InputError(f"X, y: {silent[0] if silent else 'y'} is 0 throughout, expected it to be excited")
     return features, targets, labels
-
-
-def _check_tolerances(tolerance: float, threshold: float) -> None:
-    check_number(tolerance, "tolerance", at_least=0.0)
-    check_number(threshold, "threshold", at_least=0.0)

@@ -4,7 +4,6 @@ What cannot be right is an InputError with the line to write; what may be right 
 """
 
 import math
-from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +14,7 @@ from shipgym.errors import InputError
 from shipgym.trials.columns import Source
 from shipgym.trials.derivatives import time_derivative
 from shipgym.trials.navigation import Instruments, heading_offset, straight_parts
-from shipgym.trials.resampling import Series
+from shipgym.trials.resampling import Log, Series
 
 DEGREE = math.pi / 180.0
 #: Faster than any ship, and slower than any manoeuvre, over ground, m/s.
@@ -71,14 +70,13 @@ def check_overlap(series: Series, other: Series, path: Path, column: str) -> Non
     )
 
 
-def check_log(
-    t: Floats, values: Mapping[str, Floats], tools: Instruments, source: Source, gnss: bool
-) -> list[str]:
+def check_log(log: Log, tools: Instruments, source: Source, gnss: bool) -> list[str]:
     """Compare heading with course over ground, and look for a ship at berth; remarks on what may be wrong.
 
     The channels are as logged, in SI units, the heading without jumps. Looked at are speed and course over
     ground and, where they are of `gnss`, positions.
     """
+    t, values = log.t, log.channels
     notes = [NO_RUDDER] if gnss and "delta" not in values else []
     if "ground_north" in values:
         velocity = values["ground_north"] + 1j * values["ground_east"]

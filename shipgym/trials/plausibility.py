@@ -10,6 +10,7 @@ import numpy.typing as npt
 from shipgym.arrays import Floats, integral
 from shipgym.errors import InputError
 from shipgym.trials.columns import Source
+from shipgym.trials.resampling import Log
 from shipgym.trials.units import QUANTITIES, UNITS, si_factor
 
 _DEGREE = math.pi / 180.0
@@ -81,21 +82,22 @@ def check_heading(t: Floats, psi: Floats, raw_psi: Floats, source: Source) -> No
     )
 
 
-def check_consistency(t: Floats, channels: Mapping[str, Floats], frame: str, source: Source) -> None:
+def check_consistency(log: Log, frame: str, source: Source) -> None:
     """Refuse channels that contradict each other so plainly that a unit, sign or frame must be wrong.
 
     Compared over windows in time, so that noise and offsets do not matter: yaw rate with the change of
     heading, and velocities with the change of position. The channels are as recorded, in SI units, the
     heading without jumps; `frame`, "body" or "earth", is the declared one of u and v.
     """
-    if "psi" in channels and "r" in channels:
-        _check_yaw_rate(t, channels["psi"], channels["r"], source)
-    if all(name in channels for name in ("x", "y", "psi", "u", "v")):
-        _check_velocity(t, channels, frame, source)
+    if {"psi", "r"} <= log.channels.keys():
+        _check_yaw_rate(log, source)
+    if {"x", "y", "psi", "u", "v"} <= log.channels.keys():
+        _check_velocity(log, frame, source)
 
 
-def _check_yaw_rate(t: Floats, psi: Floats, r: Floats, source: Source) -> None:
-    turned, expected = (_detrended(t, part) for part in (psi, integral(t, r)))
+def _check_yaw_rate(log: Log, source: Source) -> None:
+    parts = log.channels["psi"], integral(log.t, log.channels["r"])
+    turned, expected = (_detrended(log.t, part) for part in parts)
     if max(np.ptp(turned), np.ptp(expected)) < 2.0 * _DEGREE:
         return
     gain, misfit = _fit(np.diff(expected), np.diff(turned))
@@ -114,7 +116,8 @@ def _check_yaw_rate(t: Floats, psi: Floats, r: Floats, source: Source) -> None:
     )
 
 
-def _check_velocity(t: Floats, channels: Mapping[str, Floats], frame: str, source: Source) -> None:
+def _check_velocity(log: Log, frame: str, source: Source) -> None:
+    t, channels = log.t, log.channels
     moved = np.diff(_at_windows(channels["x"] + 1j * channels["y"]))
     velocity = channels["u"] + 1j * channels["v"]
     velocities = {"body": velocity * np.exp(1j * channels["psi"]), "earth": velocity}
