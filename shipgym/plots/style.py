@@ -75,8 +75,8 @@ def panels(
     for k, panel in enumerate(shown):
         row, column = k // columns + 1, k % columns + 1
         for trace in panel.traces:
-            if trace.legendgroup is not None:
-                trace.showlegend = trace.showlegend is not False and trace.legendgroup not in names
+            if trace.legendgroup is not None and trace.showlegend is not False:
+                trace.showlegend = trace.legendgroup not in names
                 names.add(trace.legendgroup)
         figure.add_traces(panel.traces, rows=row, cols=column)
         x, y = (axis(told) if isinstance(told, str) else told for told in (panel.x, panel.y))

@@ -7,10 +7,8 @@ options of `shipgym identify` and the tables of `docs/identification.md`: all ar
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from importlib.resources import files
 from numbers import Real
 from typing import Any
 
@@ -24,6 +22,7 @@ from shipgym.checks import (
     quoted,
 )
 from shipgym.errors import InputError
+from shipgym.files import packaged_toml
 
 AUTO = "auto"  # the structure where a ship file names none: ranked by trials held out
 TEXT, FLAG, NUMBER, WHOLE = "a text", "true or false", "a number", "a whole number"
@@ -51,10 +50,7 @@ class Option:
 
 #: Every option by name.
 OPTIONS: dict[str, Option] = {
-    name: Option(**entry)
-    for name, entry in tomllib.loads(
-        files("shipgym.trials").joinpath("identify_table.toml").read_text("utf-8")
-    ).items()
+    name: Option(**entry) for name, entry in packaged_toml("shipgym.trials", "identify_table.toml").items()
 }
 
 

@@ -4,11 +4,9 @@ pynmea2 parses the sentences; those that hold no channel (AIS, depth, satellites
 """
 
 import re
-import tomllib
 from collections import defaultdict
 from collections.abc import Iterator
 from datetime import UTC, datetime, time
-from importlib.resources import files
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -17,7 +15,7 @@ import numpy as np
 from shipgym.arrays import Floats
 from shipgym.checks import quoted
 from shipgym.errors import InputError
-from shipgym.files import LARGEST_CSV, read_bytes, read_text
+from shipgym.files import LARGEST_CSV, packaged_toml, read_bytes, read_text
 from shipgym.trials.clock_texts import DAY
 from shipgym.trials.csv_reader import MOST_LINES, Table, column_table
 from shipgym.trials.units import si_factor
@@ -25,9 +23,7 @@ from shipgym.trials.units import si_factor
 #: Share of damaged sentences from which a log is refused.
 MOST_DAMAGED = 0.1
 
-SENTENCES: dict[str, dict[str, list[str]]] = tomllib.loads(
-    files("shipgym.trials").joinpath("sentences.toml").read_text("utf-8")
-)
+SENTENCES: dict[str, dict[str, list[str]]] = packaged_toml("shipgym.trials", "sentences.toml")
 _SPEEDS = {"N": "knots", "K": "km/h", "M": "m/s"}
 #: The better sources: of heading true ones, of the speed through the water the log with two axes.
 _BETTER = {"HDT": 3, "THS": 2, "VHW": 1, "VBW": 1}

@@ -15,10 +15,16 @@ from shipgym.trials.clock_texts import read_angles, read_clock, zone_seconds
 from shipgym.trials.columns import Column, Source, choose_columns
 from shipgym.trials.csv_reader import Table, is_number
 from shipgym.trials.derivatives import time_derivative
-from shipgym.trials.mistakes import check_log, check_overlap, find_outliers
 from shipgym.trials.navigation import NO_OFFSETS, Instruments, correct_offsets, local_metres, to_midship
 from shipgym.trials.navigation import rotate_to_body as rotate_to_body
-from shipgym.trials.plausibility import check_consistency, check_heading, check_ranges
+from shipgym.trials.plausibility import (
+    check_consistency,
+    check_heading,
+    check_log,
+    check_overlap,
+    check_ranges,
+    find_outliers,
+)
 from shipgym.trials.resampling import Log, Series, have_own_clocks, on_one_clock, own_clock
 from shipgym.trials.units import QUANTITIES, si_factor
 
