@@ -8,7 +8,7 @@ options of `shipgym identify` and the tables of `docs/identification.md`: all ar
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from numbers import Real
 from typing import Any
 
@@ -30,22 +30,17 @@ TEXTS, TWO_NUMBERS = "a list of texts", "a list of two numbers"
 WHOLE_OR_TEXT, TEXT_OR_TABLE = "a whole number or a text", "a text or a table"
 
 
+@dataclass(frozen=True)
 class Option:
     """What `identify_table.toml`, which explains these fields, says of an option."""
 
-    def __init__(
-        self,
-        section: str,
-        kind: str,
-        meaning: str,
-        choices: Mapping[str, str] | None = None,
-        setting: bool = False,
-        common: bool = False,
-        **bounds: float,
-    ) -> None:
-        self.section, self.kind, self.meaning = section, kind, meaning
-        self.choices, self.bounds = choices or {}, bounds
-        self.setting, self.common = setting, common
+    section: str
+    kind: str
+    meaning: str
+    choices: Mapping[str, str] = field(default_factory=dict)
+    bounds: Mapping[str, Any] = field(default_factory=dict)
+    setting: bool = False
+    common: bool = False
 
 
 #: Every option by name.
