@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from identification.search.bee_colony import _chances, _moved, _settle
 from sklearn.linear_model import Ridge
 
 from identification import (
@@ -18,7 +19,6 @@ from identification import (
     minimise,
 )
 from identification.search import get_optimiser
-from identification.search.bee_colony import _chances, _moved, _settle
 from identification.search.objectives import held_out_error, time_blocks, training_error
 from identification.search.pattern_search import pattern_search
 from identification.search.search import Optimiser
