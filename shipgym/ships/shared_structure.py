@@ -19,7 +19,7 @@ from shipgym.arrays import Floats
 from shipgym.errors import InputError
 from shipgym.ships.particulars import Particulars
 from shipgym.ships.term_table import Structure
-from shipgym.ships.terms import Term
+from shipgym.ships.terms import Term, short_terms
 
 AXES = ("u", "v", "r")
 ACCELERATIONS = ("udot", "vdot", "rdot")
@@ -200,21 +200,8 @@ def read_shares(text: str) -> tuple[Share, ...]:
     shares = []
     for word in text.split():
         sign, body = (-1.0, word[1:]) if word[0] == "-" else (1.0, word)
-        coefficient, _, term = body.partition(":")
-        shares.append(Share(coefficient, _term(term or coefficient.partition("_")[2]), sign))
+        coefficient, _, name = body.partition(":")
+        name = name or coefficient.partition("_")[2]
+        (term,) = (Term(name, ((name, 1),)),) if name in ACCELERATIONS else short_terms(name, surge="u")
+        shares.append(Share(coefficient, term, sign))
     return tuple(shares)
-
-
-def _term(letters: str) -> Term:
-    """A term from its short name: velocities u, v, r, some between bars, or one acceleration."""
-    if letters in ACCELERATIONS:
-        return Term(letters, ((letters, 1),))
-    powers: dict[str, int] = {}
-    bars = False
-    for letter in letters:
-        if letter == "|":
-            bars = not bars
-        else:
-            symbol = f"|{letter}|" if bars else letter
-            powers[symbol] = powers.get(symbol, 0) + 1
-    return Term(letters, tuple(powers.items()))
