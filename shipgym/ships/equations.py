@@ -24,7 +24,7 @@ from shipgym.checks import check_number, check_text
 from shipgym.engine.motion import Motion, Ship
 from shipgym.engine.parts import Part
 from shipgym.engine.records import Record, field_types, is_record
-from shipgym.engine.vessel import Vessel
+from shipgym.engine.vessel import Vessel, vessel_of
 from shipgym.errors import InputError
 from shipgym.ships.particulars import Particulars
 from shipgym.ships.steering import SteeringGear
@@ -139,9 +139,11 @@ class ShipEquations:
 
     def vessel(self, coefficients: Mapping[str, float], lag: bool) -> Vessel:
         """What is compiled of the ship: the same whatever her coefficients are, but for the switches."""
-        chosen = tuple((name, bool(coefficients[name])) for name in self.switches)
-        functions = (self.accelerations, self.shaft_acceleration)
-        return _vessel(self.name, self.state_names, self.coefficients_record, functions, chosen, lag)
+        parts: dict[str, Any] = {"accelerations": Part(self.accelerations)}
+        parts |= {name: bool(coefficients[name]) for name in self.switches}
+        if self.shaft_acceleration is not None:
+            parts["shaft_acceleration"] = Part(self.shaft_acceleration)
+        return vessel_of(self.name, self.state_names, self.coefficients_record, tuple(parts.items()), lag)
 
     def numbers(
         self, coefficients: Mapping[str, float], particulars: Particulars, shaft_speed: float = 0.0
@@ -152,22 +154,6 @@ class ShipEquations:
     def to_dict(self) -> dict[str, Any]:
         """As they stand in a model file."""
         return {"name": self.name, "source": self.source}
-
-
-@cache
-def _vessel(
-    name: str,
-    state_names: tuple[str, ...],
-    record: Record,
-    functions: tuple[Callable[..., Any], Callable[..., Any] | None],
-    switches: tuple[tuple[str, bool], ...],
-    lag: bool,
-) -> Vessel:
-    accelerations, shaft = functions
-    parts: dict[str, Any] = {"accelerations": Part(accelerations), **dict(switches)}
-    if shaft is not None:
-        parts["shaft_acceleration"] = Part(shaft)
-    return Vessel(name, state_names, record, parts, lag)
 
 
 def read_ship_equations(path: str | Path) -> ShipEquations:

@@ -16,7 +16,7 @@ from shipgym.arrays import Floats
 from shipgym.engine.motion import Motion, Ship
 from shipgym.engine.parts import Part
 from shipgym.engine.records import Record
-from shipgym.engine.vessel import Vessel
+from shipgym.engine.vessel import Vessel, vessel_of
 from shipgym.errors import InputError
 from shipgym.ships.manoeuvring_model import ManoeuvringModel
 from shipgym.ships.particulars import Particulars
@@ -121,7 +121,23 @@ class GreyBox(Structure):
 
     def vessel(self, coefficients: Mapping[str, float], lag: bool) -> Vessel:
         """What is compiled of a ship with this grey box: the reference ship's functions and the terms."""
-        return _vessel(self.ship.vessel, self._source, len(self._terms), self.shaft, self.state_names, lag)
+        terms = coefficients_record(len(self._terms), "GreyBoxTerms")
+        return self._vessel(terms, {"term_accelerations": Part(accelerations_function(self._source))}, lag)
+
+    def _vessel(self, terms: Record, functions: dict[str, Any], lag: bool, **summed: Any) -> Vessel:
+        """Functions of the reference ship, of the terms with their record of coefficients, and their sum."""
+        reference = self.ship.vessel
+        parts = {
+            **reference.functions,
+            "accelerations": Part(accelerations),
+            "reference_accelerations": reference.functions["accelerations"],
+            "KNOWS_SHAFT": self.shaft,
+            **functions,
+        }
+        parts.pop("shaft_acceleration", None)  # the shaft turns as commanded
+        record = _coefficients(reference.coefficients, terms)
+        named = tuple(parts.items()), lag, tuple(summed.items())
+        return vessel_of("a grey box", self.state_names, record, *named)
 
     @cached_property
     def _source(self) -> str:
@@ -210,27 +226,7 @@ def accelerations(
 
 
 @cache
-def _vessel(
-    reference: Vessel, source: str, n_terms: int, shaft: bool, state_names: tuple[str, ...], lag: bool
-) -> Vessel:
-    parts = {"term_accelerations": Part(accelerations_function(source))}
-    record = coefficients_record(n_terms, "GreyBoxTerms")
-    return grey_box_vessel(reference, record, parts, shaft, state_names, lag)
-
-
-def grey_box_vessel(
-    reference: Vessel, terms: Record, functions: Mapping[str, Any], shaft: bool,
-    state_names: tuple[str, ...], lag: bool, summed: Mapping[str, Any] | None = None,
-) -> Vessel:  # fmt: skip
-    """Functions of the reference ship, of the terms with their record of coefficients, and their sum."""
-    fields = [("known", Ship), ("reference", reference.coefficients), ("terms", terms)]
-    parts = {
-        **reference.functions,
-        "accelerations": Part(accelerations),
-        "reference_accelerations": reference.functions["accelerations"],
-        "KNOWS_SHAFT": shaft,
-        **functions,
-    }
-    parts.pop("shaft_acceleration", None)  # the shaft turns as commanded
-    record = NamedTuple("GreyBoxCoefficients", fields)  # type: ignore[misc]
-    return Vessel("a grey box", state_names, record, parts, lag, summed or {})
+def _coefficients(reference: Record, terms: Record) -> Record:
+    fields = [("known", Ship), ("reference", reference), ("terms", terms)]
+    record: Record = NamedTuple("GreyBoxCoefficients", fields)  # type: ignore[misc]
+    return record

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cache, cached_property
+from functools import cached_property
 from typing import Any, ClassVar
 
 import numpy as np
@@ -16,7 +16,7 @@ import numpy as np
 from shipgym.arrays import Floats
 from shipgym.checks import check_choice, check_text, quoted
 from shipgym.engine.parts import Part
-from shipgym.engine.vessel import Vessel
+from shipgym.engine.vessel import Vessel, vessel_of
 from shipgym.errors import InputError
 from shipgym.ships.particulars import Particulars
 from shipgym.ships.term_functions import (
@@ -186,7 +186,9 @@ class Structure:
 
     def vessel(self, coefficients: Mapping[str, float], lag: bool) -> Vessel:
         """What is compiled of a ship with this table; the coefficients are read at run time."""
-        return _vessel(self._source, len(self._terms), self.state_names, lag)
+        parts = (("accelerations", Part(accelerations_function(self._source))),)
+        record = coefficients_record(len(self._terms))
+        return vessel_of("a ship with a table of terms", self.state_names, record, parts, lag)
 
     @cached_property
     def _source(self) -> str:
@@ -331,12 +333,6 @@ class Structure:
         }
         given = {key: table[key] for key in ("normalisation", "quantity") if key in table}
         return cls(table["name"], table["source"], equations, **given)
-
-
-@cache
-def _vessel(source: str, n_terms: int, state_names: tuple[str, ...], lag: bool) -> Vessel:
-    parts = {"accelerations": Part(accelerations_function(source))}
-    return Vessel("a ship with a table of terms", state_names, coefficients_record(n_terms), parts, lag)
 
 
 def inertia(particulars: Particulars) -> Floats:
