@@ -22,8 +22,8 @@ from shipgym.ships.manoeuvring_model import ManoeuvringModel
 from shipgym.ships.particulars import Particulars
 from shipgym.ships.structures import WITH_REFERENCE
 from shipgym.ships.term_functions import accelerations_function, accelerations_source, coefficients_record
-from shipgym.ships.term_table import Structure
-from shipgym.ships.terms import CHANNEL, read_terms
+from shipgym.ships.term_table import ALWAYS_MEASURED, MEASURED, Structure
+from shipgym.ships.terms import read_terms
 
 GREY_BOX = WITH_REFERENCE
 SOURCE = (
@@ -31,7 +31,6 @@ SOURCE = (
     "minor rudder"
 )
 LINEAR = read_terms("du, v, r, delta, 1")
-CHANNELS = ("u", "v", "r", "p", "phi", "delta", "n")
 
 
 @dataclass(frozen=True)
@@ -89,25 +88,23 @@ class GreyBox(Structure):
         """Whether the reference ship has a rolling motion, and with it the target."""
         return "phi" in self.ship.state_names
 
+    @property
+    def remembers(self) -> bool:
+        """Whether the reference ship has a memory of yaw, and with it the target."""
+        return "q" in self.ship.state_names
+
     @cached_property
     def required_channels(self) -> tuple[str, ...]:
         """Channels a trial needs: those of the terms and those that the reference ship is evaluated at."""
-        needed = {CHANNEL[symbol] for symbol in self.symbols} | {"u", "v", "r", "delta"}
+        needed = self.channels | ALWAYS_MEASURED
         needed |= {"p", "phi"} if self.rolls else set()
         needed |= {"n"} if self.shaft else set()
-        return tuple(name for name in CHANNELS if name in needed)
+        return tuple(name for name in MEASURED if name in needed)
 
     @property
     def has_rudder(self) -> bool:
         """Whether a rudder turns it: that of the reference ship does."""
         return True
-
-    @property
-    def state_names(self) -> tuple[str, ...]:
-        """Names of the state, with roll or memory where the reference ship has it."""
-        roll = ("p", "phi") if self.rolls else ()
-        memory = ("q",) if "q" in self.ship.state_names else ()
-        return ("x", "y", "psi", "u", "v", "r", *roll, *memory, "delta")
 
     @property
     def needs_shaft_speed(self) -> bool:
