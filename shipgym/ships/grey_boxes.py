@@ -145,7 +145,7 @@ class GreyBox(Structure):
         self, coefficients: Mapping[str, float], particulars: Particulars, shaft_speed: float = 0.0
     ) -> Floats:
         """Numbers of the vessel's coefficients: the reference ship's, then those of the terms."""
-        terms = super().numbers(coefficients, particulars, shaft_speed)
+        terms = self.term_numbers(coefficients, particulars, shaft_speed)
         return np.concatenate([self.ship.ship_numbers(), terms])
 
     def converted_accelerations(

@@ -145,7 +145,7 @@ class KernelBox(GreyBox):
     ) -> Floats:
         """Numbers of the vessel's coefficients: the reference ship's, scales, offset and table of centres."""
         kernel = self.kernel
-        weights = self.acceleration_matrix(particulars, shaft_speed) @ np.array(list(coefficients.values()))
+        weights = self.term_numbers(coefficients, particulars, shaft_speed)
         table = np.zeros((kernel.size, ROW))
         rows = table[: len(kernel.centres)]
         rows[:, :4] = PER_ROOT_LN_2 * kernel.centres

@@ -111,7 +111,7 @@ class SharedStructure(Structure):
             "not positive together; expected derivatives X_udot, Y_vdot, N_rdot below 0",
         )
 
-    def numbers(
+    def term_numbers(
         self, coefficients: Mapping[str, float], particulars: Particulars, shaft_speed: float = 0.0
     ) -> Floats:
         """Coefficients of the SI features: the forces by mass and added mass (see `Structure`)."""

@@ -224,7 +224,13 @@ class Structure:
     def numbers(
         self, coefficients: Mapping[str, float], particulars: Particulars, shaft_speed: float = 0.0
     ) -> Floats:
-        """Numbers of the vessel's coefficients: those of the SI features of the accelerations, in order."""
+        """Numbers of the vessel's coefficients: those of the terms."""
+        return self.term_numbers(coefficients, particulars, shaft_speed)
+
+    def term_numbers(
+        self, coefficients: Mapping[str, float], particulars: Particulars, shaft_speed: float = 0.0
+    ) -> Floats:
+        """Coefficients of the SI features of the accelerations, in order; shape (n_terms,)."""
         matrix = self.acceleration_matrix(particulars, shaft_speed)
         values: Floats = matrix @ np.array(list(coefficients.values()))
         return values
