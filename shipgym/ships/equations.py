@@ -9,10 +9,13 @@ import importlib
 import importlib.util
 import math
 import sys
+import tomllib
 import traceback
+from collections import namedtuple
 from collections.abc import Callable, Mapping
 from dataclasses import KW_ONLY, dataclass, field
 from functools import cache
+from importlib.resources import files
 from pathlib import Path
 from types import ModuleType
 from typing import Any, ClassVar
@@ -31,6 +34,18 @@ from shipgym.ships.steering import SteeringGear
 
 RATES = ("udot", "vdot", "rdot", "pdot", "qdot")
 Accelerations = Callable[[Any, Any, Any], tuple[float, float, float, float, float]]
+
+
+def published(ship: str) -> dict[str, Any]:
+    """The coefficients in the file `ship`.toml beside this one."""
+    return tomllib.loads(files("shipgym.ships").joinpath(f"{ship}.toml").read_text("utf-8"))
+
+
+def record_of(values: Mapping[str, float], module: str) -> Any:
+    """A record of coefficients with these values as defaults, for the file of a ship."""
+    record = namedtuple("Coefficients", values, defaults=[*values.values()], module=module)
+    record.__annotations__ = dict.fromkeys(values, float)
+    return record
 
 
 @dataclass(frozen=True)
