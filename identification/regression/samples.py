@@ -31,7 +31,7 @@ from shipgym.checks import check_whole
 from shipgym.errors import InputError
 from shipgym.ships.particulars import Particulars
 from shipgym.ships.steering import SteeringGear
-from shipgym.ships.structures import Structure
+from shipgym.ships.term_table import Structure
 from shipgym.trials.trial import Trial
 
 SAMPLE_STRUCTURES = ("euler", "integral", "spline")

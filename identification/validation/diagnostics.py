@@ -16,7 +16,7 @@ from identification.regression.samples import Samples
 from identification.uncertainty.covariance import residuals
 from shipgym.arrays import Floats
 from shipgym.errors import InputError
-from shipgym.ships.structures import Structure
+from shipgym.ships import Structure
 from shipgym.trials.trial import Trial
 
 LEAST_RUDDER = np.radians(0.5)  # a rudder that moves less than this excites nothing

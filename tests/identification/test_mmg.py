@@ -89,12 +89,12 @@ def test_terms_beyond_the_standard_form_act_as_they_are_named() -> None:
 
 def test_twin_screws_and_rudders_count() -> None:
     one, two = (
-        dict(zip(("d", "V", "xG", "k", "D", "A", "eta", "N"), mmg.dimensions(p), strict=True))
+        dict(zip(("d", "V", "xG", "k", "D", "A", "eta", "N"), mmg.dimensions(p).values(), strict=True))
         for p in (L7, replace(L7, propellers=2.0, rudders=2.0, rudder_area=2 * L7.require("rudder_area")))
     )
     assert (one["eta"], two["eta"]) == pytest.approx((0.216 / 0.345,) * 2)  # each in a race of its own
     assert (one["N"], two["N"]) == (1.0, 2.0)
-    assert mmg.dimensions(replace(L7, propellers=2.0))[6] == 0.0  # one rudder between the races
+    assert mmg.dimensions(replace(L7, propellers=2.0))["eta"] == 0.0  # one rudder between the races
     ahead = Motion(0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 11.85)
     surge = [at(ship_of({}, replace(L7, propellers=n)), ahead)[0] for n in (1.0, 2.0, 3.0)]
     assert surge[1] - surge[0] == pytest.approx(surge[2] - surge[1])
