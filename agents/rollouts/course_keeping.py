@@ -208,9 +208,8 @@ def step_response(
     straight = asked.changed(course_change_deg=0.0, episode_steps=steps)
     engine = Engine(fleet, len(fleet), straight, allow_unstable=allow_unstable)
     seeds = np.zeros(len(fleet), dtype=np.int64)
-    states = rollout(
-        controller, engine, seeds, record=RECORDED, show=_other_course(engine, np.radians(step_deg))
-    ).states
+    course = _other_course(engine, np.radians(step_deg))
+    states = rollout(controller, engine, seeds, record=RECORDED, show=course).states
     left = ((0, steps + 1 - len(states["psi"])), (0, 0))  # after all were lost, if they were
     heading, rudder = (
         np.pad(values, left, mode="edge").T

@@ -122,11 +122,8 @@ def tune(
                 if progress is not None:
                     progress(before + done, trials, best)
 
-            bounds = limits(found, plan.settings.total_steps)
-            jobs = [
-                {"configuration": {**plan.configuration(), "settings": settings}, "limits": bounds}
-                for _, settings in proposed
-            ]
+            whole, bounds = plan.configuration(), limits(found, plan.settings.total_steps)
+            jobs = [{"configuration": {**whole, "settings": one}, "limits": bounds} for _, one in proposed]
             results = replace(where, keep=folder / KEPT).run(training or train_trial, jobs, tell)
             for k, ((parameters, settings), result) in enumerate(zip(proposed, results, strict=True)):
                 found.append(_trial(first + k, parameters, settings, result))
