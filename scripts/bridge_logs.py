@@ -43,6 +43,7 @@ from shipgym.manoeuvres import turning_circle, zigzag  # noqa: E402
 from shipgym.sea.conditions import Current, Weather, Wind  # noqa: E402
 from shipgym.tasks.task import course_keeping_task  # noqa: E402
 from shipgym.trials.identify_table import Options  # noqa: E402
+from shipgym.trials.resampling import Log  # noqa: E402
 from shipgym.trials.sensors import GNSS, Sensor, Sensors  # noqa: E402
 from shipgym.trials.ship_file import ShipFile  # noqa: E402
 from shipgym.trials.trial_import import Conventions, to_project_conventions  # noqa: E402
@@ -124,9 +125,10 @@ def logged(run: Trial, seed: int) -> Trial:
     channels["y"] = channels["y"] - ANTENNA * np.sin(channels["psi"])
     every = slice(None, None, 2)
     channels = {name: values[every] for name, values in channels.items()}
-    t = read.t[every]
-    made, derived, *_ = to_project_conventions(t, channels, Conventions(), run.name)
-    return Trial(t, made, name=run.name, kind=run.kind, use=run.use, derived=derived, length=run.length)
+    log = Log(read.t[every], channels, run.name, [])
+    to_project_conventions(log, Conventions())
+    facts: dict[str, Any] = {"kind": run.kind, "use": run.use, "derived": log.derived, "length": run.length}
+    return Trial(log.t, log.channels, name=run.name, **facts)
 
 
 def logs_of(ship: ShipModel, seed: int) -> tuple[list[Trial], Weather]:

@@ -33,8 +33,8 @@ from numpy.typing import NDArray
 
 from shipgym.checks import check_choice, check_keys, check_table, check_text, data_only, placed
 from shipgym.envs.engine import Engine
+from shipgym.envs.environment import read_options
 from shipgym.envs.randomisation import Randomisation
-from shipgym.envs.ship_env import read_options
 from shipgym.errors import InputError
 from shipgym.files import parse_toml
 from shipgym.sea.conditions import Weather
