@@ -24,7 +24,7 @@ from agents.controllers.linear_loop import (
     compensator_margins,
     sample_ship,
 )
-from agents.controllers.memory import Flags, begun, checked_observation, deviations
+from agents.controllers.memory import Flags, begun, checked_observation, deviations, size_of
 from shipgym.errors import InputError
 from shipgym.files import write_json
 from shipgym.ships import ShipModel
@@ -275,7 +275,7 @@ class Controller(Agent):
     @property
     def memory_size(self) -> int:
         """How many numbers it remembers of each ship: in the state, never in the controller itself."""
-        return self.record.itemsize // np.dtype(np.float64).itemsize
+        return size_of(self.record)
 
     def steer(self, seen: dict[str, Floats], memory: Floats, begins: Flags) -> tuple[Floats, Floats]:
         """Commanded rudder and what is remembered next.

@@ -28,7 +28,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from agents.controllers.controller import FORMAT, Action, Agent, Controller, Policy
 from agents.controllers.lq import LQ
-from agents.controllers.memory import Flags, Floats, Records, begun, heading_error, records
+from agents.controllers.memory import Flags, Floats, Records, begun, heading_error, records, size_of
 from agents.policies.policy import LearnedPolicy
 from agents.policies.weights_file import Tensors, write_policy
 from shipgym.checks import check_number
@@ -195,7 +195,7 @@ class Shielded(Agent):
         ours, outer = self.fallback.predict(given, outer, episode_start, deterministic)
         theirs, inner = self.policy.predict(given, inner, episode_start, deterministic)
         action = np.array(theirs, dtype=np.float32)
-        watch, _ = begun(watch, episode_start, given.shape[:-1], len(WATCH))
+        watch, _ = begun(watch, episode_start, given.shape[:-1], size_of(WATCH))
         known = records(watch, WATCH)
         self._update(given, np.asarray(~np.isfinite(action).all(axis=-1)), known)
         action[..., 0] = np.where(known["steered"] > 0.0, ours[..., 0], action[..., 0])

@@ -215,7 +215,8 @@ def step_response(
         np.pad(values, left, mode="edge").T
         for values in (states["psi"] - states["set_point"], states["delta"])
     )
-    return StepResponses(np.arange(steps + 1) * engine.dt, heading, rudder)
+    t: Floats = np.arange(steps + 1, dtype=np.float64) * engine.dt
+    return StepResponses(t, heading, rudder)
 
 
 def _other_course(engine: Engine, step: float) -> Callable[[NDArray[np.float32]], NDArray[np.float32]]:
