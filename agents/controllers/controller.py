@@ -311,7 +311,7 @@ class Controller(Agent):
         self.check_fits(OBSERVATION_NAMES, observation_scales(model).tolist(), f"model '{model.name}'")
 
     def save(self, path: str | Path) -> None:
-        """Write the controller as a JSON file (format in `agents.controllers.controller_file`).
+        """Write the controller as a JSON file, whose fields are listed in docs/deployment.md.
 
         Raises
         ------

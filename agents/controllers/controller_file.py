@@ -1,21 +1,4 @@
-"""The controller file as it is read: JSON, versioned, validated field by field.
-
-Format 1:
-
-    format               1
-    kind                 "pid", "lq", ... (`agents.controllers.registry`)
-    observation_names    what it observes, in order
-    observation_scales   physical value of each observation of 1, SI units
-    gains                {name: value}, SI units; command = neutral rudder + sum of gain times signal
-    neutral_rudder       rad, positive to starboard
-    neutral_sway         m/s
-    model                {"name", "sha256"}: what it was designed on
-    margins              {name: value or null for no limit}
-    design               {name: value}: how it was designed
-    autopilot            a controller of this format; only of guidance
-    ship                 the design model (`shipgym.ships.model_file`); only of guidance that simulates it
-    arrays               {name: nested lists}; only kinds that have any, such as an observer's matrices
-"""
+"""The controller file as it is read: JSON, versioned, checked by fields (listed in docs/deployment.md)."""
 
 from __future__ import annotations
 
@@ -49,7 +32,7 @@ FIELDS = (
     "format", "kind", "observation_names", "observation_scales", "gains", "neutral_rudder", "neutral_sway",
     "model", "margins", "design",
 )  # fmt: skip
-#: Kinds whose files are described in `agents.policies.policy_file`.
+#: Kinds that `agents.policies.policy_file` reads.
 POLICIES = ("learned", "shielded", "one-for-all")
 
 

@@ -240,7 +240,7 @@ class LearnedPolicy(Agent):
         return task.observed(model)
 
     def save(self, path: str | Path) -> None:
-        """Write NAME.json and, beside it, NAME.safetensors (format in `agents.policies.policy_file`)."""
+        """Write NAME.json and, beside it, NAME.safetensors (fields in docs/policies.md)."""
         write_policy(*self.file_fields(), Path(path))
 
     def file_fields(self) -> tuple[dict[str, Any], Tensors]:

@@ -1,42 +1,4 @@
-"""The files of learned and shielded policies as they are read: NAME.json and, beside it, NAME.safetensors.
-
-They are written by `agents.policies.weights_file`. Format 1 of kind "learned":
-
-    format               1
-    kind                 "learned"
-    observation_names    what it observes, in order
-    observation_scales   physical value of each observation of 1, SI units
-    action               "rudder", "rudder-discrete" or "rudder-shaft"
-    network              {"activation": "relu" or "tanh", "output": "linear" or "tanh", "sizes": inputs, then
-                         outputs of each layer}; weights by the names layers.0.weight, layers.0.bias, ...
-    frame_stack          number of observations the network sees, the newest last
-    base                 null or a classical controller (see `controller_file.py`), whose rudder it adds to
-    authority            share of the rudder limit by which it may differ from the base
-    action_repeat        control intervals for which an output of the network is repeated
-    rate_limit           largest change of the output in force in a control interval
-    environment          {"id", "options"}: where it learned
-    model                {"name", "sha256"}: the model it learned on
-    training             how it was made: any JSON
-    weights              {"sha256"} of NAME.safetensors
-
-and of kind "shielded":
-
-    format, kind         1, "shielded"
-    policy               a controller, or a learned policy, whose weights are named policy.layers.0.weight,
-                         ...
-    fallback             a classical controller
-    dt                   control interval, s
-    envelope             null, or as in a model file
-    limits               when the fallback takes over (`agents.policies.shield.Limits`)
-    weights              as above; null where no policy has any
-
-and of kind "one-for-all" (`agents.policies.one_for_all`):
-
-    format, kind         1, "one-for-all"
-    context              of each of `CONTEXT` mean, standard deviation, least and largest in the fleet
-    decision             how long an output is repeated, times to travel a ship length
-    observation_names, network, authority, training, weights as above
-"""
+"""Files of learned and shielded policies as they are read; their fields are listed in docs/policies.md."""
 
 from __future__ import annotations
 

@@ -258,7 +258,7 @@ class Shielded(Agent):
                 check(model)
 
     def save(self, path: str | Path) -> None:
-        """Write policy and fallback as one file (format in `agents.policies.policy_file`)."""
+        """Write policy and fallback as one file (fields in docs/policies.md)."""
         write_policy(*self.file_fields(), Path(path))
 
     def file_fields(self) -> tuple[dict[str, Any], Tensors]:
