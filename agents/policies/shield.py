@@ -1,19 +1,8 @@
 """A safety shield: a policy whose rudder a fallback takes over where it leads the ship astray.
 
-It uses observations alone and takes over
-
-* where the state has been farther out of the data the model was identified from than `Limits.envelope_out`
-  for `Limits.out_lengths` (`Envelope.distance` of u, v, r and delta; a model without an envelope has no such
-  limit);
-* where the heading runs away: since she was last within `Limits.back_deg` of her course, or was turning
-  towards it, the ship has turned away from it by `Limits.runaway_deg`. Changes of the course itself do not
-  count, however large, and within `Limits.turn_lengths` of a planned turn that is observed any heading up to
-  the course beyond it is on course;
-* where the policy's command is not a number.
-
-It hands back after the ship has been within `Limits.back_deg` of her course and within
-`Limits.envelope_back` of the data for `Limits.calm_lengths` times to travel a ship length without a break.
-The limits to hand back lie inside those to take over, so that it does not chatter.
+It uses observations alone. When it takes over and hands back stands in docs/policies.md and in `Limits`; the
+limits to hand back lie inside those to take over, so that it does not chatter. Changes of the course itself
+do not count as turning away, and before a planned turn any heading up to the course beyond it is on course.
 """
 
 from __future__ import annotations
