@@ -320,6 +320,10 @@ class Controller(Agent):
         """
         write_json(self.to_dict(), Path(path))
 
+    def file_fields(self) -> tuple[dict[str, Any], dict[str, Any]]:
+        """What stands in its JSON, and its weights by name: it has none."""
+        return self.to_dict(), {}
+
     def to_dict(self) -> dict[str, Any]:
         """What the controller's file holds."""
         margins = asdict(self.margins)

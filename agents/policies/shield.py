@@ -252,7 +252,12 @@ class Shielded(Agent):
 
     def file_fields(self) -> tuple[dict[str, Any], Tensors]:
         """What stands in its JSON, and the weights of its policy by name."""
-        policy, tensors = _file_fields(self.policy)
+        if not isinstance(self.policy, Controller | LearnedPolicy | Shielded):
+            raise InputError(
+                f"policy: {type(self.policy).__name__} found, expected a learned policy or a controller of "
+                f"shipgym for a file"
+            )
+        policy, tensors = self.policy.file_fields()
         content = {
             "format": FORMAT,
             "kind": "shielded",
@@ -263,14 +268,3 @@ class Shielded(Agent):
             "limits": asdict(self.limits),
         }
         return content, {f"policy.{name}": tensor for name, tensor in tensors.items()}
-
-
-def _file_fields(policy: Policy) -> tuple[dict[str, Any], Tensors]:
-    if isinstance(policy, Controller):
-        return policy.to_dict(), {}
-    if isinstance(policy, LearnedPolicy | Shielded):
-        return policy.file_fields()
-    raise InputError(
-        f"policy: {type(policy).__name__} found, expected a learned policy or a controller of shipgym for a "
-        f"file"
-    )
