@@ -61,19 +61,15 @@ def read_controller(content: Mapping[str, Any], where: str) -> Controller:
     gains = {name: design.ranges.get(name, NUMBERS) for name in known}
     needed = {name: one for name, one in design.ranges.items() if name not in gains}
     with placed(where):
-        model = check_table(content["model"], "model")
-        check_keys(model, ("name", "sha256"), "model")
-        check_keys(check_table(content["gains"], "gains"), known, "gains")
         return design(
-            gains=_numbers(content["gains"], gains, "gains"),
+            gains=_numbers(check_table(content["gains"], "gains", known), gains, "gains"),
             neutral_rudder=_number(content["neutral_rudder"], RUDDER, "neutral_rudder"),
             neutral_sway=_number(content["neutral_sway"], NUMBERS, "neutral_sway"),
             margins=_margins(content["margins"]),
             observation_scales=read_scales(content["observation_scales"], observes),
-            model_name=check_text(model.get("name"), "model.name"),
-            model_sha256=check_text(model.get("sha256"), "model.sha256"),
             design=_numbers(content["design"], needed, "design"),
             observation_names=observes,
+            **read_model(content["model"]),
             **_arrays(content.get("arrays", {}), design.arrays),
             **_parts(content, design),
         )
@@ -94,8 +90,7 @@ def _parts(content: Mapping[str, Any], design: type[Controller]) -> dict[str, An
 
 def _arrays(value: Any, axes: Mapping[str, tuple[str | int, ...]]) -> dict[str, Any]:
     """Arrays of numbers, whose axes of one name have one length."""
-    table = check_table(value, "arrays")
-    check_keys(table, tuple(axes), "arrays", axes)
+    table = check_table(value, "arrays", axes, axes)
     lengths: dict[str | int, int] = {}
     arrays = {}
     for name, named in axes.items():
@@ -109,6 +104,12 @@ def _arrays(value: Any, axes: Mapping[str, tuple[str | int, ...]]) -> dict[str, 
             )
         arrays[name] = array
     return arrays
+
+
+def read_model(value: Any) -> dict[str, Any]:
+    """Name and hash of the model that an agent was made for, as its fields."""
+    table = check_table(value, "model", ("name", "sha256"))
+    return {f"model_{name}": check_text(table.get(name), f"model.{name}") for name in ("name", "sha256")}
 
 
 def read_scales(value: Any, names: tuple[str, ...]) -> tuple[float, ...]:
@@ -138,8 +139,7 @@ def _numbers(value: Any, needed: Mapping[str, Range], where: str) -> dict[str, f
 def _margins(value: Any) -> Margins:
     """Margins; null is no limit."""
     names = dict.fromkeys((margin.name for margin in fields(Margins)), ANY)
-    table = check_table(value, "margins")
-    check_keys(table, names, "margins")
+    table = check_table(value, "margins", names)
     finite = {name: 0.0 if number is None else number for name, number in table.items()}
     known = _numbers(finite, names, "margins")
     return Margins(**{name: np.inf if table[name] is None else known[name] for name in names})

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from agents.controllers.controller import FORMAT, Controller, check_names
-from agents.controllers.controller_file import read_controller, read_scales
+from agents.controllers.controller_file import read_controller, read_model, read_scales
 from agents.policies.network import Layer, Network
 from agents.policies.one_for_all import CONTEXT, ONE_FOR_ALL, OneForAll
 from agents.policies.policy import NO_LIMIT, LearnedPolicy
@@ -57,8 +57,7 @@ def read_policy(content: Mapping[str, Any], path: Path) -> LearnedPolicy | Shiel
     content = _checked(content, where, ("weights",))
     tensors: Tensors = {}
     if content["weights"] is not None:
-        table = check_table(content["weights"], f"{where}: weights")
-        check_keys(table, ("sha256",), f"{where}: weights")
+        table = check_table(content["weights"], f"{where}: weights", ("sha256",))
         sha256 = check_text(table.get("sha256"), f"{where}: weights.sha256")
         tensors = read_weights(weights_path(path), sha256, path)
     with placed(where):
@@ -83,10 +82,7 @@ def _checked(content: Mapping[str, Any], where: str, more: tuple[str, ...] = ())
 def _learned(content: Mapping[str, Any], tensors: Tensors, prefix: str) -> LearnedPolicy:
     """A learned policy; its weights are taken out of `tensors`."""
     names = _names(content["observation_names"])
-    place = check_table(content["environment"], "environment")
-    check_keys(place, ("id", "options"), "environment")
-    model = check_table(content["model"], "model")
-    check_keys(model, ("name", "sha256"), "model")
+    place = check_table(content["environment"], "environment", ("id", "options"))
     return LearnedPolicy(
         network=_network(content["network"], tensors, prefix),
         observation_names=names,
@@ -95,8 +91,7 @@ def _learned(content: Mapping[str, Any], tensors: Tensors, prefix: str) -> Learn
         base=None if content["base"] is None else _controller(content, "base"),
         env_id=check_text(place.get("id"), "environment.id"),
         env_options=dict(check_table(place.get("options"), "environment.options")),
-        model_name=check_text(model.get("name"), "model.name"),
-        model_sha256=check_text(model.get("sha256"), "model.sha256"),
+        **read_model(content["model"]),
         training=dict(check_table(content["training"], "training")),
     )
 
@@ -123,8 +118,7 @@ def _shielded(content: Mapping[str, Any], tensors: Tensors, prefix: str) -> Shie
 
 def _for_all(content: Mapping[str, Any], tensors: Tensors, prefix: str) -> OneForAll:
     """A policy for all ships; its weights are taken out of `tensors`."""
-    told = check_table(content["context"], "context")
-    check_keys(told, CONTEXT, "context", CONTEXT)
+    told = check_table(content["context"], "context", CONTEXT, CONTEXT)
     return OneForAll(
         network=_network(content["network"], tensors, prefix),
         observation_names=_names(content["observation_names"]),
@@ -146,8 +140,7 @@ def _controller(content: Mapping[str, Any], name: str) -> Controller:
 
 
 def _network(value: Any, tensors: Tensors, prefix: str) -> Network:
-    table = check_table(value, "network")
-    check_keys(table, ("activation", "output", "sizes"), "network")
+    table = check_table(value, "network", ("activation", "output", "sizes"))
     sizes = table.get("sizes")
     if not isinstance(sizes, list) or len(sizes) < 2:
         raise InputError(f"network.sizes: {sizes!r} found, expected a list of two numbers or more")

@@ -215,8 +215,7 @@ def _options(table: Mapping[str, Any], where: str) -> dict[str, Any]:
 
 
 def _task(name: str, value: Any, where: str) -> BenchmarkTask:
-    table = check_table(value, where)
-    check_keys(table, FIELDS, where)
+    table = check_table(value, where, FIELDS)
     environment, model = (check_text(table.get(one), f"{where}.{one}") for one in ("environment", "model"))
     data_only(table, where)
     sea = {"sea": table["sea"]} if "sea" in table else {}
