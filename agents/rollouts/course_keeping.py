@@ -177,16 +177,12 @@ def step_response(
     ----------
     controller : Policy
         Anything with `predict`.
-    models : ShipModel or sequence of ShipModel
-        Of one structure.
+    models, task, allow_unstable
+        As in `sail`; of the task its control interval and bounds are used.
     step_deg : float
         Change of course, degrees, positive to starboard.
     duration : float, optional
         In s; by default the time to travel 16 ship lengths.
-    task : Task, optional
-        Its control interval and bounds are used.
-    allow_unstable : bool
-        As in `sail`.
 
     Returns
     -------
