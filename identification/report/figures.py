@@ -72,13 +72,10 @@ def fit_figure(fit: Fit) -> Figure:
         factor = (np.degrees(1.0) if q in "rp" else 1.0) / samples.duration
         measured = (samples.targets[q] * factor)[drawn]
         explained = (estimator.predict(samples.features[q]) * factor)[drawn]
-        courses = [
-            np.insert(values, breaks, np.nan) for values in (measured, explained)
-        ]  # gaps between trials
-        windows = np.arange(len(courses[0]))
-        lines = [
-            line(windows, courses[0], "trials", MEASURED, 1.2),
-            line(windows, courses[1], "regression", MODEL, 1.7),
+        courses = (measured, "trials", MEASURED, 1.2), (explained, "regression", MODEL, 1.7)
+        windows = np.arange(len(measured) + len(breaks))
+        lines = [  # with gaps between the trials
+            line(windows, np.insert(values, breaks, np.nan), *style) for values, *style in courses
         ]
         ends = [min(measured.min(), explained.min()), max(measured.max(), explained.max())]
         cloud = [
