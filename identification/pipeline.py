@@ -25,8 +25,7 @@ from identification.uncertainty.bootstrap import bootstrap_covariance, influence
 from identification.uncertainty.covariance import coefficient_covariance, joint_covariance
 from identification.uncertainty.model_error import FEWEST_TRIALS, model_error, without_trial
 from identification.validation.diagnostics import diagnose
-from identification.validation.guard import reasons_unstable
-from identification.validation.guarded_fit import GuardedFit, guarded_fit, with_coefficients
+from identification.validation.guard import GuardedFit, guarded_fit, reasons_unstable, with_coefficients
 from identification.validation.prediction import predict, trial_metrics
 from identification.validation.selection import select
 from shipgym.arrays import Floats
@@ -89,8 +88,15 @@ def identify(
         return _identified_mmg(trials, checked_mmg(asked), particulars, steering)
     chosen = get_method(method)
     problem = pose(trials, asked, particulars, steering)
-    fit, refined = _fitted(chosen, asked, problem)
-    provenance = _fitted_provenance(asked, chosen, fit, refined, problem)
+    fit, refined, of_method = _fitted(chosen, asked, problem)
+    provenance = _provenance(asked, chosen.name, of_method, fit, problem)
+    if asked.prior is not None:
+        prior = getattr(next(iter(fit.estimators.values()), None), "prior_", {})
+        provenance |= {"prior": name_of(asked.prior), **prior}
+    if refined is not None:
+        provenance["refinement"] = refined.report
+    if asked.uncertainty != "analytic":
+        provenance["uncertainty"] = asked.uncertainty
     covariance = _scaled_covariance(asked, fit, refined, problem, provenance)
     return _evaluated(replace(fit.model, covariance=covariance), fit, problem, provenance)
 
@@ -158,38 +164,39 @@ def _simulated(model: ShipModel, estimators: dict[str, Estimator], used: Sequenc
     return GuardedFit(model, estimators, not reasons, report)
 
 
-def _fitted(method: Method, options: Options, problem: Problem) -> tuple[GuardedFit, Refined | None]:
-    """Fit, guard and refine."""
+def _fitted(
+    method: Method, options: Options, problem: Problem
+) -> tuple[GuardedFit, Refined | None, dict[str, Any]]:
+    """Fit, guard and refine; also the settings of the method alone."""
     task = FitTask(problem.samples, problem.blank, problem.used)
     if options.prior is not None:
         method = with_prior(method, options.prior, options.prior_strength, task.blank, options.prior_folds)
     refinement, settings = split_settings(options.settings(), method.refined)
     fit = guarded_fit(method, settings, task, options.guarded)
     if refinement is None:
-        return fit, None
+        return fit, None, settings
     refined = refine(fit, task, refinement, MEMORY * task.blank.travel_time)
-    return refined.fit, refined
+    return refined.fit, refined, settings
 
 
 def _provenance(
     options: Options, method: str, settings: Mapping[str, Any], fit: GuardedFit, problem: Problem
 ) -> dict[str, Any]:
     """How a model came about, for its file; `settings`: of the method."""
-    box, samples = problem.table, problem.samples
-    reference = {}
+    box, further = problem.table, {}
     if isinstance(box, GreyBox):
-        reference["reference"] = {"name": box.ship.name, "similarity": problem.similarity, "shaft": box.shaft}
-    searched = {q: m.chosen_ for q, m in fit.estimators.items() if hasattr(m, "chosen_")}
+        further["reference"] = {"name": box.ship.name, "similarity": problem.similarity, "shaft": box.shaft}
+    if searched := {q: m.chosen_ for q, m in fit.estimators.items() if hasattr(m, "chosen_")}:
+        further["search"] = searched
     return {
         "structure": name_of(options.structure),
         "method": method,
         "samples": options.samples,
         "settings": provenance_settings(options, settings),
-        **reference,
+        **further,
         "software": f"shipgym {shipgym.__version__}",
-        "steps_per_window": samples.window,
+        "steps_per_window": problem.samples.window,
         "ranks": {q: int(getattr(m, "rank_", len(m.coef_))) for q, m in fit.estimators.items()},
-        **({"search": searched} if searched else {}),
         "guard": fit.report,
         "stable": fit.stable,
         "trials": [
@@ -198,22 +205,6 @@ def _provenance(
             for trial in problem.used
         ],
     }
-
-
-def _fitted_provenance(
-    options: Options, method: Method, fit: GuardedFit, refined: Refined | None, problem: Problem
-) -> dict[str, Any]:
-    """How a model that was fitted by regression came about."""
-    _, of_method = split_settings(options.settings(), method.refined)
-    found = _provenance(options, method.name, of_method, fit, problem)
-    if options.prior is not None:
-        prior = next(iter(getattr(estimator, "prior_", {}) for estimator in fit.estimators.values()), {})
-        found |= {"prior": name_of(options.prior), **prior}
-    if refined is not None:
-        found["refinement"] = refined.report
-    if options.uncertainty != "analytic":
-        found["uncertainty"] = options.uncertainty
-    return found
 
 
 def _scaled_covariance(

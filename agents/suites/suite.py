@@ -31,19 +31,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from shipgym.checks import (
-    check_choice,
-    check_keys,
-    check_table,
-    check_text,
-    data_only,
-    did_you_mean,
-    placed,
-    quoted,
-)
+from shipgym.checks import check_choice, check_keys, check_table, check_text, data_only, placed
 from shipgym.envs.engine import Engine
+from shipgym.envs.environment import read_options
 from shipgym.envs.randomisation import Randomisation
-from shipgym.envs.ship_env import read_options
 from shipgym.errors import InputError
 from shipgym.files import parse_toml
 from shipgym.sea.conditions import Weather
@@ -152,12 +143,7 @@ class Suite:
         Raises InputError for an unknown name, with the nearest known one.
         """
         known = {task.name: task for task in self.tasks}
-        if name not in known:
-            raise InputError(
-                f"task: '{name}' found, expected one of suite '{self.name}': {quoted(known)}."
-                f"{did_you_mean(name, known)}"
-            )
-        return known[name]
+        return known[check_choice(name, known, f"suite '{self.name}': task")]
 
 
 def list_suites() -> list[str]:
@@ -248,8 +234,7 @@ def _options(table: Mapping[str, Any], where: str) -> dict[str, Any]:
 def _task(name: str, value: Any, where: str) -> BenchmarkTask:
     table = check_table(value, where)
     check_keys(table, FIELDS, where)
-    for needed in ("environment", "model"):
-        check_text(table.get(needed), f"{where}.{needed}")
+    environment, model = (check_text(table.get(one), f"{where}.{one}") for one in ("environment", "model"))
     data_only(table, where)
     sea = {"sea": table["sea"]} if "sea" in table else {}
     options = _options({**check_table(table.get("options", {}), f"{where}.options"), **sea}, where)
@@ -257,6 +242,4 @@ def _task(name: str, value: Any, where: str) -> BenchmarkTask:
     if table.get("far") and not behind:
         raise InputError(f"{where}.far: found without a ship, expected `ship`, the one behind the model")
     with placed(where):
-        return BenchmarkTask(
-            name, table["environment"], table["model"], table.get("why", ""), options, behind
-        )
+        return BenchmarkTask(name, environment, model, table.get("why", ""), options, behind)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
@@ -25,21 +26,13 @@ class HeldOut:
 
     @classmethod
     def of(cls, task: BenchmarkTask, first: int, number: int, threads: int = 1) -> HeldOut:
-        """The episodes with seeds from `first` on."""
-        engine, seeds = task.engine(number, threads=threads), first + np.arange(number)
-        return cls(engine, seeds, _lq_cost(task, engine, seeds))
+        """The episodes with seeds from `first` on; LQ follows paths by the course that the task shows."""
+        engine, seeds, cost = task.engine(number, threads=threads), first + np.arange(number), None
+        if task.task.action == "rudder":
+            with suppress(InputError):
+                cost = float(episode_costs(design("lq", task), engine, seeds).mean())
+        return cls(engine, seeds, cost)
 
     def cost(self, policy: Policy) -> float:
         """Mean cost of a policy."""
         return float(episode_costs(policy, self.engine, self.seeds).mean())
-
-
-def _lq_cost(task: BenchmarkTask, engine: Engine, seeds: NDArray[np.int64]) -> float | None:
-    """Of the course autopilot, which follows paths by the course that the environment shows."""
-    if task.task.action != "rudder":
-        return None
-    try:
-        controller = design("lq", task)
-    except InputError:
-        return None
-    return float(episode_costs(controller, engine, seeds).mean())

@@ -27,8 +27,7 @@ def measured_wind(trial: Trial, particulars: Particulars, option: str | Mapping[
 
     `option`: coefficients as in `shipgym.sea.Wind`, or a table of ``coefficients``, by name or a table
     themselves, and ``relative``: whether speed and direction are those felt on board, the latter from the
-    bow. Velocities through the water are completed by a current in columns. Raises InputError for particulars
-    from which no areas follow, and for an option that is not known.
+    bow. Velocities through the water are completed by a current in columns.
     """
     table = dict(option) if isinstance(option, Mapping) else {"coefficients": option}
     check_keys(table, ("coefficients", "relative"), "wind")
@@ -56,8 +55,7 @@ def measured_wind(trial: Trial, particulars: Particulars, option: str | Mapping[
 def constant_wind(trials: Sequence[Trial], samples: Samples, structure: str) -> dict[str, dict[str, float]]:
     """The constant sway and yaw acceleration that the regression of each trial asks for, by its name.
 
-    `samples` are those of the trials; a constant of the structure's own takes their mean. Raises InputError
-    for the MMG form, which has no regression.
+    A constant of the structure's own takes their mean. The MMG form has no regression: InputError.
     """
     if structure == MMG:
         raise InputError(

@@ -256,7 +256,8 @@ def _resistance(ship: Particulars) -> float:
 
 def _self_propulsion(c: Mapping[str, float], ship: Particulars) -> float:
     """Speed n D_P / U0 at which thrust balances resistance at service speed."""
-    _, _, _, _, D_P, _, _, propellers = dimensions(ship)
+    known = dimensions(ship)
+    D_P, propellers = known["D_P"], known["propellers"]
     inflow = 1.0 - c["w_P0"]
     thrust = (1.0 - c["t_P"]) * propellers * D_P**2 * c["thrust"]
     needed = c["R_0"] * 0.5 * ship.length * ship.require("draught") / thrust

@@ -29,8 +29,7 @@ from identification.simulation_error.segments import (
     cut,
 )
 from identification.uncertainty.covariance import newey_west
-from identification.validation.guard import reasons_unstable
-from identification.validation.guarded_fit import GuardedFit
+from identification.validation.guard import GuardedFit, reasons_unstable
 from shipgym.arrays import Floats
 from shipgym.checks import check_choice, check_number
 from shipgym.errors import InputError

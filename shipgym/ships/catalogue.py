@@ -13,10 +13,7 @@ from shipgym.ships import kvlcc2 as kvlcc2_file
 from shipgym.ships import tanker as tanker_file
 from shipgym.ships.equations import ShipEquations, read_ship_equations
 from shipgym.ships.mariner import mariner
-from shipgym.ships.particulars import Particulars
-from shipgym.ships.pmm import TABLE_11, XU
 from shipgym.ships.ship_model import ShipModel
-from shipgym.ships.steering import SteeringGear
 from shipgym.ships.structures import EQUATIONS, SHIPPED_EQUATIONS, list_structures
 
 LIBRARY = Path(__file__).parent / "library"
@@ -68,15 +65,6 @@ def kvlcc2_l7(form: Form = "published") -> ShipModel:
     """KVLCC2 as a model of 7 m; `form` as in `kvlcc2`."""
     model = model_of(kvlcc2_file.SHIP, {"PACKAGE_FORM": float(form == "shipmmg")})
     return replace(model, name="kvlcc2-l7", provenance={"source": kvlcc2_file.SHIP.source, "form": form})
-
-
-def xu_ship(particulars: Particulars) -> ShipModel:
-    """The ship towed at SINTEF Ocean, of Table 11 in `shipgym.ships.pmm`; the paper prints no particulars.
-
-    She has neither rudder nor propeller.
-    """
-    source = {"source": f"{XU}, Table 11"}
-    return ShipModel("xu-2020", "pmm18", particulars, SteeringGear(), TABLE_11, provenance=source)
 
 
 REFERENCE_SHIPS: dict[str, Callable[[], ShipModel]] = {

@@ -10,6 +10,7 @@ from shipgym.checks import check_whole
 from shipgym.engine.loops import ship_loop
 from shipgym.engine.passages import SEA_CHANNELS
 from shipgym.engine.records import leaves
+from shipgym.errors import UnstableModelError
 from shipgym.sea.conditions import Weather
 from shipgym.sea.open_sea import Sea
 from shipgym.sea.weather_column import as_weather, weather_column
@@ -36,7 +37,7 @@ class Passage:
     """
 
     def __init__(self, model: ManoeuvringModel, conditions: Conditions, dt: float) -> None:
-        self.vessel = model.vessel
+        self.model, self.vessel, self.dt = model, model.vessel, dt
         self.numbers = model.ship_numbers(conditions.water_depth)
         weather = as_weather(conditions.weather, "weather")
         self.windy = not weather.calm
@@ -48,6 +49,18 @@ class Passage:
     def loop(self, name: str) -> Any:
         """A loop of `shipgym.engine.loops`, compiled for the ship and for calm water or weather."""
         return ship_loop(self.vessel, name, self.windy)
+
+    def run(self, name: str, states: Floats, *arguments: Any, since: float = 0.0) -> Any:
+        """Fill the states after the first by a loop, from its arguments but for the sea and the ship.
+
+        Returns what the loop returns: the last row, or that and more. Raises UnstableModelError where the
+        ship leaves every physical range, `since` s after the manoeuvre began.
+        """
+        found = self.loop(name)(states, *arguments, *self.sea, self.numbers)
+        reached = found[0] if isinstance(found, tuple) else found
+        if reached < len(states) - 1:
+            raise unstable(self.model, since + self.dt * reached, states[reached])
+        return found
 
     def states(self, first: Floats, n_steps: int) -> Floats:
         """Rows for `n_steps` + 1 states, shape (n_columns,) each, and their weather; `first` filled in."""
@@ -64,3 +77,16 @@ def _first_word(seed: Seed) -> np.uint64:
     if not isinstance(seed, np.random.Generator):
         check_whole(seed, "seed", at_least=0)
     return np.uint64(np.random.default_rng(seed).integers(2**63))
+
+
+def unstable(model: ManoeuvringModel, time_s: float, state: Floats) -> UnstableModelError:
+    """The error for a ship that ran away after a given time and physical state."""
+    last = dict(zip(model.state_names, state.tolist(), strict=False))
+    heel = f", phi = {np.degrees(last['phi']):.3g} deg" if "phi" in last else ""
+    long = "" if time_s > 0.0 else ", or the step is far too long for it"
+    return UnstableModelError(
+        f"model {model.name!r} runs away after {time_s:.1f} s (u = {last['u']:.3g} m/s, "
+        f"v = {last['v']:.3g} m/s, r = {np.degrees(last['r']):.3g} deg/s{heel}): it is unstable there{long}",
+        time_s,
+        last,
+    )

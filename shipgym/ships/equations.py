@@ -9,10 +9,13 @@ import importlib
 import importlib.util
 import math
 import sys
+import tomllib
 import traceback
+from collections import namedtuple
 from collections.abc import Callable, Mapping
 from dataclasses import KW_ONLY, dataclass, field
 from functools import cache
+from importlib.resources import files
 from pathlib import Path
 from types import ModuleType
 from typing import Any, ClassVar
@@ -24,13 +27,25 @@ from shipgym.checks import check_number, check_text
 from shipgym.engine.motion import Motion, Ship
 from shipgym.engine.parts import Part
 from shipgym.engine.records import Record, field_types, is_record
-from shipgym.engine.vessel import Vessel
+from shipgym.engine.vessel import Vessel, vessel_of
 from shipgym.errors import InputError
 from shipgym.ships.particulars import Particulars
 from shipgym.ships.steering import SteeringGear
 
 RATES = ("udot", "vdot", "rdot", "pdot", "qdot")
 Accelerations = Callable[[Any, Any, Any], tuple[float, float, float, float, float]]
+
+
+def published(ship: str) -> dict[str, Any]:
+    """The coefficients in the file `ship`.toml beside this one."""
+    return tomllib.loads(files("shipgym.ships").joinpath(f"{ship}.toml").read_text("utf-8"))
+
+
+def record_of(values: Mapping[str, float], module: str) -> Any:
+    """A record of coefficients with these values as defaults, for the file of a ship."""
+    record = namedtuple("Coefficients", values, defaults=[*values.values()], module=module)
+    record.__annotations__ = dict.fromkeys(values, float)
+    return record
 
 
 @dataclass(frozen=True)
@@ -139,9 +154,11 @@ class ShipEquations:
 
     def vessel(self, coefficients: Mapping[str, float], lag: bool) -> Vessel:
         """What is compiled of the ship: the same whatever her coefficients are, but for the switches."""
-        chosen = tuple((name, bool(coefficients[name])) for name in self.switches)
-        functions = (self.accelerations, self.shaft_acceleration)
-        return _vessel(self.name, self.state_names, self.coefficients_record, functions, chosen, lag)
+        parts: dict[str, Any] = {"accelerations": Part(self.accelerations)}
+        parts |= {name: bool(coefficients[name]) for name in self.switches}
+        if self.shaft_acceleration is not None:
+            parts["shaft_acceleration"] = Part(self.shaft_acceleration)
+        return vessel_of(self.name, self.state_names, self.coefficients_record, tuple(parts.items()), lag)
 
     def numbers(
         self, coefficients: Mapping[str, float], particulars: Particulars, shaft_speed: float = 0.0
@@ -152,22 +169,6 @@ class ShipEquations:
     def to_dict(self) -> dict[str, Any]:
         """As they stand in a model file."""
         return {"name": self.name, "source": self.source}
-
-
-@cache
-def _vessel(
-    name: str,
-    state_names: tuple[str, ...],
-    record: Record,
-    functions: tuple[Callable[..., Any], Callable[..., Any] | None],
-    switches: tuple[tuple[str, bool], ...],
-    lag: bool,
-) -> Vessel:
-    accelerations, shaft = functions
-    parts: dict[str, Any] = {"accelerations": Part(accelerations), **dict(switches)}
-    if shaft is not None:
-        parts["shaft_acceleration"] = Part(shaft)
-    return Vessel(name, state_names, record, parts, lag)
 
 
 def read_ship_equations(path: str | Path) -> ShipEquations:

@@ -116,13 +116,8 @@ class ManoeuvringModel:
         Raises InputError for water that is too shallow, and for particulars that the structure cannot use.
         """
         self.check_depth(water_depth)
-        p, gear = self.particulars, self.steering
-        ship = Ship(
-            length=p["length"], speed=p["speed"], rudder_limit=gear.limit, rudder_rate=gear.rate,
-            gear_frequency=1.0 / gear.time_constant if gear.time_constant else 0.0,
-            shaft=self.service_shaft_speed, water_depth=water_depth, scale_speed=p["speed"],
-        )  # fmt: skip
-        return np.concatenate([ship, self.dynamics.numbers(self.coefficients, p, self.service_shaft_speed)])
+        own = self.dynamics.numbers(self.coefficients, self.particulars, self.service_shaft_speed)
+        return np.concatenate([ship_of(self, water_depth), own])
 
     @property
     def state_names(self) -> tuple[str, ...]:
@@ -274,3 +269,13 @@ def _within(values: Floats, low: float, high: float, what: str, expected: str, w
     if len(wrong):
         row = int(wrong[0])
         raise InputError(f"{where}: row {row}: {what} {values[row]:g} found, expected {expected}")
+
+
+def ship_of(model: ManoeuvringModel, water_depth: float = np.inf) -> Ship:
+    """What every ship has beside her coefficients, as a record."""
+    gear, p = model.steering, model.particulars
+    return Ship(
+        length=p["length"], speed=p["speed"], rudder_limit=gear.limit, rudder_rate=gear.rate,
+        gear_frequency=1.0 / gear.time_constant if gear.time_constant else 0.0,
+        shaft=float(model.service_shaft_speed), water_depth=water_depth, scale_speed=p["speed"],
+    )  # fmt: skip

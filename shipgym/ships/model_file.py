@@ -55,8 +55,9 @@ from shipgym.ships.manoeuvring_model import FORMAT, ManoeuvringModel
 from shipgym.ships.particulars import Particulars
 from shipgym.ships.shared_structure import ACCELERATIONS, AXES, SharedStructure
 from shipgym.ships.steering import SteeringGear
-from shipgym.ships.structures import EQUATION_NAMES, EQUATIONS, SHIPPED_EQUATIONS, SYMBOLS, Structure
-from shipgym.ships.terms import MOST_TERMS
+from shipgym.ships.structures import EQUATIONS, SHIPPED_EQUATIONS
+from shipgym.ships.term_table import EQUATION_NAMES, Structure
+from shipgym.ships.terms import MOST_TERMS, SYMBOLS
 
 Model = TypeVar("Model", bound=ManoeuvringModel)
 

@@ -10,17 +10,10 @@ from shipgym.arrays import Floats
 from shipgym.checks import check_number
 from shipgym.errors import InputError
 from shipgym.ships.envelope import Envelope
-from shipgym.ships.particulars import Particulars
+from shipgym.ships.particulars import BOUNDS, Particulars
 from shipgym.ships.ship_model import ShipModel
 from shipgym.ships.steering import SteeringGear
 from shipgym.ships.term_table import Structure
-
-#: Powers of the length with which the particulars grow; those without unit stay.
-GROWTH = {
-    "beam": 1, "draught": 1, "xg": 1, "yaw_gyradius": 1, "rudder_area": 2, "propeller_diameter": 1,
-    "length_overall": 1, "frontal_area": 2, "lateral_area": 2, "lateral_centroid": 1,
-    "lateral_centroid_height": 1, "metacentric_height": 1, "roll_period": 0.5,
-}  # fmt: skip
 
 
 def scale_model(
@@ -95,7 +88,8 @@ def _coefficient_factors(table: Structure, size: float, fast: float) -> dict[str
 
 
 def _particulars(ship: Particulars, size: float, speed: float, water_density: float | None) -> Particulars:
-    changes = {name: ship[name] * size**power for name, power in GROWTH.items() if ship[name] is not None}
+    growth = {name: given["growth"] for name, given in BOUNDS.items() if "growth" in given}
+    changes = {name: ship[name] * size**power for name, power in growth.items() if ship[name] is not None}
     density = ship.water_density if water_density is None else water_density
     if ship.mass is not None:
         denser = 1.0 if water_density is None else water_density / ship.require("water_density")

@@ -8,9 +8,9 @@ from numpy.typing import ArrayLike
 from shipgym.arrays import Floats
 from shipgym.engine.loops import ship_loop
 from shipgym.engine.passages import SEA_CHANNELS
-from shipgym.errors import InputError, UnstableModelError
+from shipgym.errors import InputError
 from shipgym.sea.conditions import Weather
-from shipgym.ships.conditions import Conditions, Passage, Seed
+from shipgym.ships.conditions import Conditions, Passage, Seed, unstable
 from shipgym.ships.manoeuvring_model import ManoeuvringModel, checked_orders, two_commands
 from shipgym.ships.term_table import Structure
 from shipgym.trials.trial import Trial
@@ -36,11 +36,8 @@ def simulate(
         raise InputError(f"dt: {dt} found, expected a step in s above 0")
     passage = Passage(model, Conditions(water_depth, weather, seed), dt)
     states = passage.states(initial_state(model, state), len(held))
-    reached = passage.loop("simulate")(states, two_commands(held), dt, *passage.sea, passage.numbers)
-    times = dt * np.arange(len(states), dtype=float)
-    if reached < len(held):
-        raise unstable(model, times[reached], states[reached])
-    return as_trial(model, times, states, np.vstack([held, held[-1:]]), kind)
+    passage.run("simulate", states, two_commands(held), dt)
+    return as_trial(model, dt, states, np.vstack([held, held[-1:]]), kind)
 
 
 def open_loop(model: ManoeuvringModel, trial: Trial) -> Trial:
@@ -62,7 +59,7 @@ def open_loop(model: ManoeuvringModel, trial: Trial) -> Trial:
     first = [trial[name][0] if name in trial.channels else 0.0 for name in model.state_names]
     n = np.array(trial["n"]) if "n" in trial.channels else np.zeros(len(t))
     states[0] = _settled(model, np.array([first]), n[:1])[0]
-    longest_step = LONGEST_STEP * model.particulars["length"] / model.particulars["speed"]
+    longest_step = LONGEST_STEP * model.travel_time
     wind = wind_accelerations(trial, model.dynamics)
     wind = 0.5 * (wind[1:] + wind[:-1])
     loop = ship_loop(model.vessel, "open_loop", bool(wind.any()))
@@ -94,9 +91,9 @@ def initial_state(model: ManoeuvringModel, state: ArrayLike | None) -> Floats:
 
 
 def as_trial(
-    model: ManoeuvringModel, t: Floats, states: Floats, commands: Floats, kind: str | None = None
+    model: ManoeuvringModel, dt: float, states: Floats, commands: Floats, kind: str | None = None
 ) -> Trial:
-    """States, the weather behind them and the commands held from each sample on as a Trial."""
+    """States dt apart, the weather behind them and the commands held from each sample on as a Trial."""
     channels = _channels(model, states)
     for name, values in zip(SEA_CHANNELS, states[:, len(model.state_names) :].T, strict=False):
         if name not in ("phi_wave", "p_wave") or "phi" in model.state_names:
@@ -105,6 +102,7 @@ def as_trial(
         channels[f"{name}_command"] = command
         if name == "n":  # a shaft without lag turns as ordered, and is part of the record
             channels.setdefault("n", command)
+    t = dt * np.arange(len(states), dtype=float)
     return Trial(t, channels, name=model.name, kind=kind, length=model.particulars["length"])
 
 
@@ -121,16 +119,3 @@ def _settled(model: ManoeuvringModel, states: Floats, shaft: Floats) -> Floats:
         rates = model.derivatives(states, commands)
         states[:, model.state_names.index("q")] = -rates[:, model.state_names.index("r")]
     return states
-
-
-def unstable(model: ManoeuvringModel, time_s: float, state: Floats) -> UnstableModelError:
-    """The error for a ship that ran away after a given time and physical state."""
-    last = dict(zip(model.state_names, state.tolist(), strict=False))
-    heel = f", phi = {np.degrees(last['phi']):.3g} deg" if "phi" in last else ""
-    long = "" if time_s > 0.0 else ", or the step is far too long for it"
-    return UnstableModelError(
-        f"model {model.name!r} runs away after {time_s:.1f} s (u = {last['u']:.3g} m/s, "
-        f"v = {last['v']:.3g} m/s, r = {np.degrees(last['r']):.3g} deg/s{heel}): it is unstable there{long}",
-        time_s,
-        last,
-    )

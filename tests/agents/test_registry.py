@@ -12,8 +12,8 @@ from agents import LQ, benchmark, check_controller, load_agent, register_control
 from agents.cli import app
 from agents.controllers import registry
 from agents.controllers.controller import Controller
+from agents.controllers.designs import design_base
 from agents.suites.suite import load_suite
-from agents.training.bases import design_base
 from shipgym import load_model
 from shipgym.errors import InputError
 

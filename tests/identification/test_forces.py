@@ -6,14 +6,13 @@ from functools import cache
 
 import numpy as np
 import pytest
+from papers.xu2020_tank import PMM18, PMM38, TABLE_11, xu_ship
 
 import shipgym
 from identification import identify
 from identification.regression.forces import force_regression, identify_forces
 from shipgym import InputError, Particulars, ShipModel, Trial
 from shipgym.manoeuvres.towing_tank import Tank, pure_surge, pure_sway, pure_yaw, static_drift, yaw_with_drift
-from shipgym.ships.catalogue import xu_ship
-from shipgym.ships.pmm import PMM18, PMM38, TABLE_11
 from shipgym.ships.shared_structure import read_shares, shared_structure
 from shipgym.ships.structures import get_structure
 

@@ -80,9 +80,7 @@ def test_isherwoods_superstructure_is_felt_on_the_quarter_only():
 
 def test_published_tables_keep_their_numbers():
     """Sums of the columns of Isherwood's three tables and of Blendermann's."""
-    found = [
-        table.sum(axis=0).round(6).tolist() for table in (wind_tables._CX, wind_tables._CY, wind_tables._CN)
-    ]
+    found = [table.sum(axis=0).round(6).tolist() for table in wind_tables.ISHERWOOD.values()]
     assert found == [
         [6.664, -13.63, 0.929, -0.633, -2.477, 4.63, 0.115],
         [11.104, 7.43, 1.686, 0.003, -1.283, -7.54, 1.43],

@@ -105,7 +105,7 @@ def test_states_that_do_not_fit_are_refused_and_change_nothing():
         (states[0], "state: task 'PathFollowing' found, expected 'PathFollowing-v1': .* same version"),
         (states[1], "state: model 'mariner-tls-svm' found, expected 'mariner'"),
         (states[2], "state: states of shape"),
-        (states[3], "state: unknown key 'row_keys'"),
+        (states[3], "state: unknown key 'some_over'"),
         (broken, "state: motion.x in row 0 is not finite"),
         (blind, "state: observations are not finite"),
         (
@@ -113,7 +113,7 @@ def test_states_that_do_not_fit_are_refused_and_change_nothing():
             "state: made_for: 3 found, expected a table",
         ),
         ({**state, "asked": "x"}, "state: asked: 'x' found, expected a table"),
-        ({**state, "key": "x"}, "state: key 'x' found"),
+        ({**state, "row_keys": "x"}, "state: row_keys 'x' found"),
         ({}, "state: field 'asked' is missing"),
         (3, "state: 3 found, expected a table"),
     ]:
