@@ -116,7 +116,7 @@ def _bars(lags: NDArray[Any], values: Any, bound: float, beside: str, title: str
         x=lags, y=compact(values), marker={"color": MODEL}, showlegend=False, hovertemplate=hover
     )
     name = "95 % bounds of white noise"
-    bounds = [line(ends, [at, at], name, LIMIT, 1.2, line_dash="dash") for at in (bound, -bound)]
+    bounds = [line(ends, [at, at], name, LIMIT, 1.2, line_dash="dash") for at in (-bound, bound)]
     largest = min(max(1.1 * float(np.max(np.abs(values), initial=0.0)), 3.0 * bound), 1.05)
     return Panel([bars, *bounds], "lag, windows", axis(beside, range=[-largest, largest]), title)
 
