@@ -120,19 +120,19 @@ def tracks_figure(episodes: Mapping[str, Episode], names: Sequence[str]) -> Figu
     """Paths over ground of contestants in one episode, the path to follow and its corridor."""
     style, first, traces = styles(names), next(iter(episodes.values())), []
     if first.waypoints is not None and first.path is not None:
-        green, skipped = "#2f6b3c", {"hoverinfo": "skip"}
-        corridor = _corridor(first.path, first.corridor or 0.0)
-        filled = {"fill": "toself", "fillcolor": "#e3efe5", **skipped}
+        green, (north, east) = "#2f6b3c", _corridor(first.path, first.corridor or 0.0)
+        path, marks = first.path, first.waypoints
+        filled: dict[str, Any] = {"fill": "toself", "fillcolor": "#e3efe5", "hoverinfo": "skip"}
         traces = [
-            line(*corridor[::-1], "corridor", green, 0, **filled),
-            line(*first.path.T[::-1], "path", green, 1.4, line_dash="dash", **skipped),
-            points(*first.waypoints.T[::-1], "waypoints", green, 7, **skipped),
+            line(east, north, "corridor", green, 0, **filled),
+            line(path[:, 1], path[:, 0], "path", green, 1.4, line_dash="dash", hoverinfo="skip"),
+            points(marks[:, 1], marks[:, 0], "waypoints", green, 7, hoverinfo="skip"),
         ]
     for name, episode in episodes.items():
         at = _thinned(episode.n_steps)
         traces.append(_line(episode.states["y"][at], episode.states["x"][at], name, style[name], 1.8))
-    north = axis("north, m", scaleanchor="x", scaleratio=1)
-    return bare_panels([Panel(traces, "east, m", north)], 480, hovermode="closest")
+    north_axis = axis("north, m", scaleanchor="x", scaleratio=1)
+    return bare_panels([Panel(traces, "east, m", north_axis)], 480, hovermode="closest")
 
 
 def _corridor(path: Floats, half: float) -> Floats:

@@ -124,7 +124,8 @@ def steps_figure(t: Floats, responses: Mapping[str, tuple[Floats, Floats]], step
 
 def tracks_figure(tracks: Mapping[str, Track], length: float) -> Figure:
     """Tracks sailed by the identified model under each path autopilot, and the distance from them."""
-    paths, errors = [], []
+    paths: list[Any] = []
+    errors: list[Any] = []
     for (name, track), colour in zip(tracks.items(), PILOT_COLOURS, strict=False):
         if not paths:
             planned = track.waypoints / length

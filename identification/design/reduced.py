@@ -51,21 +51,10 @@ def identify_reduced(
 ) -> ReducedIdentification:
     """Identify a structure, reduce it on the same samples, and identify the smaller one.
 
-    Parameters
-    ----------
-    trials : sequence of Trial
-        As for `identify`. Those held out have no part in the reduction either.
-    direction : {"backward", "forward"}
-        Elimination or selection (`reduction`).
-    tolerance : float
-        By how much the R2 of stretches held out may fall.
-    **arguments
-        Of `identify`.
-
-    Raises
-    ------
-    InputError
-        For a grey box, whose table is what its reference ship leaves, and fewer than five samples a term.
+    Trials that are held out have no part in the reduction either. `direction` is "backward" for elimination
+    or "forward" for selection; `tolerance` is by how much the R2 of stretches held out may fall; `arguments`
+    are those of `identify`. Raises InputError for a grey box, whose table is what its reference ship leaves,
+    and fewer than five samples a term.
     """
     full = identify(trials, **arguments)
     table = full.model.table

@@ -136,19 +136,9 @@ def forward_selection(
 ) -> Reduction:
     """Add terms by error reduction ratio; choose the shortest model near the best on what is held out.
 
-    Parameters
-    ----------
-    X, y, names
-        As in `backward_elimination`.
-    tolerance : float
-        By how much the held-out R2 of the chosen model may lie below the best of the path.
-    most : int, optional
-        Terms at which to stop.
-
-    Returns
-    -------
-    Reduction
-        The path goes on beyond the chosen model.
+    `X`, `y` and `names` are as in `backward_elimination`. The held-out R2 of the chosen model may lie below
+    the best of the path, which goes on beyond it, by `tolerance`; `most` is the number of terms at which to
+    stop. Raises InputError for shapes that do not fit and fewer samples than terms.
     """
     features, targets, labels = _checked(X, y, names)
     check_number(tolerance, "tolerance", at_least=0.0)
@@ -219,25 +209,10 @@ def sensitivity(
 ) -> dict[str, float]:
     """Change of a simulated manoeuvre per per cent of each coefficient (Cao 2015).
 
-    Parameters
-    ----------
-    model : ShipModel
-        With a table of terms.
-    manoeuvre : callable
-        Simulates it with a model, such as ``zigzag``.
-    change : float
-        Relative step to either side.
-
-    Returns
-    -------
-    dict of str to float
-        By coefficient, the largest first: root mean square change of u, v, r and psi, each by its span, in
-        per cent per per cent. Infinite where the changed ship runs away.
-
-    Raises
-    ------
-    InputError
-        For a reference ship, whose coefficients are compiled in.
+    `manoeuvre` simulates it with a model, such as ``zigzag``; `change` is the relative step to either side.
+    Returns, by coefficient, the largest first, the root mean square change of u, v, r and psi, each by its
+    span, in per cent per per cent; infinite where the changed ship runs away. Raises InputError for a
+    reference ship, whose coefficients are compiled in.
     """
     check_number(change, "change", above=0.0, below=1.0)
     table_of(model)

@@ -72,13 +72,10 @@ def fit_figure(fit: Fit) -> Figure:
         factor = (np.degrees(1.0) if q in "rp" else 1.0) / samples.duration
         measured = (samples.targets[q] * factor)[drawn]
         explained = (estimator.predict(samples.features[q]) * factor)[drawn]
-        courses = [
-            np.insert(values, breaks, np.nan) for values in (measured, explained)
-        ]  # gaps between trials
-        windows = np.arange(len(courses[0]))
-        lines = [
-            line(windows, courses[0], "trials", MEASURED, 1.2),
-            line(windows, courses[1], "regression", MODEL, 1.7),
+        windows = np.arange(len(measured) + len(breaks))
+        lines = [  # with gaps between the trials
+            line(windows, np.insert(measured, breaks, np.nan), "trials", MEASURED, 1.2),
+            line(windows, np.insert(explained, breaks, np.nan), "regression", MODEL, 1.7),
         ]
         ends = [min(measured.min(), explained.min()), max(measured.max(), explained.max())]
         cloud = [
@@ -119,7 +116,7 @@ def _bars(lags: NDArray[Any], values: Any, bound: float, beside: str, title: str
         x=lags, y=compact(values), marker={"color": MODEL}, showlegend=False, hovertemplate=hover
     )
     name = "95 % bounds of white noise"
-    bounds = [line(ends, [at, at], name, LIMIT, 1.2, line_dash="dash") for at in (bound, -bound)]
+    bounds = [line(ends, [at, at], name, LIMIT, 1.2, line_dash="dash") for at in (-bound, bound)]
     largest = min(max(1.1 * float(np.max(np.abs(values), initial=0.0)), 3.0 * bound), 1.05)
     return Panel([bars, *bounds], "lag, windows", axis(beside, range=[-largest, largest]), title)
 
@@ -178,7 +175,8 @@ def search_figure(fit: Fit) -> Figure:
     searches = {EQUATIONS.get(q, q): search for q, search in fit.searches.items()}
     logarithmic = all(search.variable == LOG_C for search in searches.values())
     common = len({id(search.history) for search in searches.values()}) == 1  # one search for all
-    objectives, best = [], []
+    objectives: list[Any] = []
+    best: list[Any] = []
     for (name, search), colour in zip(searches.items(), PALETTE, strict=False):
         rounds = np.arange(len(search.history))
         relative = search.history / (search.value if search.value > 0.0 else 1.0)
@@ -215,9 +213,10 @@ def coefficients_figure(fit: Fit) -> Figure:
             ends = {"array": compact(100.0 * (high - centre)), "arrayminus": compact(100.0 * (centre - low))}
             bars = {"type": "data", "symmetric": False, **ends, "color": colour, "thickness": 1.8, "width": 3}
             told = [f"{names[i]}: ± {100.0 * half[i]:.3g} %" for i in own]
-            hover = {"text": told, "hovertemplate": "%{text}<extra></extra>"}
-            traces.append(points(100.0 * centre, own - first, name, colour, error_x=bars, **hover))
-        labels = {"tickvals": list(range(len(places))), "ticktext": [names[i] for i in places]}
-        shown.append(Panel(traces, shares, axis(**labels, range=[rows - 0.5, -0.5])))
+            dots = points(100.0 * centre, own - first, name, colour, error_x=bars, text=told)
+            traces.append(dots.update(hovertemplate="%{text}<extra></extra>"))
+        marks = [names[i] for i in places]
+        labels = axis(tickvals=list(range(len(marks))), ticktext=marks, range=[rows - 0.5, -0.5])
+        shown.append(Panel(traces, shares, labels))
     grid = {"horizontal_spacing": 0.16}
     return panels(shown, 20 * rows + 110, columns, grid=grid, left=84, hovermode="closest")

@@ -64,14 +64,13 @@ def track_figure(fit: Fit) -> Figure | None:
     shown = []
     for k, trial in enumerate(trials):
         row = rows[trial.name]
-        drift = np.array([row["east"], row["north"]]) * trial.duration
-        end = np.array([trial["y"][-1], trial["x"][-1]])
+        east, north = (np.array([0.0, row[way] * trial.duration]) for way in ("east", "north"))
         tracks = [
             line(trial.raw["y"], trial.raw["x"], "over ground", MEASURED, 1.7),
             line(trial["y"], trial["x"], "through the water", MODEL, 1.7),
-            line(*np.array([end, end + drift]).T, "the water meanwhile", LIMIT, 1.7),
+            line(trial["y"][-1] + east, trial["x"][-1] + north, "the water meanwhile", LIMIT, 1.7),
         ]
-        north = axis("north, m", scaleanchor=f"x{k + 1 if k else ''}", scaleratio=1)
+        north_axis = axis("north, m", scaleanchor=f"x{k + 1 if k else ''}", scaleratio=1)
         title = f"{PurePath(trial.name).name}: {_set_and_drift(row)}"
-        shown.append(Panel(tracks, "east, m", north, title))
+        shown.append(Panel(tracks, "east, m", north_axis, title))
     return panels(shown, 300 * -(-len(shown) // 2) + 80, 2, hovermode="closest")

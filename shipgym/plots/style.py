@@ -80,8 +80,9 @@ def panels(
                 names.add(trace.legendgroup)
         figure.add_traces(panel.traces, rows=row, cols=column)
         x, y = (axis(told) if isinstance(told, str) else told for told in (panel.x, panel.y))
-        figure.update_xaxes(x if not outer or row == rows else x | UNTITLED, row=row, col=column)
-        figure.update_yaxes(y if not outer or column == 1 else y | UNTITLED, row=row, col=column)
+        x = x | UNTITLED if outer and row < rows else x
+        y = y | UNTITLED if outer and column > 1 else y
+        label(figure, x, y, row, column)
     figure.update_layout(layout(height, titled=bool(titles), **changes))
     return figure
 

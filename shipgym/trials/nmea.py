@@ -90,7 +90,7 @@ def read_nmea(path: Path) -> Table:
 
 
 def _values_of(message: Any) -> Iterator[tuple[str, float]]:
-    """The channels of a sentence that is valid."""
+    """The channels of a sentence that is valid; ValueError for an infinite number."""
     kind = message.sentence_type
     fields = dict(SENTENCES[kind])
     flag, valid = fields.pop("valid", ("", ""))
@@ -101,6 +101,8 @@ def _values_of(message: Any) -> Iterator[tuple[str, float]]:
         if told in (None, "") or not getattr(message, field[:3], " "):  # the latitude of an empty lat
             continue
         value = si_factor(channel, unit) * float(told)
+        if np.isinf(value):
+            raise ValueError(told)
         if kind == "HDG":
             for size, side in ((message.deviation, message.dev_dir), (message.variation, message.var_dir)):
                 value += si_factor("psi", "deg") * {"E": 1.0, "W": -1.0}.get(side, 0.0) * float(size or 0.0)

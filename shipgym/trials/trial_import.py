@@ -10,6 +10,7 @@ import numpy.typing as npt
 from shipgym.arrays import Floats
 from shipgym.checks import check_choice, check_number, quoted
 from shipgym.errors import InputError
+from shipgym.trials import plausibility
 from shipgym.trials.clock_offsets import corrected_clocks
 from shipgym.trials.clock_texts import read_angles, read_clock, zone_seconds
 from shipgym.trials.columns import Column, Source, choose_columns
@@ -17,14 +18,6 @@ from shipgym.trials.csv_reader import Table, is_number
 from shipgym.trials.derivatives import time_derivative
 from shipgym.trials.navigation import NO_OFFSETS, Instruments, correct_offsets, local_metres, to_midship
 from shipgym.trials.navigation import rotate_to_body as rotate_to_body
-from shipgym.trials.plausibility import (
-    check_consistency,
-    check_heading,
-    check_log,
-    check_overlap,
-    check_ranges,
-    find_outliers,
-)
 from shipgym.trials.resampling import Log, Series, have_own_clocks, on_one_clock, own_clock
 from shipgym.trials.units import QUANTITIES, si_factor
 
@@ -102,12 +95,12 @@ def import_tables(
         for name, (clock, values) in series.items()
     }
     log = on_one_clock(signed, where)
-    told = check_log(log, tools, source, gnss)
+    told = plausibility.check_log(log, tools, source, gnss)
     late, found = corrected_clocks(log, signed, tools.clock_offsets)
     if late:
         log = on_one_clock(late, where)
     log.notes = [*(note for table in tables for note in table.notes), *log.notes, *told, *found]
-    check_consistency(log, conventions.velocity_frame, source)
+    plausibility.check_consistency(log, conventions.velocity_frame, source)
     to_project_conventions(log, conventions)
     log.channels = {name: log.channels[name] for name in QUANTITIES if name in log.channels}
     filled = {name: n for one in recorded for name, n in one.filled.items()}
@@ -140,7 +133,7 @@ def _recorded(table: Table, chosen: dict[str, Column], repair: str | None) -> _R
         channel: values[:, k] * si_factor(channel, column.unit)
         for k, (channel, column) in enumerate(source.columns.items())
     }
-    check_ranges(recorded, source)
+    plausibility.check_ranges(recorded, source)
     t = recorded.pop("t")
     series = {
         channel: own_clock(channel, t, column, source) if own_clocks else (t, column)
@@ -151,7 +144,7 @@ def _recorded(table: Table, chosen: dict[str, Column], repair: str | None) -> _R
         series[name] = clock, np.unwrap(raw)
         if name == "psi":
             rows = source.rows[np.isfinite(recorded["psi"])]
-            check_heading(clock, series["psi"][1], raw, replace(source, rows=rows))
+            plausibility.check_heading(clock, series["psi"][1], raw, replace(source, rows=rows))
     if "sog" in series:
         (clock, speed), (_, course) = series.pop("sog"), series.pop("cog")
         if speed.size != course.size:
@@ -218,9 +211,11 @@ def _local_positions(
     here = np.flatnonzero(np.isfinite(lat) & np.isfinite(lon) & np.isfinite(t))
     local = np.full((2, t.size), np.nan)
     if here.size:
-        check_ranges({"lat": lat, "lon": lon}, source)
+        plausibility.check_ranges({"lat": lat, "lon": lon}, source)
         local[:, here] = local_metres(lat[here], lon[here], (lat[here[0]], lon[here[0]]))
-        far = find_outliers(t[here] * si_factor("t", chosen["t"].unit), local[:, here], source, here)
+        far = plausibility.find_outliers(
+            t[here] * si_factor("t", chosen["t"].unit), local[:, here], source, here
+        )
         if far.size and repair is None:
             k = int(far[0])
             raise InputError(
@@ -249,7 +244,7 @@ def _joined(recorded: Sequence[_Recorded]) -> Series:
             )
         shift = (other.start or 0.0) - (base.start or 0.0)
         moved = {name: (clock + shift, values) for name, (clock, values) in other.series.items()}
-        check_overlap(series, moved, path, other.source.columns["t"].name)
+        plausibility.check_overlap(series, moved, path, other.source.columns["t"].name)
         series |= moved
     return series
 

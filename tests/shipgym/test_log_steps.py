@@ -15,12 +15,11 @@ from shipgym.trials.clock_texts import clock_text, read_angles, zone_seconds
 from shipgym.trials.columns import Column, Source
 from shipgym.trials.csv_reader import Table, read_table
 from shipgym.trials.cuts import check_cut, cut_log
-from shipgym.trials.mistakes import check_log, check_overlap, find_outliers
 from shipgym.trials.navigation import Instruments, correct_offsets, heading_offset, straight_parts, to_midship
-from shipgym.trials.plausibility import _fit
-from shipgym.trials.resampling import have_own_clocks, on_one_clock, own_clock
+from shipgym.trials.plausibility import _fit, check_log, check_overlap, find_outliers
+from shipgym.trials.resampling import Log, have_own_clocks, on_one_clock, own_clock
 from shipgym.trials.tables import from_frame, read_log
-from shipgym.trials.trial_import import Imported, _cg_to_midship, _earth_to_body
+from shipgym.trials.trial_import import _cg_to_midship, _earth_to_body
 
 NAN, DEGREE = math.nan, math.pi / 180.0
 
@@ -59,17 +58,17 @@ def test_the_slowest_channel_of_the_motion_gives_the_clock_and_holes_stay():
         "psi": (coarse, 3.0 * coarse),
         "wind_speed": (fine[::9], fine[::9]),
     }
-    t, channels, notes = on_one_clock(series, "log.csv")
-    assert t.tolist() == [*range(1, 11), *range(18, 31)]  # where all of the motion is known
+    log = on_one_clock(series, "log.csv")
+    assert log.t.tolist() == [*range(1, 11), *range(18, 31)]  # where all of the motion is known
     for name, factor in (("delta", 2.0), ("psi", 3.0)):
-        np.testing.assert_allclose(channels[name], factor * t)
-    np.testing.assert_allclose(channels["wind_speed"], np.minimum(t, 27.0))
-    assert notes == ["psi has 1 holes, of up to 8 s; nothing is put there"]
+        np.testing.assert_allclose(log.channels[name], factor * log.t)
+    np.testing.assert_allclose(log.channels["wind_speed"], np.minimum(log.t, 27.0))
+    assert log.notes == ["psi has 1 holes, of up to 8 s; nothing is put there"]
     six = np.delete(np.arange(40.0), np.arange(11, 16))
-    assert on_one_clock(series | {"psi": (six, six)}, "")[2] == []  # six usual steps are none
+    assert on_one_clock(series | {"psi": (six, six)}, "").notes == []  # six usual steps are none
     holed = np.delete(np.arange(0.0, 40.0, 1.0), np.arange(11, 18))
-    t, channels, _ = on_one_clock({"r": (np.arange(40.0), np.arange(40.0)), "psi": (holed, holed)}, "")
-    assert t.tolist() == holed.tolist()
+    found = on_one_clock({"r": (np.arange(40.0), np.arange(40.0)), "psi": (holed, holed)}, "")
+    assert found.t.tolist() == holed.tolist()
     with pytest.raises(
         InputError, match=r"log.csv: psi, r have 0 moments in common, expected channels of one"
     ):
@@ -96,8 +95,7 @@ def test_too_short_a_record_says_nothing_of_a_clock():
 
 
 def log(start=None, **channels):
-    t = np.arange(0.0, 601.0)
-    return Imported(t, channels, frozenset(), {}, None, [], start)
+    return Log(np.arange(0.0, 601.0), channels, "log.csv", [], start=start)
 
 
 @pytest.mark.parametrize(
@@ -179,11 +177,11 @@ def test_a_heading_that_is_magnetic_by_its_name_is_told():
     t = np.arange(float(n))
     for name, offset, told in (("HDG mag", 0.0, 1), ("HDG mag", 0.1, 0), ("HDG true", 0.0, 0)):
         tools = Instruments(heading_offset=offset)
-        notes = check_log(t, values, tools, source(range(n), t="time", psi=name), gnss=True)
+        notes = check_log(Log(t, values, "", []), tools, source(range(n), t="time", psi=name), gnss=True)
         assert [note.startswith("the heading is magnetic by its name") for note in notes] == [True] * told
-    assert check_log(t, {"psi": values["psi"]}, Instruments(), source(range(n), t="time"), True) == [
-        check_log(t, {}, Instruments(), source(range(n), t="time"), True)[0]
-    ]
+    here = source(range(n), t="time")
+    alone = check_log(Log(t, {"psi": values["psi"]}, "", []), Instruments(), here, True)
+    assert alone == [check_log(Log(t, {}, "", []), Instruments(), here, True)[0]]
 
 
 def test_a_fit_of_one_channel_by_another_has_its_gain_and_what_is_left():
@@ -202,26 +200,25 @@ def test_forces_and_motion_are_moved_from_the_centre_of_gravity_to_midship():
     ahead = 2.0
     channels = {"v": 1.0, "r": 0.1, "x": 10.0, "y": 20.0, "psi": np.pi / 6, "Y": 3.0, "N": 4.0}
     channels = {name: np.array([value]) for name, value in channels.items()}
-    _cg_to_midship(channels, ahead, "log")
+    _cg_to_midship(Log(np.zeros(1), channels, "log", []), ahead)
     found = {name: float(values[0]) for name, values in channels.items()}
     assert found["v"] == pytest.approx(0.8)
     assert (found["x"], found["y"]) == pytest.approx((10.0 - np.sqrt(3.0), 19.0))
     assert found["N"] == pytest.approx(4.0 + 2.0 * 3.0)
     for name, other in (("v", "r"), ("x", "psi"), ("y", "psi"), ("N", "Y")):
         with pytest.raises(InputError, match=f'origin = "cg" needs {other} to move {name} to midship'):
-            _cg_to_midship({name: np.zeros(1)}, ahead, "log")
+            _cg_to_midship(Log(np.zeros(1), {name: np.zeros(1)}, "log", []), ahead)
 
 
 def test_velocities_of_the_earth_need_each_other_and_a_recorded_heading():
     channels = {"u": np.array([0.0]), "v": np.array([2.0]), "psi": np.array([np.pi / 2])}
     for absent in channels:
+        others = {name: values for name, values in channels.items() if name != absent}
         with pytest.raises(InputError, match=f'"earth" found without a recorded {absent}, expected u'):
-            _earth_to_body(
-                {name: values for name, values in channels.items() if name != absent}, set(), "log"
-            )
+            _earth_to_body(Log(np.zeros(1), others, "log", []))
     with pytest.raises(InputError, match="without a recorded psi"):
-        _earth_to_body(dict(channels), {"psi"}, "log")
-    _earth_to_body(channels, set(), "log")
+        _earth_to_body(Log(np.zeros(1), dict(channels), "log", [], {"psi"}))
+    _earth_to_body(Log(np.zeros(1), channels, "log", []))
     assert (channels["u"][0], channels["v"][0]) == pytest.approx((2.0, 0.0))
 
 
@@ -236,28 +233,30 @@ def test_offsets_are_estimated_from_straight_parts_on_several_courses_only():
     assert not straight[[195, 200, 205]].any()
     assert heading_offset(channels, straight)[0] == pytest.approx(3.0 * DEGREE, abs=1e-6)
     tools = Instruments(heading_offset="estimate", rudder_offset="estimate")
-    corrected = dict(channels)
-    notes = correct_offsets(t, corrected, tools, "log")
-    np.testing.assert_allclose(corrected["psi"], psi, atol=1e-6)
-    np.testing.assert_allclose(corrected["delta"], 0.0, atol=1e-12)
-    assert [note.partition(",")[0] for note in notes] == ["heading_offset_deg 3.00", "rudder_offset_deg 1.15"]
+    log = Log(t, dict(channels), "log", [])
+    correct_offsets(log, tools)
+    np.testing.assert_allclose(log.channels["psi"], psi, atol=1e-6)
+    np.testing.assert_allclose(log.channels["delta"], 0.0, atol=1e-12)
+    told = [note.partition(",")[0] for note in log.notes]
+    assert told == ["heading_offset_deg 3.00", "rudder_offset_deg 1.15"]
     one_course = {name: values[:200] for name, values in channels.items()}
     with pytest.raises(
         InputError, match="straight parts of 20 s with sog and cog on courses over 60 deg apart"
     ):
-        correct_offsets(t[:200], one_course, tools, "log")
+        correct_offsets(Log(t[:200], one_course, "log", []), tools)
     turning = {"psi": 0.1 * t, "delta": np.full(400, 0.1)}
     with pytest.raises(InputError, match=r'rudder_offset_deg = "estimate" found.*and a heading; give rudder'):
-        correct_offsets(t, turning, Instruments(rudder_offset="estimate"), "log")
+        correct_offsets(Log(t, turning, "log", []), Instruments(rudder_offset="estimate"))
 
 
 def test_without_a_heading_velocities_over_ground_tell_no_drift():
     t = np.arange(3.0)
     with pytest.raises(InputError, match="found without a heading, expected a column psi"):
-        to_midship(t, {"ground_north": t, "ground_east": t}, set(), Instruments(), "log")
-    channels = {"stw": t}
-    assert to_midship(t, channels, set(), Instruments(), "log") == []
-    np.testing.assert_array_equal(channels["u"], t)
+        to_midship(Log(t, {"ground_north": t, "ground_east": t}, "log", []), Instruments())
+    log = Log(t, {"stw": t}, "log", [])
+    to_midship(log, Instruments())
+    assert log.notes == []
+    np.testing.assert_array_equal(log.channels["u"], t)
 
 
 def test_a_wind_told_as_the_true_one_is_turned_by_the_heading_and_preferred():
@@ -344,4 +343,4 @@ def test_a_file_beyond_the_limits_is_refused(text, message, tmp_path, monkeypatc
         read_table(path)
     monkeypatch.setattr(nmea, "MOST_LINES", 1)
     with pytest.raises(InputError, match="lines found, expected at most 1; split the file"):
-        nmea.parse_log(path)
+        nmea.read_nmea(path)
