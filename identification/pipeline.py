@@ -152,12 +152,11 @@ def _identified_mmg(
 ) -> IdentificationResult:
     """The MMG form; its regression is that on the model's own accelerations."""
     problem = pose(trials, options, particulars, steering)
-    found = fit_mmg(problem, options)
-    samples, estimators = explained_samples(problem.used, found.model, **problem.sampling)
-    fit = _simulated(found.model, estimators, problem.used)
-    problem = replace(problem, samples=samples, blank=found.model)
-    provenance = _provenance(options, MAP, {}, fit, problem) | found.report
-    return _evaluated(found.model, fit, problem, provenance)
+    model, report = fit_mmg(problem, options)
+    samples, estimators = explained_samples(problem.used, model, **problem.sampling)
+    fit = _simulated(model, estimators, problem.used)
+    problem = replace(problem, samples=samples, blank=model)
+    return _evaluated(model, fit, problem, _provenance(options, MAP, {}, fit, problem) | report)
 
 
 def _simulated(model: ShipModel, estimators: dict[str, Estimator], used: Sequence[Trial]) -> GuardedFit:
