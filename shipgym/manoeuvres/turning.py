@@ -112,10 +112,15 @@ def _steady(
     return float(speed[steady].mean() / speed[0]), float(drift), float(diameter)
 
 
+def full_rudder_deg(model: ShipModel) -> float:
+    """Rudder of the standard circle, degrees: 35, or the rudder's limit where that is less."""
+    return min(TURN_DEG, model.steering.rudder_limit_deg)
+
+
 def standard_circles(model: ShipModel, water_depth: float = np.inf) -> dict[str, Manoeuvre]:
     """Turning circles with full rudder to both sides."""
     duration, dt = standard_time(model)
-    full = min(TURN_DEG, model.steering.rudder_limit_deg)
+    full = full_rudder_deg(model)
     return {
         f"turning circle {full:.0f} deg to {side}": Manoeuvre(
             partial(

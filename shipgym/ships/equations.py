@@ -43,7 +43,8 @@ def published(ship: str) -> dict[str, Any]:
 
 def record_of(values: Mapping[str, float], module: str) -> Any:
     """A record of coefficients with these values as defaults, for the file of a ship."""
-    record = namedtuple("Coefficients", values, defaults=[*values.values()], module=module)
+    names, defaults = [*values], [*values.values()]
+    record = namedtuple("Coefficients", names, defaults=defaults, module=module)  # type: ignore[misc]
     record.__annotations__ = dict.fromkeys(values, float)
     return record
 

@@ -60,11 +60,7 @@ class ManoeuvringModel:
                 f"coefficients of {self.name!r}: {wrong[0]} is {ordered[wrong[0]]}, expected a number"
             )
         object.__setattr__(self, "coefficients", ordered)
-        if (
-            (isinstance(self.dynamics, Structure) or self.dynamics.scales)
-            and "n" in self.command_names
-            and not self.service_shaft_speed > 0
-        ):
+        if self.dynamics.scales and "n" in self.command_names and not self.service_shaft_speed > 0:
             raise InputError(
                 f"service_shaft_speed of {self.name!r}: {self.service_shaft_speed:g} found, expected that at "
                 f"service speed in 1/s: structure {self.structure!r} has a shaft speed"

@@ -49,7 +49,7 @@ def scale_model(
     which is gravity's, does not follow the speed: keep to the default there.
     """
     table = model.dynamics
-    if not isinstance(table, Structure) and not table.scales:
+    if not table.scales:
         raise InputError(
             f"model {model.name!r}: the equations of reference ship '{table.name}' found, which are written "
             "for one length; expected a model with a table of terms, such as one identified from its trials"

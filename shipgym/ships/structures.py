@@ -112,7 +112,7 @@ def register_structure(
 
 def own_structure(table: Any, where: str) -> Structure:
     """A structure from the arguments of `register_structure`; messages begin with `where`."""
-    own = USUAL | check_table(table, where)
+    own: dict[str, Any] = {**USUAL, **check_table(table, where)}
     check_keys(own, ("name", "equations", *USUAL), where)
     for key in ("name", "equations"):
         if key not in own:
