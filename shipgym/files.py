@@ -18,6 +18,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from errno import EBUSY, ENOENT, EXDEV
 from functools import cache, partial
+from importlib import resources
 from pathlib import Path
 from typing import Any
 from zlib import crc32
@@ -246,6 +247,11 @@ def parse_toml(text: str, where: str) -> dict[str, Any]:
         tomllib.loads, text, where, "not valid TOML: {}; correct that line", infinite=True
     )
     return tables
+
+
+def shipped_toml(package: str, name: str) -> dict[str, Any]:
+    """A table of numbers or words that is part of a package."""
+    return tomllib.loads(resources.files(package).joinpath(name).read_text("utf-8"))
 
 
 def toml_value(text: str) -> Any:

@@ -19,7 +19,7 @@ from shipgym.manoeuvres.registry import SIDES, Manoeuvre, standard_time
 from shipgym.sea.conditions import Weather
 from shipgym.ships.conditions import Seed
 from shipgym.ships.ship_model import ShipModel
-from shipgym.ships.simulate import simulate
+from shipgym.ships.simulate import orders, simulate
 from shipgym.trials.trial import Trial
 
 TURN_DEG = 35.0  # of the standard circle, or the rudder's limit where that is less
@@ -60,10 +60,8 @@ def turning_circle(
     samples, are in s; the rest as in `zigzag`. Raises InputError for a rudder of 0 or beyond 90 degrees, or a
     duration or step that is not above 0, UnstableModelError if the ship runs away.
     """
-    angle = turning_rudder(rudder_deg, 90.0)
-    commands = np.repeat(model.service_command[None], number_of_steps(duration, dt), axis=0)
-    commands[:, 0] = angle
-    return simulate(model, commands, dt, None, water_depth, "turning-circle", weather, seed)
+    rudder = np.full(number_of_steps(duration, dt), turning_rudder(rudder_deg, 90.0))
+    return simulate(model, orders(model, rudder), dt, None, water_depth, "turning-circle", weather, seed)
 
 
 def turning_indices(trial: Trial, length: float | None = None) -> TurningIndices:

@@ -5,10 +5,8 @@ Their numbers stand in `wind_tables.toml`.
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
-from importlib.resources import files
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -16,6 +14,7 @@ import numpy as np
 from shipgym.arrays import Floats
 from shipgym.checks import check_keys, check_number, check_table, did_you_mean, quoted
 from shipgym.errors import InputError
+from shipgym.files import shipped_toml
 
 
 class Blendermann(NamedTuple):
@@ -29,7 +28,7 @@ class Blendermann(NamedTuple):
     kappa: float  # rolling-moment factor
 
 
-_TABLES = tomllib.loads(files("shipgym.sea").joinpath("wind_tables.toml").read_text("utf-8"))
+_TABLES = shipped_toml("shipgym.sea", "wind_tables.toml")
 #: By type of ship.
 BLENDERMANN = {ship: Blendermann(*row) for ship, row in _TABLES["blendermann"].items()}
 #: Rows of CX, CY and CN every 10 degrees from the bow; columns of the regression.

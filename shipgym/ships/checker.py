@@ -15,6 +15,7 @@ from shipgym.errors import InputError, UnstableModelError
 from shipgym.ships.catalogue import load_model
 from shipgym.ships.grey_boxes import GreyBox
 from shipgym.ships.ship_model import ShipModel
+from shipgym.ships.simulate import orders
 from shipgym.ships.term_table import ANGULAR, EQUATION_NAMES, Structure
 
 if TYPE_CHECKING:
@@ -170,8 +171,7 @@ def _asymmetry(model: ShipModel) -> float:
 
 def _run(model: ShipModel, rudder: float, lengths: float) -> Trial:
     """From service with the rudder held, over so many ship lengths at service speed."""
-    commands = np.tile(model.service_command, (round(lengths / STEP), 1))
-    commands[:, 0] = rudder
+    commands = orders(model, np.full(round(lengths / STEP), rudder))
     return model.simulate(commands, STEP * model.travel_time)
 
 

@@ -40,6 +40,15 @@ def simulate(
     return as_trial(model, dt, states, np.vstack([held, held[-1:]]), kind)
 
 
+def orders(model: ManoeuvringModel, rudder: Floats, shaft: Floats | None = None) -> Floats:
+    """Commands of shape (n_steps, n_command) with a rudder, rad, and a shaft, 1/s, by default as at service."""
+    commands = np.repeat(model.service_command[None], len(rudder), axis=0)
+    commands[:, 0] = rudder
+    if shaft is not None:
+        commands[:, 1] = shaft
+    return commands
+
+
 def open_loop(model: ManoeuvringModel, trial: Trial) -> Trial:
     """Predict a trial from its initial state and its measured rudder (and shaft speed) alone.
 
