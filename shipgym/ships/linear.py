@@ -177,14 +177,13 @@ def linearise(model: ShipModel, at: StraightRunning, side: int = 0) -> tuple[Flo
     varied = [model.state_names.index(name) for name in (*names, "delta")]
     n = len(names)
     scales = _scales(model)
+    signs = side * np.array([-1.0] + n * [1.0]) if side else np.ones(n + 1)
     steps = np.zeros((n + 1, len(scales)))
-    steps[range(n + 1), varied] = STEP * scales[varied]
-    if side:
-        steps *= side * np.array([-1.0] + n * [1.0])[:, None]
+    steps[range(n + 1), varied] = STEP * signs * scales[varied]
     state = at.state(model)
-    behind = state - (0.0 if side else 1.0) * steps
+    behind = np.tile(state, (n + 1, 1)) if side else state - steps
     change = (_rates(model, state + steps) - _rates(model, behind))[:, varied[:n]]
-    jacobian = change.T / (STEP * (side * np.array([-1.0] + n * [1.0]) if side else 2.0))
+    jacobian = change.T / (STEP * signs * (1.0 if side else 2.0))
     if n > 2:
         follows = np.linalg.solve(jacobian[2:, 2:n], jacobian[2:][:, [0, 1, n]])
         jacobian = jacobian[:2][:, [0, 1, n]] - jacobian[:2, 2:n] @ follows

@@ -41,7 +41,7 @@ def simulate(
 
 
 def orders(model: ManoeuvringModel, rudder: Floats, shaft: Floats | None = None) -> Floats:
-    """Commands of shape (n_steps, n_command) with a rudder, rad, and a shaft, 1/s, by default as at service."""
+    """Commands of shape (n_steps, n_command): a rudder, rad, and a shaft, 1/s, by default as in service."""
     commands = np.repeat(model.service_command[None], len(rudder), axis=0)
     commands[:, 0] = rudder
     if shaft is not None:

@@ -31,8 +31,8 @@ from shipgym.sea import (
     wind_curves,
 )
 from shipgym.sea.drift import wave_drift
-from shipgym.sea.mobility import mobility_matrix
 from shipgym.sea.open_sea import Sea, SeaParameters
+from shipgym.sea.weather_column import mobility_matrix
 from shipgym.ships.conditions import Conditions, Passage
 from shipgym.ships.simulate import open_loop, simulate
 from shipgym.tasks.task import course_keeping_task
