@@ -172,14 +172,8 @@ def _tow(model: ShipModel, tank: Tank, motion: _Motion, name: str) -> Trial:
     psi = integral(motion.t, motion.velocity[:, 2])
     columns = dict(zip("uvr", motion.velocity.T, strict=True)) | {"psi": psi}
     columns |= {"delta": np.full(len(psi), np.radians(tank.rudder_deg)), "n": np.full(len(psi), shaft)}
-    none = np.zeros(len(psi))
-    states = np.stack([columns.get(state, none) for state in model.state_names], axis=-1)
-    commands = np.stack([columns[command] for command in model.command_names], axis=-1)
-    rates = model.derivatives(states, commands, tank.water_depth)
-    own = np.zeros((len(psi), 4))
-    for i, rate in enumerate("uvrp"):
-        if rate in model.state_names:
-            own[:, i] = rates[:, model.state_names.index(rate)]
+    rates = model.rates(columns, tank.water_depth)
+    own = np.stack([rates.get(axis, np.zeros(len(psi))) for axis in "uvrp"], axis=-1)
     own[:, :3] -= motion.acceleration
     forces = own @ inertia(model, tank.water_depth).T
     if not tank.model_inertia:

@@ -106,11 +106,8 @@ def _rates(model: ShipModel) -> list[str]:
 
 def _accelerations(model: ShipModel, channels: dict[str, Floats]) -> Floats:
     """Accelerations in the order of `_rates`, shape (n, n_rates)."""
-    zero = np.zeros(SAMPLES)
-    states = np.stack([channels.get(name, zero) for name in model.state_names], axis=-1)
-    commands = np.stack([channels[name] for name in model.command_names], axis=-1)
-    which = [model.state_names.index(name) for name in _rates(model)]
-    return model.derivatives(states, commands)[:, which]
+    rates = model.rates(channels)
+    return np.stack([rates[name] for name in _rates(model)], axis=-1)
 
 
 def _wrong_accelerations(model: ShipModel) -> Iterator[str]:

@@ -180,6 +180,13 @@ class ManoeuvringModel:
         loop(flat, two_commands(flat_commands), depths, self.ship_numbers(), out)
         return out.reshape(*shape, len(self.state_names))
 
+    def rates(self, channels: Mapping[str, Floats], water_depth: float = np.inf) -> dict[str, Floats]:
+        """`derivatives` by name, at states and commands of shape (n_samples,); a state that is absent is 0."""
+        none = np.zeros(len(channels["u"]))
+        states = np.stack([channels.get(name, none) for name in self.state_names], axis=-1)
+        commands = np.stack([channels[name] for name in self.command_names], axis=-1)
+        return dict(zip(self.state_names, self.derivatives(states, commands, water_depth).T, strict=True))
+
     def to_dict(self) -> dict[str, Any]:
         """What a model file holds, ready for JSON (format in `shipgym.ships.model_file`)."""
         return {
