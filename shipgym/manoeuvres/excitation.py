@@ -10,9 +10,8 @@ from shipgym.checks import check_number
 from shipgym.errors import InputError
 from shipgym.manoeuvres.execution import number_of_steps
 from shipgym.sea.conditions import Weather
-from shipgym.ships.conditions import Seed
 from shipgym.ships.ship_model import ShipModel
-from shipgym.ships.simulate import orders, simulate
+from shipgym.ships.simulate import Seed, orders, simulate
 from shipgym.trials.trial import Trial
 
 CLOCK = 0.5  # of the binary sequence, L / U0

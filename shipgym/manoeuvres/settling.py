@@ -8,9 +8,8 @@ import numpy as np
 from shipgym.arrays import Floats
 from shipgym.checks import check_number
 from shipgym.errors import InputError
-from shipgym.ships.conditions import Conditions, Passage
 from shipgym.ships.ship_model import ShipModel
-from shipgym.ships.simulate import as_trial
+from shipgym.ships.simulate import Conditions, Passage, as_trial
 from shipgym.trials.trial import Trial
 
 STEPS_PER_LENGTH = 40  # simulation steps in the time to travel one ship length

@@ -17,9 +17,8 @@ from shipgym.manoeuvres.execution import (
 )
 from shipgym.manoeuvres.registry import SIDES, Manoeuvre, standard_time
 from shipgym.sea.conditions import Weather
-from shipgym.ships.conditions import Seed
 from shipgym.ships.ship_model import ShipModel
-from shipgym.ships.simulate import orders, simulate
+from shipgym.ships.simulate import Seed, orders, simulate
 from shipgym.trials.trial import Trial
 
 TURN_DEG = 35.0  # of the standard circle, or the rudder's limit where that is less

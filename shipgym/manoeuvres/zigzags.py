@@ -13,9 +13,8 @@ from shipgym.errors import ManoeuvreError
 from shipgym.manoeuvres.execution import distance_sailed, number_of_steps, reached, reversals, ship_length
 from shipgym.manoeuvres.registry import SIDES, Manoeuvre, standard_time
 from shipgym.sea.conditions import Weather
-from shipgym.ships.conditions import Conditions, Passage, Seed
 from shipgym.ships.ship_model import ShipModel
-from shipgym.ships.simulate import as_trial, orders
+from shipgym.ships.simulate import Conditions, Passage, Seed, as_trial, orders
 from shipgym.trials.trial import Trial
 
 STANDARD_DEG = (10.0, 20.0)

@@ -181,7 +181,7 @@ class ManoeuvringModel:
         return out.reshape(*shape, len(self.state_names))
 
     def rates(self, channels: Mapping[str, Floats], water_depth: float = np.inf) -> dict[str, Floats]:
-        """`derivatives` by name, at states and commands of shape (n_samples,); a state that is absent is 0."""
+        """`derivatives` by name at channels of shape (n_samples,); a state that is absent is 0."""
         none = np.zeros(len(channels["u"]))
         states = np.stack([channels.get(name, none) for name in self.state_names], axis=-1)
         commands = np.stack([channels[name] for name in self.command_names], axis=-1)
