@@ -48,8 +48,11 @@ class Passage:
         self.windy = not weather.calm
         self.sea = np.zeros(0), np.zeros(0, dtype=np.uint64), np.zeros(0)
         if self.windy:
-            parameters = weather_column(model, weather, dt, conditions.water_depth)
-            self.sea = np.zeros(len(leaves(Sea))), np.array([_first_word(conditions.seed)]), parameters
+            seed, parameters = conditions.seed, weather_column(model, weather, dt, conditions.water_depth)
+            if not isinstance(seed, np.random.Generator):
+                check_whole(seed, "seed", at_least=0)
+            word = np.random.default_rng(seed).integers(2**63)
+            self.sea = np.zeros(len(leaves(Sea))), np.array([word], dtype=np.uint64), parameters
 
     def loop(self, name: str) -> Any:
         """A loop of `shipgym.engine.loops`, compiled for the ship and for calm water or weather."""
@@ -75,13 +78,6 @@ class Passage:
         if len(first) < width:
             self.loop("meet")(states, *self.sea)
         return states
-
-
-def _first_word(seed: Seed) -> np.uint64:
-    """State of the weather's random numbers at its beginning."""
-    if not isinstance(seed, np.random.Generator):
-        check_whole(seed, "seed", at_least=0)
-    return np.uint64(np.random.default_rng(seed).integers(2**63))
 
 
 def simulate(
