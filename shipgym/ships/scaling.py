@@ -12,6 +12,7 @@ from shipgym.errors import InputError
 from shipgym.ships.envelope import Envelope
 from shipgym.ships.particulars import BOUNDS, Particulars
 from shipgym.ships.ship_model import ShipModel
+from shipgym.ships.steering import SteeringGear
 from shipgym.ships.term_table import Structure
 
 
@@ -55,8 +56,7 @@ def scale_model(
         )
     check_number(length, "length", above=0.0, hint="in m")
     size = length / model.particulars.length
-    if speed is None:
-        speed = model.particulars["speed"] * np.sqrt(size)
+    speed = model.particulars["speed"] * np.sqrt(size) if speed is None else speed
     check_number(speed, "speed", above=0.0, hint="in m/s")
     fast = float(speed) / model.particulars["speed"]
     quick, gear = fast / size, model.steering
@@ -67,8 +67,8 @@ def scale_model(
     return replace(
         model,
         particulars=_particulars(model.particulars, size, float(speed), water_density),
-        steering=replace(
-            gear, rudder_rate_deg_s=gear.rudder_rate_deg_s * quick, time_constant=gear.time_constant / quick
+        steering=SteeringGear(
+            gear.rudder_limit_deg, gear.rudder_rate_deg_s * quick, gear.time_constant / quick
         ),
         coefficients={name: value * factors[name] for name, value in model.coefficients.items()},
         covariance=None if model.covariance is None else model.covariance * np.outer(scale, scale),
