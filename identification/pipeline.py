@@ -31,7 +31,7 @@ from identification.validation.prediction import predict, trial_metrics
 from identification.validation.selection import select
 from shipgym.arrays import Floats
 from shipgym.ships import GreyBox, ShipModel, Structure
-from shipgym.ships.grey_box_model import fitted_box
+from shipgym.ships.catalogue import fitted_box
 from shipgym.ships.mmg import MMG
 from shipgym.ships.steering import SteeringGear
 from shipgym.trials.identify_table import AUTO

@@ -26,10 +26,12 @@ def wake(drift: float, turn: float, c: Any) -> float:
     """Wake fraction at the propeller."""
     if PACKAGE_FORM:
         angle = drift - c.x_P_package * turn
-        return c.w_P0 * exponential(-4.0 * angle * angle)
+        behind: float = c.w_P0 * exponential(-4.0 * angle * angle)
+        return behind
     angle = drift - c.x_P * turn
     side = c.C_2_starboard if angle >= 0.0 else c.C_2_port
-    return 1.0 - (1.0 - c.w_P0) * (1.0 + (1.0 - exponential(-c.C_1 * fabs(angle))) * (side - 1.0))
+    fraction: float = 1.0 - (1.0 - c.w_P0) * (1.0 + (1.0 - exponential(-c.C_1 * fabs(angle))) * (side - 1.0))
+    return fraction
 
 
 def accelerations(motion: Motion, c: Any, ship: Ship) -> tuple[float, float, float, float, float]:
