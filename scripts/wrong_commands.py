@@ -38,8 +38,8 @@ RIGHT: dict[str, list[str]] = {
     "reduce": [SHIP, "--out", "out"],
     "autopilot": [SHIP, "--out", "out"],
     "export": [AGENT, "--onnx", "out"],
-    "steer": [AGENT, "--nmea", "tcp:127.0.0.1:1"],  # where nobody listens
-    "simulate": ["mariner", "--nmea", "tcp:256.0.0.1:1"],  # where nobody can
+    "steer": [AGENT, "--nmea", "tcp:256.0.0.1:1"],  # where nobody can
+    "simulate": ["mariner", "--nmea", "tcp:256.0.0.1:1"],
     "train": ["ppo", "--out", "out"],
     "tune": ["ppo", "--out", "out"],
     "benchmark": ["--controllers", "pid", "--out", "out"],

@@ -7,7 +7,7 @@ import gzip
 import shlex
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from agents.benchmarking.contestants import BEST_KNOWN
 from agents.benchmarking.page_figures import (
@@ -23,12 +23,10 @@ from agents.benchmarking.replays import EpisodeId, Rerun, rerun
 from agents.benchmarking.results import RESULTS, BenchmarkResult
 from agents.output import check_page
 from agents.suites.suite import N_EPISODES, load_suite
+from identification.progress import Progress
 from shipgym.files import write_text
 from shipgym.pages import render
 from shipgym.plots import graph_objects
-
-if TYPE_CHECKING:
-    from agents.verification.chain import Progress
 
 PAGE = "index.html"
 WORST = 3  # episodes of each contestant in each task that may be replayed

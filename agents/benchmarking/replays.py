@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -13,11 +13,9 @@ from agents.benchmarking.results import BenchmarkResult
 from agents.engines.jobs import run_jobs
 from agents.rollouts.episodes import recorded
 from agents.suites.suite import BenchmarkTask, load_suite
+from identification.progress import Progress
 from shipgym.envs.episode import Episode
 from shipgym.errors import InputError
-
-if TYPE_CHECKING:
-    from agents.verification.chain import Progress
 
 SAME_COST = 1e-9  # relative difference of the cost that is rounding
 

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from contextlib import nullcontext
 from pathlib import Path
 from types import NoneType
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -17,12 +17,9 @@ from agents.output import in_use
 from agents.rollouts.metrics import evaluate
 from agents.suites.reference import best_costs
 from agents.suites.suite import DEFAULT_SUITE, N_EPISODES, BenchmarkTask, load_suite, suite_hash
+from identification.progress import Progress
 from shipgym.checks import ANY_KEY, Shape, check_number, check_shape, check_whole
 from shipgym.errors import InputError
-
-if TYPE_CHECKING:
-    from agents.verification.chain import Progress
-
 
 RUN: Shape = {
     "episodes": {ANY_KEY: (np.ndarray,)}, "failure": (str,), "seconds_per_action": (int, float),

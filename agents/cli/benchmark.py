@@ -11,7 +11,7 @@ from agents.cli.command import FAILED, INTERRUPTED, Address, EngineName, answere
 
 if TYPE_CHECKING:
     from agents.benchmarking.results import BenchmarkResult
-    from agents.verification.chain import Progress
+    from identification.progress import Progress
 
 
 Controllers = Annotated[

@@ -58,13 +58,13 @@ def _chosen(ship: Path, options: dict[str, Any], *unnamed: str) -> tuple[ShipFil
 
 
 def _identify(read: ShipFile, settings: dict[str, Any], out: Path) -> None:
-    from agents.cli.terminal import answer, console, err, prediction_table, selection_table
+    from agents.cli.terminal import answer, console, identifying, prediction_table, selection_table
     from agents.identifying import identify_ship
     from agents.output import whole_folder
     from identification.result import FILES
     from identification.validation.warnings import held_out_error, why_unstable
 
-    with whole_folder(out, FILES) as draft, err.status("identifying"):
+    with whole_folder(out, FILES) as draft, identifying("identifying"):
         result = identify_ship(read, settings)
         result.save(draft)
     instability = why_unstable(result)
@@ -97,13 +97,13 @@ def _check_stable(result: IdentificationResult) -> None:
 def _compare(
     read: ShipFile, settings: dict[str, Any], out: Path, names: tuple[str | None, str | None]
 ) -> None:
-    from agents.cli.terminal import answer, console, err, selection_table, warn
+    from agents.cli.terminal import answer, console, identifying, selection_table, warn
     from agents.identifying import compare_ship
     from agents.output import whole_folder
     from identification.validation.comparison import COMPARISON_FILES
 
     own = () if read.structure is None else (f"model-{read.structure.name}.json",)
-    with whole_folder(out, (*COMPARISON_FILES, *own)) as draft, err.status("comparing"):
+    with whole_folder(out, (*COMPARISON_FILES, *own)) as draft, identifying("comparing"):
         found = compare_ship(read, settings, *names)
         found.save(draft)
     answer(found.to_dict())
@@ -137,12 +137,12 @@ def advise_command(
     and binary rudder sequences, simulated on the model identified so far, by how much each would shrink what
     is least certain.
     """
-    from agents.cli.terminal import answer, console, err
+    from agents.cli.terminal import answer, console, identifying
     from agents.identifying import identify_ship
     from identification.design.experiment import advise
 
     read, settings = _chosen(ship, options, "abkowitz")
-    with err.status("identifying"):
+    with identifying("identifying"):
         result = identify_ship(read, settings)
         used = [trial for trial in result.trials if trial.use == "fit"]
         advice = advise(result.model, used, None, criterion, coefficient, number)
@@ -169,14 +169,14 @@ def reduce_command(
     Writes the reduced model's files and reduction.json, with the whole path. Exits with 1 if the reduced
     model is unstable.
     """
-    from agents.cli.terminal import answer, console, err, prediction_table
+    from agents.cli.terminal import answer, console, identifying, prediction_table
     from agents.identifying import reduce_ship
     from agents.output import whole_folder
     from identification.result import FILES
     from shipgym.files import write_json
 
     read, settings = _chosen(ship, options, "abkowitz")
-    with whole_folder(out, (*FILES, "reduction.json")) as draft, err.status("reducing"):
+    with whole_folder(out, (*FILES, "reduction.json")) as draft, identifying("reducing"):
         found = reduce_ship(read, settings, direction, tolerance)
         fields = found.to_dict()
         found.reduced.save(draft)

@@ -18,9 +18,9 @@ from rich.text import Text
 
 if TYPE_CHECKING:
     from agents.training.training import Progress as Training
-    from agents.verification.chain import Progress
     from agents.verification.result import AutopilotResult
     from identification import IdentificationResult
+    from identification.progress import Progress
     from shipgym.manoeuvres import Criterion, IndexInterval
 
 WIDTH_WITHOUT_TERMINAL = 110
@@ -107,27 +107,42 @@ def fail(message: str) -> None:
 
 @contextmanager
 def progress_bars(shown: bool = True) -> Iterator[Progress | None]:
-    """Bars on standard error, one for each stage.
+    """Bars on standard error, one for each stage, with the time that remains, in the end that it took.
 
-    Yields a function to be told the stage, units done and total; None where nothing is `shown`, as with
-    `--json` and `--quiet`. The time is what remains, and what it took in the end.
+    Yields a function to be told the stage, units done and their total, 0 where that is not known; None where
+    nothing is `shown`, as with `--json` and `--quiet`.
     """
     if not shown or out.quiet or not err.is_terminal:
         yield None
         return
-    from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
+    from rich.progress import BarColumn, TaskProgressColumn, TextColumn, TimeRemainingColumn
+    from rich.progress import Progress as Bars
 
     described = TextColumn("{task.description:<30}", markup=False)
     left = TimeRemainingColumn(elapsed_when_finished=True)
-    with Progress(described, BarColumn(bar_width=32), TaskProgressColumn(), left, console=err) as bars:
+    with Bars(described, BarColumn(bar_width=32), TaskProgressColumn(), left, console=err) as bars:
         tasks: dict[str, Any] = {}
 
         def tell(stage: str, done: int, total: int) -> None:
             if stage not in tasks:
-                tasks[stage] = bars.add_task(stage, total=total)
-            bars.update(tasks[stage], completed=done)
+                tasks[stage] = bars.add_task(stage)
+            bars.update(tasks[stage], completed=done, total=total or None)
 
         yield tell
+
+
+@contextmanager
+def identifying(stage: str) -> Iterator[None]:
+    """A bar of an identification, and one with the remaining time for each part whose total is known."""
+    from identification.progress import PROGRESS
+
+    with progress_bars() as tell:
+        before = PROGRESS.set(tell or PROGRESS.get())
+        PROGRESS.get()(stage, 0, 0)
+        try:
+            yield
+        finally:
+            PROGRESS.reset(before)
 
 
 @contextmanager

@@ -152,7 +152,7 @@ class Link:
         except (ValueError, OverflowError):
             raise InputError(f"address: '{address[:80]}' found, {EXPECTED}") from None
         except OSError as error:
-            raise InputError(f"{address}: cannot be opened ({error.strerror or error})") from None
+            raise InputError(f"{address}: cannot be opened ({error.strerror or error})") from error
 
     async def _open_serial(self, device: str, baud: str) -> None:
         serial, line = library("serial"), self.line()

@@ -16,12 +16,14 @@ from agents.deployment.autopilot import Autopilot
 from agents.deployment.c99 import render
 from agents.deployment.nmea import TABLES, Link, Reading, readings, sentences
 from agents.deployment.route import Route
+from agents.deployment.scheduling import short_slice
 from shipgym.checks import check_number
 from shipgym.errors import InputError
 from shipgym.tasks.guidance import wrapped
 
 STANDBY, STEERING, MANUAL = "standby", "steering", "manual"
 LONGEST_TICK = 1.0  # s, between two looks at the sensors
+RETRY_S, CONNECT_S = 1.0, 5.0  # between two attempts to connect, and the longest of one
 ANGLES = ("heading", "course", "leg", "to_steer", "rudder", "waypoint_bearing")
 PLACES = ("latitude", "longitude")
 EARTH_M = 6.371e6  # radius
@@ -172,7 +174,7 @@ class Helm:
             fault = fault or self.sensors.fault(self.order, step, now)
             ended = self.route is not None and self.route.ended
             fault = fault or ("the end of the route is reached" if ended else None)
-        if fault and self.state != MANUAL:
+        if fault and self.state == STEERING:
             self.state, self.alarm = MANUAL, fault
         self.warnings = self._warned(given, now) if self.state == STEERING else []
 
@@ -247,18 +249,20 @@ async def steer(
     """Steer a ship over NMEA 0183 for a duration in s; the helm as it was at the end.
 
     `agent`, `heading`, `limits`, `route` and `rate` are those of `Helm`, `address` is that of a `Link`. Of
-    simulated ships `speed_up` seconds pass in one. `told` is given a line for each change of state. Raises
-    InputError for an address that cannot be opened, and for an autopilot that reads what no sentence tells.
+    simulated ships `speed_up` seconds pass in one. `told` is given a line for each change of state. It waits
+    for an address at which nobody answers yet, and connects again when the connection was closed, which ends
+    in an alarm if it steered. Raises InputError for an address that cannot be opened at all, and for an
+    autopilot that reads what no sentence tells.
     """
     for name, number in (("speed_up", speed_up), ("heading", heading or 0.0), ("rate", rate or 0.0)):
         check_number(number, name)
     helm, loop = Helm(agent, heading, limits or Limits(), route, rate), asyncio.get_running_loop()
     link = Link(lambda line: helm.hear(line, loop.time() * speed_up))
-    await link.open(address)
     parts = ceil(helm.pilot.dt / LONGEST_TICK - 1e-9)
+    missing, retry_at = await _missing(link, address, first=True), loop.time() + RETRY_S
     tick, begin, number, status = helm.pilot.dt / parts, loop.time() * speed_up, 0, ""
     gc.freeze()  # so that no collection of garbage looks through all that was imported, which takes long
-    with closing(link), suppress(asyncio.CancelledError):  # the end that an interruption asks for
+    with closing(link), short_slice(), suppress(asyncio.CancelledError):  # an interruption ends it
         while number * tick < duration:
             due = begin + number * tick
             await asyncio.sleep(max(0.0, due / speed_up - loop.time()))
@@ -269,9 +273,23 @@ async def steer(
             if number % parts == 0:
                 helm.steer(now)
             link.send(helm.sentences())
-            if helm.status != status:
-                told(f"{number * tick:.1f} s: {helm.status}")
-            status, number = helm.status, number + 1
-            if not link.ends:
-                break
+            before, status = status, f"{helm.status}{'' if link.ends else missing}"
+            if status != before:
+                told(f"{number * tick:.1f} s: {status}")
+            if not link.ends and loop.time() >= retry_at:
+                missing, retry_at = await _missing(link, address), loop.time() + RETRY_S
+            number += 1
     return helm
+
+
+async def _missing(link: Link, address: str, first: bool = False) -> str:
+    """Why a link could not be opened but may be later, for the line of status; empty where it is open."""
+    try:
+        await asyncio.wait_for(link.open(address), CONNECT_S)
+    except TimeoutError:
+        return f"; {address}: no answer"
+    except InputError as error:
+        if first and not isinstance(error.__cause__, ConnectionError | TimeoutError):
+            raise
+        return f"; {error}"
+    return ""

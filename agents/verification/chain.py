@@ -23,6 +23,7 @@ from agents.verification.refusal import helpful_trial, lost_control, why_refused
 from agents.verification.result import STEP_DEG, AutopilotResult, Pilot, Verification
 from agents.verification.tracks import Track, keep_track, track_task
 from identification import IdentificationResult
+from identification.progress import PROGRESS, Progress
 from identification.validation.warnings import why_unstable
 from shipgym.checks import check_number, quoted
 from shipgym.errors import InputError, UnstableModelError
@@ -41,9 +42,6 @@ if TYPE_CHECKING:
 FILES = ("report.html", "metrics.json", "model.json")  # beside those of the autopilots
 DESIGNS = ("pid", "lq", "lq-scheduled", "turn-rate", "wheel-over")
 LARGEST_SEED = 2**32
-
-#: Told the stage of the work, the units of it done and their total.
-Progress = Callable[[str, int, int], None]
 
 
 def build_autopilot(
@@ -103,9 +101,13 @@ def build_autopilot(
 
 @contextmanager
 def _stage(tell: Progress, name: str) -> Iterator[None]:
-    """Work of one unit, told when it begins and when it is done."""
+    """Work of one unit, told when it begins and when it is done, and so are its parts."""
     tell(name, 0, 1)
-    yield
+    before = PROGRESS.set(tell)
+    try:
+        yield
+    finally:
+        PROGRESS.reset(before)
     tell(name, 1, 1)
 
 

@@ -12,6 +12,7 @@ from sklearn.base import clone
 from identification.estimators.estimator import Estimator
 from identification.estimators.lssvm import LSSVM, TruncatedLSSVM
 from identification.estimators.threads import single_threaded
+from identification.progress import counted
 from identification.regression.samples import Samples
 from identification.uncertainty.covariance import residuals
 from shipgym.arrays import Floats
@@ -52,7 +53,7 @@ def bootstrap_covariance(
     lengths = [_rows_in(memory, samples.start[rows]) for rows in groups]
     errors = residuals(estimators, samples)
     found = []
-    for _ in range(draws):
+    for _ in counted("bootstrap", range(draws)):
         rows = moving_blocks(groups, lengths, rng)
         found.append(np.concatenate([_again(estimators[q], samples, q, rows, errors[q]) for q in estimators]))
     return np.asarray(np.cov(np.array(found).T))

@@ -23,6 +23,7 @@ from agents.benchmarking.results import gathered
 from agents.benchmarking.run import checked_part, job_of, run_job
 from agents.cli.benchmark_tables import costs_table, ranking_table
 from agents.deployment.nmea import Line
+from agents.deployment.route import Route
 from agents.deployment.steering import Helm, Limits
 from agents.engines.jobs import run_jobs
 from agents.engines.serialisation import KeptResults, pack, serialised, unpack
@@ -240,8 +241,15 @@ def use_helm(helm: Helm) -> None:
     helm.sentences().encode("ascii")
 
 
+def use_route(route: Route) -> None:
+    """Where a ship at its beginning stands on it."""
+    if not np.isfinite([*route.given(*np.radians(route.origin)).values()]).all():
+        raise AssertionError(f"{route.plan}: not finite")
+
+
 KINDS = (
     Kind("bridge", read_bridge, use_helm, slow=2),
+    Kind("route", lambda path: Route.from_csv(path, 500.0), use_route),
     Kind("ship-file", lambda path: ShipFile.load(path).trials(), use_ship, main="ship.toml", slow=3),
     Kind("trial", lambda path: [Trial.from_csv(path)], use_ship),
     Kind("log", lambda path: [guess_trial(path)[2]], use_ship, slow=4),

@@ -1,9 +1,9 @@
 """How loops are compiled for a ship, a sea and a task, and kept on disk, never stale.
 
 The machine code of a loop lies in the cache under a name that hashes all that it depends on: the bytecode of
-the loop and of every function put into it, the fields of their records, the versions of Python and Numba, and
-the processor. A file that is there is right, whoever made it and when; so a cache that was filled beforehand
-and may only be read is used as it is.
+the loop and of every function put into it, the fields of their records, the code generators of this folder,
+the versions of Python and Numba, and the processor. A file that is there is right, whoever made it and when;
+so a cache that was filled beforehand and may only be read is used as it is.
 """
 
 from __future__ import annotations

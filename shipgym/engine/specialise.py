@@ -14,6 +14,7 @@ import platform
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cache
+from pathlib import Path
 from types import CodeType, FunctionType, ModuleType
 from typing import Any
 
@@ -29,6 +30,8 @@ INNER = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 # error_model "numpy" keeps loops free of branches; contraction is the only fast-math liberty taken, because
 # the others would optimise NaN checks away and make results depend on the batch size.
 SEMANTICS = {"error_model": "numpy", "fastmath": {"contract"}}
+#: Modules that write machine code, or say how it is written.
+GENERATORS = ("addresses", "compiling", "lean_numba", "record_code", "specialise")
 
 
 @dataclass
@@ -147,11 +150,12 @@ def fingerprint(function: Any, parts: Parts) -> str:
 
 @cache
 def _machine() -> str:
-    """Versions and processor that machine code is made for."""
+    """What writes machine code, versions, and the processor that it is made for."""
     import llvmlite.binding as llvm
     import numba
 
+    sources = b"".join(Path(__file__).with_name(f"{name}.py").read_bytes() for name in GENERATORS)
+    written = hashlib.sha256(sources).hexdigest()
     features = sorted(llvm.get_host_cpu_features().items())
-    return repr(
-        (platform.python_version(), numba.__version__, platform.machine(), llvm.get_host_cpu_name(), features)
-    )
+    versions = (written, platform.python_version(), numba.__version__)
+    return repr((*versions, platform.machine(), llvm.get_host_cpu_name(), features))

@@ -245,6 +245,14 @@ def free_port():
         return server.getsockname()[1]
 
 
+class HearingShip(SimulatedShip):
+    """She keeps what she hears."""
+
+    def hear(self, line):
+        self.heard = [*getattr(self, "heard", []), line]
+        super().hear(line)
+
+
 class NoisyShip(SimulatedShip):
     """Her line carries what no sentence is, and a compass whose checksums are wrong."""
 
@@ -310,6 +318,25 @@ def test_a_sensor_that_is_dropped_ends_in_an_alarm_and_a_rudder_amidships():
     assert ship.order == 0.0
 
 
+def test_it_waits_for_a_ship_connects_again_when_she_is_lost_and_steers_no_more():
+    ships, address, told = [HearingShip(MARINER) for _ in range(2)], f"tcp:127.0.0.1:{free_port()}", []
+
+    async def both():
+        found = asyncio.create_task(steer(PID_MARINER, address, heading=0.3, duration=90.0, told=told.append))
+        for ship in ships:
+            await asyncio.sleep(10.0)
+            await simulate_ship(ship, address, duration=20.0)
+        return await found
+
+    with asyncio.Runner(loop_factory=no_waiting) as runner:
+        found = runner.run(both())
+    assert (found.state, found.alarm) == (MANUAL, "the connection was closed")
+    assert "cannot be opened" in told[0]
+    assert ships[0].order != 0.0
+    assert ships[1].order == 0.0
+    assert any("ALR" in line for line in ships[1].heard)
+
+
 def test_datagrams_and_a_serial_line_carry_it_too():
     master, slave = os.openpty()
     port, heard = free_port(), []
@@ -339,7 +366,7 @@ def test_datagrams_and_a_serial_line_carry_it_too():
     ("address", "message"),
     [
         ("serial:/dev/no-such-port", "serial:/dev/no-such-port: cannot be opened"),
-        ("tcp:127.0.0.1:1", "tcp:127.0.0.1:1: cannot be opened"),
+        ("tcp:256.0.0.1:1", "tcp:256.0.0.1:1: cannot be opened"),
         ("tcp:somewhere", "expected tcp:HOST:PORT, udp:HOST:PORT, serial:DEVICE"),
         ("usb:1", "expected tcp:HOST:PORT"),
         ("udp:127.0.0.1:99999999", "expected tcp:HOST:PORT"),

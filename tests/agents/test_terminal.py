@@ -1,6 +1,7 @@
 """What is printed: numbers, tables and progress, from results that are made up."""
 # ruff: noqa: RUF001 - pages have a true minus and a dash
 
+from contextlib import nullcontext
 from io import StringIO
 from types import SimpleNamespace
 
@@ -9,6 +10,7 @@ import pytest
 from rich.console import Console
 
 from agents.cli import benchmark_tables, terminal
+from identification import progress
 from shipgym.manoeuvres import Criterion, IndexInterval
 from shipgym.pages.numbers import counted, degrees, fixed, number, percent
 
@@ -206,3 +208,15 @@ def test_what_is_printed_after_a_quiet_command_is_printed():
         assert state() == (True, True, True)
         terminal.fail("said even so")
     assert state() == (False, False, False)
+
+
+def test_an_identification_tells_its_bars_what_is_counted_and_not_what_is_counted_within(monkeypatch):
+    told = []
+    monkeypatch.setattr(terminal, "progress_bars", lambda: nullcontext(lambda *now: told.append(now)))
+    with terminal.identifying("identifying"):
+        assert [
+            len(list(progress.counted("draws", "ab"))) for _ in progress.counted("structures", range(2))
+        ] == [2, 2]
+    assert told == [("identifying", 0, 0), *(("structures", k, 2) for k in range(3))]
+    assert list(progress.counted("nobody listens", "ab")) == ["a", "b"]
+    assert len(told) == 4

@@ -1,0 +1,31 @@
+"""How far a long identification has come, for a command that shows it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from contextvars import ContextVar
+from typing import TypeVar
+
+T = TypeVar("T")
+#: Told the stage of the work, the units of it done and their total.
+Progress = Callable[[str, int, int], None]
+
+
+def _untold(stage: str, done: int, total: int) -> None:
+    """Nobody listens."""
+
+
+PROGRESS: ContextVar[Progress] = ContextVar("progress", default=_untold)
+
+
+def counted(stage: str, items: Sequence[T]) -> Iterator[T]:
+    """The items, telling `PROGRESS` how many are done; what is counted while one is worked on is not told."""
+    tell = PROGRESS.get()
+    for done, item in enumerate(items):
+        tell(stage, done, len(items))
+        token = PROGRESS.set(_untold)
+        try:
+            yield item
+        finally:
+            PROGRESS.reset(token)
+    tell(stage, len(items), len(items))
