@@ -51,7 +51,11 @@ class Specialisation:
         elif key not in self.made:
             copy = self.copy(part.function)
             if self.jit is not None:
-                copy = self.jit(**({"forceinline": True} if part.inline else {}), **INNER, **SEMANTICS)(copy)
+                # the package's functions make no arrays: Numba's counting of references, taken out again by
+                # its passes, takes a tenth of the time
+                counted = not is_shipped(part.function)
+                inline = {"forceinline": True} if part.inline else {}
+                copy = self.jit(**inline, _nrt=counted, **INNER, **SEMANTICS)(copy)
             self.made[key] = copy
         return self.made[key]
 
@@ -77,12 +81,16 @@ def named_globals(function: Any, parts: Parts) -> Iterator[tuple[str, Any]]:
             f"{function.__module__}.{function.__name__}: uses variables of the function around it "
             f"({', '.join(function.__code__.co_freevars)}), expected a function at the top of a file"
         )
-    shipped = function.__module__.partition(".")[0] == "shipgym"  # a user's names are the user's
     for name in _loaded_names(function.__code__):
-        if shipped and name in parts:
+        if is_shipped(function) and name in parts:  # a user's names are the user's
             yield name, parts[name]
         elif name in function.__globals__:
             yield name, function.__globals__[name]
+
+
+def is_shipped(function: Any) -> bool:
+    """Whether a function is one of the package's, and not a user's."""
+    return bool(function.__module__.partition(".")[0] == "shipgym")
 
 
 def _is_plain(value: Any) -> bool:

@@ -141,8 +141,10 @@ def zigzag(
             break
         motion = following
         follow(out, i + 1, motion, h, sea, words, parameters)
-    commands[last:] = command
-    out[: last + 1, 2] += start
+    for i in range(last, len(commands)):
+        commands[i] = command
+    for i in range(last + 1):
+        out[i, 2] += start
     return last, reversals
 
 

@@ -85,7 +85,8 @@ def rudder_orders(numbers: Any, shape: tuple[int, ...], where: str) -> NDArray[n
             (f"int of shape {shape}", "rudder orders") if shape else ("a whole number", "a rudder order")
         )
         raise InputError(f"{where}: {numbers!r} found, expected {what} from 0 to {last}: {each}")
-    return ORDERS[array.reshape(-1, 1)]
+    ordered: NDArray[np.float32] = ORDERS[array.reshape(-1, 1)]
+    return ordered
 
 
 class ShipsEnv:

@@ -94,7 +94,7 @@ class ShipVectorEnv(ShipsEnv, VectorEnv[Observation, Any, Floats]):
         self._made()
 
     def _counters(self) -> dict[str, Any]:
-        return {**super()._counters(), "some_over": self._some_over}
+        return {**super()._counters(), "some_over": np.array(self._some_over)}
 
     def _recall(self, counters: Mapping[str, Any]) -> None:
         super()._recall(counters)

@@ -148,7 +148,8 @@ def _differ(
     """Observations and rewards of an engine's lanes that are not those of another, steered alike."""
     seeds = np.arange(one.num_envs)
     seen, expected = one.reset(seeds)[lanes], other.reset(seeds[lanes])
-    earned = due = np.zeros(other.num_envs)
+    earned: Floats = np.zeros(other.num_envs)
+    due = earned
     paths = [f"Observation.{quantity.path}" for quantity in one.task.observed(one.model)]
     for step in range(min(steps, one.task.episode_steps) + 1):
         first, second = np.column_stack([earned, seen]), np.column_stack([due, expected])
@@ -161,7 +162,8 @@ def _differ(
             )
             return
         orders = _orders(one, step)
-        seen, earned = (array[lanes] for array in one.step(orders)[:2])
+        seen, earned, *_ = one.step(orders)
+        seen, earned = seen[lanes], earned[lanes]
         expected, due, *_ = other.step(orders[lanes])
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from typing import Any
 
@@ -29,19 +29,17 @@ class SensorSet(Configurable):
     filter: bool = False
 
 
-def read_sensors(source: Any, **has: bool) -> SensorSet:
+def read_sensors(source: Any) -> SensorSet:
     """The sensor set of a file or module; InputError names what is missing or of another form."""
     if isinstance(source, SensorSet):
         return source
     namespace, where = read_source(source)
-    return SensorSet(
-        where, where, **check_namespace(namespace, where, ("Settings", "Memory"), FUNCTIONS), **has
-    )
+    return SensorSet(where, where, **check_namespace(namespace, where, ("Settings", "Memory"), FUNCTIONS))
 
 
 @cache
 def shipped_sensors(windy: bool, noise: bool, filtered: bool) -> SensorSet:
     """The sensor set for what is asked: without error in calm water, else a bridge's."""
     if windy or noise or filtered:
-        return read_sensors(bridge, noise=noise, filter=filtered)
+        return replace(read_sensors(bridge), noise=noise, filter=filtered)
     return read_sensors(perfect)
