@@ -86,18 +86,10 @@ def benchmark(
         )  # fmt: skip
         pairs = zip(jobs, found, strict=True)
         done = {(job["contestant"], job["task"]): checked_part(one, job) for job, one in pairs}
-        done |= _of_objects(who, chosen, suite, episodes)
+        for one in who:
+            if not one.is_text:  # an object steers in this process
+                done |= {(one.name, task.name): results_of(one, task, suite, episodes) for task in chosen}
         return gathered(suite, chosen, who, done, episodes).save(folder)
-
-
-def _of_objects(
-    who: Sequence[Contestant], tasks: Sequence[BenchmarkTask], suite: str, episodes: int
-) -> dict[tuple[str, str], dict[str, Any]]:
-    """Results of contestants that were given as objects, which steer in this process."""
-    objects = [one for one in who if not one.is_text]
-    return {
-        (one.name, task.name): results_of(one, task, suite, episodes) for one in objects for task in tasks
-    }
 
 
 def checked_part(part: dict[str, Any], job: Mapping[str, Any]) -> dict[str, Any]:
