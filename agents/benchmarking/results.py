@@ -25,7 +25,7 @@ from agents.benchmarking.summary import Done, summary_of
 from agents.controllers.controller import model_hash
 from agents.output import present
 from agents.suites.suite import FIRST_SEED, BenchmarkTask, suite_hash
-from shipgym.checks import check_choice, check_keys
+from shipgym.checks import check_choice, check_format, check_keys
 from shipgym.errors import InputError
 from shipgym.files import make_folder, read_json, write_json
 
@@ -222,14 +222,8 @@ def load_results(path: str | Path) -> BenchmarkResult:
         raise InputError(
             f"{where}: kind {content.get('kind')!r} found, expected '{KIND}': not benchmark results"
         )
-    if content.get("format") != FORMAT:
-        raise InputError(
-            f"{where}: format {content.get('format')!r} found, this version of shipgym reads format {FORMAT}"
-        )
-    check_keys(content, FIELDS, str(where))
-    for name in FIELDS:
-        if name not in content:
-            raise InputError(f"{where}: field '{name}' is missing; {REMEDY}")
+    check_format(content, FORMAT, str(where))
+    check_keys(content, FIELDS, str(where), required=FIELDS)
     check_summary(content, str(where))
     table = where.with_name(EPISODES)
     if content["episodes"]["sha256"] != file_hash(table):
@@ -250,11 +244,9 @@ def _check_agree(result: BenchmarkResult, where: str) -> None:
         for task, by_name in result.summary["tasks"].items()
         for one, found in by_name.items()
     }
-    if set(rows) != set(told):
-        raise InputError(f"{where}: contestants and tasks differ from those of {EPISODES}; {REMEDY}")
-    for (one, task), runs in told.items():
-        if rows[one, task] != runs * count:
+    for pair in rows.keys() | told.keys():
+        if rows[pair] != (runs := told.get(pair, 0)) * count:
             raise InputError(
-                f"{where}: {rows[one, task]} episodes of '{one}' on '{task}' found, expected {runs} runs "
-                f"of {count}; {REMEDY}"
+                f"{where}: {rows[pair]} episodes of '{pair[0]}' on '{pair[1]}' found in {EPISODES}, expected "
+                f"{runs} runs of {count}; {REMEDY}"
             )

@@ -9,10 +9,12 @@ import sys
 from collections.abc import Callable
 from errno import EBADF, ENOSPC, EPIPE
 from pathlib import Path
-from typing import Annotated, Any, get_type_hints
+from typing import Annotated, Any
 
 import typer
 from typer.core import TyperCommand, TyperGroup
+
+from agents.cli.parameters import take_parameters, typed_parameters
 
 FAILED, WRONG_INPUT, INTERRUPTED = 1, 2, 130
 OUTPUT_GONE = (EPIPE, ENOSPC, EBADF)
@@ -81,24 +83,6 @@ def answered(command: Callable[..., None]) -> Callable[..., None]:
         if name not in own
     }
     return take_parameters(wrapped, own | shared)
-
-
-def typed_parameters(command: Callable[..., None]) -> dict[str, inspect.Parameter]:
-    """The parameters of a command, keyword only, their annotations as objects."""
-    hints = get_type_hints(command, include_extras=True)
-    return {
-        name: one.replace(annotation=hints[name], kind=inspect.Parameter.KEYWORD_ONLY)
-        for name, one in inspect.signature(command).parameters.items()
-    }
-
-
-def take_parameters(
-    command: Callable[..., None], parameters: dict[str, inspect.Parameter]
-) -> Callable[..., None]:
-    """Tell typer which parameters a command takes."""
-    command.__signature__ = inspect.Signature(list(parameters.values()))  # type: ignore[attr-defined]
-    command.__annotations__ = {name: one.annotation for name, one in parameters.items()}
-    return command
 
 
 def told_failure(error: OSError) -> int:

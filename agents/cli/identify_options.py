@@ -9,7 +9,7 @@ from typing import Annotated, Any
 
 import typer
 
-from agents.cli.command import take_parameters, typed_parameters
+from agents.cli.parameters import take_parameters, typed_parameters
 from shipgym.files import named_values
 from shipgym.trials.identify_table import AUTO, FLAG, NUMBER, OPTIONS, TEXTS, WHOLE, Options, check_options
 
