@@ -313,6 +313,22 @@ def test_warm_takes_what_is_named_or_all_there_is():
         list(_jobs("titanic"))
 
 
+def test_warm_says_what_cannot_be_and_goes_on_only_where_all_was_asked_for(monkeypatch):
+    def refuses():
+        raise InputError("no beam")
+
+    jobs = {"one": [("first", refuses)], "other": [("second", int)]}
+    monkeypatch.setattr("agents.cli.warm._names", lambda wanted, everything: list(jobs))
+    monkeypatch.setattr("agents.cli.warm._jobs", lambda name: iter(jobs[name]))
+    answer = shipgym("warm", "--all", "--json")
+    assert answer.exit_code == 0
+    ready = json.loads(answer.stdout)["ready"]
+    assert [(one["what"], one["refused"]) for one in ready] == [("first", "no beam"), ("second", "")]
+    answer = shipgym("warm", "one", "other")
+    assert (answer.exit_code, answer.stderr) == (2, "error: no beam\n")
+    assert "2/2  second: 0.0 s" in shipgym("warm", "--all").stdout
+
+
 @pytest.mark.parametrize(
     ("error", "code", "said"),
     [
