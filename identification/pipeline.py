@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -30,7 +31,7 @@ from identification.validation.prediction import predict, trial_metrics
 from identification.validation.selection import select
 from shipgym.arrays import Floats
 from shipgym.ships import GreyBox, ShipModel, Structure
-from shipgym.ships.grey_box_model import fitted_box
+from shipgym.ships.catalogue import fitted_box
 from shipgym.ships.mmg import MMG
 from shipgym.ships.steering import SteeringGear
 from shipgym.trials.identify_table import AUTO
@@ -80,24 +81,31 @@ def identify(
         For trials that excite nothing, lack channels or samples, and for particulars that do not suffice.
     """
     asked = Options.of({"structure": structure, "method": method, "samples": samples, **options})
-    if structure == AUTO and asked.kernel is None:
-        return _identified_best(trials, asked, particulars, steering)
-    if asked.kernel is not None:
-        return _identified_with_kernel(trials, asked, particulars, steering)
-    if structure == MMG:
-        return _identified_mmg(trials, checked_mmg(asked), particulars, steering)
-    chosen = get_method(method)
-    problem = pose(trials, asked, particulars, steering)
-    fit, refined, of_method = _fitted(chosen, asked, problem)
-    provenance = _provenance(asked, chosen.name, of_method, fit, problem)
-    if asked.prior is not None:
+    return _identified(trials, asked, particulars, steering)
+
+
+def _identified(
+    trials: Sequence[Trial], options: Options, particulars: Given, steering: SteeringGear | None
+) -> IdentificationResult:
+    """By regression, unless the options ask for another way."""
+    if options.kernel is not None:
+        return _identified_with_kernel(trials, options, particulars, steering)
+    if options.structure == AUTO:
+        return _identified_best(trials, options, particulars, steering)
+    if options.structure == MMG:
+        return _identified_mmg(trials, checked_mmg(options), particulars, steering)
+    method = get_method(options.method)
+    problem = pose(trials, options, particulars, steering)
+    fit, refined, of_method = _fitted(method, options, problem)
+    provenance = _provenance(options, method.name, of_method, fit, problem)
+    if options.prior is not None:
         prior = getattr(next(iter(fit.estimators.values()), None), "prior_", {})
-        provenance |= {"prior": name_of(asked.prior), **prior}
+        provenance |= {"prior": name_of(options.prior), **prior}
     if refined is not None:
         provenance["refinement"] = refined.report
-    if asked.uncertainty != "analytic":
-        provenance["uncertainty"] = asked.uncertainty
-    covariance = _scaled_covariance(asked, fit, refined, problem, provenance)
+    if options.uncertainty != "analytic":
+        provenance["uncertainty"] = options.uncertainty
+    covariance = _scaled_covariance(options, fit, refined, problem, provenance)
     return _evaluated(replace(fit.model, covariance=covariance), fit, problem, provenance)
 
 
@@ -105,11 +113,8 @@ def _identified_best(
     trials: Sequence[Trial], options: Options, particulars: Given, steering: SteeringGear | None
 ) -> IdentificationResult:
     """By the structure and method that predict the trials to fit best, each held out, and the ranking."""
-
-    def fitted(some: Sequence[Trial], own: Options) -> IdentificationResult:
-        return identify(some, particulars=particulars, steering=steering, **own.own(), **own.settings())
-
     marked = held_out(trials, options.hold_out)
+    fitted = partial(_identified, particulars=particulars, steering=steering)
     chosen, found = select(fitted, [trial for trial in marked if trial.use == "fit"], options)
     best = fitted(trials, chosen)
     return replace(
@@ -128,11 +133,9 @@ def _identified_with_kernel(
     problem = pose(trials, beneath, particulars, steering)
     blank, box = problem.blank, problem.table
     if not isinstance(box, GreyBox):
-        fitted = identify(
-            trials, particulars=particulars, steering=steering, **beneath.own(), **beneath.settings()
-        ).model
-        fitted = stabilised(fitted) if beneath.structure == BLACK_BOX else fitted
-        blank, box = fitted, fitted_box(fitted)
+        fitted = _identified(trials, beneath, particulars, steering).model
+        blank = stabilised(fitted) if beneath.structure == BLACK_BOX else fitted
+        box = fitted_box(blank)
     found = fit_kernel(blank, problem.used, box, options, problem.sampling)
     fit = _simulated(found.model, found.estimators, problem.used)
     call = whole_call(options, problem.trials, particulars, steering)
@@ -149,12 +152,11 @@ def _identified_mmg(
 ) -> IdentificationResult:
     """The MMG form; its regression is that on the model's own accelerations."""
     problem = pose(trials, options, particulars, steering)
-    found = fit_mmg(problem, options)
-    samples, estimators = explained_samples(problem.used, found.model, **problem.sampling)
-    fit = _simulated(found.model, estimators, problem.used)
-    problem = replace(problem, samples=samples, blank=found.model)
-    provenance = _provenance(options, MAP, {}, fit, problem) | found.report
-    return _evaluated(found.model, fit, problem, provenance)
+    model, report = fit_mmg(problem, options)
+    samples, estimators = explained_samples(problem.used, model, **problem.sampling)
+    fit = _simulated(model, estimators, problem.used)
+    problem = replace(problem, samples=samples, blank=model)
+    return _evaluated(model, fit, problem, _provenance(options, MAP, {}, fit, problem) | report)
 
 
 def _simulated(model: ShipModel, estimators: dict[str, Estimator], used: Sequence[Trial]) -> GuardedFit:

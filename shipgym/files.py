@@ -250,6 +250,11 @@ def parse_toml(text: str, where: str) -> dict[str, Any]:
     return tables
 
 
+def shipped_toml(package: str, name: str) -> dict[str, Any]:
+    """A table of numbers or words that is part of a package."""
+    return tomllib.loads(resources.files(package).joinpath(name).read_text("utf-8"))
+
+
 def toml_value(text: str) -> Any:
     """A value as TOML has it, such as 3, true or [1, 2]; any other text is itself."""
     try:

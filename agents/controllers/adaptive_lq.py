@@ -237,8 +237,9 @@ class AdaptiveLQ(Controller):
         array of shape (2, 4) or (n, 2, 4)
             As `prior`.
         """
-        found: Floats = records(np.asarray(state), self.record)["theta"]
-        return found * self.error_size[:, None] / SIZES
+        theta = records(np.asarray(state), self.record)["theta"]
+        found: Floats = theta * self.error_size[:, None] / SIZES
+        return found
 
     def _redesigned(self, kept: Records) -> Records:
         """What is remembered, with new gains and a new neutral rudder where they can be believed."""

@@ -24,7 +24,7 @@ from agents.controllers.linear_loop import (
     compensator_margins,
     sample_ship,
 )
-from agents.controllers.memory import Flags, begun, checked_observation, deviations
+from agents.controllers.memory import Flags, begun, checked_observation, deviations, size_of
 from shipgym.errors import InputError
 from shipgym.files import write_json
 from shipgym.ships import ShipModel
@@ -275,7 +275,7 @@ class Controller(Agent):
     @property
     def memory_size(self) -> int:
         """How many numbers it remembers of each ship: in the state, never in the controller itself."""
-        return self.record.itemsize // np.dtype(np.float64).itemsize
+        return size_of(self.record)
 
     def steer(self, seen: dict[str, Floats], memory: Floats, begins: Flags) -> tuple[Floats, Floats]:
         """Commanded rudder and what is remembered next.
@@ -311,7 +311,7 @@ class Controller(Agent):
         self.check_fits(OBSERVATION_NAMES, observation_scales(model).tolist(), f"model '{model.name}'")
 
     def save(self, path: str | Path) -> None:
-        """Write the controller as a JSON file (format in `agents.controllers.controller_file`).
+        """Write the controller as a JSON file, whose fields are listed in docs/deployment.md.
 
         Raises
         ------
@@ -319,6 +319,10 @@ class Controller(Agent):
             If the folder does not exist or cannot be written.
         """
         write_json(self.to_dict(), Path(path))
+
+    def file_fields(self) -> tuple[dict[str, Any], dict[str, Any]]:
+        """What stands in its JSON, and its weights by name: it has none."""
+        return self.to_dict(), {}
 
     def to_dict(self) -> dict[str, Any]:
         """What the controller's file holds."""

@@ -1,21 +1,4 @@
-"""The controller file as it is read: JSON, versioned, validated field by field.
-
-Format 1:
-
-    format               1
-    kind                 "pid", "lq", ... (`agents.controllers.registry`)
-    observation_names    what it observes, in order
-    observation_scales   physical value of each observation of 1, SI units
-    gains                {name: value}, SI units; command = neutral rudder + sum of gain times signal
-    neutral_rudder       rad, positive to starboard
-    neutral_sway         m/s
-    model                {"name", "sha256"}: what it was designed on
-    margins              {name: value or null for no limit}
-    design               {name: value}: how it was designed
-    autopilot            a controller of this format; only of guidance
-    ship                 the design model (`shipgym.ships.model_file`); only of guidance that simulates it
-    arrays               {name: nested lists}; only kinds that have any, such as an observer's matrices
-"""
+"""The controller file as it is read: JSON, versioned, checked by fields (listed in docs/deployment.md)."""
 
 from __future__ import annotations
 
@@ -49,7 +32,7 @@ FIELDS = (
     "format", "kind", "observation_names", "observation_scales", "gains", "neutral_rudder", "neutral_sway",
     "model", "margins", "design",
 )  # fmt: skip
-#: Kinds whose files are described in `agents.policies.policy_file`.
+#: Kinds that `agents.policies.policy_file` reads.
 POLICIES = ("learned", "shielded", "one-for-all")
 
 
@@ -78,19 +61,15 @@ def read_controller(content: Mapping[str, Any], where: str) -> Controller:
     gains = {name: design.ranges.get(name, NUMBERS) for name in known}
     needed = {name: one for name, one in design.ranges.items() if name not in gains}
     with placed(where):
-        model = check_table(content["model"], "model")
-        check_keys(model, ("name", "sha256"), "model")
-        check_keys(check_table(content["gains"], "gains"), known, "gains")
         return design(
-            gains=_numbers(content["gains"], gains, "gains"),
+            gains=_numbers(check_table(content["gains"], "gains", known), gains, "gains"),
             neutral_rudder=_number(content["neutral_rudder"], RUDDER, "neutral_rudder"),
             neutral_sway=_number(content["neutral_sway"], NUMBERS, "neutral_sway"),
             margins=_margins(content["margins"]),
             observation_scales=read_scales(content["observation_scales"], observes),
-            model_name=check_text(model.get("name"), "model.name"),
-            model_sha256=check_text(model.get("sha256"), "model.sha256"),
             design=_numbers(content["design"], needed, "design"),
             observation_names=observes,
+            **read_model(content["model"]),
             **_arrays(content.get("arrays", {}), design.arrays),
             **_parts(content, design),
         )
@@ -111,8 +90,7 @@ def _parts(content: Mapping[str, Any], design: type[Controller]) -> dict[str, An
 
 def _arrays(value: Any, axes: Mapping[str, tuple[str | int, ...]]) -> dict[str, Any]:
     """Arrays of numbers, whose axes of one name have one length."""
-    table = check_table(value, "arrays")
-    check_keys(table, tuple(axes), "arrays", axes)
+    table = check_table(value, "arrays", axes, axes)
     lengths: dict[str | int, int] = {}
     arrays = {}
     for name, named in axes.items():
@@ -126,6 +104,12 @@ def _arrays(value: Any, axes: Mapping[str, tuple[str | int, ...]]) -> dict[str, 
             )
         arrays[name] = array
     return arrays
+
+
+def read_model(value: Any) -> dict[str, Any]:
+    """Name and hash of the model that an agent was made for, as its fields."""
+    table = check_table(value, "model", ("name", "sha256"))
+    return {f"model_{name}": check_text(table.get(name), f"model.{name}") for name in ("name", "sha256")}
 
 
 def read_scales(value: Any, names: tuple[str, ...]) -> tuple[float, ...]:
@@ -155,8 +139,7 @@ def _numbers(value: Any, needed: Mapping[str, Range], where: str) -> dict[str, f
 def _margins(value: Any) -> Margins:
     """Margins; null is no limit."""
     names = dict.fromkeys((margin.name for margin in fields(Margins)), ANY)
-    table = check_table(value, "margins")
-    check_keys(table, names, "margins")
+    table = check_table(value, "margins", names)
     finite = {name: 0.0 if number is None else number for name, number in table.items()}
     known = _numbers(finite, names, "margins")
     return Margins(**{name: np.inf if table[name] is None else known[name] for name in names})

@@ -137,10 +137,10 @@ def lq_gain(
     `rate_weight`: of the rudder rate, s^2; `integral_time`: for an offset to decay, s. Raises InputError
     where no feedback makes the loop stable.
     """
-    row = lq_rows(ship.A[None], ship.B.T, ship.dt, rate_weight, integral_time, rudder_weight)[0]
+    row: Floats = -lq_rows(ship.A[None], ship.B.T, ship.dt, rate_weight, integral_time, rudder_weight)[0]
     if not np.isfinite(row).all():
         raise InputError("LQ: no gains found with which the loop is stable; choose other weights or dt")
-    return -row
+    return row
 
 
 def lq_rows(

@@ -22,6 +22,11 @@ def records(memory: Floats, record: np.dtype[Any]) -> Records:
     return np.ascontiguousarray(memory).view(record)[..., 0]
 
 
+def size_of(record: np.dtype[Any]) -> int:
+    """How many numbers a record has."""
+    return record.itemsize // np.dtype(np.float64).itemsize
+
+
 def checked_observation(
     observation: ArrayLike, names: Sequence[str], dtype: type[np.generic] = np.float64
 ) -> NDArray[Any]:

@@ -30,7 +30,7 @@ from shipgym.checks import check_choice, check_number, check_whole
 from shipgym.errors import InputError
 from shipgym.ships import ShipModel
 from shipgym.tasks.definition import read_definition
-from shipgym.tasks.task import ACTIONS, RUDDER_ORDERS, Observed, Task
+from shipgym.tasks.task import ACTIONS, RUDDER_ORDERS, Task
 
 Numbers = NDArray[np.float32]
 
@@ -180,13 +180,10 @@ class LearnedPolicy(Agent):
         if due.any():
             left = np.where(due[:, None], np.float32(self.action_repeat), left)
             outputs = np.where(due[:, None], self.network(inputs), outputs)
-        return np.concatenate([left - 1.0, outputs, self._in_force(outputs, before)], axis=1)
-
-    def _in_force(self, outputs: Numbers, before: Numbers) -> Numbers:
-        """Outputs limited in size and rate; those before that were not a number limit nothing."""
-        if self.rate_limit == NO_LIMIT:
-            return outputs
-        return toward(outputs, np.where(np.isfinite(before), before, 0.0), self.rate_limit)
+        in_force = outputs
+        if self.rate_limit < NO_LIMIT:  # limited from those before, if they were numbers
+            in_force = toward(outputs, np.where(np.isfinite(before), before, 0.0), self.rate_limit)
+        return np.concatenate([left - 1.0, outputs, in_force], axis=1)
 
     def commands(self, output: Numbers, proposed: Numbers | None) -> Action:
         """What is commanded for the network's outputs and the base's action, each of shape (n, ...)."""
@@ -226,21 +223,17 @@ class LearnedPolicy(Agent):
 
     def check_fits_model(self, model: ShipModel) -> None:
         """Refuse a ship with other observation scales in the environment that it learned in."""
-        shown = self._observed(model)
-        names, scales = [one.name for one in shown], [one.scale for one in shown]
-        self.check_fits(names, scales, f"model '{model.name}'")
-
-    def _observed(self, model: ShipModel) -> tuple[Observed, ...]:
-        """What its environment shows of a ship."""
         definition = read_definition(task_showing(self.observation_names))
         known = {"action": self.action, "roll": "roll" in self.observation_names, **self.env_options}
         names = [name for name in SHOWING if name in known and name in Task.option_names(definition)]
         task = Task.of(definition, **{name: known[name] for name in names})
         task.check_fits(model)
-        return task.observed(model)
+        shown = task.observed(model)
+        names, scales = [one.name for one in shown], [one.scale for one in shown]
+        self.check_fits(names, scales, f"model '{model.name}'")
 
     def save(self, path: str | Path) -> None:
-        """Write NAME.json and, beside it, NAME.safetensors (format in `agents.policies.policy_file`)."""
+        """Write NAME.json and, beside it, NAME.safetensors (fields in docs/policies.md)."""
         write_policy(*self.file_fields(), Path(path))
 
     def file_fields(self) -> tuple[dict[str, Any], Tensors]:

@@ -1,42 +1,4 @@
-"""The files of learned and shielded policies as they are read: NAME.json and, beside it, NAME.safetensors.
-
-They are written by `agents.policies.weights_file`. Format 1 of kind "learned":
-
-    format               1
-    kind                 "learned"
-    observation_names    what it observes, in order
-    observation_scales   physical value of each observation of 1, SI units
-    action               "rudder", "rudder-discrete" or "rudder-shaft"
-    network              {"activation": "relu" or "tanh", "output": "linear" or "tanh", "sizes": inputs, then
-                         outputs of each layer}; weights by the names layers.0.weight, layers.0.bias, ...
-    frame_stack          number of observations the network sees, the newest last
-    base                 null or a classical controller (see `controller_file.py`), whose rudder it adds to
-    authority            share of the rudder limit by which it may differ from the base
-    action_repeat        control intervals for which an output of the network is repeated
-    rate_limit           largest change of the output in force in a control interval
-    environment          {"id", "options"}: where it learned
-    model                {"name", "sha256"}: the model it learned on
-    training             how it was made: any JSON
-    weights              {"sha256"} of NAME.safetensors
-
-and of kind "shielded":
-
-    format, kind         1, "shielded"
-    policy               a controller, or a learned policy, whose weights are named policy.layers.0.weight,
-                         ...
-    fallback             a classical controller
-    dt                   control interval, s
-    envelope             null, or as in a model file
-    limits               when the fallback takes over (`agents.policies.shield.Limits`)
-    weights              as above; null where no policy has any
-
-and of kind "one-for-all" (`agents.policies.one_for_all`):
-
-    format, kind         1, "one-for-all"
-    context              of each of `CONTEXT` mean, standard deviation, least and largest in the fleet
-    decision             how long an output is repeated, times to travel a ship length
-    observation_names, network, authority, training, weights as above
-"""
+"""Files of learned and shielded policies as they are read; their fields are listed in docs/policies.md."""
 
 from __future__ import annotations
 
@@ -50,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from agents.controllers.controller import FORMAT, Controller, check_names
-from agents.controllers.controller_file import read_controller, read_scales
+from agents.controllers.controller_file import read_controller, read_model, read_scales
 from agents.policies.network import Layer, Network
 from agents.policies.one_for_all import CONTEXT, ONE_FOR_ALL, OneForAll
 from agents.policies.policy import NO_LIMIT, LearnedPolicy
@@ -95,8 +57,7 @@ def read_policy(content: Mapping[str, Any], path: Path) -> LearnedPolicy | Shiel
     content = _checked(content, where, ("weights",))
     tensors: Tensors = {}
     if content["weights"] is not None:
-        table = check_table(content["weights"], f"{where}: weights")
-        check_keys(table, ("sha256",), f"{where}: weights")
+        table = check_table(content["weights"], f"{where}: weights", ("sha256",))
         sha256 = check_text(table.get("sha256"), f"{where}: weights.sha256")
         tensors = read_weights(weights_path(path), sha256, path)
     with placed(where):
@@ -121,10 +82,7 @@ def _checked(content: Mapping[str, Any], where: str, more: tuple[str, ...] = ())
 def _learned(content: Mapping[str, Any], tensors: Tensors, prefix: str) -> LearnedPolicy:
     """A learned policy; its weights are taken out of `tensors`."""
     names = _names(content["observation_names"])
-    place = check_table(content["environment"], "environment")
-    check_keys(place, ("id", "options"), "environment")
-    model = check_table(content["model"], "model")
-    check_keys(model, ("name", "sha256"), "model")
+    place = check_table(content["environment"], "environment", ("id", "options"))
     return LearnedPolicy(
         network=_network(content["network"], tensors, prefix),
         observation_names=names,
@@ -133,8 +91,7 @@ def _learned(content: Mapping[str, Any], tensors: Tensors, prefix: str) -> Learn
         base=None if content["base"] is None else _controller(content, "base"),
         env_id=check_text(place.get("id"), "environment.id"),
         env_options=dict(check_table(place.get("options"), "environment.options")),
-        model_name=check_text(model.get("name"), "model.name"),
-        model_sha256=check_text(model.get("sha256"), "model.sha256"),
+        **read_model(content["model"]),
         training=dict(check_table(content["training"], "training")),
     )
 
@@ -161,8 +118,7 @@ def _shielded(content: Mapping[str, Any], tensors: Tensors, prefix: str) -> Shie
 
 def _for_all(content: Mapping[str, Any], tensors: Tensors, prefix: str) -> OneForAll:
     """A policy for all ships; its weights are taken out of `tensors`."""
-    told = check_table(content["context"], "context")
-    check_keys(told, CONTEXT, "context", CONTEXT)
+    told = check_table(content["context"], "context", CONTEXT, CONTEXT)
     return OneForAll(
         network=_network(content["network"], tensors, prefix),
         observation_names=_names(content["observation_names"]),
@@ -184,8 +140,7 @@ def _controller(content: Mapping[str, Any], name: str) -> Controller:
 
 
 def _network(value: Any, tensors: Tensors, prefix: str) -> Network:
-    table = check_table(value, "network")
-    check_keys(table, ("activation", "output", "sizes"), "network")
+    table = check_table(value, "network", ("activation", "output", "sizes"))
     sizes = table.get("sizes")
     if not isinstance(sizes, list) or len(sizes) < 2:
         raise InputError(f"network.sizes: {sizes!r} found, expected a list of two numbers or more")

@@ -1,19 +1,8 @@
 """A safety shield: a policy whose rudder a fallback takes over where it leads the ship astray.
 
-It uses observations alone and takes over
-
-* where the state has been farther out of the data the model was identified from than `Limits.envelope_out`
-  for `Limits.out_lengths` (`Envelope.distance` of u, v, r and delta; a model without an envelope has no such
-  limit);
-* where the heading runs away: since she was last within `Limits.back_deg` of her course, or was turning
-  towards it, the ship has turned away from it by `Limits.runaway_deg`. Changes of the course itself do not
-  count, however large, and within `Limits.turn_lengths` of a planned turn that is observed any heading up to
-  the course beyond it is on course;
-* where the policy's command is not a number.
-
-It hands back after the ship has been within `Limits.back_deg` of her course and within
-`Limits.envelope_back` of the data for `Limits.calm_lengths` times to travel a ship length without a break.
-The limits to hand back lie inside those to take over, so that it does not chatter.
+It uses observations alone. When it takes over and hands back stands in docs/policies.md and in `Limits`; the
+limits to hand back lie inside those to take over, so that it does not chatter. Changes of the course itself
+do not count as turning away, and before a planned turn any heading up to the course beyond it is on course.
 """
 
 from __future__ import annotations
@@ -28,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from agents.controllers.controller import FORMAT, Action, Agent, Controller, Policy
 from agents.controllers.lq import LQ
-from agents.controllers.memory import Flags, Floats, Records, begun, heading_error, records
+from agents.controllers.memory import Flags, Floats, Records, begun, heading_error, records, size_of
 from agents.policies.policy import LearnedPolicy
 from agents.policies.weights_file import Tensors, write_policy
 from shipgym.checks import check_number
@@ -195,7 +184,7 @@ class Shielded(Agent):
         ours, outer = self.fallback.predict(given, outer, episode_start, deterministic)
         theirs, inner = self.policy.predict(given, inner, episode_start, deterministic)
         action = np.array(theirs, dtype=np.float32)
-        watch, _ = begun(watch, episode_start, given.shape[:-1], len(WATCH))
+        watch, _ = begun(watch, episode_start, given.shape[:-1], size_of(WATCH))
         known = records(watch, WATCH)
         self._update(given, np.asarray(~np.isfinite(action).all(axis=-1)), known)
         action[..., 0] = np.where(known["steered"] > 0.0, ours[..., 0], action[..., 0])
@@ -258,12 +247,17 @@ class Shielded(Agent):
                 check(model)
 
     def save(self, path: str | Path) -> None:
-        """Write policy and fallback as one file (format in `agents.policies.policy_file`)."""
+        """Write policy and fallback as one file (fields in docs/policies.md)."""
         write_policy(*self.file_fields(), Path(path))
 
     def file_fields(self) -> tuple[dict[str, Any], Tensors]:
         """What stands in its JSON, and the weights of its policy by name."""
-        policy, tensors = _file_fields(self.policy)
+        if not isinstance(self.policy, Controller | LearnedPolicy | Shielded):
+            raise InputError(
+                f"policy: {type(self.policy).__name__} found, expected a learned policy or a controller of "
+                f"shipgym for a file"
+            )
+        policy, tensors = self.policy.file_fields()
         content = {
             "format": FORMAT,
             "kind": "shielded",
@@ -274,14 +268,3 @@ class Shielded(Agent):
             "limits": asdict(self.limits),
         }
         return content, {f"policy.{name}": tensor for name, tensor in tensors.items()}
-
-
-def _file_fields(policy: Policy) -> tuple[dict[str, Any], Tensors]:
-    if isinstance(policy, Controller):
-        return policy.to_dict(), {}
-    if isinstance(policy, LearnedPolicy | Shielded):
-        return policy.file_fields()
-    raise InputError(
-        f"policy: {type(policy).__name__} found, expected a learned policy or a controller of shipgym for a "
-        f"file"
-    )

@@ -177,16 +177,12 @@ def step_response(
     ----------
     controller : Policy
         Anything with `predict`.
-    models : ShipModel or sequence of ShipModel
-        Of one structure.
+    models, task, allow_unstable
+        As in `sail`; of the task its control interval and bounds are used.
     step_deg : float
         Change of course, degrees, positive to starboard.
     duration : float, optional
         In s; by default the time to travel 16 ship lengths.
-    task : Task, optional
-        Its control interval and bounds are used.
-    allow_unstable : bool
-        As in `sail`.
 
     Returns
     -------
@@ -208,15 +204,15 @@ def step_response(
     straight = asked.changed(course_change_deg=0.0, episode_steps=steps)
     engine = Engine(fleet, len(fleet), straight, allow_unstable=allow_unstable)
     seeds = np.zeros(len(fleet), dtype=np.int64)
-    states = rollout(
-        controller, engine, seeds, record=RECORDED, show=_other_course(engine, np.radians(step_deg))
-    ).states
+    course = _other_course(engine, np.radians(step_deg))
+    states = rollout(controller, engine, seeds, record=RECORDED, show=course).states
     left = ((0, steps + 1 - len(states["psi"])), (0, 0))  # after all were lost, if they were
     heading, rudder = (
         np.pad(values, left, mode="edge").T
         for values in (states["psi"] - states["set_point"], states["delta"])
     )
-    return StepResponses(np.arange(steps + 1) * engine.dt, heading, rudder)
+    t: Floats = np.arange(steps + 1, dtype=np.float64) * engine.dt
+    return StepResponses(t, heading, rudder)
 
 
 def _other_course(engine: Engine, step: float) -> Callable[[NDArray[np.float32]], NDArray[np.float32]]:

@@ -55,30 +55,10 @@ def _on_path(task: Task) -> bool:
 
 
 def metrics(run: Rollout) -> dict[str, Floats]:
-    """Figures of each episode by name, each of shape (n,).
+    """Figures of each episode by name, each of shape (n,); docs/benchmark.md says what they are.
 
-    Parameters
-    ----------
-    run : Rollout
-        That recorded `recorded_for_metrics`.
-
-    Returns
-    -------
-    dict of str to array
-        cost, cost_heading and so on : minus the sum of the rewards, and its parts. An episode in which the
-            policy failed is charged as if it had lost control then.
-        heading_rmse_deg : against the set-point, on a path against its line-of-sight course.
-        rudder_travel_deg_min, rudder_reversals_min : way of the rudder, and how often it turns round (by
-            0.5 degrees at least), a minute.
-        overshoot_percent, settling_s, unsettled : see `course_changes`.
-        cross_track_rmse_m : on a path.
-        outside_corridor, left_corridor, grounded : share of the time; whether at all.
-        success : on a path, whether its end was reached; else whether control was kept to the end.
-        fuel : see `fuel_per_distance`.
-        extrapolating : share of the time outside the model's envelope.
-        shielded : share of the time in which a safety shield steered; interventions: how often it took over.
-        terminated, failed : control lost, the ship ran away or aground; no command.
-        duration_s : time sailed.
+    `run`: that recorded `recorded_for_metrics`. An episode in which the policy failed is charged as if it had
+    lost control then.
     """
     shielded = run.shielded & run.sailing
     kept = (~(run.terminated | run.failed)).astype(np.float64)

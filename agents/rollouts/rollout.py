@@ -118,8 +118,8 @@ def rollout(
         command, memory = log.ask(policy, seen if show is None else show(seen), memory, starts)
         if not log.sailing.any():  # the policy has failed in all episodes
             break
-        seen, *outcome = engine.step(command)
-        log.note(command, memory, *outcome)
+        seen, rewards, terminated, truncated = engine.step(command)
+        log.note(command, memory, rewards, terminated, truncated)
         starts = np.zeros(engine.num_envs, dtype=np.bool_)
     return log.rollout(np.asarray(seeds))
 

@@ -1,22 +1,8 @@
 """Suites: named tasks with their ship, their sea and the seeds of their episodes, fixed once and for all.
 
-A suite is a TOML file of `agents/suites`:
-
-    name = "shipgym-v1"
-
-    [tasks.mariner-calm]
-    environment = "course-keeping"          # or "path-following"
-    model = "mariner"                       # name of a shipped model
-    why = "sanity: ..."                     # what the task is there for
-    sea = "rough"                           # optional: a sea state, or a table `[tasks.NAME.sea]` as weather
-                                            # has it: current, wind, waves
-    ship = "mariner"                        # optional: the ship behind an identified model
-    [tasks.mariner-calm.options]            # optional: any other keywords of the environment
-    course_change_deg = 30.0
-    [tasks.mariner-calm.far]                # with a ship: keywords, and `gear`, far from the design
-
-A task with a ship is three (`SETS`): contestants are made for the model and evaluated on the ship, on the
-model, and on the ship far from what they were made for.
+A suite is a TOML file of `agents/suites`, as docs/benchmark.md describes it. A task with a ship is three
+(`SETS`): contestants are made for the model and evaluated on the ship, on the model, and on the ship far from
+what they were made for.
 """
 
 from __future__ import annotations
@@ -195,10 +181,7 @@ def _suite_text(name: str) -> str:
 
 
 def parse_suite(text: str, where: str) -> Suite:
-    """A suite from its TOML text (format in the module's docstring).
-
-    Raises InputError naming the field at fault.
-    """
+    """A suite from its TOML text; raises InputError naming the field at fault."""
     content = parse_toml(text, f"{where}:")
     check_keys(content, ("name", "tasks"), where)
     tasks = check_table(content.get("tasks"), f"{where}: tasks")
@@ -232,8 +215,7 @@ def _options(table: Mapping[str, Any], where: str) -> dict[str, Any]:
 
 
 def _task(name: str, value: Any, where: str) -> BenchmarkTask:
-    table = check_table(value, where)
-    check_keys(table, FIELDS, where)
+    table = check_table(value, where, FIELDS)
     environment, model = (check_text(table.get(one), f"{where}.{one}") for one in ("environment", "model"))
     data_only(table, where)
     sea = {"sea": table["sea"]} if "sea" in table else {}

@@ -139,7 +139,7 @@ def _own(agent: Any) -> Memory:
     return own
 
 
-def _moments(weights: list[torch.Tensor]) -> Callable[[Any], Memory]:
+def _moments(weights: list[torch.Tensor]) -> Callable[[Any], dict[int, Memory]]:
     """What an optimiser, Adam, keeps of each weight that had a step."""
     kept = [{"step": torch.zeros(()), "exp_avg": one, "exp_avg_sq": one} for one in weights]
     return lambda found: {k: one for k, one in enumerate(kept) if not isinstance(found, dict) or k in found}

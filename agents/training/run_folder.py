@@ -1,12 +1,4 @@
-"""The folder of a run of training.
-
-run.json                configuration, command, versions
-checkpoint.safetensors  the run at its last boundary kept
-progress.json           the learning curve
-agent.json, .safetensors    the best policy so far
-last.json, .safetensors     the newest one
-tensorboard/            TensorBoard's log
-"""
+"""The folder of a run of training; its files are listed in docs/training.md."""
 
 from __future__ import annotations
 

@@ -1,13 +1,8 @@
-"""Settings of learning: one frozen dataclass an algorithm, read from TOML.
+"""Settings of learning: one frozen dataclass an algorithm, read from TOML as docs/training.md says.
 
-The files in `hyperparameters/` have the tuned ones, later tables before earlier ones:
-
-    [defaults]                          # every setting of the algorithm, to learn from scratch
-    [residual.path-following]           # those that differ there beside a base, by default for the rudder
-    [suites.shipgym-v1]                 # those that differ on every task of a suite
-    [tasks.mariner-rough]               # those that differ on one of them
-
-A file of a user's own, and `--set`, name settings without tables.
+The files in `hyperparameters/` have the tuned ones, later tables before earlier ones: `defaults`, every
+setting of the algorithm to learn from scratch; those that differ beside a base in an environment
+(`residual`), on every task of a suite (`suites`), on one of them (`tasks`).
 """
 
 from __future__ import annotations

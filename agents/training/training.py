@@ -8,21 +8,25 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager, nullcontext
+from contextlib import contextmanager, nullcontext, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from agents.agent_file import load_agent
-from agents.controllers.designs import design_base
+from agents.controllers.controller import Policy
+from agents.controllers.designs import design, design_base
 from agents.output import in_use
 from agents.policies.policy import LearnedPolicy
+from agents.rollouts.rollout import episode_costs
+from agents.suites.suite import BenchmarkTask
 from agents.training import run_folder
-from agents.training.evaluation import HeldOut
 from agents.training.plan import EVALUATION_SEED, N_EVALUATIONS, Plan
 from agents.training.safe_file import read_values, write_values
+from shipgym.envs.engine import Engine
 from shipgym.errors import InputError
 from shipgym.files import write_json
 
@@ -38,6 +42,29 @@ except ModuleNotFoundError as error:
 
 REACHED = 1.001  # of LQ's cost: a network that has learned nothing yet adds nearly nothing
 CHECKPOINT_SECONDS = 45.0  # with a rollout on top a checkpoint is at most a minute old
+
+
+@dataclass(frozen=True)
+class HeldOut:
+    """Episodes of a task that are not learned from, and what LQ costs on them."""
+
+    engine: Engine  # with a lane for each
+    seeds: NDArray[np.int64]  # shape (n,)
+    lq_cost: float | None  # mean cost of LQ designed on the task's ship; None where there is none for her
+
+    @classmethod
+    def of(cls, task: BenchmarkTask, first: int, number: int, threads: int = 1) -> HeldOut:
+        """The episodes with seeds from `first` on; LQ follows paths by the course that the task shows."""
+        found = cls(task.engine(number, threads=threads), first + np.arange(number), None)
+        lq = None
+        if task.task.action == "rudder":
+            with suppress(InputError):
+                lq = design("lq", task)
+        return found if lq is None else replace(found, lq_cost=found.cost(lq))
+
+    def cost(self, policy: Policy) -> float:
+        """Mean cost of a policy."""
+        return float(episode_costs(policy, self.engine, self.seeds).mean())
 
 
 class Progress(NamedTuple):

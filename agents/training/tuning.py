@@ -123,10 +123,7 @@ def tune(
                     progress(before + done, trials, best)
 
             bounds = limits(found, plan.settings.total_steps)
-            jobs = [
-                {"configuration": {**plan.configuration(), "settings": settings}, "limits": bounds}
-                for _, settings in proposed
-            ]
+            jobs = [_job(plan, settings, bounds) for _, settings in proposed]
             results = replace(where, keep=folder / KEPT).run(training or train_trial, jobs, tell)
             for k, ((parameters, settings), result) in enumerate(zip(proposed, results, strict=True)):
                 found.append(_trial(first + k, parameters, settings, result))
@@ -190,6 +187,10 @@ def allowed(limits: Curve, steps: int) -> float:
 
 def _best_until(curve: Curve, steps: int) -> float:
     return min((cost for mark, cost in curve if mark <= steps), default=np.inf)
+
+
+def _job(plan: Plan, settings: Mapping[str, Any], bounds: Curve) -> dict[str, Any]:
+    return {"configuration": {**plan.configuration(), "settings": dict(settings)}, "limits": bounds}
 
 
 def _trial(number: int, parameters: Mapping[str, Any], settings: Mapping[str, Any], result: Any) -> Trial:

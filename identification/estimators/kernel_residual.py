@@ -17,7 +17,7 @@ from sklearn.cluster import KMeans
 
 from identification.estimators.estimator import Estimators
 from identification.estimators.lssvm import LSSVM
-from identification.estimators.rm_svm import heading_error, smoothest
+from identification.estimators.rm_svm import heading_error, most_regularised
 from identification.regression.grey_box import structure_samples
 from identification.regression.preprocess import smoothed_channels
 from identification.regression.samples import Samples
@@ -118,7 +118,7 @@ def fit_kernel(
     (length, weight), errors = pairs[0], {}
     if len(pairs) > 1:
         tried = {(length, weight): search.error(stages[length], weight) for length, weight in pairs}
-        length, weight = smoothest(pairs, [*tried.values()])
+        length, weight = most_regularised(pairs, [*tried.values()])
         errors = {"kernel": tried[length, weight]}
     errors["reference"] = search.error(stages[length], 0.0)
     remarks = []

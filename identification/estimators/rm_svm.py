@@ -231,7 +231,7 @@ class _Tuner:
             models = ((self.model(weight, self.first_bands, rows), held) for rows, held in folds)
             return float(np.mean([heading_error(model, held, "rmse") for model, held in models]))
 
-        return smoothest(WEIGHTS, [error(weight) for weight in WEIGHTS])
+        return most_regularised(WEIGHTS, [error(weight) for weight in WEIGHTS])
 
     def bands(self, weight: float) -> tuple[list[float], SearchResult | None]:
         """The insensitive bands, by a pattern search on the simulated heading of the trials."""
@@ -247,8 +247,8 @@ class _Tuner:
         return search.x.tolist(), search
 
 
-def smoothest(choices: Sequence[Choice], errors: Sequence[float]) -> Choice:
-    """The first of some choices whose error is nearly the least; the first where none is finite."""
+def most_regularised(choices: Sequence[Choice], errors: Sequence[float]) -> Choice:
+    """The first of choices, the most regularised first, whose error is nearly the least, if any is finite."""
     allowed = ERROR_TOLERANCE * min(errors)
     found = (choice for choice, error in zip(choices, errors, strict=True) if error <= allowed)
     return next(found, choices[0])

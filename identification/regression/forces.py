@@ -14,6 +14,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
+from sklearn.metrics import r2_score
 
 from identification.estimators.estimator import Estimator
 from identification.estimators.lssvm import TruncatedLSSVM
@@ -55,13 +56,9 @@ class ForceRegression:
 
     def r_squared(self, coefficients: Floats) -> dict[str, float]:
         """Share of the variance of X, Y and N that is explained (equation 22)."""
-        errors = self.targets - self.features @ coefficients
-        found = {}
-        for i, force in enumerate(FORCES):
-            rows = self.equation == i
-            about = self.targets[rows] - self.targets[rows].mean()
-            found[force] = 1.0 - float(errors[rows] @ errors[rows]) / max(float(about @ about), 1e-300)
-        return found
+        fitted, forces = self.features @ coefficients, [self.equation == i for i in range(len(FORCES))]
+        explained = [float(r2_score(self.targets[rows], fitted[rows])) for rows in forces]
+        return dict(zip(FORCES, explained, strict=True))
 
 
 def force_regression(

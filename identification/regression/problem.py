@@ -60,7 +60,7 @@ def pose(
         raise InputError(
             f"steering: {steering!r} found, expected a SteeringGear, or None to estimate it from the rudders"
         )
-    used = [repaired(trial) if options.repair else trial for trial in _used(everything)]
+    used = [repaired(trial) if options.repair else trial for trial in everything if trial.use == "fit"]
     table, similarity = _table(options.structure, options.reference_model, particulars, used)
     used, everything = (
         [_at_constant_speed(one, table, particulars) for one in group] for group in (used, everything)
@@ -113,13 +113,19 @@ def _blank(
 
 
 def held_out(trials: Any, names: Sequence[str]) -> Sequence[Trial]:
-    """The trials, those named marked to validate only; InputError for what is not a list of trials."""
+    """The trials, those named marked to validate only; InputError for what is no list of different trials."""
     wrong = [trials] if isinstance(trials, Trial | str) else [t for t in trials if not isinstance(t, Trial)]
     if wrong:
         raise InputError(
             f"trials: {wrong[0]!r} found, expected a list of Trials, such as ship.trials() of a ship file"
         )
     known = [trial.name for trial in trials]
+    twice = [name for name in known if known.count(name) > 1]
+    if twice:
+        raise InputError(
+            f"trials: {len(known)} trials found, two of them named {twice[0]!r}, expected different names; "
+            "rename one with trial.with_(name=...)"
+        )
     wanted = [names] if isinstance(names, str) else list(names)
     for name in wanted:
         check_choice(name, known, "hold_out")
@@ -142,18 +148,6 @@ def _table(
     steering = get_structure("linear-steering")
     check_trials(used, steering)
     return chosen_box(reference, _ship(particulars, used, steering), used)
-
-
-def _used(trials: Sequence[Trial]) -> list[Trial]:
-    """Trials to fit, after checking that all trials have different names."""
-    names = [trial.name for trial in trials]
-    twice = [name for name in names if names.count(name) > 1]
-    if twice:
-        raise InputError(
-            f"trials: {len(names)} trials found, two of them named {twice[0]!r}, expected different names; "
-            "rename one with trial.with_(name=...)"
-        )
-    return [trial for trial in trials if trial.use == "fit"]
 
 
 def _ship(particulars: Given, trials: Sequence[Trial], table: Structure) -> Particulars:

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import brentq, minimize_scalar
+from scipy.special import lambertw
 
 from identification.regression.preprocess import is_noisy
 from shipgym.arrays import Floats
@@ -26,7 +27,6 @@ TOLERANCE = 1e-3  # of the rudder's range: orders closer than this are one order
 RAMP = 1e-4  # a rate within this part of the gear's rate is the gear's rate
 EXPLAINED = 0.85  # share of the intervals that the gear has to explain
 FEWEST_SAMPLES = 8  # per change of order: with fewer the gear explains noise
-BISECTIONS = 60
 USUAL_LIMIT_DEG = 35.0
 MOVING = 0.5  # of the fastest move: faster ones are taken for the gear's own rate
 FAST_QUANTILE = 0.995  # of the rates of records with noise
@@ -142,12 +142,10 @@ def _orders(t: Floats, delta: Floats, rate: float, lag: float) -> Floats:
     size, side = np.abs(move), np.sign(move)
     distance = size / -np.expm1(-steps / lag) if lag > 0.0 else size
     if lag > 0.0 and np.any(distance > rate * lag):
-        low, high = np.zeros_like(steps), steps.copy()
-        for _ in range(BISECTIONS):
-            ramping = 0.5 * (low + high)
-            short = rate * (ramping - lag * np.expm1(-(steps - ramping) / lag)) < size
-            low, high = np.where(short, ramping, low), np.where(short, high, ramping)
-        distance = np.where(distance > rate * lag, rate * (0.5 * (low + high) + lag), distance)
+        # the ramp lasts x seconds, of x - lag exp((x - step) / lag) = size / rate - lag
+        short = size / rate - lag
+        ramping = short - lag * lambertw(-np.exp(np.minimum((short - steps) / lag, -1.0))).real
+        distance = np.where(distance > rate * lag, rate * (ramping + lag), distance)
     ramps = size >= (1.0 - RAMP) * rate * steps
     return np.where(ramps, np.copysign(np.inf, move), delta[:-1] + side * distance)
 

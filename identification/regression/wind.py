@@ -10,8 +10,7 @@ import numpy as np
 from identification.regression.samples import Samples
 from shipgym.checks import check_flag, check_keys
 from shipgym.errors import InputError
-from shipgym.sea.wind import AIR_DENSITY, wind_curves
-from shipgym.sea.wind_tables import WindTable
+from shipgym.sea.wind import AIR_DENSITY, WindTable, wind_curves
 from shipgym.ships.inertia import particulars_inertia
 from shipgym.ships.mmg import MMG
 from shipgym.ships.particulars import Particulars

@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,7 +26,8 @@ from shipgym.trials.trial import Trial
 
 Floats = NDArray[np.float64]
 
-PMM18, PMM38 = get_structure("pmm18"), get_structure("pmm38")
+PMM18: Any = get_structure("pmm18")
+PMM38: Any = get_structure("pmm38")
 #: Table 11: the reduced model of the ship towed at SINTEF Ocean, prime system.
 TABLE_11 = {
     "X_udot": -1.04e-2, "X_uuu": -2.67e-4, "X_uvv": -9.29e-3, "X_rvu": 5.84e-2, "X_urr": -1.22e-3,

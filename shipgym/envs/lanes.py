@@ -142,48 +142,6 @@ class Lanes:
         lengths = getattr(self.task, name, None)
         return None if lengths is None else float(lengths * self.model.particulars["length"])
 
-    def copy_lanes(self, source: Lanes, lanes: ArrayLike) -> None:
-        """Make each lane the copy of one of another engine: same ship, same episode, same future.
-
-        Gusts, noise and what will be asked are functions of the episode's seed and of the step, so copies
-        that are steered alike go on bit for bit like the original. `lanes`, shape (num_envs,), says which
-        lane of `source` each lane becomes. Raises InputError if the engines differ in more than the number
-        of lanes, or there is no such lane.
-        """
-        which = np.asarray(lanes)
-        if which.shape != (self.num_envs,) or which.dtype.kind not in "iu":
-            raise InputError(
-                f"lanes: {which.dtype} of shape {which.shape} found, expected {self.num_envs} whole numbers"
-            )
-        if which.min() < 0 or which.max() >= source.num_envs:
-            raise InputError(
-                f"lanes: {which.min()} to {which.max()} found, expected 0 to {source.num_envs - 1}"
-            )
-        self._check_alike(source)
-        there, here = divmod(which, LANES), divmod(np.arange(self.num_envs), LANES)
-        pairs: list[tuple[NDArray[Any], NDArray[Any]]] = [
-            (self._states, source._states), (self._keys, source._keys),
-        ]  # fmt: skip
-        if not self._voyages.shared:
-            pairs.append((self._ships, source._ships))
-        for own, other in pairs:
-            lanes_of(own)[here[0], :, here[1]] = lanes_of(other)[there[0] % len(other), :, there[1]]
-        self.shown.observations[:] = source.shown.observations[which]
-        self.shown.outcomes[:] = source.shown.outcomes[:, which]
-        self.shown.flags[:] = source.shown.flags[:, which]
-
-    def _check_alike(self, source: Lanes) -> None:
-        """Refuse an engine whose lanes cannot be taken over."""
-        same_task = (
-            self._voyages is source._voyages
-            and self._states.shape[1] == source._states.shape[1]
-            and np.array_equal(self._settings, source._settings, equal_nan=True)
-        )
-        if not same_task:
-            raise InputError("source: an engine of another task found, expected one of the same")
-        if self._voyages.shared and not np.array_equal(source._ships, self._ships, equal_nan=True):
-            raise InputError("source: an engine with other ships found, expected one with the same")
-
     def get_state(self) -> dict[str, Any]:
         """All that `set_state` needs to go on from here, copies by name."""
         shown, gear = self.shown, self._voyages.state

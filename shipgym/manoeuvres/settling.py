@@ -8,9 +8,8 @@ import numpy as np
 from shipgym.arrays import Floats
 from shipgym.checks import check_number
 from shipgym.errors import InputError
-from shipgym.ships.conditions import Conditions, Passage
 from shipgym.ships.ship_model import ShipModel
-from shipgym.ships.simulate import as_trial
+from shipgym.ships.simulate import Conditions, Passage, as_trial
 from shipgym.trials.trial import Trial
 
 STEPS_PER_LENGTH = 40  # simulation steps in the time to travel one ship length
@@ -120,9 +119,8 @@ class Voyage:
 def _rudder_effect(model: ShipModel, water_depth: float) -> float:
     """Yaw acceleration per rudder angle at service speed, 1/s^2."""
     angle = float(np.radians(5.0))
-    states = np.repeat(model.service_state[None], 2, axis=0)
-    states[:, model.state_names.index("delta")] = angle, -angle
-    rates = model.derivatives(states, model.service_command, water_depth)[:, model.state_names.index("r")]
+    u, n = np.full(2, model.particulars["speed"]), np.full(2, model.service_shaft_speed)
+    rates = model.rates({"u": u, "delta": np.array([angle, -angle]), "n": n}, water_depth)["r"]
     effect = float(rates[0] - rates[1]) / (2.0 * angle)
     if not effect > 0.0:
         raise InputError(

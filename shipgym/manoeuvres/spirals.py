@@ -18,9 +18,9 @@ from shipgym.manoeuvres.execution import require, rudder
 from shipgym.manoeuvres.registry import Manoeuvre
 from shipgym.manoeuvres.settling import Voyage
 from shipgym.sea.conditions import Weather
-from shipgym.ships.conditions import Conditions, Seed
 from shipgym.ships.linear import is_course_stable
 from shipgym.ships.ship_model import ShipModel
+from shipgym.ships.simulate import Conditions, Seed
 from shipgym.trials.trial import Trial
 
 Method = Literal["direct", "reverse"]

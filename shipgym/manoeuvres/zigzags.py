@@ -13,9 +13,8 @@ from shipgym.errors import ManoeuvreError
 from shipgym.manoeuvres.execution import distance_sailed, number_of_steps, reached, reversals, ship_length
 from shipgym.manoeuvres.registry import SIDES, Manoeuvre, standard_time
 from shipgym.sea.conditions import Weather
-from shipgym.ships.conditions import Conditions, Passage, Seed
 from shipgym.ships.ship_model import ShipModel
-from shipgym.ships.simulate import as_trial
+from shipgym.ships.simulate import Conditions, Passage, Seed, as_trial, orders
 from shipgym.trials.trial import Trial
 
 STANDARD_DEG = (10.0, 20.0)
@@ -88,11 +87,9 @@ def zigzag(
     check_choice(switch, ("inside", "step"), "switch")
     passage = Passage(model, Conditions(water_depth, weather, seed), dt)
     states, rudder = passage.states(model.service_state, n_steps), np.empty(n_steps + 1)
-    order = -angle if port_first else angle, threshold, model.service_shaft_speed
-    _, turns = passage.run("zigzag", states, rudder, *order, dt, switch == "inside")
-    orders = np.repeat(model.service_command[None], n_steps + 1, axis=0)
-    orders[:, 0] = rudder
-    trial = as_trial(model, dt, states, orders, kind="zigzag")
+    first = -angle if port_first else angle, threshold, model.service_shaft_speed
+    _, turns = passage.run("zigzag", states, rudder, *first, dt, switch == "inside")
+    trial = as_trial(model, dt, states, orders(model, rudder), kind="zigzag")
     if must_reverse and turns == 0:
         raise _never_reversed(f"zigzag {rudder_deg:g}/{heading_deg:g} of {model.name!r}", trial, heading_deg)
     return trial

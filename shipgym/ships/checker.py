@@ -15,6 +15,7 @@ from shipgym.errors import InputError, UnstableModelError
 from shipgym.ships.catalogue import load_model
 from shipgym.ships.grey_boxes import GreyBox
 from shipgym.ships.ship_model import ShipModel
+from shipgym.ships.simulate import orders
 from shipgym.ships.term_table import ANGULAR, EQUATION_NAMES, Structure
 
 if TYPE_CHECKING:
@@ -105,11 +106,8 @@ def _rates(model: ShipModel) -> list[str]:
 
 def _accelerations(model: ShipModel, channels: dict[str, Floats]) -> Floats:
     """Accelerations in the order of `_rates`, shape (n, n_rates)."""
-    zero = np.zeros(SAMPLES)
-    states = np.stack([channels.get(name, zero) for name in model.state_names], axis=-1)
-    commands = np.stack([channels[name] for name in model.command_names], axis=-1)
-    which = [model.state_names.index(name) for name in _rates(model)]
-    return model.derivatives(states, commands)[:, which]
+    rates = model.rates(channels)
+    return np.stack([rates[name] for name in _rates(model)], axis=-1)
 
 
 def _wrong_accelerations(model: ShipModel) -> Iterator[str]:
@@ -170,8 +168,7 @@ def _asymmetry(model: ShipModel) -> float:
 
 def _run(model: ShipModel, rudder: float, lengths: float) -> Trial:
     """From service with the rudder held, over so many ship lengths at service speed."""
-    commands = np.tile(model.service_command, (round(lengths / STEP), 1))
-    commands[:, 0] = rudder
+    commands = orders(model, np.full(round(lengths / STEP), rudder))
     return model.simulate(commands, STEP * model.travel_time)
 
 

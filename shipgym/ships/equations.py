@@ -6,18 +6,12 @@ ship)`, and `SHIP`, which says the rest. The functions are plain Python; `shipgy
 """
 
 import importlib
-import importlib.util
 import math
-import sys
-import tomllib
 import traceback
 from collections import namedtuple
 from collections.abc import Callable, Mapping
 from dataclasses import KW_ONLY, dataclass, field
-from functools import cache
-from importlib.resources import files
 from pathlib import Path
-from types import ModuleType
 from typing import Any, ClassVar
 
 import numpy as np
@@ -29,6 +23,7 @@ from shipgym.engine.parts import Part
 from shipgym.engine.records import Record, field_types, is_record
 from shipgym.engine.vessel import Vessel, vessel_of
 from shipgym.errors import InputError
+from shipgym.python_files import load_file
 from shipgym.ships.particulars import Particulars
 from shipgym.ships.steering import SteeringGear
 
@@ -36,14 +31,10 @@ RATES = ("udot", "vdot", "rdot", "pdot", "qdot")
 Accelerations = Callable[[Any, Any, Any], tuple[float, float, float, float, float]]
 
 
-def published(ship: str) -> dict[str, Any]:
-    """The coefficients in the file `ship`.toml beside this one."""
-    return tomllib.loads(files("shipgym.ships").joinpath(f"{ship}.toml").read_text("utf-8"))
-
-
 def record_of(values: Mapping[str, float], module: str) -> Any:
     """A record of coefficients with these values as defaults, for the file of a ship."""
-    record = namedtuple("Coefficients", values, defaults=[*values.values()], module=module)
+    names, defaults = [*values], [*values.values()]
+    record = namedtuple("Coefficients", names, defaults=defaults, module=module)  # type: ignore[misc]
     record.__annotations__ = dict.fromkeys(values, float)
     return record
 
@@ -177,29 +168,7 @@ def read_ship_equations(path: str | Path) -> ShipEquations:
     Raises InputError for a file that is not there, cannot be run, or defines no `SHIP`.
     """
     path = Path(path).resolve()
-    if not path.is_file():
-        raise InputError(
-            f"{path}: no such file, expected a Python file that defines SHIP = ShipEquations(...)"
-        )
-    return _read(path, path.stat().st_mtime_ns)
-
-
-@cache
-def _read(path: Path, changed: int) -> ShipEquations:
-    """Read once as long as the file does not change, so that models of one ship share what is compiled."""
-    name = f"shipgym_ship_{path.stem}_{abs(hash((path, changed))):x}"
-    spec = importlib.util.spec_from_file_location(name, path)
-    assert spec is not None
-    assert spec.loader is not None
-    module: ModuleType = importlib.util.module_from_spec(spec)
-    sys.modules[name] = module
-    try:
-        spec.loader.exec_module(module)
-    except InputError as error:
-        raise InputError(f"{path}: {error}") from None
-    except Exception as error:
-        raise InputError(f"{path}: cannot be run: {type(error).__name__}: {error}") from error
-    ship = getattr(module, "SHIP", None)
+    ship = getattr(load_file(path), "SHIP", None)
     if not isinstance(ship, ShipEquations):
         raise InputError(f"{path}: SHIP = {ship!r} found, expected SHIP = ShipEquations(...)")
     object.__setattr__(ship, "path", path)

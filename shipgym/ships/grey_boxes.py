@@ -161,19 +161,14 @@ class GreyBox(Structure):
         ship = self.ship
         fast = ship.particulars["speed"] / particulars["speed"]
         quick = fast * particulars["length"] / ship.particulars["length"]
-        u = np.asarray(channels["u"], dtype=float)
-        zero = np.zeros_like(u)
-        n = np.full_like(u, ship.service_shaft_speed)
-        if self.shaft:
-            n = np.asarray(channels["n"], dtype=float) * (ship.service_shaft_speed / shaft_speed)
         scale = {"u": fast, "v": fast, "r": quick, "p": quick, "phi": 1.0, "q": quick**2, "delta": 1.0}
-        values = {name: scale[name] * np.asarray(channels.get(name, zero), dtype=float) for name in scale}
-        values["n"] = n
-        states = np.stack([values.get(name, zero) for name in ship.state_names], axis=-1)
-        commands = np.stack([values[name] for name in ship.command_names], axis=-1)
-        rates = ship.derivatives(states, commands)
+        values = {name: scale[name] * np.asarray(channels[name]) for name in scale if name in channels}
+        values["n"] = np.full_like(values["u"], ship.service_shaft_speed)
+        if self.shaft:
+            values["n"] = np.asarray(channels["n"]) * (ship.service_shaft_speed / shaft_speed)
         back = {"u": 1.0 / (fast * quick), "v": 1.0 / (fast * quick), "r": quick**-2, "q": quick**-3}
-        return {q: rates[:, ship.state_names.index(q)] * back[q] for q in back if q in ship.state_names}
+        rates = ship.rates(values)
+        return {q: rates[q] * back[q] for q in back if q in rates}
 
     def to_dict(self) -> dict[str, Any]:
         """The table and the whole reference ship, as they stand in a model file."""

@@ -3,22 +3,19 @@
 from __future__ import annotations
 
 import math
-import tomllib
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, fields, replace
-from importlib.resources import files
 from typing import Any
 
 from shipgym.checks import check_keys, check_number, check_table, check_text
 from shipgym.errors import InputError
+from shipgym.files import shipped_toml
 
 #: Added masses, in the prime system; in a ship file under ``[ship.added_mass]``.
 ADDED_MASSES = ("X_udot", "Y_vdot", "Y_rdot", "N_vdot", "N_rdot")
 
 #: Bounds of each value, hints of its unit, and how it grows with the length.
-BOUNDS: dict[str, dict[str, Any]] = tomllib.loads(
-    files("shipgym.ships").joinpath("particulars.toml").read_text("utf-8")
-)
+BOUNDS: dict[str, dict[str, Any]] = shipped_toml("shipgym.ships", "particulars.toml")
 
 
 @dataclass(frozen=True)

@@ -49,17 +49,17 @@ def scale_model(
     which is gravity's, does not follow the speed: keep to the default there.
     """
     table = model.dynamics
-    if not isinstance(table, Structure) and not table.scales:
+    if not table.scales:
         raise InputError(
             f"model {model.name!r}: the equations of reference ship '{table.name}' found, which are written "
             "for one length; expected a model with a table of terms, such as one identified from its trials"
         )
     check_number(length, "length", above=0.0, hint="in m")
     size = length / model.particulars.length
-    if speed is None:
-        speed = model.particulars["speed"] * np.sqrt(size)
+    speed = model.particulars["speed"] * np.sqrt(size) if speed is None else speed
     check_number(speed, "speed", above=0.0, hint="in m/s")
     fast = float(speed) / model.particulars["speed"]
+    quick, gear = fast / size, model.steering
     factors = dict.fromkeys(model.coefficients, 1.0)  # those without unit
     if isinstance(table, Structure) and table.normalisation == "si":
         factors = _coefficient_factors(table, size, fast)
@@ -67,10 +67,12 @@ def scale_model(
     return replace(
         model,
         particulars=_particulars(model.particulars, size, float(speed), water_density),
-        steering=_steering(model.steering, fast / size),
+        steering=SteeringGear(
+            gear.rudder_limit_deg, gear.rudder_rate_deg_s * quick, gear.time_constant / quick
+        ),
         coefficients={name: value * factors[name] for name, value in model.coefficients.items()},
         covariance=None if model.covariance is None else model.covariance * np.outer(scale, scale),
-        envelope=_envelope(model.envelope, np.array([fast, fast, fast / size, 1.0])),
+        envelope=_envelope(model.envelope, np.array([fast, fast, quick, 1.0])),
         provenance=(model.provenance or {})
         | {"scaled": {"from_length": model.particulars.length, "from_speed": model.particulars["speed"]}},
         service_shaft_speed=model.service_shaft_speed * fast / size,
@@ -95,10 +97,6 @@ def _particulars(ship: Particulars, size: float, speed: float, water_density: fl
         denser = 1.0 if water_density is None else water_density / ship.require("water_density")
         changes["mass"] = ship.mass * size**3 * denser
     return replace(ship, length=ship.length * size, speed=speed, water_density=density, **changes)
-
-
-def _steering(gear: SteeringGear, quicker: float) -> SteeringGear:
-    return SteeringGear(gear.rudder_limit_deg, gear.rudder_rate_deg_s * quicker, gear.time_constant / quicker)
 
 
 def _envelope(envelope: Envelope | None, scale: Floats) -> Envelope | None:

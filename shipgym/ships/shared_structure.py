@@ -117,7 +117,7 @@ class SharedStructure(Structure):
         """Coefficients of the SI features: the forces by mass and added mass (see `Structure`)."""
         p = particulars.completed()
         forces = np.concatenate([self._velocity_forces(axis, coefficients, p) for axis in AXES])
-        numbers: Floats = self.scales(p) * (self._from_forces(self.inertia(coefficients, p)) @ forces)
+        numbers: Floats = self.term_scales(p) * (self._from_forces(self.inertia(coefficients, p)) @ forces)
         return numbers
 
     def _velocity_forces(self, axis: str, coefficients: Mapping[str, float], p: Particulars) -> Floats:

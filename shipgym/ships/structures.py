@@ -1,12 +1,11 @@
 """The printed structures by name (`structures.toml`), and those that users register."""
 
-import tomllib
 from collections.abc import Mapping, Sequence
-from importlib.resources import files
 from typing import Any
 
 from shipgym.checks import check_choice, check_keys, check_table, placed
 from shipgym.errors import InputError
+from shipgym.files import shipped_toml
 from shipgym.ships import container, kvlcc2, mmg, tanker
 from shipgym.ships.equations import ShipEquations
 from shipgym.ships.shared_structure import read_shares, shared_structure
@@ -18,7 +17,7 @@ USUAL = {"source": "own", "normalisation": "si", "quantity": "acceleration"}  # 
 
 
 def _printed() -> dict[str, Structure]:
-    tables = tomllib.loads(files("shipgym.ships").joinpath("structures.toml").read_text("utf-8"))
+    tables = shipped_toml("shipgym.ships", "structures.toml")
     papers = tables.pop("papers")
     return {name: _read_printed(name, USUAL | table, papers) for name, table in tables.items()}
 
@@ -112,7 +111,7 @@ def register_structure(
 
 def own_structure(table: Any, where: str) -> Structure:
     """A structure from the arguments of `register_structure`; messages begin with `where`."""
-    own = USUAL | check_table(table, where)
+    own: dict[str, Any] = {**USUAL, **check_table(table, where)}
     check_keys(own, ("name", "equations", *USUAL), where)
     for key in ("name", "equations"):
         if key not in own:

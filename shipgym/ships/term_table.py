@@ -68,6 +68,7 @@ class Structure:
     # {"force", "acceleration"}; what the terms make up (those of `q` accelerations per time). Accelerations
     # follow from forces by the inertia of the particulars (mass and added mass, sway and yaw coupled)
     quantity: str = "force"
+    scales: ClassVar[bool] = True  # whether the dimensions are those of the particulars
     captive: ClassVar[bool] = False  # whether it is identified from the forces of captive tests
     shallow_water: ClassVar[bool] = False  # whether it knows the depth of the water
 
@@ -264,7 +265,7 @@ class Structure:
         speeds = self.unit_speeds(equation) - term.power(*SPEEDS, *TURN_RATES)
         return float(length ** float(lengths) * speed ** float(speeds) / (shaft**turns if turns else 1.0))
 
-    def scales(self, particulars: Particulars, shaft_speed: float = 0.0) -> Floats:
+    def term_scales(self, particulars: Particulars, shaft_speed: float = 0.0) -> Floats:
         """`feature_scale` of all terms, one equation after the other, for a ship; shape (n_coefficients,)."""
         ship = particulars["length"], particulars["speed"], shaft_speed
         scaled = [self.feature_scale(q, term, *ship) for q, terms in self.equations.items() for term in terms]
@@ -310,8 +311,8 @@ class Structure:
                 f"1/s: the terms of structure '{self.name}' refer to it"
             )
         if self.quantity == "acceleration":
-            return np.diag(self.scales(particulars, shaft_speed))
-        return self.scales(particulars, shaft_speed)[:, None] * self._from_forces(inertia(particulars))
+            return np.diag(self.term_scales(particulars, shaft_speed))
+        return self.term_scales(particulars, shaft_speed)[:, None] * self._from_forces(inertia(particulars))
 
     @property
     def needs_shaft_speed(self) -> bool:

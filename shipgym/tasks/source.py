@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-import hashlib
-import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -16,42 +13,8 @@ import numpy as np
 from shipgym.checks import check_keys, check_number, check_whole
 from shipgym.engine.records import Record, field_types, is_list, is_record, leaves
 from shipgym.errors import InputError
+from shipgym.python_files import load_file
 from shipgym.tasks.contract import Setting
-
-
-def load_file(path: Path) -> ModuleType:
-    """A Python file as a module, executed once however often it is asked for while it stays the same.
-
-    Raises InputError if there is none, or it cannot be executed.
-    """
-    if not path.is_file():
-        raise InputError(f"{path}: no such file, expected a Python file")
-    resolved = path.resolve()
-    content = hashlib.sha256(str(resolved).encode() + b"\0" + resolved.read_bytes())
-    name = f"shipgym_user_{content.hexdigest()[:16]}"
-    if name in sys.modules:
-        return sys.modules[name]
-    module = ModuleType(name)
-    module.__file__ = str(resolved)
-    sys.modules[name] = module
-    try:
-        # compiled here, because Python's own cache takes a file changed within a second for the same
-        exec(compile(resolved.read_bytes(), str(resolved), "exec"), vars(module))
-    except Exception as error:
-        del sys.modules[name]
-        line = _line_in(resolved, error)
-        raise InputError(f"{path}{line}: cannot be executed: {type(error).__name__}: {error}") from error
-    return module
-
-
-def _line_in(path: Path, error: Exception) -> str:
-    """The last line of a file that an error passed through."""
-    traceback, line = error.__traceback__, getattr(error, "lineno", None)
-    while traceback is not None:
-        if traceback.tb_frame.f_code.co_filename == str(path):
-            line = traceback.tb_lineno
-        traceback = traceback.tb_next
-    return f", line {line}" if line else ""
 
 
 def read_source(source: Any) -> tuple[Any, str]:

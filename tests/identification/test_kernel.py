@@ -17,8 +17,8 @@ from identification.report.page import report_page
 from shipgym import ShipModel, Trial
 from shipgym.errors import InputError
 from shipgym.manoeuvres import zigzag
+from shipgym.ships.catalogue import fitted_box
 from shipgym.ships.checker import check_ship_model
-from shipgym.ships.grey_box_model import fitted_box
 from shipgym.ships.kernel_boxes import Kernel, KernelBox, kernel_box
 from shipgym.ships.linear import nomoto
 from shipgym.ships.particulars import Particulars

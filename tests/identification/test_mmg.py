@@ -16,14 +16,20 @@ import pytest
 import shipgym
 from identification import IdentificationResult, identify
 from identification.simulation_error.maximum_a_posteriori import LARGEST, _groups, _Problem
-from identification.simulation_error.mmg_prior import formula_coefficients, mmg_prior
+from identification.simulation_error.mmg_prior import (
+    HULL_FORMULAS,
+    formula_coefficients,
+    mmg_prior,
+    reference_coefficients,
+)
 from identification.validation.warnings import model_warnings
 from shipgym import InputError, Particulars, ShipModel, Trial
 from shipgym.engine.motion import Motion, Ship
 from shipgym.manoeuvres import turning_circle, turning_indices
-from shipgym.ships import kvlcc2, mmg
+from shipgym.ships import container, kvlcc2, load_model, mmg
 from shipgym.ships.particulars import ADDED_MASSES
 from shipgym.ships.scaling import scale_model
+from tests.ships.mmg import MMG_SHIPS, mmg_ship
 
 L7 = mmg.SHIP.particulars
 
@@ -157,6 +163,27 @@ def test_formulas_give_about_what_was_measured_of_kvlcc2() -> None:
     for source in ("yoshimura", "kijima", "kvlcc2-l7"):  # at service speed thrust balances resistance
         found = mmg_prior(source, L7)
         assert at(ship_of(found.mean, found.ship), ahead)[0] == pytest.approx(0.0, abs=1e-12)
+
+
+@pytest.mark.parametrize("hull", HULL_FORMULAS)
+def test_formulas_claim_no_more_than_published_ships_bear_out(hull: str) -> None:
+    """The prior's deviation is at least the root mean square of published coefficients less the formula's."""
+    ships = [load_model("kvlcc2-l7"), *map(mmg_ship, MMG_SHIPS)]
+    forms = [(ship.particulars, reference_coefficients(ship)) for ship in ships]
+    s175 = load_model("container")  # by rho L^2 / 2; her rudder straightens the flow by another law
+    own, by_draught = s175.coefficients, s175.particulars.length / s175.particulars.require("draught")
+    hull_terms = {name for name in own if name in mmg.IDENTIFIED and (name[1] == "_" or name[0] in "mJ")}
+    rudder_terms = {"a_H", "x_H", "epsilon", "kappa"}
+    form = {name: by_draught * own[name] for name in hull_terms - rudder_terms}
+    form |= {name: own[name] for name in rudder_terms}
+    form |= {"R_0": -by_draught * own["X_uu"], "w_P0": own["wp"], "t_R": 1.0 - own["c_RX"]}
+    form["f_alpha"] = 6.13 * container.ASPECT_RATIO / (2.25 + container.ASPECT_RATIO)
+    forms.append((s175.particulars, form))
+    priors = [mmg_prior(hull, replace(ship, **dict.fromkeys(ADDED_MASSES))) for ship, _ in forms]
+    for k, name in enumerate(mmg.IDENTIFIED):
+        apart = [form[name] - prior.mean[name]
+                 for (_, form), prior in zip(forms, priors, strict=True) if name in form]  # fmt: skip
+        assert np.sqrt(np.mean(np.square(apart))) <= priors[0].deviation[k], name
 
 
 def test_main_dimensions_outside_the_range_are_said_and_an_unlike_reference_refused() -> None:
