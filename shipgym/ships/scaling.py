@@ -12,6 +12,7 @@ from shipgym.errors import InputError
 from shipgym.ships.envelope import Envelope
 from shipgym.ships.particulars import BOUNDS, Particulars
 from shipgym.ships.ship_model import ShipModel
+from shipgym.ships.steering import SteeringGear
 from shipgym.ships.term_table import Structure
 
 
@@ -55,26 +56,24 @@ def scale_model(
         )
     check_number(length, "length", above=0.0, hint="in m")
     size = length / model.particulars.length
-    if speed is None:
-        speed = model.particulars["speed"] * np.sqrt(size)
+    speed = model.particulars["speed"] * np.sqrt(size) if speed is None else speed
     check_number(speed, "speed", above=0.0, hint="in m/s")
     fast = float(speed) / model.particulars["speed"]
     quick, gear = fast / size, model.steering
+    gear = SteeringGear(gear.rudder_limit_deg, gear.rudder_rate_deg_s * quick, gear.time_constant / quick)
     factors = dict.fromkeys(model.coefficients, 1.0)  # those without unit
     if isinstance(table, Structure) and table.normalisation == "si":
         factors = _coefficient_factors(table, size, fast)
     scale = np.array(list(factors.values()))
+    origin = {"from_length": model.particulars.length, "from_speed": model.particulars["speed"]}
     return replace(
         model,
         particulars=_particulars(model.particulars, size, float(speed), water_density),
-        steering=replace(
-            gear, rudder_rate_deg_s=gear.rudder_rate_deg_s * quick, time_constant=gear.time_constant / quick
-        ),
+        steering=gear,
         coefficients={name: value * factors[name] for name, value in model.coefficients.items()},
         covariance=None if model.covariance is None else model.covariance * np.outer(scale, scale),
         envelope=_envelope(model.envelope, np.array([fast, fast, quick, 1.0])),
-        provenance=(model.provenance or {})
-        | {"scaled": {"from_length": model.particulars.length, "from_speed": model.particulars["speed"]}},
+        provenance=(model.provenance or {}) | {"scaled": origin},
         service_shaft_speed=model.service_shaft_speed * fast / size,
     )
 
