@@ -26,12 +26,10 @@ def wake(drift: float, turn: float, c: Any) -> float:
     """Wake fraction at the propeller."""
     if PACKAGE_FORM:
         angle = drift - c.x_P_package * turn
-        behind: float = c.w_P0 * exponential(-4.0 * angle * angle)
-        return behind
+        return c.w_P0 * exponential(-4.0 * angle * angle)  # type: ignore[no-any-return]
     angle = drift - c.x_P * turn
     side = c.C_2_starboard if angle >= 0.0 else c.C_2_port
-    fraction: float = 1.0 - (1.0 - c.w_P0) * (1.0 + (1.0 - exponential(-c.C_1 * fabs(angle))) * (side - 1.0))
-    return fraction
+    return 1.0 - (1.0 - c.w_P0) * (1.0 + (1.0 - exponential(-c.C_1 * fabs(angle))) * (side - 1.0))  # type: ignore[no-any-return]
 
 
 def accelerations(motion: Motion, c: Any, ship: Ship) -> tuple[float, float, float, float, float]:
