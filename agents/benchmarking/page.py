@@ -60,27 +60,13 @@ def write_page(
     workers: int | None = 1,
     progress: Progress | None = None,
 ) -> None:
-    """Write the page of a benchmark. The worst episodes are run again for it.
+    """Write the page of a benchmark, one HTML file that loads nothing; the worst episodes are run again.
 
-    Parameters
-    ----------
-    result : BenchmarkResult
-        Of `benchmark` or `load_results`.
-    path : str or Path
-        The HTML file; one that exists is replaced. It loads nothing.
-    controllers : optional
-        As `benchmark` was given them; needed to replay contestants that were given as objects.
-    worst : int
-        How many episodes of each contestant in each task may be replayed; fewer if they are too many.
-    workers : int or None
-        Processes that run them; None for as many as there are cores.
-    progress : callable, optional
-        Called with the stage of the work, the number done and the total.
-
-    Raises
-    ------
-    InputError
-        If plotly is not installed or the page cannot be written; nothing is written then.
+    `result`: of `benchmark` or `load_results`. `path`: the file; one that exists is replaced. `controllers`:
+    as `benchmark` was given them; needed to replay those given as objects. `worst`: how many episodes of each
+    contestant in each task may be replayed; fewer if they are too many. `workers`: processes that run them;
+    None for as many as there are cores. `progress`: told the stage of the work, what is done and the total.
+    Raises InputError if plotly is not installed or the page cannot be written; nothing is written then.
     """
     target = Path(path)
     check_page(target)
@@ -100,7 +86,7 @@ def _page(result: BenchmarkResult, again: Rerun, count: int) -> str:
         best_known=BEST_KNOWN,
         styles=styles(result.ranking),
         wins={name: wins.count(name) for name in result.ranking},
-        failures=_failures(result),
+        failures=result.failures,
         figures={
             "scores": scores_figure(result),
             "profile": profile_figure(result.summary["profile"], result.ranking),
@@ -122,19 +108,6 @@ def _page(result: BenchmarkResult, again: Rerun, count: int) -> str:
 def packed(text: str) -> str:
     """A text that the page's script unpacks: gzip in base64."""
     return base64.b64encode(gzip.compress(text.encode(), 9, mtime=0)).decode()
-
-
-def _failures(result: BenchmarkResult) -> list[str]:
-    """Contestants that failed or could not take part."""
-    failures = []
-    for name, one in result.summary["contestants"].items():
-        failures += [f"{name} did not take part in {task}: {why}" for task, why in one["refused"].items()]
-        failures += [
-            f"{name} failed in {found[name]['failed']} episodes of {task}: {found[name]['failure']}"
-            for task, found in result.summary["tasks"].items()
-            if name in found and found[name]["failed"]
-        ]
-    return failures
 
 
 def _task(result: BenchmarkResult, again: Rerun, task: str) -> dict[str, Any]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -71,7 +72,7 @@ def rerun(
             found[name, task] = _recorded(one, asked, suite, runs)
             continue
         jobs.append({"suite": suite, "task": task, "contestant": name, "source": one.source, "runs": runs})
-    told = None if progress is None else lambda done, total: progress("episodes run again", done, total)
+    told = progress and partial(progress, "episodes run again")
     done = run_jobs(rerun_job, jobs, workers=workers, progress=told)
     found |= {(job["contestant"], job["task"]): one for job, one in zip(jobs, done, strict=True)}
     return _gathered(result, found)

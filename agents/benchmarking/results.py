@@ -25,7 +25,7 @@ from agents.benchmarking.summary import Done, summary_of
 from agents.controllers.controller import model_hash
 from agents.output import present
 from agents.suites.suite import FIRST_SEED, BenchmarkTask, suite_hash
-from shipgym.checks import check_choice, check_keys
+from shipgym.checks import check_choice, check_format, check_keys
 from shipgym.errors import InputError
 from shipgym.files import make_folder, read_json, write_json
 
@@ -66,6 +66,19 @@ class BenchmarkResult:
         """Names of the tasks."""
         return tuple(self.summary["tasks"])
 
+    @property
+    def failures(self) -> list[str]:
+        """In words, who failed or could not take part."""
+        failures = []
+        for name, one in self.summary["contestants"].items():
+            failures += [f"{name} did not take part in {task}: {why}" for task, why in one["refused"].items()]
+            failures += [
+                f"{name} failed in {found[name]['failed']} episodes of {task}: {found[name]['failure']}"
+                for task, found in self.summary["tasks"].items()
+                if name in found and found[name]["failed"]
+            ]
+        return failures
+
     def figures(self, contestant: str, task: str, name: str = "cost") -> Floats:
         """A figure of each episode, shape (n_runs, n_episodes); of no runs where it took no part.
 
@@ -84,12 +97,8 @@ class BenchmarkResult:
     def save(self, folder: str | Path | None) -> BenchmarkResult:
         """Write `episodes.parquet` and then `results.json`, each whole or not at all; None: nowhere.
 
-        Returns the result with the hash of `episodes.parquet` in its summary.
-
-        Raises
-        ------
-        InputError
-            If pyarrow is missing or the folder cannot be written.
+        Returns the result with the hash of `episodes.parquet` in its summary. Raises InputError if pyarrow is
+        missing or the folder cannot be written.
         """
         if folder is None:
             return self
@@ -119,12 +128,7 @@ def check_new(folder: Path, resume: bool, suite: str) -> Path:
         raise InputError(
             f"{folder}: holds results already; go on there with --resume (resume=True), or take another"
         )
-    if (
-        ours
-        and resume
-        and (folder / RESULTS).is_file()
-        and load_results(folder).summary["suite"]["name"] != suite
-    ):
+    if ours and (folder / RESULTS).is_file() and load_results(folder).summary["suite"]["name"] != suite:
         raise InputError(f"{folder}: holds results of another suite than '{suite}'; choose a new folder")
     if found and not ours:
         raise InputError(f"{folder}: holds '{found[0]}', not a result of a benchmark; choose a new folder")
@@ -148,15 +152,12 @@ def gathered(
             for number, run in enumerate(done[one.name, task.name]["runs"])
         ]
     )
+    about_tasks = {task.name: _about_task(task) for task in tasks}
     about = {
         "format": FORMAT,
         "kind": KIND,
         "versions": versions(),
-        "suite": {
-            "name": suite,
-            "sha256": suite_hash(suite),
-            "tasks": {task.name: _about_task(task) for task in tasks},
-        },
+        "suite": {"name": suite, "sha256": suite_hash(suite), "tasks": about_tasks},
         "seeds": {"first": FIRST_SEED, "count": episodes},
         "contestants": {one.name: _about_contestant(one, tasks, done) for one in who},
     }
@@ -191,9 +192,7 @@ def _about_task(task: BenchmarkTask) -> dict[str, Any]:
 
 
 def _about_contestant(one: Contestant, tasks: Sequence[BenchmarkTask], done: Done) -> dict[str, Any]:
-    files: dict[str, str] = {}
-    for task in tasks:
-        files |= one.fingerprint(task)
+    files = {path: code for task in tasks for path, code in one.fingerprint(task).items()}
     parts = {task.name: done[one.name, task.name] for task in tasks}
     return {
         "source": one.source if one.is_text else None,
@@ -223,14 +222,8 @@ def load_results(path: str | Path) -> BenchmarkResult:
         raise InputError(
             f"{where}: kind {content.get('kind')!r} found, expected '{KIND}': not benchmark results"
         )
-    if content.get("format") != FORMAT:
-        raise InputError(
-            f"{where}: format {content.get('format')!r} found, this version of shipgym reads format {FORMAT}"
-        )
-    check_keys(content, FIELDS, str(where))
-    for name in FIELDS:
-        if name not in content:
-            raise InputError(f"{where}: field '{name}' is missing; {REMEDY}")
+    check_format(content, FORMAT, str(where))
+    check_keys(content, FIELDS, str(where), required=FIELDS)
     check_summary(content, str(where))
     table = where.with_name(EPISODES)
     if content["episodes"]["sha256"] != file_hash(table):
@@ -251,11 +244,9 @@ def _check_agree(result: BenchmarkResult, where: str) -> None:
         for task, by_name in result.summary["tasks"].items()
         for one, found in by_name.items()
     }
-    if set(rows) != set(told):
-        raise InputError(f"{where}: contestants and tasks differ from those of {EPISODES}; {REMEDY}")
-    for (one, task), runs in told.items():
-        if rows[one, task] != runs * count:
+    for pair in rows.keys() | told.keys():
+        if rows[pair] != (runs := told.get(pair, 0)) * count:
             raise InputError(
-                f"{where}: {rows[one, task]} episodes of '{one}' on '{task}' found, expected {runs} runs "
-                f"of {count}; {REMEDY}"
+                f"{where}: {rows[pair]} episodes of '{pair[0]}' on '{pair[1]}' found in {EPISODES}, expected "
+                f"{runs} runs of {count}; {REMEDY}"
             )

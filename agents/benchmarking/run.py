@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from contextlib import nullcontext
+from functools import partial
 from pathlib import Path
 from types import NoneType
 from typing import Any
@@ -80,24 +81,14 @@ def benchmark(
     jobs = [job_of(one, task, suite, episodes) for one in who if one.is_text for task in chosen]
     with nullcontext() if folder is None else in_use(folder):
         found = run_jobs(
-            run_job, jobs, engine=engine, workers=workers, address=address,
-            keep=None if folder is None else folder / PARTS,
-            progress=None if progress is None else lambda done, total: progress("tasks done", done, total),
+            run_job, jobs, engine=engine, workers=workers, address=address, keep=folder and folder / PARTS,
+            progress=progress and partial(progress, "tasks done"),
         )  # fmt: skip
         pairs = zip(jobs, found, strict=True)
         done = {(job["contestant"], job["task"]): checked_part(one, job) for job, one in pairs}
-        done |= _of_objects(who, chosen, suite, episodes)
+        for one in (one for one in who if not one.is_text):  # an object steers in this process
+            done |= {(one.name, task.name): results_of(one, task, suite, episodes) for task in chosen}
         return gathered(suite, chosen, who, done, episodes).save(folder)
-
-
-def _of_objects(
-    who: Sequence[Contestant], tasks: Sequence[BenchmarkTask], suite: str, episodes: int
-) -> dict[tuple[str, str], dict[str, Any]]:
-    """Results of contestants that were given as objects, which steer in this process."""
-    objects = [one for one in who if not one.is_text]
-    return {
-        (one.name, task.name): results_of(one, task, suite, episodes) for one in objects for task in tasks
-    }
 
 
 def checked_part(part: dict[str, Any], job: Mapping[str, Any]) -> dict[str, Any]:

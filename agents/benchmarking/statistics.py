@@ -41,6 +41,9 @@ class Interval(NamedTuple):
         return {name: finite(number) for name, number in self._asdict().items()}
 
 
+NOTHING = Interval(np.nan, np.nan, np.nan)
+
+
 def finite(number: float) -> float | None:
     """The number, None if it is not finite."""
     return float(number) if np.isfinite(number) else None
@@ -53,15 +56,7 @@ def interquartile_mean(values: ArrayLike, axis: int | None = None) -> Floats:
 
 
 class Draws:
-    """Bootstrap draws of the episodes of each task, the same for every contestant.
-
-    Parameters
-    ----------
-    n_tasks, n_episodes : int
-    seed : int
-        Of the draws.
-    n_draws : int
-    """
+    """Bootstrap draws of the episodes of each task, the same for every contestant, by `seed`."""
 
     def __init__(self, n_tasks: int, n_episodes: int, seed: int = 0, n_draws: int = N_DRAWS) -> None:
         random = np.random.default_rng([seed, 0])
@@ -143,6 +138,8 @@ def aggregate_score(
 
     `costs`: of each task, shape (n_runs, n_episodes); `references`: costs that are 0 and 1 in each task.
     """
+    if not tasks:
+        return NOTHING
     found, drawn = [], []
     for task, cost, known in zip(tasks, costs, references, strict=True):
         found.append(score(cost.mean(axis=1), *known))
@@ -161,7 +158,7 @@ def improvement(
     """
     common = sorted(set(one) & set(other))
     if not common:
-        return Interval(np.nan, np.nan, np.nan)
+        return NOTHING
     values, drawn = [], np.zeros(draws.n_draws)
     rows = np.arange(draws.n_draws)[:, None, None]
     for task in common:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from agents.benchmarking.contestants import BEST_KNOWN
 from agents.benchmarking.statistics import (
+    NOTHING,
     Draws,
     Interval,
     aggregate_score,
@@ -28,7 +29,6 @@ Floats = NDArray[np.float64]
 Done = Mapping[tuple[str, str], Mapping[str, Any]]
 
 THRESHOLDS = np.linspace(-1.0, 1.5, 51)  # scores of the performance profile
-NOTHING: dict[str, float | None] = {"value": None, "low": None, "high": None}
 
 
 def summary_of(
@@ -90,7 +90,7 @@ class _Summary:
             found[self.names[who]] = {
                 "cost": mean.to_dict(),
                 "cost_iqm": interquartile_cost(cost, self.draws, number, who).to_dict(),
-                "score": NOTHING if reference is None else _score(mean, reference).to_dict(),
+                "score": (NOTHING if reference is None else _score(mean, reference)).to_dict(),
                 "relative_cost": finite(mean.value / lowest),
                 "runs": len(runs),
                 "lost": _count(runs, "terminated"),
@@ -124,23 +124,17 @@ class _Summary:
         """What a contestant came to in the tasks of a set."""
         part = [k for k in self.sets[on] if (who, k) in self.costs]
         scored = [k for k in part if np.isfinite(score(0.0, *self.reference.get(k, (0.0, 0.0))))]
+        costs, known = [self.costs[who, k] for k in scored], [self.reference[k] for k in scored]
         found = [by_task[self.tasks[k]][self.names[who]] for k in part]
         relative = [one["relative_cost"] for one in found if one["relative_cost"]]
         return {
-            "score": self._aggregate(who, scored),
+            "score": aggregate_score(costs, known, self.draws, scored, who).to_dict(),
             "scored_tasks": len(scored),
             "relative_cost": finite(np.exp(np.mean(np.log(relative)))) if relative else None,
             "tasks": len(part),
             "lost": sum(one["lost"] for one in found),
             "failed": sum(one["failed"] for one in found),
         }
-
-    def _aggregate(self, who: int, tasks: Sequence[int]) -> dict[str, float | None]:
-        """Score over some tasks."""
-        if not tasks:
-            return dict(NOTHING)
-        costs, known = [self.costs[who, k] for k in tasks], [self.reference[k] for k in tasks]
-        return aggregate_score(costs, known, self.draws, tasks, who).to_dict()
 
     def _improvements(self) -> dict[str, dict[str, Any]]:
         """Probability that one costs less than another, for all pairs."""

@@ -71,49 +71,6 @@ def shipgym_command(
     """From recorded ship trials to an identified model, its uncertainty and verified autopilots."""
 
 
-#: What stands below the help of each command.
-EXAMPLES = {
-    "new-ship": "zigzag.csv circle.csv --length 160.9",
-    "look": "ship.toml --out look.html",
-    "identify": "ship.toml --structure abkowitz --out my_ship/",
-    "advise": "ship.toml --criterion c --number 2",
-    "reduce": "ship.toml --direction backward --out my_ship/",
-    "trials": "my_ship/model.json --out trials.html",
-    "autopilot": "ship.toml --draws 200 --out report/",
-    "export": "report/lq.json --c lq/",
-    "steer": "report/lq.json --nmea tcp:192.168.1.20:10110 --heading 45",
-    "simulate": "my_ship/model.json --nmea tcp:127.0.0.1:10110 --sea moderate",
-    "train": "sac --env path-following --model my_ship/model.json --out run/",
-    "tune": "sac --trials 40 --workers 2 --out study/",
-    "benchmark": "--suite shipgym-v1 --controllers pid,lq,ppo --out results/",
-    "reproduce": "cao2015 --markdown tables.md",
-    "warm": "my_ship/model.json",
-    "replay": "recordings/episode-0.json --out replay.html",
-    "doctor": "--json",
-}
-
-
-def add(name: str, **settings: Any) -> Callable[[Callable[..., None]], Callable[..., None]]:
-    """Add a command with its example to the command line."""
-    return app.command(name, epilog=f"Example: shipgym {name} {EXAMPLES[name]}", **settings)
-
-
-add("new-ship")(new_ship_command)
-add("look")(look_command)
-add("identify", cls=IdentifyCommand)(identify_command)
-add("advise", cls=IdentifyCommand)(advise_command)
-add("reduce", cls=IdentifyCommand)(reduce_command)
-add("export")(export_command)
-add("steer")(steer_command)
-add("simulate")(simulate_command)
-add("train")(train_command)
-add("tune")(tune_command)
-add("benchmark")(benchmark_command)
-add("reproduce")(reproduce_command)
-add("warm")(warm_command)
-
-
-@add("trials")
 @answered
 def trials_command(
     model: Annotated[
@@ -156,7 +113,7 @@ def trials_command(
 
 def _print_trials(found: StandardTrials, page: Path | None) -> None:
     """Print tables of the standard manoeuvres, and where the page was written."""
-    from agents.cli.terminal import console, criteria_notes, criteria_table, manoeuvre_table, warn
+    from agents.cli.terminal import console, criteria_notes, criteria_table, manoeuvre_table, say, warn
 
     console.print(manoeuvre_table(found.indices, found.water))
     console.print()
@@ -164,15 +121,13 @@ def _print_trials(found: StandardTrials, page: Path | None) -> None:
         console.print(criteria_table(found.criteria))
     else:
         console.print("The IMO criteria are made for deep water: leave --depth out to assess them.")
-    for note in criteria_notes(found.criteria):
-        console.print(note, soft_wrap=True)
+    say(*criteria_notes(found.criteria))
     for name, reason in found.refused.items():
         warn(f"no {name}: {reason}")
     if page is not None:
-        console.print(f"\nwritten: {page}", soft_wrap=True)
+        say(f"\nwritten: {page}")
 
 
-@add("autopilot", cls=IdentifyCommand)
 @answered
 def autopilot_command(
     ship: ShipFileArgument,
@@ -233,6 +188,7 @@ def _print_result(result: AutopilotResult, report: Path, draws: int) -> None:
         criteria_table,
         prediction_table,
         ranking_table,
+        say,
         warn,
     )
     from identification.validation.warnings import held_out_error, model_warnings
@@ -240,12 +196,11 @@ def _print_result(result: AutopilotResult, report: Path, draws: int) -> None:
     answer({**result.metrics, "report": str(report)})
     if result.verification is not None:
         found = result.verification.manoeuvres
-        console.print(held_out_error(result.identification), soft_wrap=True)
+        say(held_out_error(result.identification))
         console.print(prediction_table(result.identification))
         console.print()
         console.print(criteria_table(found.criteria))
-        for note in criteria_notes(found.criteria):
-            console.print(note, soft_wrap=True)
+        say(*criteria_notes(found.criteria))
         console.print(f"\nunstable draws: {int(found.unstable.sum())} of {draws}\n")
         console.print(ranking_table(result))
         console.print()
@@ -265,10 +220,9 @@ def _print_result(result: AutopilotResult, report: Path, draws: int) -> None:
         warn(warning)
     for name, reason in (result.verification.refused if result.verification else {}).items():
         warn(f"no {name.upper()} autopilot: {reason}")
-    console.print(f"report: {report}", soft_wrap=True)
+    say(f"report: {report}")
 
 
-@add("replay")
 @answered
 def replay_command(
     episodes: Annotated[
@@ -277,15 +231,14 @@ def replay_command(
     out: Annotated[Path, typer.Option(metavar="REPLAY.HTML", help="The page to write.")],
 ) -> None:
     """Replay recorded episodes in one HTML page: chart, time slider, histories; several over each other."""
-    from agents.cli.terminal import answer, console
+    from agents.cli.terminal import answer, say
     from agents.rollouts.replay_page import write_replay
 
     write_replay(episodes, out)
     answer({"written": str(out)})
-    console.print(f"written: {out}", soft_wrap=True)
+    say(f"written: {out}")
 
 
-@add("doctor")
 @answered
 def doctor_command() -> None:
     """Check the installation: versions, cache, optional packages, the import name agents.
@@ -293,14 +246,40 @@ def doctor_command() -> None:
     Exits with 1 if something does not work.
     """
     from agents.cli.doctor import examine_installation
-    from agents.cli.terminal import answer, console
+    from agents.cli.terminal import answer, say
 
     findings = examine_installation()
-    answer({"findings": [finding.to_dict() for finding in findings]})
-    for finding in findings:
-        console.print(finding.line(), soft_wrap=True)
+    answer({"findings": [vars(finding) for finding in findings]})
+    say(*(finding.line() for finding in findings))
     if any(finding.state == "wrong" for finding in findings):
         raise typer.Exit(FAILED)
+
+
+#: The commands, each with the example that stands below its help.
+COMMANDS: dict[str, tuple[Callable[..., None], str]] = {
+    "new-ship": (new_ship_command, "zigzag.csv circle.csv --length 160.9"),
+    "look": (look_command, "ship.toml --out look.html"),
+    "identify": (identify_command, "ship.toml --structure abkowitz --out my_ship/"),
+    "advise": (advise_command, "ship.toml --criterion c --number 2"),
+    "reduce": (reduce_command, "ship.toml --direction backward --out my_ship/"),
+    "trials": (trials_command, "my_ship/model.json --out trials.html"),
+    "autopilot": (autopilot_command, "ship.toml --draws 200 --out report/"),
+    "export": (export_command, "report/lq.json --c lq/"),
+    "steer": (steer_command, "report/lq.json --nmea tcp:192.168.1.20:10110 --heading 45"),
+    "simulate": (simulate_command, "my_ship/model.json --nmea tcp:127.0.0.1:10110 --sea moderate"),
+    "train": (train_command, "sac --env path-following --model my_ship/model.json --out run/"),
+    "tune": (tune_command, "sac --trials 40 --workers 2 --out study/"),
+    "benchmark": (benchmark_command, "--suite shipgym-v1 --controllers pid,lq,ppo --out results/"),
+    "reproduce": (reproduce_command, "cao2015 --markdown tables.md"),
+    "warm": (warm_command, "my_ship/model.json"),
+    "replay": (replay_command, "recordings/episode-0.json --out replay.html"),
+    "doctor": (doctor_command, "--json"),
+}
+IDENTIFYING = ("identify", "advise", "reduce", "autopilot")  # they take the options of `identify`
+
+for name, (command, example) in COMMANDS.items():
+    kind = IdentifyCommand if name in IDENTIFYING else None
+    app.command(name, epilog=f"Example: shipgym {name} {example}", cls=kind)(command)
 
 
 def _show_warning(message: Warning | str, *_: Any, **__: Any) -> None:

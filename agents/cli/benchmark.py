@@ -11,8 +11,6 @@ from agents.cli.command import FAILED, INTERRUPTED, Address, EngineName, answere
 
 if TYPE_CHECKING:
     from agents.benchmarking.results import BenchmarkResult
-    from identification.progress import Progress
-
 
 Controllers = Annotated[
     str | None,
@@ -88,11 +86,13 @@ def benchmark_command(
         return
     if allow_code or tolerance is not None:
         fail("--allow-code and --tolerance are for --verify alone, leave them out", 2)
+    from agents.benchmarking.page import PAGE, write_page
     from agents.benchmarking.run import benchmark
     from agents.benchmarking.submission import submit as write_submission
-    from agents.cli.terminal import progress_bars
+    from agents.cli.terminal import progress_bars, warn
     from agents.controllers.designs import CLASSICAL
     from agents.output import check_file
+    from shipgym.errors import InputError
 
     if submit is not None:
         check_file(submit)
@@ -108,50 +108,30 @@ def benchmark_command(
             )  # fmt: skip
             if submit is not None:
                 write_submission(result, list(result.summary["contestants"])[-1], submit)
-            _remove_page(out)  # of other results, where these were gone on with
+            (out / PAGE).unlink(missing_ok=True)  # of other results, where these were gone on with
             if page:
-                _write_page(result, out, workers, progress)
+                try:
+                    write_page(result, out / PAGE, workers=workers, progress=progress)
+                except InputError as error:  # the results are there even without plotly
+                    warn(f"there is no {PAGE}: {error}")
     except KeyboardInterrupt:
         fail(f"interrupted; what was done is kept in {out}: go on with --resume", INTERRUPTED)
         return
     _print_result(result, out)
 
 
-def _remove_page(out: Path) -> None:
-    from agents.benchmarking.page import PAGE
-
-    (out / PAGE).unlink(missing_ok=True)
-
-
-def _write_page(result: BenchmarkResult, out: Path, workers: int | None, progress: Progress | None) -> None:
-    """Write the page; the results are there even where it cannot be, without plotly."""
-    from agents.benchmarking.page import PAGE, write_page
-    from agents.cli.terminal import warn
-    from shipgym.errors import InputError
-
-    try:
-        write_page(result, out / PAGE, workers=workers, progress=progress)
-    except InputError as error:
-        warn(f"there is no {PAGE}: {error}")
-
-
 def _print_result(result: BenchmarkResult, out: Path) -> None:
     """Print the ranking, or all of the summary."""
     from agents.cli.benchmark_tables import costs_table, ranking_table
-    from agents.cli.terminal import answer, console, warn
+    from agents.cli.terminal import answer, console, say, warn
 
     answer(result.summary)
     console.print(ranking_table(result))
     console.print()
     console.print(costs_table(result))
-    console.print(f"\nwritten: {out}", soft_wrap=True)
-    for name, about in result.summary["contestants"].items():
-        for task, why in about["refused"].items():
-            warn(f"{name} did not take part in {task}: {why}")
-    for task, by_name in result.summary["tasks"].items():
-        for name, found in by_name.items():
-            if found["failed"]:
-                warn(f"{name} failed in {found['failed']} episodes of {task}: {found['failure']}")
+    say(f"\nwritten: {out}")
+    for failure in result.failures:
+        warn(failure)
     if result.summary["seeds"]["count"] < 100:
         warn(f"{result.summary['seeds']['count']} of 100 episodes: for a quick look, not for a ranking")
 

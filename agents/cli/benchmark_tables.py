@@ -20,12 +20,10 @@ def ranking_table(result: BenchmarkResult) -> Table:
     """Contestants, the best first."""
     summary = result.summary
     about = f"{len(result.tasks)} tasks of {summary['seeds']['count']} episodes"
-    table = plain_table(f"{summary['suite']['name']}: {about}, best first")
-    table.add_column("contestant")
-    for heading in (
-        "score", "95 %", "cost by\nthe lowest", "tasks", "runs", "lost\ncontrol", "failed", "us by\naction",
-    ):  # fmt: skip
-        table.add_column(heading, justify="right")
+    table = plain_table(
+        f"{summary['suite']['name']}: {about}, best first", "contestant", ">score", ">95 %",
+        ">cost by\nthe lowest", ">tasks", ">runs", ">lost\ncontrol", ">failed", ">us by\naction",
+    )  # fmt: skip
     for entry in summary["ranking"]:
         name = entry["name"]
         times = [
@@ -35,60 +33,41 @@ def ranking_table(result: BenchmarkResult) -> Table:
         ]
         failed = entry["failed"]
         table.add_row(
-            name,
-            number(entry["score"]["value"], 3),
-            between(entry["score"], 3),
-            number(entry["relative_cost"], 3),
-            str(entry["tasks"]),
-            str(summary["contestants"][name]["runs"]),
-            str(entry["lost"]),
-            Text(str(failed), "bold red") if failed else "0",
+            name, number(entry["score"]["value"], 3), between(entry["score"], 3),
+            number(entry["relative_cost"], 3), str(entry["tasks"]), str(summary["contestants"][name]["runs"]),
+            str(entry["lost"]), Text(str(failed), "bold red") if failed else "0",
             number(sum(times) / len(times) if times else None, 2),
-        )
+        )  # fmt: skip
     return table
 
 
 def costs_table(result: BenchmarkResult) -> Table:
     """Mean cost of an episode with its interval, one line a task and contestant, the lowest first."""
-    table = plain_table("Mean cost of an episode, 95 % interval; the lowest first")
-    table.add_column("task")
-    table.add_column("contestant")
-    for heading in ("cost", "95 %", "score", "lost", "success"):
-        table.add_column(heading, justify="right")
+    title = "Mean cost of an episode, 95 % interval; the lowest first"
+    table = plain_table(title, "task", "contestant", ">cost", ">95 %", ">score", ">lost", ">success")
     for task, by_name in result.summary["tasks"].items():
         ordered = sorted(by_name.items(), key=lambda item: item[1]["cost"]["value"])
         for k, (name, found) in enumerate(ordered):
             success = found["metrics"].get("success", {}).get("mean")
             table.add_row(
-                task if k == 0 else "",
-                name,
-                number(found["cost"]["value"], 2),
-                between(found["cost"], 2),
-                number(found["score"]["value"], 2),
-                str(found["lost"] + found["failed"]),
+                task if k == 0 else "", name, number(found["cost"]["value"], 2), between(found["cost"], 2),
+                number(found["score"]["value"], 2), str(found["lost"] + found["failed"]),
                 "-" if success is None else f"{100.0 * success:.0f} %",
-            )
+            )  # fmt: skip
     return table
 
 
 def verification_table(checks: Sequence[Check]) -> Table:
     """What was run again."""
-    table = plain_table("Run again")
-    for heading in ("contestant", "task"):
-        table.add_column(heading)
-    for heading in ("episodes", "difference"):
-        table.add_column(heading, justify="right")
+    table = plain_table("Run again", "contestant", "task", ">episodes", ">difference")
     for heading in ("verdict", "note"):
         table.add_column(heading, overflow="fold")
     for check in checks:
-        table.add_row(
-            check.contestant,
-            check.task,
-            str(check.episodes),
-            "none" if check.exact else f"{check.difference:.1e}",
-            Text("the same" if check.exact else "close", "green") if check.passed else Text("differs", "red"),
-            check.note,
-        )
+        verdict = Text("the same" if check.exact else "close", "green")
+        verdict = verdict if check.passed else Text("differs", "red")
+        difference = "none" if check.exact else f"{check.difference:.1e}"
+        row = check.contestant, check.task, str(check.episodes), difference, verdict, check.note
+        table.add_row(*row)
     return table
 
 

@@ -9,7 +9,7 @@ import platform
 import re
 import tempfile
 from contextlib import suppress
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 
 from rich.text import Text
@@ -35,10 +35,6 @@ class Finding:
     #: something does not work
     state: str
     detail: str  # what was found and, where needed, what to do
-
-    def to_dict(self) -> dict[str, str]:
-        """Plain values, ready for JSON."""
-        return asdict(self)
 
     def line(self) -> Text:
         """One line for the terminal."""

@@ -38,7 +38,7 @@ def export_command(
 ) -> None:
     """Write an autopilot or a ship model as C99, as an FMU or, of a learned policy, as ONNX."""
     from agents.agent_file import load_agent
-    from agents.cli.terminal import answer, console, warn
+    from agents.cli.terminal import answer, say, warn
     from agents.deployment.fmu import write_fmu
     from agents.output import whole_folder
     from agents.policies.onnx_export import export_onnx
@@ -64,7 +64,7 @@ def export_command(
     written = [str(path) for path in (onnx, c, fmu) if path]
     answer({"written": written})
     for path in written:
-        console.print(f"written: {path}", soft_wrap=True)
+        say(f"written: {path}")
 
 
 def _source(what: str, name: str | None, depth: float) -> Source:

@@ -58,7 +58,7 @@ def _chosen(ship: Path, options: dict[str, Any], *unnamed: str) -> tuple[ShipFil
 
 
 def _identify(read: ShipFile, settings: dict[str, Any], out: Path) -> None:
-    from agents.cli.terminal import answer, console, identifying, prediction_table, selection_table
+    from agents.cli.terminal import answer, console, identifying, prediction_table, say, selection_table
     from agents.identifying import identify_ship
     from agents.output import whole_folder
     from identification.result import FILES
@@ -72,12 +72,12 @@ def _identify(read: ShipFile, settings: dict[str, Any], out: Path) -> None:
     if "selection" in result.metrics:
         console.print(selection_table(result.metrics["selection"]))
         for name, reason in result.metrics["selection"]["refused"].items():
-            console.print(f"{name} was not fitted: {reason}", soft_wrap=True)
+            say(f"{name} was not fitted: {reason}")
     if instability is None:
-        console.print(result.summary(), soft_wrap=True)
+        say(result.summary())
         console.print(prediction_table(result))
-        console.print(held_out_error(result), soft_wrap=True)
-    console.print(f"\nwritten to {out}: {', '.join(FILES)}", soft_wrap=True)
+        say(held_out_error(result))
+    say(f"\nwritten to {out}: {', '.join(FILES)}")
     _check_stable(result)
 
 
@@ -97,7 +97,7 @@ def _check_stable(result: IdentificationResult) -> None:
 def _compare(
     read: ShipFile, settings: dict[str, Any], out: Path, names: tuple[str | None, str | None]
 ) -> None:
-    from agents.cli.terminal import answer, console, identifying, selection_table, warn
+    from agents.cli.terminal import answer, console, identifying, say, selection_table, warn
     from agents.identifying import compare_ship
     from agents.output import whole_folder
     from identification.validation.comparison import COMPARISON_FILES
@@ -108,7 +108,7 @@ def _compare(
         found.save(draft)
     answer(found.to_dict())
     console.print(selection_table(found.to_dict()))
-    console.print(f"\nwritten to {out}: comparison.json, comparison.html, models", soft_wrap=True)
+    say(f"\nwritten to {out}: comparison.json, comparison.html, models")
     for name, reason in found.refused.items():
         warn(f"{name} was not fitted: {reason}")
     for name, left in found.left_out.items():
@@ -137,7 +137,7 @@ def advise_command(
     and binary rudder sequences, simulated on the model identified so far, by how much each would shrink what
     is least certain.
     """
-    from agents.cli.terminal import answer, console, identifying
+    from agents.cli.terminal import answer, identifying, say
     from agents.identifying import identify_ship
     from identification.design.experiment import advise
 
@@ -147,8 +147,7 @@ def advise_command(
         used = [trial for trial in result.trials if trial.use == "fit"]
         advice = advise(result.model, used, None, criterion, coefficient, number)
     answer(advice.to_dict())
-    console.print(str(advice), soft_wrap=True)
-    console.print(f"run next: {', then '.join(advice.chosen)}", soft_wrap=True)
+    say(str(advice), f"run next: {', then '.join(advice.chosen)}")
 
 
 @answered
@@ -169,7 +168,7 @@ def reduce_command(
     Writes the reduced model's files and reduction.json, with the whole path. Exits with 1 if the reduced
     model is unstable.
     """
-    from agents.cli.terminal import answer, console, identifying, prediction_table
+    from agents.cli.terminal import answer, console, identifying, prediction_table, say
     from agents.identifying import reduce_ship
     from agents.output import whole_folder
     from identification.result import FILES
@@ -183,8 +182,7 @@ def reduce_command(
         write_json(fields, draft / "reduction.json")
     answer(fields)
     for q, reduction in found.reductions.items():
-        console.print(f"equation of {q}")
-        console.print(str(reduction), soft_wrap=True)
+        say(f"equation of {q}", str(reduction))
     console.print(prediction_table(found.full, "with all terms"))
     console.print(prediction_table(found.reduced, "with the terms left"))
     count = fields["terms"]

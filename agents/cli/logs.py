@@ -28,7 +28,7 @@ def new_ship_command(
     """Write a ship file for recorded trials, guessing columns, units and signs, and say what was guessed."""
     import numpy as np
 
-    from agents.cli.terminal import answer, console, warn
+    from agents.cli.terminal import answer, say, warn
     from shipgym.errors import InputError
     from shipgym.files import write_text
     from shipgym.pages import render
@@ -57,7 +57,7 @@ def new_ship_command(
     told += [] if guesses else [f"channels: {', '.join(trial.channels)}"]
     told += [f"a positive rudder steers to {side}, by the yaw that follows it"] if "delta" in trial else []
     told.append(f"written: {out}{'' if length else ', fill in the length'}; next: shipgym look {out}")
-    console.print("\n".join(told), soft_wrap=True)
+    say("\n".join(told))
     for note in trial.notes:
         warn(note)
 
@@ -68,7 +68,7 @@ def look_command(
     out: Annotated[Path, typer.Option(metavar="FILE", help="The page to write.")] = Path("look.html"),
 ) -> None:
     """Draw the trials of a ship file, or a log: track, channels, and what was repaired or found amiss."""
-    from agents.cli.terminal import answer, console, warn
+    from agents.cli.terminal import answer, say, warn
     from agents.cli.trials_page import check_page
     from shipgym.files import write_text
     from shipgym.pages import render
@@ -90,7 +90,7 @@ def look_command(
     answer({"written": str(out), "trials": fields})
     for trial in trials:
         about = f"{len(trial)} samples over {trial.duration:.5g} s: {', '.join(trial.channels)}"
-        console.print(f"{trial.name}: {about}", soft_wrap=True)
+        say(f"{trial.name}: {about}")
         for note in trial.notes:
             warn(f"{trial.name}: {note}")
-    console.print(f"written: {out}", soft_wrap=True)
+    say(f"written: {out}")

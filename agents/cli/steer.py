@@ -52,7 +52,7 @@ def steer_command(
     more. Not certified: read docs/deployment.md first. Exits with 1 after an alarm.
     """
     from agents.agent_file import load_agent
-    from agents.cli.terminal import answer, console
+    from agents.cli.terminal import answer, say
     from agents.deployment.route import Route
     from agents.deployment.steering import Limits, steer
     from shipgym.checks import check_keys
@@ -67,7 +67,7 @@ def steer_command(
     found = asyncio.run(
         steer(
             pilot, nmea, heading=course, limits=Limits(**limits), duration=duration, speed_up=speed_up,
-            told=lambda line: console.print(line, soft_wrap=True), route=track,
+            told=lambda line: say(line), route=track,
             rate=None if rate is None else radians(rate) / 60.0,
         )
     )  # fmt: skip

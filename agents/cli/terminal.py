@@ -94,6 +94,12 @@ def print_json(fields: Mapping[str, Any]) -> None:
     print(json.dumps(fields, indent=1, allow_nan=False))
 
 
+def say(*lines: str | Text) -> None:
+    """Lines of text, however long they are."""
+    for line in lines:
+        out.print(line, soft_wrap=True)
+
+
 def warn(message: str) -> None:
     """A warning on standard error."""
     err.print(Text.assemble(("warning: ", "bold yellow"), message), soft_wrap=True)
@@ -106,13 +112,13 @@ def fail(message: str) -> None:
 
 
 @contextmanager
-def progress_bars(shown: bool = True) -> Iterator[Progress | None]:
+def progress_bars() -> Iterator[Progress | None]:
     """Bars on standard error, one for each stage, with the time that remains, in the end that it took.
 
-    Yields a function to be told the stage, units done and their total, 0 where that is not known; None where
-    nothing is `shown`, as with `--json` and `--quiet`.
+    Yields a function to be told the stage, units done and their total, 0 where that is not known; None
+    where nothing is shown, as with `--json` and `--quiet`.
     """
-    if not shown or out.quiet or not err.is_terminal:
+    if out.quiet or not err.is_terminal:
         yield None
         return
     from rich.progress import BarColumn, TaskProgressColumn, TextColumn, TimeRemainingColumn
@@ -146,12 +152,12 @@ def identifying(stage: str) -> Iterator[None]:
 
 
 @contextmanager
-def training_bar(shown: bool = True) -> Iterator[Callable[[Training], None] | None]:
+def training_bar() -> Iterator[Callable[[Training], None] | None]:
     """A bar of a training on standard error, or a line for each evaluation where that is no terminal.
 
-    Yields a function to be told the progress; None where nothing is `shown`.
+    Yields a function to be told the progress; None where nothing is shown.
     """
-    if not shown or out.quiet:
+    if out.quiet:
         yield None
         return
     if not err.is_terminal:

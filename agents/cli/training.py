@@ -109,20 +109,18 @@ def _train(given: Given, out: Path, resume: bool, max_seconds: float | None) -> 
 
 def _print_result(result: TrainingResult, out: Path) -> None:
     """Print costs, and where the agent was written."""
-    from agents.cli.terminal import answer, console
+    from agents.cli.terminal import answer, console, say
 
     answer({**result.to_dict(), "agent": str(out / "agent.json")})
     if result.resumed_from is not None:
         console.print(f"resumed at step {result.resumed_from:,}")
     lq = "" if result.lq_cost is None else f"; LQ's: {result.lq_cost:.2f}"
     found = f"cost of a held-out episode: {result.best_cost:.2f}{lq}"
-    console.print(f"{found} (step {result.best_steps:,} of {result.steps:,})", soft_wrap=True)
+    say(f"{found} (step {result.best_steps:,} of {result.steps:,})")
     reached = result.lq_reached
     if reached is not None:
         console.print(f"LQ's cost reached at step {reached['steps']:,}, after {reached['seconds']:.0f} s")
     if not result.finished:
         total = result.plan.settings.total_steps
-        console.print(
-            f"stopped at step {result.steps:,} of {total:,}: go on with --resume --out {out}", soft_wrap=True
-        )
-    console.print(f"written: {out / 'agent.json'}", soft_wrap=True)
+        say(f"stopped at step {result.steps:,} of {total:,}: go on with --resume --out {out}")
+    say(f"written: {out / 'agent.json'}")

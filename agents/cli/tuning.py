@@ -86,7 +86,7 @@ def _print_result(found: Tuning, out: Path) -> None:
     """Print trials and where the best settings are."""
     from dataclasses import asdict
 
-    from agents.cli.terminal import answer, console, plain_table
+    from agents.cli.terminal import answer, console, plain_table, say
     from agents.training.tuning import BEST
 
     trials = [asdict(trial) for trial in found.trials]
@@ -98,7 +98,7 @@ def _print_result(found: Tuning, out: Path) -> None:
         cost = "-" if trial.cost is None else f"{trial.cost:.3f}"
         table.add_row(str(trial.number), cost, trial.ended, varied or "nothing: as it was")
     console.print(table)
-    console.print(f"\nwritten: {out / BEST}", soft_wrap=True)
+    say(f"\nwritten: {out / BEST}")
 
 
 def _short(value: object) -> str:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import asdict, dataclass
 from functools import partial
 from typing import Annotated, Any
 
@@ -22,15 +21,6 @@ All = Annotated[
 SEAS = (None, "rough")  # every sea but the calm one shares what is compiled
 
 
-@dataclass(frozen=True)
-class Warmed:
-    """One thing that is ready now."""
-
-    what: str
-    seconds: float  # that compiling took; few if it was in the cache
-    refused: str = ""  # why it cannot be; empty as a rule
-
-
 @answered
 def warm_command(wanted: Wanted = None, everything: All = False) -> None:
     """Compile ships beforehand; without arguments, both tasks and the Mariner.
@@ -38,14 +28,14 @@ def warm_command(wanted: Wanted = None, everything: All = False) -> None:
     An environment stands for its default ship in calm water and in a sea, a model for its manoeuvres and
     simulations in calm water. Writes nothing but the cache (SHIPGYM_CACHE, else the user's cache folder).
     """
-    from agents.cli.terminal import answer, console
+    from agents.cli.terminal import answer, say
     from shipgym.engine.cache_folder import usable_folder
     from shipgym.errors import InputError
 
     if (folder := usable_folder()) is None:
         raise InputError("there is no cache to fill, for the reason above")
     jobs = dict(job for name in _names(wanted, everything) for job in _jobs(name))
-    done = []
+    done: list[dict[str, Any]] = []
     for number, (what, job) in enumerate(jobs.items(), start=1):
         begin, refused = time.perf_counter(), ""
         try:
@@ -54,11 +44,12 @@ def warm_command(wanted: Wanted = None, everything: All = False) -> None:
             if not everything:
                 raise
             refused = str(error)  # not every ship has the particulars that a sea asks for
-        done.append(Warmed(what, round(time.perf_counter() - begin, 2), refused))
-        told = refused or f"{done[-1].seconds:.1f} s"
-        console.print(f"{number}/{len(jobs)}  {what}: {told}", soft_wrap=True)
-    answer({"cache": str(folder), "ready": [asdict(one) for one in done]})
-    console.print(f"kept in {folder}", soft_wrap=True)
+        seconds = time.perf_counter() - begin  # that compiling took; few if it was in the cache
+        done.append({"what": what, "seconds": round(seconds, 2), "refused": refused})
+        told = refused or f"{seconds:.1f} s"
+        say(f"{number}/{len(jobs)}  {what}: {told}")
+    answer({"cache": str(folder), "ready": done})
+    say(f"kept in {folder}")
 
 
 def _names(wanted: list[str] | None, everything: bool) -> list[str]:

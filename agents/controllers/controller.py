@@ -34,6 +34,7 @@ Floats = NDArray[np.float64]
 Action = NDArray[np.float32]
 
 FORMAT = 1  # of the controller file
+SMALL = 1e-5  # rad, and other SI units, of motions about straight running
 SCALE_TOLERANCE = 1e-6  # relative difference of observation scales that is rounding
 
 
@@ -229,6 +230,21 @@ class Controller(Agent):
     def loop(self) -> Compensator:
         """The controller for small motions, without limits: what its margins are computed from."""
         return Compensator.static(self.row[None])
+
+    def linearised(self) -> Compensator:
+        """Its law about straight running, by central differences: `loop` where the law is linear there."""
+        n, size = len(SIGNALS), self.memory_size
+        small = SMALL * np.concatenate([np.eye(n + size), -np.eye(n + size)])
+        sway, rate, error, rudder, integral = small[:, :n].T
+        seen = {
+            "heading_error_sin": np.sin(error), "heading_error_cos": np.cos(error), "yaw_rate": rate,
+            "sway": self.neutral_sway + sway, "rudder": self.neutral_rudder + rudder,
+            "heading_error_integral": integral,
+        }  # fmt: skip
+        order, kept = self.steer(seen, small[:, n:], np.zeros(len(small), dtype=np.bool_))
+        above, below = np.split(np.column_stack([order, kept]), 2)
+        slopes = (above - below).T / (2.0 * SMALL)
+        return Compensator(slopes[1:, n:], slopes[1:, :n], slopes[:1, n:], slopes[:1, :n])
 
     @property
     def row(self) -> Floats:

@@ -15,7 +15,6 @@ import numpy as np
 from agents.controllers.controller import Controller, Range
 from agents.controllers.linear_loop import (
     ERROR,
-    INTEGRAL,
     RUDDER,
     SIGNALS,
     YAW_RATE,
@@ -176,23 +175,7 @@ class LQG(Controller):
 
     def loop(self) -> Compensator:
         """Filter and feedback together; the course does not jump."""
-        n = len(self.input)
-        measure = np.zeros((2, len(SIGNALS)))
-        measure[[0, 1], list(OUTPUTS)] = 1.0
-        trusted = np.eye(n) - self.kalman @ self.output
-        rudder = np.eye(len(SIGNALS))[RUDDER]
-        remember = np.column_stack([trusted @ self.transition, 0.5 * trusted @ self.input])
-        correct = 0.5 * np.outer(trusted @ self.input, rudder) + self.kalman @ measure
-        row = np.zeros(n)
-        row[: ERROR + 1] = [self.gains[signal] for signal in SIGNALS[: ERROR + 1]]
-        at_once = self.gains["rudder"] * rudder
-        at_once[INTEGRAL] = self.gains["heading_error_integral"]
-        return Compensator(
-            A=np.vstack([remember, np.zeros(n + 1)]),
-            B=np.vstack([correct, rudder]),
-            C=(row @ remember)[None],
-            D=(row @ correct + at_once)[None],
-        )
+        return self.linearised()
 
 
 def rudder_response(model: ShipModel, about: StraightRunning, dt: float) -> tuple[Floats, Floats]:

@@ -16,7 +16,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from agents.controllers.controller import NUMBERS, Controller, Range
-from agents.controllers.linear_loop import ERROR, SIGNALS, YAW_RATE, Compensator, length_time, sample_ship
+from agents.controllers.linear_loop import Compensator, length_time, sample_ship
 from agents.controllers.memory import Flags, Floats, heading_error, records
 from agents.controllers.scheduled_lq import rising
 from shipgym.checks import check_number
@@ -134,18 +134,8 @@ class TurnRate(Controller):
         return order, np.column_stack([kept["gathered"] + gathered, followed])
 
     def loop(self) -> Compensator:
-        """Small changes of a heading; the memory is that of `steer`."""
-        gains, share = self.gains, self.smoothing
-        step, signals = self.design["dt"] * gains["integral"], np.eye(len(SIGNALS))
-        wanted, rate = share / gains["heading_time"] * signals[ERROR], signals[YAW_RATE]
-        at = np.interp([-1e-6, 1e-6], self.rates, self.rudders)
-        per_rate = gains["proportional"] + (at[1] - at[0]) / 2e-6
-        return Compensator(
-            A=np.array([[1.0, step * (1.0 - share)], [0.0, 1.0 - share]]),
-            B=np.vstack([step * (wanted - rate), wanted]),
-            C=np.array([[1.0, per_rate * (1.0 - share)]]),
-            D=(per_rate * wanted - gains["proportional"] * rate)[None],
-        )
+        """Small changes of a heading."""
+        return self.linearised()
 
 
 def steady_turns(model: ShipModel, neutral: float) -> tuple[Floats, Floats]:

@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterable
 from contextlib import closing, suppress
 from dataclasses import dataclass, field, replace
 from math import ceil, cos, inf, radians, sin
+from time import perf_counter
 from typing import Any
 
 from agents.controllers.los_autopilot import Guided
@@ -23,6 +24,7 @@ from shipgym.tasks.guidance import wrapped
 
 STANDBY, STEERING, MANUAL = "standby", "steering", "manual"
 LONGEST_TICK = 1.0  # s, between two looks at the sensors
+EARLY_S = 1e-3  # before a step it sleeps no more: who sleeps wakes late
 RETRY_S, CONNECT_S = 1.0, 5.0  # between two attempts to connect, and the longest of one
 ANGLES = ("heading", "course", "leg", "to_steer", "rudder", "waypoint_bearing")
 PLACES = ("latitude", "longitude")
@@ -265,7 +267,10 @@ async def steer(
     with closing(link), short_slice(), suppress(asyncio.CancelledError):  # an interruption ends it
         while number * tick < duration:
             due = begin + number * tick
-            await asyncio.sleep(max(0.0, due / speed_up - loop.time()))
+            await asyncio.sleep(max(0.0, due / speed_up - EARLY_S - loop.time()))
+            ready = perf_counter() + due / speed_up - loop.time()
+            while perf_counter() < ready:
+                pass
             now = loop.time() * speed_up
             late = helm.state == STEERING and now - due > helm.limits.late_s * speed_up
             fault = f"a step came {now - due:.1f} s late" if late else None

@@ -11,7 +11,7 @@ import hashlib
 import json
 import math
 import re
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -91,17 +91,9 @@ def unpack(value: Any) -> Any:
 class KeptResults:
     """A folder with one file for each job that is done, named by a hash of the job.
 
-    Parameters
-    ----------
-    folder : str or Path
-        Made with the first result where it does not exist, so that nothing is left of a call that does none.
-    function : callable
-        That does the jobs: results of another function, or of another version of shipgym, are not taken.
-
-    Raises
-    ------
-    InputError
-        If there is a file of that name.
+    It is made with the first result, so that nothing is left of a call that does none. Results of another
+    `function` than the one given, or of another version of shipgym, are not taken. Raises InputError if there
+    is a file of the folder's name.
     """
 
     def __init__(self, folder: str | Path, function: Callable[[dict[str, Any]], Any]) -> None:
@@ -109,10 +101,6 @@ class KeptResults:
         self.function = f"{function.__module__}.{function.__qualname__}"
         if self.folder.exists() and not self.folder.is_dir():
             raise InputError(f"{folder}: is not a folder, expected one for results; choose another")
-
-    def load_all(self, texts: Iterable[str]) -> dict[str, dict[str, Any]]:
-        """The packed results that are there, by job."""
-        return {text: packed for text in texts if (packed := self.load(text)) is not None}
 
     def load(self, text: str) -> dict[str, Any] | None:
         """The packed result of a job, None where there is none yet or its file is broken."""

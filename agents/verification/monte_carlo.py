@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from agents.controllers.controller import Controller
 from agents.controllers.controller_file import read_controller
-from agents.engines.jobs import HERE, JobEngine, JobProgress
+from agents.engines.jobs import HERE, JobEngine
 from agents.rollouts.course_keeping import Episodes, sail
 from agents.verification.index_uncertainty import (
     ManoeuvreUncertainty,
@@ -52,27 +52,11 @@ def monte_carlo(
 ) -> MonteCarlo:
     """Sail the standard manoeuvres and an episode of course keeping with models drawn from the covariance.
 
-    Parameters
-    ----------
-    controllers : sequence of Controller
-        Each steers every draw; draw i with seed + i, the same episodes for all.
-    model : ShipModel
-        With a covariance.
-    draws : int
-        Models drawn, at least 2.
-    seed : int
-        Of the draws and of the episodes.
-    where : JobEngine
-        In this process, in several, or on a ray cluster; the results are the same, bit for bit.
-    progress : callable, optional
-        Told the number of draws done.
-
-    Raises
-    ------
-    InputError
-        If the model has no covariance, or a controller is for another ship.
-    UnstableModelError
-        If the model itself runs away.
+    `controllers`: each steers every draw; draw i with seed + i, the same episodes for all. `model`: with a
+    covariance. `draws`: at least 2. `seed`: of the draws and of the episodes. `where`: in this process, in
+    several, or on a ray cluster; the results are the same, bit for bit. `progress`: told the number of draws
+    done. Raises InputError if the model has no covariance, or a controller is for another ship;
+    UnstableModelError if the model itself runs away.
     """
     check_whole(draws, "draws", at_least=2)
     check_whole(seed, "seed", at_least=0)
@@ -80,7 +64,9 @@ def monte_carlo(
         controller.check_fits_model(model)
     nominal = nominal_runs(model)
     drawn = model.sample(draws, seed)
-    found = where.run(do_draws, draw_jobs(controllers, model, drawn, seed), _by_draw(progress, draws))
+    tell = progress or (lambda done: None)
+    jobs = draw_jobs(controllers, model, drawn, seed)
+    found = where.run(do_draws, jobs, lambda done, _: tell(min(done * DRAWS_A_JOB, draws)))
     episodes = zip(*(part["episodes"] for part in found), strict=True) if controllers else ()
     return MonteCarlo(
         draws=tuple(drawn),
@@ -104,11 +90,12 @@ def draw_jobs(
     return [
         {
             **common,
-            "coefficients": [list(draw.coefficients.values()) for draw in drawn[first : first + DRAWS_A_JOB]],
-            "names": [draw.name for draw in drawn[first : first + DRAWS_A_JOB]],
+            "coefficients": [list(draw.coefficients.values()) for draw in some],
+            "names": [draw.name for draw in some],
             "first_seed": seed + first,
         }
         for first in range(0, len(drawn), DRAWS_A_JOB)
+        for some in [drawn[first : first + DRAWS_A_JOB]]
     ]
 
 
@@ -134,11 +121,3 @@ def keeps_course(model: ShipModel) -> bool:
         return is_course_stable(model)
     except InputError:
         return False
-
-
-def _by_draw(progress: Callable[[int], None] | None, draws: int) -> JobProgress:
-    def tell(done: int, total: int) -> None:
-        if progress is not None:
-            progress(min(done * DRAWS_A_JOB, draws) if done < total else draws)
-
-    return tell

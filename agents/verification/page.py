@@ -18,7 +18,14 @@ from agents.verification.figures import (
     steps_figure,
     tracks_figure,
 )
-from agents.verification.result import STEP_DEG, AutopilotResult, Pilot, Verification, track_metrics
+from agents.verification.result import (
+    STEP_DEG,
+    AutopilotResult,
+    Pilot,
+    Verification,
+    pilot_metrics,
+    track_metrics,
+)
 from identification.report.view import fit_view, trial_figures
 from identification.validation.warnings import held_out_error
 from shipgym.files import write_text
@@ -62,33 +69,29 @@ def write_report(result: AutopilotResult, path: str | Path) -> None:
 
 def verification_view(found: Verification) -> dict[str, Any]:
     """What the template shows of a verification but for its figures."""
-    pilots = [_pilot(pilot) for pilot in found.pilots]
     designed = {pilot.name: pilot.design for pilot in _by_name(found) if pilot.design is not None}
-    criteria = _criteria(found)
+    criteria = {criterion_name(name, one): one for name, one in found.manoeuvres.criteria.items()}
     first, *others = found.pilots
-    met = sum(one["passed"] is True for one in criteria)
-    return {
+    passed = [one.passed for one in criteria.values()]
+    lost, unstable = np.sum(first.episodes.terminated), int(found.manoeuvres.unstable.sum())
+    return vars(found) | {
         "headline": headline(found),
-        "certain": met == len(criteria) and not found.manoeuvres.unstable.any() and not pilots[0]["lost"],
-        "draws": found.draws,
-        "seed": found.seed,
-        "unstable": int(found.manoeuvres.unstable.sum()),
+        "certain": all(passed) and not unstable and not lost,
+        "unstable": unstable,
         "course_unstable": int(found.course_unstable.sum()),
         "criteria": criteria,
-        "met": met,
-        "missed": sum(one["passed"] is False for one in criteria),
-        "nomoto": found.nomoto,
-        "pilots": pilots,
+        "met": passed.count(True),
+        "missed": passed.count(False),
+        "best": first.name,
+        "pilots": {pilot.name: pilot_metrics(pilot) for pilot in found.pilots},
         "designs": designed,
-        "standards": found.standards,
         "linear": {name: one for name, one in designed.items() if one.feedback},
         "gains": _gains([one for one in designed.values() if one.feedback]),
         "tracks": {track.key.upper(): track_metrics(track) for track in found.tracks},
         "learned": [pilot.name for pilot in _by_name(found) if pilot.design is None],
-        "refused": found.refused,
-        "cheaper": [
-            (other.name, float(np.mean(first.episodes.cost < other.episodes.cost))) for other in others
-        ],
+        "cheaper": {
+            other.name: float(np.mean(first.episodes.cost < other.episodes.cost)) for other in others
+        },
     }
 
 
@@ -98,50 +101,18 @@ def headline(found: Verification) -> str:
     names = {name: criterion_name(name, one).lower() for name, one in criteria.items()}
     missed = [names[name] for name, one in criteria.items() if one.passed is False]
     open_ones = [names[name] for name, one in criteria.items() if not one.decided]
-    imo = f"The model is stable but misses the IMO criterion of {', '.join(missed)}."
-    if not missed:
-        which = (
-            "meets all IMO criteria" if not open_ones else "misses no IMO criterion that these trials decide"
-        )
-        imo = f"The model is stable and {which}."
+    imo = f"misses the IMO criterion of {', '.join(missed)}" if missed else "meets all IMO criteria"
+    if open_ones and not missed:
+        imo = "misses no IMO criterion that these trials decide"
+    imo = f"The model is stable {'but' if missed else 'and'} {imo}."
     if open_ones:
         imo += f" Not decided by these trials: {', '.join(open_ones)}."
-    unstable = int(found.manoeuvres.unstable.sum())
-    if unstable:
+    if unstable := int(found.manoeuvres.unstable.sum()):
         imo += f" {unstable} of {found.draws} models drawn run away in a manoeuvre."
     best = found.pilots[0]
     lost = int(np.sum(best.episodes.terminated))
-    control = f"keeps control of all {found.draws} models drawn"
-    if lost:
-        control = f"loses control of {lost} of {found.draws} models drawn"
-    return f"{imo} {best.name} steers best and {control}."
-
-
-def _criteria(found: Verification) -> list[dict[str, Any]]:
-    """A row for each criterion."""
-    return [
-        {
-            "name": criterion_name(name, one), "source": one.source, "passed": one.passed, "value": one.value,
-            "measured": one.measured, "interval": one.interval, "limit": one.limit, "unit": one.unit,
-            "probability": one.probability, "note": one.note, "drawn": one.drawn,
-        }
-        for name, one in found.manoeuvres.criteria.items()
-    ]  # fmt: skip
-
-
-def _pilot(pilot: Pilot) -> dict[str, Any]:
-    """A row of the ranking: means and 95 % quantiles over the models drawn."""
-    episodes = pilot.episodes
-    return {
-        "name": pilot.name,
-        "lost": int(np.sum(episodes.terminated)),
-        "cost": float(np.mean(episodes.cost)),
-        "cost_95": float(np.quantile(episodes.cost, 0.95)),
-        "heading": float(np.mean(episodes.heading_rmse_deg)),
-        "heading_95": float(np.quantile(episodes.heading_rmse_deg, 0.95)),
-        "rudder_travel": float(np.mean(episodes.rudder_travel_deg_min)),
-        "extrapolating": float(np.mean(episodes.extrapolating)),
-    }
+    control = f"loses control of {lost} of" if lost else "keeps control of all"
+    return f"{imo} {best.name} steers best and {control} {found.draws} models drawn."
 
 
 def _gains(designs: Sequence[Controller]) -> list[tuple[str, str, list[tuple[str, float] | None]]]:

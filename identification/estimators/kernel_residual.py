@@ -216,7 +216,7 @@ class _Search:
             found: dict[str, Floats] = {}
             for q, X in samples.select(rows).features.items():
                 moment = X.T @ X * C + np.eye(X.shape[1])
-                found[q] = np.linalg.solve(moment, C * (X.T @ samples.targets[q][rows]))
+                found[q] = np.linalg.solve(moment, C * (X.T @ samples.targets[q][rows])).astype(float)
             errors.append(heading_error(stage.model.with_accelerations(found), held, "rmse"))
         return float(np.mean(errors))
 

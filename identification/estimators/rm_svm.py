@@ -231,7 +231,7 @@ class _Tuner:
             models = ((self.model(weight, self.first_bands, rows), held) for rows, held in folds)
             return float(np.mean([heading_error(model, held, "rmse") for model, held in models]))
 
-        return most_regularised(WEIGHTS, [error(weight) for weight in WEIGHTS])
+        return float(most_regularised(WEIGHTS, [error(weight) for weight in WEIGHTS]))
 
     def bands(self, weight: float) -> tuple[list[float], SearchResult | None]:
         """The insensitive bands, by a pattern search on the simulated heading of the trials."""

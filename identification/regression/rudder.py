@@ -144,7 +144,7 @@ def _orders(t: Floats, delta: Floats, rate: float, lag: float) -> Floats:
     if lag > 0.0 and np.any(distance > rate * lag):
         # the ramp lasts x seconds, of x - lag exp((x - step) / lag) = size / rate - lag
         short = size / rate - lag
-        ramping = short - lag * lambertw(-np.exp(np.minimum((short - steps) / lag, -1.0))).real
+        ramping = short - lag * lambertw(-np.exp(np.minimum((short - steps) / lag, -1.0)), 0).real
         distance = np.where(distance > rate * lag, rate * (ramping + lag), distance)
     ramps = size >= (1.0 - RAMP) * rate * steps
     return np.where(ramps, np.copysign(np.inf, move), delta[:-1] + side * distance)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Any
+from typing import Any, cast
 
 from numpy.typing import ArrayLike
 
@@ -30,7 +30,7 @@ OPTIMISERS: dict[str, Callable[..., Optimiser]] = {
 def get_optimiser(optimiser: str | Mapping[str, Any] | Optimiser) -> Optimiser:
     """An optimiser by name, as a table with settings, `{"name": "abc", "rounds": 60}`, or as given."""
     if hasattr(optimiser, "minimise"):
-        return optimiser
+        return cast(Optimiser, optimiser)
     settings = dict(optimiser) if isinstance(optimiser, Mapping) else {"name": optimiser}
     name = check_choice(settings.pop("name", None), OPTIMISERS, "optimiser")
     try:

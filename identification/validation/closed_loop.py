@@ -65,7 +65,7 @@ def _leg(
     begin, duration = time
     dt = STEP * model.travel_time
     count = max(int(np.ceil((duration if target is None else LONGEST_LEG * duration) / dt)), 2)
-    t = begin + dt * np.arange(count + 1)
+    t = begin + dt * np.arange(count + 1, dtype=float)
     commands = np.tile(model.service_command, (count, 1))
     commands[:, 0] = order
     if "n" in model.command_names and "n" in trial.channels:

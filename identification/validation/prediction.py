@@ -39,8 +39,8 @@ def trial_metrics(model: ShipModel, trial: Trial, prediction: Trial | None) -> d
     no such index or never got there.
     """
     errors: dict[str, float | None] = dict.fromkeys(COMPARED)
-    for channel in COMPARED if prediction is not None else ():
-        if channel in trial:
+    if prediction is not None:
+        for channel in [name for name in COMPARED if name in trial]:
             errors[channel] = float(np.sqrt(np.mean((prediction[channel] - trial[channel]) ** 2)))
     metrics: dict[str, Any] = {"use": trial.use, "diverged": prediction is None, "rmse": errors}
     metrics |= dict.fromkeys((*ZIGZAG, *TURNING))

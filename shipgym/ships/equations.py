@@ -23,18 +23,12 @@ from shipgym.engine.parts import Part
 from shipgym.engine.records import Record, field_types, is_record
 from shipgym.engine.vessel import Vessel, vessel_of
 from shipgym.errors import InputError
-from shipgym.files import shipped_toml
 from shipgym.python_files import load_file
 from shipgym.ships.particulars import Particulars
 from shipgym.ships.steering import SteeringGear
 
 RATES = ("udot", "vdot", "rdot", "pdot", "qdot")
 Accelerations = Callable[[Any, Any, Any], tuple[float, float, float, float, float]]
-
-
-def published(ship: str) -> dict[str, Any]:
-    """The coefficients in the file `ship`.toml beside this one."""
-    return shipped_toml("shipgym.ships", f"{ship}.toml")
 
 
 def record_of(values: Mapping[str, float], module: str) -> Any:

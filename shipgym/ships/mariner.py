@@ -10,7 +10,6 @@ terms are inside the coefficients: Y_r is Y_r' - m', X_vr is m', and so on.
 
 from math import sqrt
 
-from shipgym.ships.equations import published
 from shipgym.ships.particulars import Particulars
 from shipgym.ships.ship_model import ShipModel
 from shipgym.ships.steering import SteeringGear
@@ -20,12 +19,25 @@ LENGTH = 160.93
 WATER_DENSITY = 1025.0
 MASS, INERTIA, XG = 798e-5, 39.2e-5, -0.023  # prime system, inertia about midship
 
+X = {
+    "u": -184, "uu": -110, "uuu": -215, "vv": -899, "rr": 18, "dd": -95, "udd": -190, "vr": 798,
+    "vd": 93, "uvd": 93,
+}  # fmt: skip
+Y = {
+    "0": -4, "0u": -8, "0uu": -4, "v": -1160, "r": -499, "d": 278, "vvv": -8078, "ddd": -90,
+    "vvr": 15356, "vvd": 1190, "vdd": -4, "ud": 556, "uv": -1160, "ur": -499, "uud": 278,
+}  # fmt: skip
+N = {
+    "0": 3, "0u": 6, "0uu": 3, "v": -264, "r": -166, "d": -139, "vvv": 1636, "ddd": 45,
+    "vvr": -5483, "vvd": -489, "vdd": 13, "ud": -278, "uv": -264, "ur": -166, "uud": -139,
+}  # fmt: skip
+
 
 def mariner(service_speed: float = 7.7175) -> ShipModel:
     """The Mariner class reference ship, expanded about a service speed U0 in m/s."""
     coefficients = {
         f"{force}_{term}": value * 1e-5 * (-1.0) ** term.count("d")
-        for force, table in published("mariner").items()
+        for force, table in (("X", X), ("Y", Y), ("N", N))
         for term, value in table.items()
     }
     particulars = Particulars(

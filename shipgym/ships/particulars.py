@@ -283,13 +283,12 @@ def _check_together(values: Mapping[str, float], where: str) -> None:
     """Refuse values that do not fit each other: most often a wrong unit."""
     length = values["length"]
     for name, value in values.items():
-        for bound, power, unit in (("of_length", 1, "m"), ("of_square", 2, "m2")):
-            share = BOUNDS[name].get(bound, math.inf)
-            if abs(value) > share * length**power:
-                raise InputError(
-                    f"{where} {name}: {value:g} found with length {length:g}, expected at most {share:g} of "
-                    f"the length{' squared' * (power - 1)}; check the units ({unit})"
-                )
+        share, power = (BOUNDS[name].get(key, usual) for key, usual in (("share", math.inf), ("growth", 0)))
+        if abs(value) > share * length**power:
+            raise InputError(
+                f"{where} {name}: {value:g} found with length {length:g}, expected at most {share:g} of "
+                f"the length{' squared' * (power - 1)}; check the units (m{'2' * (power - 1)})"
+            )
     if "mass" in values:
         low, high, reason = _mass_range(values)
         if not low <= values["mass"] <= high:

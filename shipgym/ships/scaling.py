@@ -60,21 +60,20 @@ def scale_model(
     check_number(speed, "speed", above=0.0, hint="in m/s")
     fast = float(speed) / model.particulars["speed"]
     quick, gear = fast / size, model.steering
+    gear = SteeringGear(gear.rudder_limit_deg, gear.rudder_rate_deg_s * quick, gear.time_constant / quick)
     factors = dict.fromkeys(model.coefficients, 1.0)  # those without unit
     if isinstance(table, Structure) and table.normalisation == "si":
         factors = _coefficient_factors(table, size, fast)
     scale = np.array(list(factors.values()))
+    origin = {"from_length": model.particulars.length, "from_speed": model.particulars["speed"]}
     return replace(
         model,
         particulars=_particulars(model.particulars, size, float(speed), water_density),
-        steering=SteeringGear(
-            gear.rudder_limit_deg, gear.rudder_rate_deg_s * quick, gear.time_constant / quick
-        ),
+        steering=gear,
         coefficients={name: value * factors[name] for name, value in model.coefficients.items()},
         covariance=None if model.covariance is None else model.covariance * np.outer(scale, scale),
         envelope=_envelope(model.envelope, np.array([fast, fast, quick, 1.0])),
-        provenance=(model.provenance or {})
-        | {"scaled": {"from_length": model.particulars.length, "from_speed": model.particulars["speed"]}},
+        provenance=(model.provenance or {}) | {"scaled": origin},
         service_shaft_speed=model.service_shaft_speed * fast / size,
     )
 

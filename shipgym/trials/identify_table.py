@@ -149,28 +149,23 @@ class Options:
         return {name: getattr(self, name) for name, option in OPTIONS.items() if not option.setting}
 
 
-def _is_text(value: Any) -> bool:
-    return isinstance(value, str) and bool(value.strip())
-
-
-def _is_number(value: Any) -> bool:
-    return isinstance(value, Real) and not isinstance(value, bool)
-
-
-def _is_whole(value: Any) -> bool:
-    return isinstance(value, int) and not isinstance(value, bool)
+def _is(value: Any, *kinds: type) -> bool:
+    """Whether a value is of one of some types; a truth value is no number, and a blank no text."""
+    if isinstance(value, bool):
+        return bool in kinds
+    return isinstance(value, kinds) and not (isinstance(value, str) and not value.strip())
 
 
 #: How each kind of value is recognised in a file; the words stand in messages.
 KINDS: dict[str, Callable[[Any], bool]] = {
-    TEXT: _is_text,
-    FLAG: lambda value: isinstance(value, bool),
-    NUMBER: _is_number,
-    WHOLE: _is_whole,
-    TEXTS: lambda value: isinstance(value, list) and all(map(_is_text, value)),
-    TWO_NUMBERS: lambda value: isinstance(value, list) and len(value) == 2 and all(map(_is_number, value)),
-    WHOLE_OR_TEXT: lambda value: _is_whole(value) or _is_text(value),
-    TEXT_OR_TABLE: lambda value: _is_text(value) or isinstance(value, Mapping),
+    TEXT: lambda value: _is(value, str),
+    FLAG: lambda value: _is(value, bool),
+    NUMBER: lambda value: _is(value, Real),
+    WHOLE: lambda value: _is(value, int),
+    TEXTS: lambda value: isinstance(value, list) and all(_is(one, str) for one in value),
+    TWO_NUMBERS: lambda value: isinstance(value, list) and [_is(one, Real) for one in value] == [True] * 2,
+    WHOLE_OR_TEXT: lambda value: _is(value, int, str),
+    TEXT_OR_TABLE: lambda value: _is(value, str, Mapping),
 }
 
 

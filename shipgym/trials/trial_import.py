@@ -87,16 +87,12 @@ def import_tables(
     gnss = any("lat" in one for one in chosen)
     recorded = [_recorded(*pair, conventions.repair) for pair in zip(tables, chosen, strict=True)]
     series, source, where = _joined(recorded), recorded[0].source, str(tables[0].path)
-    signed = {
-        name: (
-            clock,
-            0.0 - values if conventions.rudder_positive == "port" and name.startswith("delta") else values,
-        )
-        for name, (clock, values) in series.items()
-    }
-    log = on_one_clock(signed, where)
+    if conventions.rudder_positive == "port":
+        for name in {"delta", "delta_command"} & series.keys():
+            series[name] = series[name][0], 0.0 - series[name][1]
+    log = on_one_clock(series, where)
     told = plausibility.check_log(log, tools, source, gnss)
-    late, found = corrected_clocks(log, signed, tools.clock_offsets)
+    late, found = corrected_clocks(log, series, tools.clock_offsets)
     if late:
         log = on_one_clock(late, where)
     log.notes = [*(note for table in tables for note in table.notes), *log.notes, *told, *found]

@@ -7,7 +7,7 @@ import pytest
 from typer.testing import CliRunner
 
 from agents import LQ, PID, benchmark, load_results
-from agents.benchmarking.contestants import Contestant, contestants
+from agents.benchmarking.contestants import Contestant, contestants, pretrained
 from agents.benchmarking.replays import EpisodeId, rerun
 from agents.benchmarking.results import check_new
 from agents.benchmarking.run import _chosen, _run, checked_part, results_of
@@ -225,6 +225,13 @@ def test_classical_controllers_are_designed_for_the_ship_of_the_task():
 def test_wrong_contestants(given, said):
     with pytest.raises(InputError, match=said):
         contestants(given)
+
+
+def test_agents_in_the_box_are_found_by_task_and_algorithm():
+    assert [path.name for path in pretrained("container-path", "ppo")] == ["container-path-ppo.json"]
+    runs = [path.name for path in pretrained("course-unstable", "ppo")]
+    assert runs == [f"course-unstable-ppo-s{run}.json" for run in range(5)]
+    assert pretrained("container", "ppo") == []
 
 
 def test_wrong_task_and_suite():

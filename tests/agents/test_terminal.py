@@ -141,9 +141,10 @@ def test_a_training_without_a_terminal_is_told_line_by_line(monkeypatch, capsys)
         tell(SimpleNamespace(evaluated=True, **now | {"lq_cost": None}))
     told = "step 1,000 of 20,000, 12 s: cost 5.00, best 4.50"
     assert capsys.readouterr().err.splitlines() == [f"{told}, LQ 6.25", told]
-    for bars in (terminal.training_bar(False), terminal.progress_bars(False), terminal.progress_bars()):
-        with bars as tell:
-            assert tell is None
+    with terminal.printing(as_json=False, quiet=True), terminal.training_bar() as tell:
+        assert tell is None
+    with terminal.progress_bars() as tell:  # standard error is no terminal
+        assert tell is None
     terminal.warn("odd")
     terminal.fail("wrong")
     assert capsys.readouterr().err.splitlines() == ["warning: odd", "error: wrong"]

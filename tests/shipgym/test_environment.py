@@ -2,6 +2,7 @@
 
 import copy
 import pickle
+from functools import partial
 
 import gymnasium
 import numpy as np
@@ -50,7 +51,7 @@ def same(first, second):
     [
         (one, {"episode_steps": 20}),
         (many, {"episode_steps": 20}),
-        (many, {**SEA, "autoreset_mode": "SameStep"}),
+        (partial(many, FIRST), {**SEA, "autoreset_mode": "SameStep"}),
     ],
 )
 def test_copies_step_identically_and_on_their_own(make, options, again):

@@ -99,7 +99,8 @@ class _Motion:
 
 def _variances(trial: Trial, names: Sequence[str]) -> Floats:
     levels = [[noise_level(trial.t, trial[c]), LEAST_NOISE * np.ptp(trial[c]), 1e-9] for c in names]
-    return np.max(levels, axis=1) ** 2
+    largest: Floats = np.max(levels, axis=1)
+    return largest**2
 
 
 def _integrators(h: Floats) -> Floats:
