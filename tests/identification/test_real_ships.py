@@ -93,10 +93,12 @@ def test_a_model_keeps_its_turn_when_it_is_taken_to_full_scale(data: Data) -> No
 
 @measured
 def test_the_mmg_form_of_three_zigzags_predicts_the_others_and_the_circle(data: Data) -> None:
-    """Aims of 0.095 deg/s, 4 % of tactical diameter and 1.5 deg of drift to starboard."""
+    """Aims of 0.095 deg/s, 4.3 deg of heading, 4 % of tactical diameter and 1.5 deg of drift to starboard."""
     hsva = data.ship(SHIP, 4)
-    model = fitted(hsva, reference_model="kvlcc2-l7")
-    assert mean_errors(zigzag_errors(model, hsva.runs[name]) for name in OTHERS)[0] < 0.095
+    model = fitted(hsva, reference_model="kvlcc2-l7", prior_strength=2.0)
+    yaw_rate, heading, *_ = mean_errors(zigzag_errors(model, hsva.runs[name]) for name in OTHERS)
+    assert yaw_rate < 0.095
+    assert heading < 4.3
     _, diameter, drift, _ = circle(full_scale(model, data.ship("kvlcc2_marin", 10)), 1.0)
     assert diameter == pytest.approx(CIRCLES[0][1], rel=0.04)
     assert drift == pytest.approx(CIRCLES[0][2], abs=1.5)
