@@ -24,7 +24,7 @@ demo: $(VENV)/demo-installed
 
 # Many loops and few steps of each: plain Python takes a tenth of the time that compiling them would. Tests of
 # these files that are marked as `compiled` take many steps, or state facts about compiled code.
-INTERPRETED := conversions env_conformance grey_box orders scaling ship_of_your_own structures
+INTERPRETED := conversions env_conformance env_options grey_box orders scaling ship_of_your_own structures
 INTERPRETED := $(patsubst %,tests/shipgym/test_%.py,$(INTERPRETED))
 
 test: lint type

@@ -13,8 +13,11 @@ from .estimators.coefficient_history import (
     CoefficientHistory as CoefficientHistory,
     coefficient_history as coefficient_history,
 )
-from .estimators.lssvm import LSSVM as LSSVM, TruncatedLSSVM as TruncatedLSSVM
-from .estimators.polynomial import polynomial_coefficients as polynomial_coefficients
+from .estimators.lssvm import (
+    LSSVM as LSSVM,
+    TruncatedLSSVM as TruncatedLSSVM,
+    polynomial_coefficients as polynomial_coefficients,
+)
 from .estimators.recursive import (
     MultiInnovationLeastSquares as MultiInnovationLeastSquares,
     RecursiveLeastSquares as RecursiveLeastSquares,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -25,13 +26,12 @@ from identification.uncertainty.bootstrap import bootstrap_covariance, influence
 from identification.uncertainty.covariance import coefficient_covariance, joint_covariance
 from identification.uncertainty.model_error import FEWEST_TRIALS, model_error, without_trial
 from identification.validation.diagnostics import diagnose
-from identification.validation.guard import reasons_unstable
-from identification.validation.guarded_fit import GuardedFit, guarded_fit, with_coefficients
+from identification.validation.guard import GuardedFit, guarded_fit, reasons_unstable, with_coefficients
 from identification.validation.prediction import predict, trial_metrics
 from identification.validation.selection import select
 from shipgym.arrays import Floats
 from shipgym.ships import GreyBox, ShipModel, Structure
-from shipgym.ships.grey_box_model import fitted_box
+from shipgym.ships.catalogue import fitted_box
 from shipgym.ships.mmg import MMG
 from shipgym.ships.steering import SteeringGear
 from shipgym.trials.identify_table import AUTO
@@ -81,17 +81,31 @@ def identify(
         For trials that excite nothing, lack channels or samples, and for particulars that do not suffice.
     """
     asked = Options.of({"structure": structure, "method": method, "samples": samples, **options})
-    if structure == AUTO and asked.kernel is None:
-        return _identified_best(trials, asked, particulars, steering)
-    if asked.kernel is not None:
-        return _identified_with_kernel(trials, asked, particulars, steering)
-    if structure == MMG:
-        return _identified_mmg(trials, checked_mmg(asked), particulars, steering)
-    chosen = get_method(method)
-    problem = pose(trials, asked, particulars, steering)
-    fit, refined = _fitted(chosen, asked, problem)
-    provenance = _fitted_provenance(asked, chosen, fit, refined, problem)
-    covariance = _scaled_covariance(asked, fit, refined, problem, provenance)
+    return _identified(trials, asked, particulars, steering)
+
+
+def _identified(
+    trials: Sequence[Trial], options: Options, particulars: Given, steering: SteeringGear | None
+) -> IdentificationResult:
+    """By regression, unless the options ask for another way."""
+    if options.kernel is not None:
+        return _identified_with_kernel(trials, options, particulars, steering)
+    if options.structure == AUTO:
+        return _identified_best(trials, options, particulars, steering)
+    if options.structure == MMG:
+        return _identified_mmg(trials, checked_mmg(options), particulars, steering)
+    method = get_method(options.method)
+    problem = pose(trials, options, particulars, steering)
+    fit, refined, of_method = _fitted(method, options, problem)
+    provenance = _provenance(options, method.name, of_method, fit, problem)
+    if options.prior is not None:
+        prior = getattr(next(iter(fit.estimators.values()), None), "prior_", {})
+        provenance |= {"prior": name_of(options.prior), **prior}
+    if refined is not None:
+        provenance["refinement"] = refined.report
+    if options.uncertainty != "analytic":
+        provenance["uncertainty"] = options.uncertainty
+    covariance = _scaled_covariance(options, fit, refined, problem, provenance)
     return _evaluated(replace(fit.model, covariance=covariance), fit, problem, provenance)
 
 
@@ -99,11 +113,8 @@ def _identified_best(
     trials: Sequence[Trial], options: Options, particulars: Given, steering: SteeringGear | None
 ) -> IdentificationResult:
     """By the structure and method that predict the trials to fit best, each held out, and the ranking."""
-
-    def fitted(some: Sequence[Trial], own: Options) -> IdentificationResult:
-        return identify(some, particulars=particulars, steering=steering, **own.own(), **own.settings())
-
     marked = held_out(trials, options.hold_out)
+    fitted = partial(_identified, particulars=particulars, steering=steering)
     chosen, found = select(fitted, [trial for trial in marked if trial.use == "fit"], options)
     best = fitted(trials, chosen)
     return replace(
@@ -122,11 +133,9 @@ def _identified_with_kernel(
     problem = pose(trials, beneath, particulars, steering)
     blank, box = problem.blank, problem.table
     if not isinstance(box, GreyBox):
-        fitted = identify(
-            trials, particulars=particulars, steering=steering, **beneath.own(), **beneath.settings()
-        ).model
-        fitted = stabilised(fitted) if beneath.structure == BLACK_BOX else fitted
-        blank, box = fitted, fitted_box(fitted)
+        fitted = _identified(trials, beneath, particulars, steering).model
+        blank = stabilised(fitted) if beneath.structure == BLACK_BOX else fitted
+        box = fitted_box(blank)
     found = fit_kernel(blank, problem.used, box, options, problem.sampling)
     fit = _simulated(found.model, found.estimators, problem.used)
     call = whole_call(options, problem.trials, particulars, steering)
@@ -143,12 +152,11 @@ def _identified_mmg(
 ) -> IdentificationResult:
     """The MMG form; its regression is that on the model's own accelerations."""
     problem = pose(trials, options, particulars, steering)
-    found = fit_mmg(problem, options)
-    samples, estimators = explained_samples(problem.used, found.model, **problem.sampling)
-    fit = _simulated(found.model, estimators, problem.used)
-    problem = replace(problem, samples=samples, blank=found.model)
-    provenance = _provenance(options, MAP, {}, fit, problem) | found.report
-    return _evaluated(found.model, fit, problem, provenance)
+    model, report = fit_mmg(problem, options)
+    samples, estimators = explained_samples(problem.used, model, **problem.sampling)
+    fit = _simulated(model, estimators, problem.used)
+    problem = replace(problem, samples=samples, blank=model)
+    return _evaluated(model, fit, problem, _provenance(options, MAP, {}, fit, problem) | report)
 
 
 def _simulated(model: ShipModel, estimators: dict[str, Estimator], used: Sequence[Trial]) -> GuardedFit:
@@ -158,38 +166,39 @@ def _simulated(model: ShipModel, estimators: dict[str, Estimator], used: Sequenc
     return GuardedFit(model, estimators, not reasons, report)
 
 
-def _fitted(method: Method, options: Options, problem: Problem) -> tuple[GuardedFit, Refined | None]:
-    """Fit, guard and refine."""
+def _fitted(
+    method: Method, options: Options, problem: Problem
+) -> tuple[GuardedFit, Refined | None, dict[str, Any]]:
+    """Fit, guard and refine; also the settings of the method alone."""
     task = FitTask(problem.samples, problem.blank, problem.used)
     if options.prior is not None:
         method = with_prior(method, options.prior, options.prior_strength, task.blank, options.prior_folds)
     refinement, settings = split_settings(options.settings(), method.refined)
     fit = guarded_fit(method, settings, task, options.guarded)
     if refinement is None:
-        return fit, None
+        return fit, None, settings
     refined = refine(fit, task, refinement, MEMORY * task.blank.travel_time)
-    return refined.fit, refined
+    return refined.fit, refined, settings
 
 
 def _provenance(
     options: Options, method: str, settings: Mapping[str, Any], fit: GuardedFit, problem: Problem
 ) -> dict[str, Any]:
     """How a model came about, for its file; `settings`: of the method."""
-    box, samples = problem.table, problem.samples
-    reference = {}
+    box, further = problem.table, {}
     if isinstance(box, GreyBox):
-        reference["reference"] = {"name": box.ship.name, "similarity": problem.similarity, "shaft": box.shaft}
-    searched = {q: m.chosen_ for q, m in fit.estimators.items() if hasattr(m, "chosen_")}
+        further["reference"] = {"name": box.ship.name, "similarity": problem.similarity, "shaft": box.shaft}
+    if searched := {q: m.chosen_ for q, m in fit.estimators.items() if hasattr(m, "chosen_")}:
+        further["search"] = searched
     return {
         "structure": name_of(options.structure),
         "method": method,
         "samples": options.samples,
         "settings": provenance_settings(options, settings),
-        **reference,
+        **further,
         "software": f"shipgym {shipgym.__version__}",
-        "steps_per_window": samples.window,
+        "steps_per_window": problem.samples.window,
         "ranks": {q: int(getattr(m, "rank_", len(m.coef_))) for q, m in fit.estimators.items()},
-        **({"search": searched} if searched else {}),
         "guard": fit.report,
         "stable": fit.stable,
         "trials": [
@@ -198,22 +207,6 @@ def _provenance(
             for trial in problem.used
         ],
     }
-
-
-def _fitted_provenance(
-    options: Options, method: Method, fit: GuardedFit, refined: Refined | None, problem: Problem
-) -> dict[str, Any]:
-    """How a model that was fitted by regression came about."""
-    _, of_method = split_settings(options.settings(), method.refined)
-    found = _provenance(options, method.name, of_method, fit, problem)
-    if options.prior is not None:
-        prior = next(iter(getattr(estimator, "prior_", {}) for estimator in fit.estimators.values()), {})
-        found |= {"prior": name_of(options.prior), **prior}
-    if refined is not None:
-        found["refinement"] = refined.report
-    if options.uncertainty != "analytic":
-        found["uncertainty"] = options.uncertainty
-    return found
 
 
 def _scaled_covariance(

@@ -26,11 +26,8 @@ class IdentificationResult(Fit):
     def summary(self) -> str:
         """Table of all coefficients and of the inertia they are based on.
 
-        Returns
-        -------
-        str
-            Name, value and standard error (of forces in the prime system 1e-5) and t; inertia that was
-            not given is marked as estimated.
+        Name, value and standard error (of forces in the prime system 1e-5) and t; inertia that was not given
+        is marked as estimated.
         """
         return summary_table(self)
 

@@ -11,6 +11,7 @@ import json
 import os
 import subprocess
 import sys
+import tempfile
 import time
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
@@ -85,6 +86,29 @@ env = gymnasium.make("shipgym/CourseKeeping-v0", model="{model}")
 env.reset(seed=0)
 env.step(np.zeros(1, dtype=np.float32))
 print(imported, time.perf_counter() - start)
+"""
+COLD_START = """
+import sys, time
+import gymnasium, numpy as np, shipgym
+env = gymnasium.make("shipgym/CourseKeeping-v0", model=sys.argv[1], sea=sys.argv[2])
+env.reset(seed=0)
+env.step(np.zeros(1, dtype=np.float32))
+print(time.process_time())
+"""
+WORKERS = """
+import resource, sys, time
+import gymnasium
+from stable_baselines3.common.vec_env import SubprocVecEnv
+
+name, n = sys.argv[1], int(sys.argv[2])
+start = time.perf_counter()
+env = SubprocVecEnv([lambda: __import__("gymnasium").make(name)] * n, start_method="spawn")
+env.reset()
+env.step([env.action_space.sample() for _ in range(n)])
+wall = time.perf_counter() - start
+env.close()
+used = resource.getrusage(resource.RUSAGE_CHILDREN)
+print(wall, used.ru_utime + used.ru_stime)
 """
 
 
@@ -180,16 +204,16 @@ def native_against_python(task: str, n_envs: int = 64) -> Row:
     )
 
 
-def native_against_cart_pole(n_envs: int = 1024) -> Row:
+def native_against_cart_pole(task: str, n_envs: int = 1024) -> Row:
     """The native vector environment against Gymnasium's own of CartPole."""
-    native = native_speed("shipgym/CourseKeeping-v0", n_envs, model=MODEL)
+    native = native_speed(env_id(task), n_envs, model=MODEL)
     poles = native_speed("CartPole-v1", n_envs)
     return Row(
-        f"{n_envs} CourseKeeping, gymnasium.make_vec",
+        f"{n_envs} {task}, gymnasium.make_vec",
         f"{native / 1e6:.1f} M steps/s",
         f"Gymnasium's native CartPole {poles / 1e6:.1f} M steps/s",
         native / poles,
-        "1 time",
+        "3 times",
     )
 
 
@@ -415,6 +439,32 @@ def start_up() -> list[Row]:
     ]
 
 
+def cold_start(sea: str, aim: str) -> Row:
+    """Processor time to the first step of a fresh process, on an empty cache and on a filled one."""
+    with tempfile.TemporaryDirectory() as cache:
+        (cold,), (warm,) = (run_python(COLD_START, MODEL, sea, SHIPGYM_CACHE=cache) for _ in range(2))
+    what = f"first environment, {sea} sea, empty cache"
+    return Row(what, f"{cold:.1f} s of processor", f"filled cache {warm:.1f} s", cold / warm, aim)
+
+
+def cold_workers() -> list[Row]:
+    """Workers of stable-baselines3 that start at once on an empty cache, against one; and CartPole's."""
+
+    def used(env_id: str, n: int) -> tuple[float, float]:
+        with tempfile.TemporaryDirectory() as cache:
+            wall, processor = run_python(WORKERS, env_id, str(n), SHIPGYM_CACHE=cache)
+        return wall, processor
+
+    rows = []
+    for env, aim in (("shipgym:shipgym/CourseKeeping-v0", "1.3 times"), ("CartPole-v1", "")):
+        one, four = used(env, 1), used(env, 4)
+        told = (f"{processor:.1f} s of processor, {wall:.0f} s" for wall, processor in (four, one))
+        ours, single = told
+        what = f"SubprocVecEnv of {env.rpartition('/')[2]}, 4 spawned workers, empty cache"
+        rows.append(Row(what, ours, f"one worker {single}", four[1] / one[1], aim))
+    return rows
+
+
 #: What is measured, by group; each is called when it is its turn.
 GROUPS: dict[str, list[Callable[[], Row | list[Row]]]] = {
     "environments": [
@@ -429,7 +479,7 @@ GROUPS: dict[str, list[Callable[[], Row | list[Row]]]] = {
         partial(kernel_ship, centres=100),
         two_threads,
         *(partial(native_against_python, task) for task in TASKS),
-        native_against_cart_pole,
+        *(partial(native_against_cart_pole, task) for task in TASKS[:2]),
     ],
     "learning": [partial(learning, task) for task in TASKS],
     "physics": [
@@ -443,7 +493,12 @@ GROUPS: dict[str, list[Callable[[], Row | list[Row]]]] = {
         recursive_updates,
         refinement,
     ],
-    "start": [start_up],
+    "start": [
+        start_up,
+        partial(cold_start, "calm", "5 s"),
+        partial(cold_start, "moderate", "7 s"),
+        cold_workers,
+    ],
 }
 
 

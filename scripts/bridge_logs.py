@@ -29,7 +29,9 @@ ROOT = Path(__file__).parents[1]
 if str(ROOT) not in sys.path:
     sys.path.insert(0, str(ROOT))
 
-import shipgym  # noqa: E402 - the folder above has to be found first
+from certainty import SHIPS, ship_of  # noqa: E402 - the folder above has to be found first
+from real_ships.section import table  # noqa: E402
+
 from agents.controllers.lq import LQ  # noqa: E402
 from agents.controllers.pid import PID  # noqa: E402
 from agents.rollouts.course_keeping import sail  # noqa: E402
@@ -43,10 +45,10 @@ from shipgym.manoeuvres import turning_circle, zigzag  # noqa: E402
 from shipgym.sea.conditions import Current, Weather, Wind  # noqa: E402
 from shipgym.tasks.task import course_keeping_task  # noqa: E402
 from shipgym.trials.identify_table import Options  # noqa: E402
+from shipgym.trials.resampling import Log  # noqa: E402
 from shipgym.trials.sensors import GNSS, Sensor, Sensors  # noqa: E402
 from shipgym.trials.ship_file import ShipFile  # noqa: E402
 from shipgym.trials.trial_import import Conventions, to_project_conventions  # noqa: E402
-from tests.ships.mmg import MMG_SHIPS, mmg_ship  # noqa: E402
 
 CURRENT, WIND = 0.5, 9.0  # m/s
 UNSEEN = "turn 25 port"
@@ -55,18 +57,12 @@ RECIPES: dict[str, dict[str, Any]] = {
     "mmg": {"structure": "mmg"},
 }
 LEFT_IN: dict[str, Any] = {"current": "none", "wind": "none"}
-SHIPS = ("mariner", "container", "tanker", "kvlcc2", *MMG_SHIPS)
 ANTENNA = 25.0  # m forward of midship
 DEGREE = np.pi / 180.0
 LOG = Sensors(
     {"x": GNSS, "y": GNSS, "psi": Sensor(noise=0.1 * DEGREE), "delta": Sensor(resolution=0.5 * DEGREE),
      "n": Sensor(resolution=0.1 / 60.0)},
 )  # fmt: skip
-
-
-def ship_of(name: str) -> ShipModel:
-    """A ship by name, the truth behind the logs."""
-    return mmg_ship(name) if name in MMG_SHIPS else shipgym.load_model(name)
 
 
 def turned(run: Trial, angle: float) -> Trial:
@@ -124,9 +120,10 @@ def logged(run: Trial, seed: int) -> Trial:
     channels["y"] = channels["y"] - ANTENNA * np.sin(channels["psi"])
     every = slice(None, None, 2)
     channels = {name: values[every] for name, values in channels.items()}
-    t = read.t[every]
-    made, derived, *_ = to_project_conventions(t, channels, Conventions(), run.name)
-    return Trial(t, made, name=run.name, kind=run.kind, use=run.use, derived=derived, length=run.length)
+    log = Log(read.t[every], channels, run.name, [])
+    to_project_conventions(log, Conventions())
+    facts: dict[str, Any] = {"kind": run.kind, "use": run.use, "derived": log.derived, "length": run.length}
+    return Trial(log.t, log.channels, name=run.name, **facts)
 
 
 def logs_of(ship: ShipModel, seed: int) -> tuple[list[Trial], Weather]:
@@ -178,12 +175,6 @@ def autopilots(result: IdentificationResult, ship: ShipModel, weather: Weather) 
     return found
 
 
-def markdown(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """A table in Markdown."""
-    lines = [head, ["---"] * len(head), *rows]
-    return "\n".join("| " + " | ".join(line) + " |" for line in lines)
-
-
 def current_table(names: Sequence[str], seeds: range) -> str:
     """How well the current is found."""
     rows, every = [], []
@@ -197,7 +188,7 @@ def current_table(names: Sequence[str], seeds: range) -> str:
     together = [np.concatenate(part) for part in zip(*every, strict=True)]
     rows.append(["all", *_current_cells(*together), ""])
     head = ["ship", "error, m/s rms", "largest", "below 0.05 m/s", "inside the 95 % interval", "taken out"]
-    return markdown(head, rows)
+    return table(head, rows)
 
 
 def _current_cells(errors: np.ndarray, deviations: np.ndarray) -> list[str]:
@@ -209,15 +200,15 @@ def _current_cells(errors: np.ndarray, deviations: np.ndarray) -> list[str]:
     ]  # fmt: skip
 
 
-def model_table(names: Sequence[str], seeds: range) -> str:
+def model_table(names: Sequence[str], seeds: range, recipes: Sequence[str]) -> str:
     """Heading of the unseen turn, and autopilots on the ship."""
     rows = []
     for name in names:
         ship = ship_of(name)
-        for title, recipe in RECIPES.items():
+        for title in recipes:
             for seed in seeds:
                 logs, weather = logs_of(ship, seed)
-                known = {"particulars": ship.particulars, "steering": ship.steering, **recipe}
+                known = {"particulars": ship.particulars, "steering": ship.steering, **RECIPES[title]}
                 result = identify(logs, **known)
                 with_both = heading_error(identify(logs, **known, **LEFT_IN))
                 pilots = autopilots(result, ship, weather)
@@ -235,10 +226,10 @@ def model_table(names: Sequence[str], seeds: range) -> str:
         "PID, deg rms",
         "LQ, deg rms",
     ]
-    return markdown(head, rows)
+    return table(head, rows)
 
 
-def wind_table() -> str:
+def wind_table(recipes: Sequence[str]) -> str:
     """Esso Osaka's zigzags, each predicted from the five others, without and with her wind."""
     ship = ShipFile.load(ROOT / "tests/ships/esso_osaka_3m.toml")
     particulars = replace(ship.particulars, frontal_area=0.135, lateral_area=0.520)
@@ -248,20 +239,19 @@ def wind_table() -> str:
     }  # fmt: skip
     paths = [path for entry in ship.entries for path in entry.paths if "zigzag" in path.name]
     runs = [under_way(Trial.from_csv(path, columns, name=path.stem, kind="zigzag")) for path in paths]
+    known = {"particulars": particulars, "steering": ship.steering, "repair": True}
     rows = []
-    for title, recipe in ESSO_OSAKA.items():
+    for title in recipes:
         for wind in ("none", "auto", "constant")[: 2 if title == "mmg" else 3]:
             errors = []
             for held in runs:
                 trials = [run.with_(use="validate" if run is held else "fit") for run in runs]
-                result = identify(
-                    trials, particulars=particulars, steering=ship.steering, repair=True, wind=wind, **recipe
-                )
+                result = identify(trials, wind=wind, **known, **ESSO_OSAKA[title])
                 error = result.metrics["trials"][held.name]["rmse"]["psi"]
                 errors.append(float("nan") if error is None else float(np.degrees(error)))
             told = {"none": "left in", "auto": "of columns", "constant": "constant"}[wind]
             rows.append([title, told, *(f"{e:.1f}" for e in errors), f"{np.mean(errors):.1f}"])
-    return markdown(["recipe", "wind", *(run.name[-8:] for run in runs), "mean"], rows)
+    return table(["recipe", "wind", *(run.name[-8:] for run in runs), "mean"], rows)
 
 
 def under_way(trial: Trial) -> Trial:
@@ -287,16 +277,19 @@ def main() -> None:
     parser.add_argument("--models", type=int, default=2, help="seeds of models and autopilots")
     parser.add_argument("--first", type=int, default=100, help="first seed; below 10 the recipes were chosen")
     parser.add_argument("--ships", default=",".join(SHIPS))
+    parser.add_argument("--recipes", help="with semicolons between; by default all")
     parser.add_argument("--wind", action="store_true", help="Esso Osaka only")
     given = parser.parse_args()
     warnings.simplefilter("ignore")
+    every = ESSO_OSAKA if given.wind else RECIPES
+    recipes = given.recipes.split(";") if given.recipes else list(every)
     if given.wind:
-        print(wind_table())
+        print(wind_table(recipes))
         return
     names = given.ships.split(",")
     if given.seeds:
         print(current_table(names, range(given.first, given.first + given.seeds)), end="\n\n", flush=True)
-    print(model_table(names, range(given.first, given.first + given.models)))
+    print(model_table(names, range(given.first, given.first + given.models), recipes))
 
 
 if __name__ == "__main__":

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from shipgym.tasks.definition import TASKS, read_definition
-from shipgym.tasks.settings import keywords
+from shipgym.tasks.source import keywords
 
 FOLDER = Path(__file__).parents[1] / "docs" / "environments"
 PAGES = tuple(FOLDER / f"{name}.md" for name in ("course_keeping", "path_following", "path_following_v0"))

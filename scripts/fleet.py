@@ -24,7 +24,7 @@ from agents.policies.weights_file import as_json
 from agents.rollouts.rollout import episode_costs, rollout
 from agents.training.residual import ResidualVecEnv
 from shipgym.envs.engine import Engine, episode_keys
-from shipgym.envs.ship_env import spaces as spaces_of
+from shipgym.envs.environment import spaces as spaces_of
 from shipgym.errors import InputError, UnstableModelError
 from shipgym.sea.conditions import Current, Weather
 from shipgym.ships import ShipModel, load_model

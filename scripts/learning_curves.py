@@ -14,9 +14,8 @@ from pathlib import Path
 from typing import Any
 
 from agents.controllers.designs import design
-from agents.training.evaluation import HeldOut
 from agents.training.plan import EVALUATION_SEED, N_EVALUATIONS, Given, make_plan
-from agents.training.training import train
+from agents.training.training import HeldOut, train
 from shipgym.files import make_folder, read_json, write_json
 
 ROOT = Path(__file__).parents[1]

@@ -22,6 +22,7 @@ from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
+from lane_copies import copy_lanes
 from numpy.typing import ArrayLike, NDArray
 
 from agents.controllers.controller import Controller, Policy
@@ -215,7 +216,7 @@ class _Ships:
 
     def copy(self, source: _Ships, lanes: NDArray[np.int64], keep_course: bool) -> None:
         """Become copies of other ships, which are not ordered another course if they shall keep theirs."""
-        self.engine.copy_lanes(source.engine, lanes)
+        copy_lanes(self.engine, source.engine, lanes)
         self.integral, self.over = source.integral[lanes], source.over[lanes]
         if keep_course:
             self.engine.write("next_change", np.inf)

@@ -31,8 +31,8 @@ from .ships.checker import ModelCheck as ModelCheck
 from .ships.checker import check_ship_model as check_ship_model
 from .ships.particulars import Particulars as Particulars
 from .ships.scaling import scale_model as scale_model
-from .ships.stability import StraightLineStability as StraightLineStability
-from .ships.stability import straight_line_stability as straight_line_stability
+from .ships.linear import StraightLineStability as StraightLineStability
+from .ships.linear import straight_line_stability as straight_line_stability
 from .ships.steering import SteeringGear as SteeringGear
 from .trials.sensors import Sensor as Sensor
 from .trials.sensors import Sensors as Sensors

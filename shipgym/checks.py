@@ -109,10 +109,14 @@ def check_format(content: Mapping[str, Any], known: int, where: str) -> None:
         )
 
 
-def check_table(value: Any, where: str) -> Mapping[str, Any]:
-    """Return `value`, which must be a table (a mapping with text as keys)."""
+def check_table(
+    value: Any, where: str, allowed: Collection[str] | None = None, required: Iterable[str] = ()
+) -> Mapping[str, Any]:
+    """Return `value`, which must be a table (a mapping with text as keys), of these keys where given."""
     if not isinstance(value, Mapping):
         raise InputError(f"{where}: {shown(value)} found, expected a table of keys and values")
+    if allowed is not None:
+        check_keys(value, allowed, where, required)
     return value
 
 

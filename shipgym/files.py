@@ -18,6 +18,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from errno import EBUSY, ENOENT, EXDEV
 from functools import cache, partial
+from importlib import resources
 from pathlib import Path
 from typing import Any
 from zlib import crc32
@@ -58,22 +59,18 @@ def atomic_path(path: Path) -> Iterator[Path]:
             raise InputError(f"{path}: is not a file; choose another name")
         remove_drafts(path.parent)
         yield draft
-        _take_place(draft, path)
+        try:
+            draft.replace(path)
+        except OSError as error:
+            if error.errno not in MOUNTED:
+                raise
+            shutil.copyfile(draft, path)
     except OSError as error:
         remedy = "; choose a folder that exists" if error.errno == ENOENT else ""
         raise InputError(f"{path}: cannot be written ({error.strerror or error}){remedy}") from error
     finally:
         with suppress(OSError):
             draft.unlink()
-
-
-def _take_place(draft: Path, path: Path) -> None:
-    try:
-        draft.replace(path)
-    except OSError as error:
-        if error.errno not in MOUNTED:
-            raise
-        shutil.copyfile(draft, path)
 
 
 def draft_name(path: Path) -> Path:
@@ -238,6 +235,11 @@ def read_toml(path: Path, what: str) -> dict[str, Any]:
     return parse_toml(read_text(path, f"{what} (TOML)", LARGEST_TOML), f"{path}:")
 
 
+def packaged_toml(package: str, name: str) -> dict[str, Any]:
+    """The tables of a TOML file that comes with a package."""
+    return tomllib.loads(resources.files(package).joinpath(name).read_text("utf-8"))
+
+
 def parse_toml(text: str, where: str) -> dict[str, Any]:
     """The tables of a TOML text within the limits of `check_content`; `where` begins messages: "a.toml:"."""
     if _LONG_KEY.search(text):
@@ -246,6 +248,11 @@ def parse_toml(text: str, where: str) -> dict[str, Any]:
         tomllib.loads, text, where, "not valid TOML: {}; correct that line", infinite=True
     )
     return tables
+
+
+def shipped_toml(package: str, name: str) -> dict[str, Any]:
+    """A table of numbers or words that is part of a package."""
+    return tomllib.loads(resources.files(package).joinpath(name).read_text("utf-8"))
 
 
 def toml_value(text: str) -> Any:

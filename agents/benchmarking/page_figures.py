@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from functools import partial
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,10 +12,8 @@ from numpy.typing import NDArray
 from agents.benchmarking.contestants import BEST_KNOWN
 from agents.benchmarking.results import BenchmarkResult
 from shipgym.envs.episode import Episode
-from shipgym.plots import INK, MUTED, axis, compact, graph_objects, label, layout, line, subplots, translucent
-
-if TYPE_CHECKING:
-    from plotly.graph_objects import Figure
+from shipgym.plots import INK, MUTED, Panel, axis, compact, graph_objects, line, panels, points, translucent
+from shipgym.plots.style import Figure
 
 Floats = NDArray[np.float64]
 
@@ -24,11 +23,13 @@ COLOURS = (
     "#5566d6", "#7a4b2a", "#0891b2", "#8f8a00",
 )  # fmt: skip
 DASHES = ("solid", "dash", "dot")
-MARGIN = {"l": 58, "r": 14, "t": 14, "b": 44}
 LOGARITHMIC = 20.0  # ratio of the largest to the smallest cost from which on their axis is logarithmic
 SHOWN = {True: (-1.5, 1.5), False: (0.0, 4.0)}  # scores, and relative costs; further ones stand at the edge
 SCORED = "wheel-over from the model 0, best known 1"
 SAMPLES = 240  # of a line at most
+
+#: Panels without a legend: the page has one for all figures.
+bare_panels = partial(panels, margin={"l": 58, "r": 14, "t": 14, "b": 44}, showlegend=False, hovermode="x")
 
 
 def styles(names: Sequence[str]) -> dict[str, tuple[str, str]]:
@@ -43,8 +44,7 @@ def styles(names: Sequence[str]) -> dict[str, tuple[str, str]]:
 
 def scores_figure(result: BenchmarkResult) -> Figure:
     """Scores with their intervals, the best on top; relative costs where there are no scores."""
-    go, style = graph_objects(), styles(result.ranking)
-    figure = go.Figure()
+    style, traces = styles(result.ranking), []
     scored = bool(result.summary["reference"])
     for entry in result.summary["ranking"]:
         score = entry["score"] if scored else {"value": entry["relative_cost"], "low": None, "high": None}
@@ -54,48 +54,48 @@ def scores_figure(result: BenchmarkResult) -> Figure:
         low, high = (value if score[end] is None else score[end] for end in ("low", "high"))
         low, at, high = np.clip((low, value, high), *SHOWN[scored]).tolist()
         beyond = "triangle-left" if value < at else "triangle-right" if value > at else "circle"
-        figure.add_trace(
-            go.Scatter(
+        traces.append(
+            graph_objects().Scatter(
                 x=[at], y=[entry["name"]], name=entry["name"], mode="markers", customdata=[value],
                 marker={"color": style[entry["name"]][0], "size": 10, "symbol": beyond},
                 error_x={"array": [high - at], "arrayminus": [at - low], "thickness": 2.2},
                 hovertemplate="%{customdata:.3f}<extra>%{y}</extra>",
             )
         )  # fmt: skip
-    if scored:
-        for value, dash in ((0.0, "dot"), (1.0, "dot")):
-            figure.add_vline(x=value, line={"color": MUTED, "width": 1.2, "dash": dash})
     title = f"score: {SCORED}" if scored else "cost relative to the lowest, geometric mean over tasks"
-    figure.update_layout(_layout(30 * len(result.ranking) + 70, hovermode="closest"))
-    label(figure, title, axis(autorange="reversed", automargin=True, showgrid=True))
+    panel = Panel(traces, title, axis(autorange="reversed", automargin=True, showgrid=True))
+    figure = bare_panels([panel], 30 * len(result.ranking) + 70, hovermode="closest")
+    return _with_limits(figure) if scored else figure
+
+
+def _with_limits(figure: Figure) -> Figure:
+    """With lines at the scores 0 and 1."""
+    for value in (0.0, 1.0):
+        figure.add_vline(x=value, line={"color": MUTED, "width": 1.2, "dash": "dot"})
     return figure
 
 
 def profile_figure(profile: Mapping[str, Any], names: Sequence[str]) -> Figure:
     """Share of episodes that score more than a threshold."""
-    figure, style = graph_objects().Figure(), styles(names)
-    for name in names:
-        if name in profile["shares"]:
-            share = 100.0 * np.asarray(profile["shares"][name])
-            figure.add_trace(_line(profile["thresholds"], share, name, style[name], 2.0))
-    for value in (0.0, 1.0):
-        figure.add_vline(x=value, line={"color": MUTED, "width": 1.2, "dash": "dot"})
-    figure.update_layout(_layout(380))
+    style = styles(names)
+    lines = [
+        _line(profile["thresholds"], 100.0 * np.asarray(profile["shares"][name]), name, style[name], 2.0)
+        for name in names
+        if name in profile["shares"]
+    ]
     shares_axis = axis("episodes that score more, %", range=[-2, 102])
-    label(figure, f"score of an episode: {SCORED}", shares_axis)
-    return figure
+    return _with_limits(bare_panels([Panel(lines, f"score of an episode: {SCORED}", shares_axis)], 380))
 
 
 def costs_figure(result: BenchmarkResult, task: str) -> Figure:
     """Box of the costs of the episodes of a task for each contestant, and each episode as a dot."""
-    go, style = graph_objects(), styles(result.ranking)
-    figure = go.Figure()
+    style, boxes = styles(result.ranking), []
     names = [name for name in result.ranking if name in result.summary["tasks"][task]]
     costs = np.concatenate([np.zeros(0), *(result.figures(name, task).ravel() for name in names)])
     for name in names:
         colour = style[name][0]
-        figure.add_trace(
-            go.Box(
+        boxes.append(
+            graph_objects().Box(
                 x=compact(result.figures(name, task).ravel()), name=name, orientation="h",
                 boxpoints="all", jitter=0.7, pointpos=0.0,
                 marker={"color": translucent(colour, 0.35), "size": 3}, line={"color": colour, "width": 1.5},
@@ -104,11 +104,10 @@ def costs_figure(result: BenchmarkResult, task: str) -> Figure:
         )  # fmt: skip
     least, most = (costs.min(), costs.max()) if len(costs) else (0.0, 0.0)
     kind = "log" if least > 0.0 and most > LOGARITHMIC * least else "linear"
-    figure.update_layout(_layout(34 * len(names) + 70, hovermode="closest"))
     marks: dict[str, Any] = {"tickvals": _one_two_five(least, most)} if kind == "log" else {}
     costs_axis = axis("cost of an episode", type=kind, **marks)
-    label(figure, costs_axis, axis(autorange="reversed", automargin=True))
-    return figure
+    panel = Panel(boxes, costs_axis, axis(autorange="reversed", automargin=True))
+    return bare_panels([panel], 34 * len(names) + 70, hovermode="closest")
 
 
 def _one_two_five(least: float, most: float) -> list[float]:
@@ -119,27 +118,21 @@ def _one_two_five(least: float, most: float) -> list[float]:
 
 def tracks_figure(episodes: Mapping[str, Episode], names: Sequence[str]) -> Figure:
     """Paths over ground of contestants in one episode, the path to follow and its corridor."""
-    go, style = graph_objects(), styles(names)
-    figure = go.Figure()
-    first = next(iter(episodes.values()))
+    style, first, traces = styles(names), next(iter(episodes.values())), []
     if first.waypoints is not None and first.path is not None:
-        green = {"color": "#2f6b3c"}
-        for (north, east), style_of_path in (
-            (
-                _corridor(first.path, first.corridor or 0.0),
-                {"name": "corridor", "line": {"width": 0}, "fill": "toself", "fillcolor": "#e3efe5"},
-            ),
-            (first.path.T, {"name": "path", "line": {**green, "width": 1.4, "dash": "dash"}}),
-            (first.waypoints.T, {"name": "waypoints", "mode": "markers", "marker": {**green, "size": 7}}),
-        ):
-            points = {"x": compact(east), "y": compact(north), "mode": "lines", "hoverinfo": "skip"}
-            figure.add_trace(go.Scatter({**points, **style_of_path}))
+        green, (north, east) = "#2f6b3c", _corridor(first.path, first.corridor or 0.0)
+        path, marks = first.path, first.waypoints
+        filled: dict[str, Any] = {"fill": "toself", "fillcolor": "#e3efe5", "hoverinfo": "skip"}
+        traces = [
+            line(east, north, "corridor", green, 0, **filled),
+            line(path[:, 1], path[:, 0], "path", green, 1.4, line_dash="dash", hoverinfo="skip"),
+            points(marks[:, 1], marks[:, 0], "waypoints", green, 7, hoverinfo="skip"),
+        ]
     for name, episode in episodes.items():
         at = _thinned(episode.n_steps)
-        figure.add_trace(_line(episode.states["y"][at], episode.states["x"][at], name, style[name], 1.8))
-    figure.update_layout(_layout(480, hovermode="closest"))
-    label(figure, "east, m", axis("north, m", scaleanchor="x", scaleratio=1))
-    return figure
+        traces.append(_line(episode.states["y"][at], episode.states["x"][at], name, style[name], 1.8))
+    north_axis = axis("north, m", scaleanchor="x", scaleratio=1)
+    return bare_panels([Panel(traces, "east, m", north_axis)], 480, hovermode="closest")
 
 
 def _corridor(path: Floats, half: float) -> Floats:
@@ -160,29 +153,25 @@ def _corridor(path: Floats, half: float) -> Floats:
 def histories_figure(episodes: Mapping[str, Episode], names: Sequence[str]) -> Figure:
     """What contestants did over time in one episode: cross-track error, or heading, and the rudder."""
     style = styles(names)
-    figure = subplots(2, 1, shared_xaxes=True, vertical_spacing=0.05, row_heights=[0.58, 0.42])
     first = max(episodes.values(), key=lambda episode: episode.n_steps)
     path = first.waypoints is not None
+    above = Panel([], "", "cross-track error, m" if path else "heading, deg")
+    below = Panel([], "time, s", axis("rudder, deg", zero=True))
     for name, episode in episodes.items():
         at = _thinned(episode.n_steps)
-        t = episode.dt * at
+        t, rudder = episode.dt * at, np.degrees(episode.states["delta"])
         upper = episode.info["cross_track"] if path else np.degrees(np.unwrap(episode.states["psi"]))
-        figure.add_trace(_line(t, upper[at], name, style[name], 1.7), row=1, col=1)
-        figure.add_trace(
-            _line(t, np.degrees(episode.states["delta"])[at], name, style[name], 1.2), row=2, col=1
-        )
+        above.traces.append(_line(t, upper[at], name, style[name], 1.7))
+        below.traces.append(_line(t, rudder[at], name, style[name], 1.2))
+    if not path:
+        t = first.dt * np.arange(first.n_steps + 1)
+        course = np.degrees(_unwrapped(first.states["set_point"], np.unwrap(first.states["psi"])))
+        above.traces.append(line(t, course, "ordered course", INK, 1.3, line_dash="dash", line_shape="hv"))
+    grid = {"shared_xaxes": True, "vertical_spacing": 0.05, "row_heights": [0.58, 0.42]}
+    figure = bare_panels([above, below], 480, grid=grid)
     if path and first.corridor:
         for bound in (-first.corridor, first.corridor):
             figure.add_hline(y=bound, line={"color": "#2f6b3c", "width": 1.2, "dash": "dash"}, row=1, col=1)
-    elif not path:
-        t = first.dt * np.arange(first.n_steps + 1)
-        course = np.degrees(_unwrapped(first.states["set_point"], np.unwrap(first.states["psi"])))
-        figure.add_trace(
-            line(t, course, "ordered course", INK, 1.3, line_dash="dash", line_shape="hv"), row=1, col=1
-        )
-    label(figure, "", "cross-track error, m" if path else "heading, deg", row=1, col=1)
-    label(figure, "time, s", axis("rudder, deg", zero=True), row=2, col=1)
-    figure.update_layout(_layout(480))
     return figure
 
 
@@ -199,9 +188,3 @@ def _thinned(steps: int) -> NDArray[np.int64]:
 
 def _line(x: Any, y: Any, name: str, style: tuple[str, str], width: float) -> Any:
     return line(x, y, name, style[0], width, line_dash=style[1])
-
-
-def _layout(height: int, **changes: Any) -> dict[str, Any]:
-    """The shared layout without a legend: the page has one for all figures."""
-    shared: dict[str, Any] = {"margin": MARGIN, "showlegend": False, "hovermode": "x"}
-    return layout(height, **(shared | changes))

@@ -10,16 +10,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from functools import cached_property
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
-from agents.controllers.batched_lq import lq_rows
 from agents.controllers.controller import Controller, Range
 from agents.controllers.linear_loop import SIGNALS, length_time, sampled_ships
-from agents.controllers.lq import LQ
-from agents.controllers.memory import Flags, Floats, deviations
-from agents.controllers.stateful import Stateful
+from agents.controllers.lq import LQ, lq_rows
+from agents.controllers.memory import Flags, Floats, Records, deviations, records
 from identification.estimators.recursive_kernels import scalar_updates
 from shipgym.checks import check_number
 from shipgym.errors import InputError
@@ -37,22 +35,11 @@ LARGEST_SWAY, LARGEST_TURN = 0.1, 0.25  # prime speeds beyond which steering is 
 INNOVATIONS = 3
 WIDEST = 5.0  # factor by which the rudder's effect may differ from that of the design
 
-# What is remembered of a ship.
-THETA = slice(0, N_EQUATIONS * N_TERMS)
-COVARIANCE = slice(THETA.stop, THETA.stop + N_EQUATIONS * N_TERMS**2)
-PAST_TERMS = slice(COVARIANCE.stop, COVARIANCE.stop + (INNOVATIONS - 1) * N_TERMS)
-PAST_TARGETS = slice(PAST_TERMS.stop, PAST_TERMS.stop + (INNOVATIONS - 1) * N_EQUATIONS)
-GAINS = slice(PAST_TARGETS.stop, PAST_TARGETS.stop + len(SIGNALS))
-NEUTRAL = slice(GAINS.stop, GAINS.stop + 2)  # rudder, sway
-LAST = slice(NEUTRAL.stop, NEUTRAL.stop + 4)  # sway, yaw rate, rudder, speed
-STEP, CHANGE, RESTLESS = LAST.stop, LAST.stop + 1, LAST.stop + 2  # steps; of the yaw rate; mean square
-N_MEMORY = RESTLESS + 1
-
 RESTLESS_LIMIT = 1.4  # times what the sensors' noise makes of the yaw rate's second difference
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class AdaptiveLQ(Stateful):
+class AdaptiveLQ(Controller):
     """LQ whose gains follow the ship: linear steering is identified by TMILS, the gains designed for it.
 
     It begins every episode with the design on the model; `gains` and `margins` are those. Turns too hard to
@@ -76,6 +63,17 @@ class AdaptiveLQ(Stateful):
         "rudder_weight": Range(1e-12, 1e12, RUDDER_WEIGHT), "restless_limit": Range(1e-9, 1e6),
         "forgetting": Range(1e-300, 1.0), "redesign_steps": Range(1.0, 1e9),
     }  # fmt: skip
+
+    record: ClassVar[np.dtype[Any]] = np.dtype([
+        ("theta", "f8", (N_EQUATIONS, N_TERMS)),  # the estimate, scaled, and its covariance
+        ("covariance", "f8", (N_EQUATIONS, N_TERMS, N_TERMS)),
+        ("terms", "f8", (INNOVATIONS - 1, N_TERMS)),  # of the last intervals
+        ("targets", "f8", (INNOVATIONS - 1, N_EQUATIONS)),
+        ("gains", "f8", len(SIGNALS)),  # in use
+        ("neutral", "f8", 2),  # rudder, sway
+        ("last", "f8", 4),  # sway, yaw rate, rudder, speed
+        ("step", "f8"), ("change", "f8"), ("restless", "f8"),  # steps; of the yaw rate; its mean square
+    ])  # fmt: skip
 
     prior: Floats
 
@@ -124,57 +122,57 @@ class AdaptiveLQ(Stateful):
         check_number(noise, "noise", at_least=0.0)
         if not has_sway(model):
             raise InputError(f"model: {model.name!r} has no sway, expected one with surge, sway and yaw")
-        start = LQ.from_model(
-            model, dt=dt, integral_lengths=integral_lengths, rudder_weight=rudder_weight,
-            rate_weight_s2=rate_weight_s2,
-        )  # fmt: skip
+        weights = {"integral_lengths": integral_lengths, "rudder_weight": rudder_weight}
+        start = LQ.from_model(model, dt=dt, rate_weight_s2=rate_weight_s2, **weights)
         interval, time = start.design["dt"], length_time(model)
-        settings = {
+        length, speed = model.particulars["length"], straight_running(model).surge
+        deviation = np.sqrt(2.0) * noise / interval * np.array([SEA_TRIAL["v"].noise, SEA_TRIAL["r"].noise])
+        errors = np.hypot(UNEXPLAINED, deviation / units(length, speed)[:, 3])
+        design = start.design | {
+            "length": length,
+            "speed": speed,
+            "sway_error": float(errors[0]),
+            "yaw_error": float(errors[1]),
+            "gear_lag": model.steering.time_constant,
             "integral_time": integral_lengths * time,
             "restless_limit": RESTLESS_LIMIT * np.sqrt(6.0) * max(noise, 1.0) * SEA_TRIAL["r"].noise,
             "forgetting": float(np.exp(-interval / (forgetting_lengths * time))),
             "redesign_steps": float(max(1, round(redesign_lengths * time / interval))),
         }
-        common = {one.name: getattr(start, one.name) for one in fields(start)}
-        design = start.design | _identification(model, interval, noise) | settings
         design.pop("integral_lengths")
+        common = {one.name: getattr(start, one.name) for one in fields(start)}
         return cls(**common | {"design": design}, prior=prime_steering(model))
-
-    @property
-    def memory_size(self) -> int:
-        """Estimate, its covariance, last samples, gains in use."""
-        return N_MEMORY
 
     def steer(self, seen: dict[str, Floats], memory: Floats, begins: Flags) -> tuple[Floats, Floats]:
         """Learn from the last interval, redesign now and then, and feed back."""
-        kept = memory.copy()
+        memory = memory.copy()
+        kept = records(memory, self.record)
         kept[begins] = self._fresh()
         speed = np.maximum(np.hypot(seen["surge"], seen["sway"]), 0.1 * self.design["speed"])
         now = np.stack([seen["sway"], seen["yaw_rate"], seen["rudder"], speed], axis=-1)
         self._learn(kept, now, begins, self._at_rest(kept, now, begins))
-        kept[:, LAST] = now
-        kept[:, STEP] += 1.0
-        due = np.flatnonzero(kept[:, STEP] % self.design["redesign_steps"] == 0.0)
+        kept["last"] = now
+        kept["step"] += 1.0
+        due = np.flatnonzero(kept["step"] % self.design["redesign_steps"] == 0.0)
         if len(due):
             kept[due] = self._redesigned(kept[due])
-        rudder, sway = kept[:, NEUTRAL].T
-        order: Floats = rudder + np.einsum("ij,ij->i", kept[:, GAINS], deviations(seen, rudder, sway))
-        return order, kept
+        rudder, sway = kept["neutral"].T
+        order: Floats = rudder + np.einsum("ij,ij->i", kept["gains"], deviations(seen, rudder, sway))
+        return order, memory
 
     @property
     def error_size(self) -> Floats:
         """Of prime accelerations that are not explained, shape (2,)."""
         return np.array([self.design["sway_error"], self.design["yaw_error"]])
 
-    def _fresh(self) -> Floats:
+    def _fresh(self) -> Records:
         """What is remembered when an episode begins: the design."""
-        memory = np.zeros(N_MEMORY)
-        memory[THETA] = (self.prior * SIZES / self.error_size[:, None]).ravel()
-        memory[COVARIANCE] = np.stack([np.diag(self._doubt()[q]) for q in range(N_EQUATIONS)]).ravel()
-        memory[GAINS] = [self.gains[signal] for signal in SIGNALS]
-        memory[RESTLESS] = 10.0 * self.design["restless_limit"] ** 2  # it must be seen to be calm
-        memory[NEUTRAL] = self.neutral_rudder, self.neutral_sway
-        return memory
+        fresh = np.zeros(1, self.record)
+        fresh["theta"] = self.prior * SIZES / self.error_size[:, None]
+        fresh["covariance"] = self._doubt()[:, :, None] * np.eye(N_TERMS)
+        fresh["gains"], fresh["neutral"] = self.row, (self.neutral_rudder, self.neutral_sway)
+        fresh["restless"] = 10.0 * self.design["restless_limit"] ** 2  # it must be seen to be calm
+        return fresh
 
     def _doubt(self) -> Floats:
         """Variance of the model's scaled coefficients, shape (2, 4): each may be as wrong as it is large."""
@@ -182,19 +180,19 @@ class AdaptiveLQ(Stateful):
         doubt: Floats = np.maximum(size, 0.01) ** 2
         return doubt
 
-    def _at_rest(self, kept: Floats, now: Floats, begins: Flags) -> Flags:
+    def _at_rest(self, kept: Records, now: Floats, begins: Flags) -> Flags:
         """Whether the yaw rate's second difference, over the last ship lengths, is what noise explains."""
-        change = np.where(begins, 0.0, now[:, 1] - kept[:, LAST][:, 1])
-        oscillation = (change - kept[:, CHANGE]) ** 2
+        change = np.where(begins, 0.0, now[:, 1] - kept["last"][:, 1])
+        oscillation = (change - kept["change"]) ** 2
         share = 1.0 / self.design["redesign_steps"]
-        kept[:, RESTLESS] += share * (oscillation - kept[:, RESTLESS])
-        kept[:, CHANGE] = change
-        at_rest: Flags = kept[:, RESTLESS] < self.design["restless_limit"] ** 2
+        kept["restless"] += share * (oscillation - kept["restless"])
+        kept["change"] = change
+        at_rest: Flags = kept["restless"] < self.design["restless_limit"] ** 2
         return at_rest
 
-    def _learn(self, kept: Floats, now: Floats, begins: Flags, at_rest: Flags) -> None:
+    def _learn(self, kept: Records, now: Floats, begins: Flags, at_rest: Flags) -> None:
         """TMILS with the last interval's mean motion and accelerations; all ships side by side."""
-        last, dt, length = kept[:, LAST], self.design["dt"], self.design["length"]
+        last, dt, length = kept["last"], self.design["dt"], self.design["length"]
         sway, turn, rudder, speed = (0.5 * (last + now)).T
         speed = np.where(begins, now[:, 3], speed)
         terms = np.stack([sway / speed, turn * length / speed, rudder, np.ones_like(speed)], axis=-1)
@@ -204,42 +202,28 @@ class AdaptiveLQ(Stateful):
         )
         if not linear.any():
             return
-        n = int(linear.sum())
         chosen = kept[linear]
-        rows = chosen[:, PAST_TERMS].reshape(n, INNOVATIONS - 1, N_TERMS)
-        phi = np.concatenate([rows, (terms[linear] / SIZES)[:, None]], axis=1)
-        past = chosen[:, PAST_TARGETS].reshape(n, INNOVATIONS - 1, N_EQUATIONS)
-        y = np.concatenate([past, (targets[linear] / self.error_size)[:, None]], axis=1)
+        phi = np.concatenate([chosen["terms"], (terms[linear] / SIZES)[:, None]], axis=1)
+        y = np.concatenate([chosen["targets"], (targets[linear] / self.error_size)[:, None]], axis=1)
         self._update(chosen, phi, y)
-        chosen[:, PAST_TERMS] = phi[:, 1:].reshape(n, -1)
-        chosen[:, PAST_TARGETS] = y[:, 1:].reshape(n, -1)
+        chosen["terms"], chosen["targets"] = phi[:, 1:], y[:, 1:]
         kept[linear] = chosen
 
-    def _update(self, chosen: Floats, phi: Floats, y: Floats) -> None:
+    def _update(self, chosen: Records, phi: Floats, y: Floats) -> None:
         """One step of TMILS for each ship and equation; estimates and covariances are changed in place."""
-        n = len(chosen)
-        signals = n * N_EQUATIONS
-        theta = np.ascontiguousarray(chosen[:, THETA]).reshape(signals, N_TERMS)
-        covariance = np.ascontiguousarray(chosen[:, COVARIANCE]).reshape(signals, N_TERMS, N_TERMS)
+        signals = len(chosen) * N_EQUATIONS
+        theta = np.ascontiguousarray(chosen["theta"]).reshape(signals, N_TERMS)
+        covariance = np.ascontiguousarray(chosen["covariance"]).reshape(signals, N_TERMS, N_TERMS)
         features = np.ascontiguousarray(np.repeat(phi.transpose(1, 0, 2), N_EQUATIONS, axis=1))
         targets = np.ascontiguousarray(y.transpose(1, 0, 2).reshape(INNOVATIONS, signals))
-        course = np.empty((1, signals, N_TERMS))
-        ceiling = np.ascontiguousarray(np.tile(self._doubt(), (n, 1)))
-        forgetting = float(self.design["forgetting"])
+        ceiling = np.ascontiguousarray(np.tile(self._doubt(), (len(chosen), 1)))
+        forgetting, history = float(self.design["forgetting"]), np.empty((1, signals, N_TERMS))
         scalar_updates(
-            features,
-            targets,
-            INNOVATIONS - 1,
-            theta,
-            covariance,
-            ceiling,
-            forgetting,
-            INNOVATIONS,
-            0.0,
-            course,
-        )
-        chosen[:, THETA] = theta.reshape(n, -1)
-        chosen[:, COVARIANCE] = covariance.reshape(n, -1)
+            features, targets, INNOVATIONS - 1, theta, covariance, ceiling, forgetting, INNOVATIONS, 0.0,
+            history,
+        )  # fmt: skip
+        chosen["theta"] = theta.reshape(chosen["theta"].shape)
+        chosen["covariance"] = covariance.reshape(chosen["covariance"].shape)
 
     def coefficients(self, state: Floats) -> Floats:
         """Prime coefficients that are identified, of the state that `predict` returns.
@@ -253,34 +237,27 @@ class AdaptiveLQ(Stateful):
         array of shape (2, 4) or (n, 2, 4)
             As `prior`.
         """
-        estimate = np.asarray(state)[..., THETA]
-        scaled = estimate.reshape(*estimate.shape[:-1], N_EQUATIONS, N_TERMS)
-        found: Floats = scaled * self.error_size[:, None] / SIZES
+        theta = records(np.asarray(state), self.record)["theta"]
+        found: Floats = theta * self.error_size[:, None] / SIZES
         return found
 
-    def _redesigned(self, kept: Floats) -> Floats:
+    def _redesigned(self, kept: Records) -> Records:
         """What is remembered, with new gains and a new neutral rudder where they can be believed."""
-        new = kept.copy()
-        prime = self.coefficients(kept)
+        new, design = kept.copy(), self.design
+        prime = kept["theta"] * self.error_size[:, None] / SIZES
         share = prime[:, 1, 2] / self.prior[1, 2]
-        linear = prime * units(self.design["length"], self.design["speed"])
+        linear = prime * units(design["length"], design["speed"])
         at_rest = linear[:, :, [0, 2]]
         solvable = (share > 1.0 / WIDEST) & (share < WIDEST) & (np.linalg.det(at_rest) != 0.0)
         which = np.flatnonzero(solvable)
         neutral = np.linalg.solve(at_rest[which], -linear[which, :, 3:])[:, ::-1, 0]  # rudder, sway
-        A, B = sampled_ships(linear[which, :, :3], self.design["gear_lag"], self.design["dt"])
-        rows = lq_rows(
-            A,
-            B,
-            self.design["dt"],
-            self.design["rate_weight_s2"],
-            self.design["integral_time"],
-            self.design["rudder_weight"],
-        )
+        A, B = sampled_ships(linear[which, :, :3], design["gear_lag"], design["dt"])
+        weights = design["rate_weight_s2"], design["integral_time"], design["rudder_weight"]
+        rows = lq_rows(A, B, design["dt"], *weights)
         good = np.isfinite(rows).all(axis=1) & (np.abs(neutral[:, 0]) < LARGEST_RUDDER)
         which, neutral, rows, A, B = which[good], neutral[good], rows[good], A[good], B[good]
         good = _stable(A, B, rows) & _stable(*self._believed, rows)
-        new[which[good], GAINS], new[which[good], NEUTRAL] = rows[good], neutral[good]
+        new["gains"][which[good]], new["neutral"][which[good]] = rows[good], neutral[good]
         return new
 
     @cached_property
@@ -288,20 +265,6 @@ class AdaptiveLQ(Stateful):
         """The ship of the model, sampled."""
         linear = self.prior * units(self.design["length"], self.design["speed"])
         return sampled_ships(linear[None, :, :3], self.design["gear_lag"], self.design["dt"])
-
-
-def _identification(model: ShipModel, dt: float, noise: float) -> dict[str, float]:
-    """What identification needs to know of a ship: her scales, and errors of prime accelerations."""
-    length, speed = model.particulars["length"], straight_running(model).surge
-    deviation = np.sqrt(2.0) * noise / dt * np.array([SEA_TRIAL["v"].noise, SEA_TRIAL["r"].noise])
-    errors = np.hypot(UNEXPLAINED, deviation / units(length, speed)[:, 3])
-    return {
-        "length": length,
-        "speed": speed,
-        "sway_error": float(errors[0]),
-        "yaw_error": float(errors[1]),
-        "gear_lag": model.steering.time_constant,
-    }
 
 
 def has_sway(model: ShipModel) -> bool:

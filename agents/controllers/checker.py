@@ -62,13 +62,9 @@ def check_controller(
     for step in range(n_steps):
         action, after = _answer(controller, seen, state, starts, f"{who}.predict, step {step}")
         for ship_number in range(N_SHIPS):
-            own, alone[ship_number] = _answer(
-                controller,
-                seen[ship_number],
-                alone[ship_number],
-                starts[:1],
-                f"{who}.predict of one observation, step {step}",
-            )
+            shown = seen[ship_number], alone[ship_number], starts[:1]
+            where = f"{who}.predict of one observation, step {step}"
+            own, alone[ship_number] = _answer(controller, *shown, where)
             _check_same(own, action[ship_number], f"{who}.predict, step {step}, ship {ship_number} alone")
         state = after
         seen, *_ = engine.step(action)
@@ -95,8 +91,7 @@ SIGNATURE = "predict(observation, state=None, episode_start=None, deterministic=
 def _check_observations(controller: Any, model: ShipModel, task: Task, who: str) -> None:
     """Names and scales that a controller says it was made for must be the first of the task's."""
     shown = task.observed(model)
-    names = getattr(controller, "observation_names", None)
-    if names is None:
+    if (names := getattr(controller, "observation_names", None)) is None:
         return
     check_names([quantity.name for quantity in shown[: len(names)]], list(names), f"{who} on {model.name!r}")
     for quantity, scale in zip(shown, getattr(controller, "observation_scales", ()), strict=False):

@@ -24,7 +24,7 @@ from agents.controllers.linear_loop import (
     compensator_margins,
     sample_ship,
 )
-from agents.controllers.memory import Flags, begun, checked_observation, deviations
+from agents.controllers.memory import Flags, begun, checked_observation, deviations, size_of
 from shipgym.errors import InputError
 from shipgym.files import write_json
 from shipgym.ships import ShipModel
@@ -34,6 +34,7 @@ Floats = NDArray[np.float64]
 Action = NDArray[np.float32]
 
 FORMAT = 1  # of the controller file
+SMALL = 1e-5  # rad, and other SI units, of motions about straight running
 SCALE_TOLERANCE = 1e-6  # relative difference of observation scales that is rounding
 
 
@@ -85,8 +86,50 @@ class Policy(Protocol):
         """
 
 
+class Agent:
+    """What classical and learned autopilots have in common."""
+
+    def reset(self) -> None:
+        """The state with which an episode begins: None, whatever the number of ships.
+
+        What there is to remember is in the state that `predict` returns, so one agent may steer any number of
+        episodes side by side.
+        """
+
+    @property
+    def made_for(self) -> str:
+        """What is said where it is shown something else; {} stands for its own scale."""
+        raise NotImplementedError
+
+    def check_fits(self, names: Sequence[str], scales: Sequence[float], where: str = "observations") -> None:
+        """Refuse to steer what shows other quantities first, or in other scales, than those made for.
+
+        Parameters
+        ----------
+        names : sequence of str
+            `observation_names` of an environment; it may show more than what is steered by.
+        scales : sequence of float
+            Its `observation_scales`.
+        where : str
+            Start of the message.
+
+        Raises
+        ------
+        InputError
+            Naming the first difference.
+        """
+        agent: Any = self
+        n, learned = len(agent.observation_names), getattr(agent, "env_id", None)
+        named = where if learned is None else f"{where}: not those that the agent learned with in {learned}"
+        check_names(names[:n], agent.observation_names, named)
+        for name, one, other in zip(names, scales, agent.observation_scales, strict=False):
+            if abs(one - other) > SCALE_TOLERANCE * abs(other):
+                said = self.made_for.replace("{}", f"{other:g}")
+                raise InputError(f"{where}: the scale of '{name}' is {one:g}, but {said}")
+
+
 @dataclass(frozen=True, eq=False)
-class Controller:
+class Controller(Agent):
     """Feedback of deviations from straight running to the commanded rudder.
 
     Attributes
@@ -118,6 +161,8 @@ class Controller:
     gain_names: ClassVar[tuple[str, ...]] = ()
     #: What it reads of the ship beside her heading, where that does not follow from `feedback`.
     reads: ClassVar[tuple[str, ...]] = ("yaw_rate", "sway", "surge", "rudder")
+    #: Numbers that it remembers of each ship, by name (`agents.controllers.memory.records`).
+    record: ClassVar[np.dtype[Any]] = np.dtype([])
     #: Whether it leads another controller, its `autopilot`, which the file holds too.
     has_autopilot: ClassVar[bool] = False
     has_ship: ClassVar[bool] = False  # whether the file holds its design model, its `ship`, too
@@ -184,8 +229,28 @@ class Controller:
 
     def loop(self) -> Compensator:
         """The controller for small motions, without limits: what its margins are computed from."""
+        return Compensator.static(self.row[None])
+
+    def linearised(self) -> Compensator:
+        """Its law about straight running, by central differences: `loop` where the law is linear there."""
+        n, size = len(SIGNALS), self.memory_size
+        small = SMALL * np.concatenate([np.eye(n + size), -np.eye(n + size)])
+        sway, rate, error, rudder, integral = small[:, :n].T
+        seen = {
+            "heading_error_sin": np.sin(error), "heading_error_cos": np.cos(error), "yaw_rate": rate,
+            "sway": self.neutral_sway + sway, "rudder": self.neutral_rudder + rudder,
+            "heading_error_integral": integral,
+        }  # fmt: skip
+        order, kept = self.steer(seen, small[:, n:], np.zeros(len(small), dtype=np.bool_))
+        above, below = np.split(np.column_stack([order, kept]), 2)
+        slopes = (above - below).T / (2.0 * SMALL)
+        return Compensator(slopes[1:, n:], slopes[1:, :n], slopes[:1, n:], slopes[:1, :n])
+
+    @property
+    def row(self) -> Floats:
+        """Feedback of the deviations in the order of `linear_loop.SIGNALS`, shape (5,)."""
         by_signal = {signal: sign * self.gains[gain] for gain, (signal, sign) in self.feedback.items()}
-        return Compensator.static(np.array([[by_signal.get(signal, 0.0) for signal in SIGNALS]]))
+        return np.array([by_signal.get(signal, 0.0) for signal in SIGNALS])
 
     def margins_on(self, model: ShipModel) -> Margins:
         """Margins and bandwidth of the same controller on another ship.
@@ -196,13 +261,6 @@ class Controller:
             If the closed loop is unstable, or the model has no straight course.
         """
         return self._margins(sample_ship(model, self.design["dt"]), model)
-
-    def reset(self) -> None:
-        """The state with which an episode begins: None, whatever the number of ships.
-
-        What there is to remember is in the state that `predict` returns, so one controller may steer any
-        number of episodes side by side.
-        """
 
     @property
     def name(self) -> str:
@@ -222,14 +280,18 @@ class Controller:
         memory, begins = begun(state if size else None, episode_start, shape, size)
         seen = dict(zip(self.observation_names, rows.T, strict=True))
         order, kept = self.steer(seen, memory.reshape(len(rows), size), begins.reshape(-1))
-        limit = self.observation_scales[self.observation_names.index("rudder")]
-        action = np.clip(order / limit, -1.0, 1.0)[:, None].astype(np.float32)
+        action = np.clip(order / self.rudder_limit, -1.0, 1.0)[:, None].astype(np.float32)
         return action.reshape(*shape, 1), kept.reshape(*shape, size) if size else state
 
     @property
+    def rudder_limit(self) -> float:
+        """Largest rudder angle, rad."""
+        return self.observation_scales[self.observation_names.index("rudder")]
+
+    @property
     def memory_size(self) -> int:
-        """How many numbers it remembers of each ship."""
-        return 0
+        """How many numbers it remembers of each ship: in the state, never in the controller itself."""
+        return size_of(self.record)
 
     def steer(self, seen: dict[str, Floats], memory: Floats, begins: Flags) -> tuple[Floats, Floats]:
         """Commanded rudder and what is remembered next.
@@ -250,41 +312,22 @@ class Controller:
         memory : array of shape (n, memory_size)
         """
         found = deviations(seen, self.neutral_rudder, self.neutral_sway)
-        by_signal = dict(zip(SIGNALS, np.moveaxis(found, -1, 0), strict=True))
-        order = np.full(found.shape[:-1], self.neutral_rudder)
-        for gain, (signal, sign) in self.feedback.items():
-            order = order + sign * self.gains[gain] * by_signal[signal]
-        return order, memory
+        return self.neutral_rudder + np.einsum("ij,j->i", found, self.row), memory
 
-    def check_fits(self, names: Sequence[str], scales: Sequence[float], where: str = "observations") -> None:
-        """Refuse to steer what shows other quantities first, or in other scales, than those designed for.
-
-        Parameters
-        ----------
-        names : sequence of str
-            `observation_names` of an environment; it may show more than what is steered by.
-        scales : sequence of float
-            Its `observation_scales`.
-        where : str
-            Start of the message.
-
-        Raises
-        ------
-        InputError
-            Naming the first difference.
-        """
-        check_observed(
-            self, names, scales, where,
+    @property
+    def made_for(self) -> str:
+        """See `Agent.made_for`."""
+        return (
             f"controller '{self.name}' was designed for {{}} (model '{self.model_name}'): another ship or "
-            f"rudder limit; design a controller on this model with {type(self).__name__}.from_model",
-        )  # fmt: skip
+            f"rudder limit; design a controller on this model with {type(self).__name__}.from_model"
+        )
 
     def check_fits_model(self, model: ShipModel) -> None:
         """Refuse a ship with other observation scales (length, service speed, rudder limit)."""
         self.check_fits(OBSERVATION_NAMES, observation_scales(model).tolist(), f"model '{model.name}'")
 
     def save(self, path: str | Path) -> None:
-        """Write the controller as a JSON file (format in `agents.controllers.controller_file`).
+        """Write the controller as a JSON file, whose fields are listed in docs/deployment.md.
 
         Raises
         ------
@@ -292,6 +335,10 @@ class Controller:
             If the folder does not exist or cannot be written.
         """
         write_json(self.to_dict(), Path(path))
+
+    def file_fields(self) -> tuple[dict[str, Any], dict[str, Any]]:
+        """What stands in its JSON, and its weights by name: it has none."""
+        return self.to_dict(), {}
 
     def to_dict(self) -> dict[str, Any]:
         """What the controller's file holds."""
@@ -323,18 +370,6 @@ def check_names(found: Sequence[str], expected: Sequence[str], where: str) -> No
             f"{where}: {len(found)} observations found, expected {len(expected)}; "
             f"in one and not in the other: {', '.join(difference)}"
         )
-
-
-def check_observed(agent: Any, names: Sequence[str], scales: Sequence[float], where: str, meant: str) -> None:
-    """Refuse observations that an agent was not made for; `meant` has {} for its own scale."""
-    n, learned = len(agent.observation_names), getattr(agent, "env_id", None)
-    named = where if learned is None else f"{where}: not those that the agent learned with in {learned}"
-    check_names(names[:n], agent.observation_names, named)
-    for name, one, other in zip(names, scales, agent.observation_scales, strict=False):
-        if abs(one - other) > SCALE_TOLERANCE * abs(other):
-            raise InputError(
-                f"{where}: the scale of '{name}' is {one:g}, but {meant.replace('{}', f'{other:g}')}"
-            )
 
 
 def model_hash(model: ShipModel) -> str:

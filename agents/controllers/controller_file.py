@@ -1,21 +1,4 @@
-"""The controller file as it is read: JSON, versioned, validated field by field.
-
-Format 1:
-
-    format               1
-    kind                 "pid", "lq", ... (`agents.controllers.registry`)
-    observation_names    what it observes, in order
-    observation_scales   physical value of each observation of 1, SI units
-    gains                {name: value}, SI units; command = neutral rudder + sum of gain times signal
-    neutral_rudder       rad, positive to starboard
-    neutral_sway         m/s
-    model                {"name", "sha256"}: what it was designed on
-    margins              {name: value or null for no limit}
-    design               {name: value}: how it was designed
-    autopilot            a controller of this format; only of guidance
-    ship                 the design model (`shipgym.ships.model_file`); only of guidance that simulates it
-    arrays               {name: nested lists}; only kinds that have any, such as an observer's matrices
-"""
+"""The controller file as it is read: JSON, versioned, checked by fields (listed in docs/deployment.md)."""
 
 from __future__ import annotations
 
@@ -49,8 +32,7 @@ FIELDS = (
     "format", "kind", "observation_names", "observation_scales", "gains", "neutral_rudder", "neutral_sway",
     "model", "margins", "design",
 )  # fmt: skip
-MORE_FIELDS = ("arrays", "autopilot", "ship")  # of kinds that have any
-#: Kinds whose files are described in `agents.policies.policy_file`.
+#: Kinds that `agents.policies.policy_file` reads.
 POLICIES = ("learned", "shielded", "one-for-all")
 
 
@@ -65,88 +47,78 @@ def read_controller(content: Mapping[str, Any], where: str) -> Controller:
         kind = check_choice(content["kind"], (*kinds, *POLICIES), f"{where}: kind")
         if kind in POLICIES:
             raise InputError(f"{where}: kind: '{kind}' found, expected a classical one: {quoted(kinds)}")
-    check_keys(content, (*FIELDS, *MORE_FIELDS), where)
-    _check_all_there(content, FIELDS, where)
+    check_keys(content, content, where, FIELDS)
     design = controller_class(content["kind"])
     has = {"arrays": bool(design.arrays), "autopilot": design.has_autopilot, "ship": design.has_ship}
-    expected = (*FIELDS, *(name for name in MORE_FIELDS if has[name]))
-    check_keys(content, expected, where)
-    _check_all_there(content, expected, where)
-    model = check_table(content["model"], f"{where}: model")
-    check_keys(model, ("name", "sha256"), f"{where}: model")
-    given = content["observation_names"]
-    names = next((some for some in design.alternatives if list(some) == given), design.observes)
-    _check_observations(given, names, where)
-    more = _arrays(content.get("arrays", {}), design.arrays, f"{where}: arrays")
-    if design.has_autopilot:
-        at = f"{where}: autopilot"
-        more["autopilot"] = read_controller(check_table(content["autopilot"], at), at)
-        if more["autopilot"].has_autopilot:
-            raise InputError(f"{at}: '{more['autopilot'].kind}' found, expected one that keeps a heading")
-    if design.has_ship:
-        more["ship"] = ShipModel.from_dict(check_table(content["ship"], f"{where}: ship"), f"{where}: ship")
-    gains = dict.fromkeys(design.gain_names or tuple(design.feedback), NUMBERS)
+    expected = (*FIELDS, *(name for name in has if has[name]))
+    check_keys(content, expected, where, expected)
+    names = content["observation_names"]
+    if not isinstance(names, list):
+        raise InputError(f"{where}: observation_names: {shown(names)} found, expected a list of names")
+    observes = next((some for some in design.alternatives if list(some) == names), design.observes)
+    check_names([str(name) for name in names], observes, f"{where}: observation_names")
+    known = design.gain_names or tuple(design.feedback)
+    gains = {name: design.ranges.get(name, NUMBERS) for name in known}
     needed = {name: one for name, one in design.ranges.items() if name not in gains}
-    of_gains = {name: design.ranges.get(name, one) for name, one in gains.items()}
     with placed(where):
         return design(
-            gains=_numbers(content["gains"], of_gains, f"{where}: gains"),
-            neutral_rudder=_number(content["neutral_rudder"], RUDDER, f"{where}: neutral_rudder"),
-            neutral_sway=_number(content["neutral_sway"], NUMBERS, f"{where}: neutral_sway"),
-            margins=_margins(content["margins"], f"{where}: margins"),
-            observation_scales=read_scales(content["observation_scales"], names, where),
-            model_name=check_text(model.get("name"), f"{where}: model.name"),
-            model_sha256=check_text(model.get("sha256"), f"{where}: model.sha256"),
-            design=_design(content["design"], needed, f"{where}: design"),
-            observation_names=names,
-            **more,
+            gains=_numbers(check_table(content["gains"], "gains", known), gains, "gains"),
+            neutral_rudder=_number(content["neutral_rudder"], RUDDER, "neutral_rudder"),
+            neutral_sway=_number(content["neutral_sway"], NUMBERS, "neutral_sway"),
+            margins=_margins(content["margins"]),
+            observation_scales=read_scales(content["observation_scales"], observes),
+            design=_numbers(content["design"], needed, "design"),
+            observation_names=observes,
+            **read_model(content["model"]),
+            **_arrays(content.get("arrays", {}), design.arrays),
+            **_parts(content, design),
         )
 
 
-def _check_all_there(content: Mapping[str, Any], expected: tuple[str, ...], where: str) -> None:
-    for name in expected:
-        if name not in content:
-            raise InputError(f"{where}: field '{name}' is missing; a controller file has {quoted(expected)}")
+def _parts(content: Mapping[str, Any], design: type[Controller]) -> dict[str, Any]:
+    """The autopilot that guidance leads, and its design model, where it has them."""
+    parts: dict[str, Any] = {}
+    if design.has_autopilot:
+        parts["autopilot"] = read_controller(check_table(content["autopilot"], "autopilot"), "autopilot")
+        if parts["autopilot"].has_autopilot:
+            kind = parts["autopilot"].kind
+            raise InputError(f"autopilot: '{kind}' found, expected one that keeps a heading")
+    if design.has_ship:
+        parts["ship"] = ShipModel.from_dict(check_table(content["ship"], "ship"), "ship")
+    return parts
 
 
-def _arrays(value: Any, axes: Mapping[str, tuple[str | int, ...]], where: str) -> dict[str, Any]:
+def _arrays(value: Any, axes: Mapping[str, tuple[str | int, ...]]) -> dict[str, Any]:
     """Arrays of numbers, whose axes of one name have one length."""
-    table = check_table(value, where)
-    check_keys(table, tuple(axes), where)
+    table = check_table(value, "arrays", axes, axes)
     lengths: dict[str | int, int] = {}
     arrays = {}
     for name, named in axes.items():
-        if name not in table:
-            raise InputError(f"{where}: '{name}' is missing, expected {quoted(axes)}")
         shape = tuple(lengths.get(axis) if isinstance(axis, str) else axis for axis in named)
-        array = check_array(table[name], shape, f"{where}.{name}")
+        array = check_array(table[name], shape, f"arrays.{name}")
         fits = array.ndim == len(named) and array.size > 0 and np.abs(array).max() <= NUMBERS.largest
         if not (fits and all(lengths.setdefault(a, n) == n for a, n in zip(named, array.shape, strict=True))):
             raise InputError(
-                f"{where}.{name}: expected numbers of magnitude {NUMBERS.largest:g} at most, of shape "
+                f"arrays.{name}: expected numbers of magnitude {NUMBERS.largest:g} at most, of shape "
                 f"({', '.join(map(str, named))}); {REMEDY}"
             )
         arrays[name] = array
     return arrays
 
 
-def _check_observations(names: Any, expected: tuple[str, ...], where: str) -> None:
-    """The observations must be those of the environment, in its order."""
-    if not isinstance(names, list):
-        raise InputError(f"{where}: observation_names: {shown(names)} found, expected a list of names")
-    check_names([str(name) for name in names], expected, f"{where}: observation_names")
+def read_model(value: Any) -> dict[str, Any]:
+    """Name and hash of the model that an agent was made for, as its fields."""
+    table = check_table(value, "model", ("name", "sha256"))
+    return {f"model_{name}": check_text(table.get(name), f"model.{name}") for name in ("name", "sha256")}
 
 
-def read_scales(value: Any, names: tuple[str, ...], where: str) -> tuple[float, ...]:
+def read_scales(value: Any, names: tuple[str, ...]) -> tuple[float, ...]:
     """Observation scales, positive numbers, one for each name."""
-    n = len(names)
-    if not isinstance(value, list) or len(value) != n:
+    if not isinstance(value, list) or len(value) != len(names):
         found = len(value) if isinstance(value, list) else shown(value)
-        raise InputError(f"{where}: observation_scales: {found} found, expected {n} numbers")
-    return tuple(
-        _number(scale, SCALES, f"{where}: observation_scales[{i}] ('{names[i]}')")
-        for i, scale in enumerate(value)
-    )
+        raise InputError(f"observation_scales: {found} found, expected {len(names)} numbers")
+    pairs = enumerate(zip(names, value, strict=True))
+    return tuple(_number(scale, SCALES, f"observation_scales[{i}] ('{name}')") for i, (name, scale) in pairs)
 
 
 def _number(value: Any, allowed: Range, where: str) -> float:
@@ -154,23 +126,7 @@ def _number(value: Any, allowed: Range, where: str) -> float:
     return check_number(value, where, at_least=allowed.least, at_most=allowed.largest)
 
 
-def _numbers(value: Any, ranges: Mapping[str, Range], where: str) -> dict[str, float]:
-    """A number for each name and none besides."""
-    table = check_table(value, where)
-    check_keys(table, tuple(ranges), where)
-    return _design(table, ranges, where)
-
-
-def _margins(value: Any, where: str) -> Margins:
-    """Margins; null is no limit."""
-    names = tuple(margin.name for margin in fields(Margins))
-    table = check_table(value, where)
-    finite = {name: 0.0 if number is None else number for name, number in table.items()}
-    known = _numbers(finite, dict.fromkeys(names, ANY), where)
-    return Margins(**{name: np.inf if table[name] is None else known[name] for name in names})
-
-
-def _design(value: Any, needed: Mapping[str, Range], where: str) -> dict[str, float]:
+def _numbers(value: Any, needed: Mapping[str, Range], where: str) -> dict[str, float]:
     """Numbers by name, all that are needed among them."""
     later = {name: one.default for name, one in needed.items() if one.default is not None}
     table = later | dict(check_table(value, where))
@@ -178,3 +134,12 @@ def _design(value: Any, needed: Mapping[str, Range], where: str) -> dict[str, fl
         if name not in table:
             raise InputError(f"{where}: '{name}' is missing, expected {quoted(needed)}; {REMEDY}")
     return {name: _number(number, needed.get(name, ANY), f"{where}.{name}") for name, number in table.items()}
+
+
+def _margins(value: Any) -> Margins:
+    """Margins; null is no limit."""
+    names = dict.fromkeys((margin.name for margin in fields(Margins)), ANY)
+    table = check_table(value, "margins", names)
+    finite = {name: 0.0 if number is None else number for name, number in table.items()}
+    known = _numbers(finite, names, "margins")
+    return Margins(**{name: np.inf if table[name] is None else known[name] for name in names})

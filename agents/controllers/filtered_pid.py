@@ -9,30 +9,25 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
 from agents.controllers.controller import Controller, Range
 from agents.controllers.linear_loop import ERROR, SIGNALS, YAW_RATE, Compensator, length_time, sample_ship
-from agents.controllers.memory import Flags, Floats, heading_error
+from agents.controllers.memory import Flags, Floats, Records, heading_error, records
 from agents.controllers.pid import PID
-from agents.controllers.stateful import Stateful
 from shipgym.checks import check_number
 from shipgym.ships import ShipModel
 from shipgym.tasks.guidance import wrapped
 
 DEEP, WIDE = 0.1, 0.7  # damping ratios of the notch's numerator and denominator (Fossen 2011, 11.1.2)
-# what is remembered: last measured error and yaw rate, the reference's lead over the course with its first
-# and second derivative, the integral, and the notch's four numbers of heading and of yaw rate
-LAST_ERROR, LAST_RATE, LEAD, TURN, TURN_RATE, GATHERED, NOTCHES = range(7)
-N_MEMORY = NOTCHES + 8
 LEAST_INTEGRAL = 1e-12  # gain below which the integral is not worth limiting: the rudder does not see it
 FROM_NONE = Range(0.0, 1e6)  # of rates and frequencies; 0 leaves a filter out
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class FilteredPID(Stateful):
+class FilteredPID(Controller):
     """PID with a reference filter, an integral that does not wind up, and a notch filter for waves.
 
     order = neutral + proportional * (reference - heading) + derivative * (reference's rate - yaw rate)
@@ -47,6 +42,12 @@ class FilteredPID(Stateful):
         **Controller.ranges, "reference_frequency": FROM_NONE, "largest_turn_rate": FROM_NONE,
         "tracking_rate": FROM_NONE, "wave_frequency": FROM_NONE,
     }  # fmt: skip
+    record: ClassVar[np.dtype[Any]] = np.dtype([
+        ("error", "f8"), ("rate", "f8"),  # measured last
+        ("lead", "f8"), ("turn", "f8"), ("turn_rate", "f8"),  # of the reference over the course
+        ("gathered", "f8"),  # integral of the error
+        ("heading_notch", "f8", 4), ("rate_notch", "f8", 4),
+    ])  # fmt: skip
 
     @classmethod
     def from_model(
@@ -66,8 +67,7 @@ class FilteredPID(Stateful):
 
         Parameters
         ----------
-        model : ShipModel
-        dt, frequency, damping, integral_lengths
+        model, dt, frequency, damping, integral_lengths
             As in `PID.from_model`.
         reference_share : float
             Natural frequency of the reference model over that of the loop. Less turns slower and with less
@@ -90,8 +90,7 @@ class FilteredPID(Stateful):
         )
         interval = plain.design["dt"]
         frequency_share = _rate(reference_share, "reference_share")
-        limited = _rate(tracking_lengths, "tracking_lengths") > 0.0
-        tracking = 1.0 / (tracking_lengths * length_time(model)) if limited else 0.0
+        tracking = _rate(tracking_lengths, "tracking_lengths") * length_time(model)
         turn_rate = 0.0  # no limit
         if largest_turn_rate_deg_s is not None:
             turn_rate = check_number(largest_turn_rate_deg_s, "largest_turn_rate_deg_s", above=0.0)
@@ -105,44 +104,37 @@ class FilteredPID(Stateful):
                 **plain.design,
                 "reference_frequency": frequency_share * plain.design["frequency"],
                 "largest_turn_rate": float(np.radians(turn_rate)),
-                "tracking_rate": tracking,
+                "tracking_rate": 1.0 / tracking if tracking else 0.0,
                 "wave_frequency": 0.0 if wave_period is None else 2.0 * np.pi / wave_period,
             },
         )
 
-    @property
-    def memory_size(self) -> int:
-        """Reference, integral and the memories of two notch filters."""
-        return N_MEMORY
-
     def steer(self, seen: dict[str, Floats], memory: Floats, begins: Flags) -> tuple[Floats, Floats]:
         """One control interval of filters and feedback."""
-        dt, gains = self.design["dt"], self.gains
-        kept = memory.copy()
+        dt, gains, memory = self.design["dt"], self.gains, memory.copy()
+        kept = records(memory, self.record)
         error, rate = heading_error(seen), seen["yaw_rate"]
         # a change of the heading error that is not the ship's own turning is one of the course
-        turned = 0.5 * dt * (rate + memory[:, LAST_RATE])
-        course_change = np.where(begins, 0.0, wrapped(error - memory[:, LAST_ERROR] + turned))
-        kept[:, LAST_ERROR], kept[:, LAST_RATE] = error, rate
-        kept[begins, LEAD] = -error[begins]  # the reference sets out from the heading
+        turned = 0.5 * dt * (rate + kept["rate"])
+        course_change = np.where(begins, 0.0, wrapped(error - kept["error"] + turned))
+        kept["error"], kept["rate"] = error, rate
+        kept["lead"][begins] = -error[begins]  # the reference sets out from the heading
         lead, turn = self._reference(kept, course_change)
         quiet_error, quiet_rate = error, rate
         if self.design["wave_frequency"]:
-            quiet_error = wrapped(error - self._notched(error, course_change, kept, NOTCHES, begins))
-            still = np.zeros_like(rate)
-            quiet_rate = rate - self._notched(rate, still, kept, NOTCHES + 4, begins)
+            quiet_error = wrapped(error - self._notched(error, course_change, kept["heading_notch"], begins))
+            quiet_rate = rate - self._notched(rate, np.zeros_like(rate), kept["rate_notch"], begins)
         off = wrapped(quiet_error + lead)
-        gathered = memory[:, GATHERED] + np.where(begins, 0.0, dt * off)
+        gathered = kept["gathered"] + np.where(begins, 0.0, dt * off)
         order = self.neutral_rudder + gains["proportional"] * off + gains["derivative"] * (turn - quiet_rate)
         order = order + gains["integral"] * gathered
-        limit = self.observation_scales[self.observation_names.index("rudder")]
-        cut = np.clip(order, -limit, limit) - order
+        cut = np.clip(order, -self.rudder_limit, self.rudder_limit) - order
         if self.design["tracking_rate"] and gains["integral"] > LEAST_INTEGRAL:
             gathered = gathered + dt * self.design["tracking_rate"] * cut / gains["integral"]
-        kept[:, GATHERED] = gathered
-        return order, kept
+        kept["gathered"] = gathered
+        return order, memory
 
-    def _reference(self, kept: Floats, course_change: Floats) -> tuple[Floats, Floats]:
+    def _reference(self, kept: Records, course_change: Floats) -> tuple[Floats, Floats]:
         """Lead of the reference over the course, and the reference's turn rate, an interval later.
 
         A third-order reference model (w / (s + w)) w^2 / (s^2 + 2 w s + w^2) with the course as input, which
@@ -151,26 +143,27 @@ class FilteredPID(Stateful):
         frequency, dt = self.design["reference_frequency"], self.design["dt"]
         if frequency == 0.0:
             return np.zeros_like(course_change), np.zeros_like(course_change)
-        lead = wrapped(kept[:, LEAD] - course_change)
-        turn, turn_rate = kept[:, TURN], kept[:, TURN_RATE]
+        lead = wrapped(kept["lead"] - course_change)
+        turn, turn_rate = kept["turn"], kept["turn_rate"]
         jerk = -3.0 * frequency * turn_rate - 3.0 * frequency**2 * turn - frequency**3 * lead
         turn_rate = turn_rate + dt * jerk
         turn = turn + dt * turn_rate
         if largest := self.design["largest_turn_rate"]:
             turn = np.clip(turn, -largest, largest)
         lead = wrapped(lead + dt * turn)
-        kept[:, LEAD], kept[:, TURN], kept[:, TURN_RATE] = lead, turn, turn_rate
+        kept["lead"], kept["turn"], kept["turn_rate"] = lead, turn, turn_rate
         return lead, turn
 
-    def _notched(self, signal: Floats, shift: Floats, kept: Floats, at: int, begins: Flags) -> Floats:
-        """What the notch takes away from a signal whose past is shifted with the course; 0 at the start."""
-        x1, x2 = kept[:, at] + shift, kept[:, at + 1] + shift
-        x1, x2 = np.where(begins, signal, x1), np.where(begins, signal, x2)
+    def _notched(self, signal: Floats, shift: Floats, kept: Floats, begins: Flags) -> Floats:
+        """What the notch takes away from a signal whose past is shifted with the course; 0 at the start.
+
+        `kept`: the last two signals and what was taken away from them, shape (n, 4), changed in place.
+        """
+        x1, x2 = (np.where(begins, signal, past + shift) for past in kept[:, :2].T)
         signal = x1 + wrapped(signal - x1)
         band, once, twice = notch_band(self.design["wave_frequency"] * self.design["dt"])
-        taken: Floats = band * (signal - x2) - once * kept[:, at + 2] - twice * kept[:, at + 3]
-        kept[:, at + 3], kept[:, at + 1] = kept[:, at + 2], x1
-        kept[:, at + 2], kept[:, at] = taken, signal
+        taken: Floats = band * (signal - x2) - once * kept[:, 2] - twice * kept[:, 3]
+        kept[:] = np.stack([signal, x1, taken, kept[:, 2]], axis=-1)
         return taken
 
     def loop(self) -> Compensator:

@@ -22,12 +22,11 @@ from numpy.typing import ArrayLike
 from agents.controllers.controller import NUMBERS, Action, Controller, Policy, Range
 from agents.controllers.linear_loop import Compensator, Margins, length_time
 from agents.controllers.lq import LQ
-from agents.controllers.memory import Floats, begun, checked_observation, heading_error
+from agents.controllers.memory import Floats, begun, checked_observation, gathered, heading_error, on_course
 from shipgym.checks import check_number
 from shipgym.errors import InputError
 from shipgym.ships import ShipModel
 from shipgym.tasks.guidance import PathPosition, integral_line_of_sight, wrapped
-from shipgym.tasks.steering import INTEGRAL_ZONE
 from shipgym.tasks.task import OBSERVATION_NAMES, Task, path_following_task
 
 N_HEADING = len(OBSERVATION_NAMES)
@@ -63,9 +62,8 @@ class Guided(Controller):
         `design`: how they were found. Raises InputError if the autopilot was designed for another ship.
         """
         dt = task.interval(model)
-        pilot = LQ.from_model(model, dt=dt) if autopilot is None else autopilot
-        known = isinstance(pilot, Controller)
-        like = pilot if isinstance(pilot, Controller) else LQ.from_model(model, dt=dt)
+        like = autopilot if isinstance(autopilot, Controller) else LQ.from_model(model, dt=dt)
+        own = autopilot is None or autopilot is like
         like.check_fits_model(model)
         scales = {quantity.name: quantity.scale for quantity in task.observed(model)}
         names = next((some for some in cls.alternatives if scales.keys() >= {*some}), cls.observes)
@@ -73,13 +71,13 @@ class Guided(Controller):
             gains={**gains, "task_lookahead": task.lookahead * model.particulars["length"]},
             neutral_rudder=like.neutral_rudder,
             neutral_sway=like.neutral_sway,
-            margins=like.margins if known else Margins(np.inf, np.inf, np.inf, np.inf),
+            margins=like.margins if own else Margins(np.inf, np.inf, np.inf, np.inf),
             observation_scales=tuple(scales[name] for name in names),
             model_name=like.model_name,
             model_sha256=like.model_sha256,
             design={"dt": dt, **design},
             observation_names=names,
-            autopilot=pilot,
+            autopilot=like if autopilot is None else autopilot,
             **({"ship": model} if cls.has_ship else {}),
         )
 
@@ -104,7 +102,7 @@ class Guided(Controller):
         self, observation: ArrayLike, state: Any = None, episode_start: Any = None, deterministic: bool = True
     ) -> tuple[Action, Any]:
         """See `Policy.predict`; it observes the path-following environment, and the state is a pair."""
-        given = checked_observation(observation, self.observation_names).copy()
+        given = checked_observation(observation, self.observation_names)
         own, inner = (None, None) if state is None else state
         memory, begins = begun(own, episode_start, given.shape[:-1], self.remembers + 1)
         first = (given[..., : len(self.observation_names)] * self.observation_scales).T
@@ -114,12 +112,10 @@ class Guided(Controller):
         shown = -np.arctan2(seen["cross_track"], self.gains["task_lookahead"])
         error = wrapped(seen["heading_error"] + wanted - shown)
         reach = self.observation_scales[N_HEADING - 1]
-        gathered = np.where((np.abs(error) > INTEGRAL_ZONE) | begins, 0.0, error * self.design["dt"])
-        integral = np.clip(memory[..., -1] + gathered, -reach, reach)
-        helm = given[..., :N_HEADING]
-        helm[..., 0], helm[..., 1], helm[..., N_HEADING - 1] = np.sin(error), np.cos(error), integral / reach
+        integral = gathered(memory[..., -1], error, begins, self.design["dt"], reach)
+        helm = on_course(given[..., :N_HEADING], error, integral, reach)
         starts = None if inner is None else np.atleast_1d(begins)
-        action, inner = self.autopilot.predict(helm.astype(np.float32), inner, starts, deterministic)
+        action, inner = self.autopilot.predict(helm, inner, starts, deterministic)
         return action, (np.concatenate([kept, integral[..., None]], axis=-1), inner)
 
     def loop(self) -> Compensator:
@@ -189,17 +185,12 @@ class LineOfSight(Guided):
         """
         asked = task or path_following_task()
         length = model.particulars["length"]
-        if lookahead_lengths is None:
-            lookahead_lengths = asked.lookahead
-        check_number(lookahead_lengths, "lookahead_lengths", above=0.0)
-        if integral_lengths is None:
-            integral_lengths = CRITICAL * lookahead_lengths
-        check_number(integral_lengths, "integral_lengths", above=0.0)
-        gains = {
-            "lookahead": lookahead_lengths * length,
-            "integral": 1.0 / (integral_lengths * length_time(model)),
-        }
-        return cls.leading(model, autopilot, asked, gains, {"integral_lengths": float(integral_lengths)})
+        ahead = asked.lookahead if lookahead_lengths is None else lookahead_lengths
+        check_number(ahead, "lookahead_lengths", above=0.0)
+        integral = CRITICAL * ahead if integral_lengths is None else integral_lengths
+        check_number(integral, "integral_lengths", above=0.0)
+        gains = {"lookahead": ahead * length, "integral": 1.0 / (integral * length_time(model))}
+        return cls.leading(model, autopilot, asked, gains, {"integral_lengths": float(integral)})
 
     def course(self, seen: Mapping[str, Floats], memory: Floats) -> tuple[Floats, Floats]:
         """See `Guided.course`; nothing is remembered."""

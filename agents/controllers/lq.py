@@ -1,14 +1,17 @@
 """LQ autopilot: the feedback that minimises the environment's own cost on the linearised ship.
 
 Source: Norrbin 1972, On the added resistance due to steering on a straight course (the cost); van
-Amerongen 1982, Adaptive steering of ships, chapter 3; Anderson & Moore 1990, Optimal Control, chapter 2.
+Amerongen 1982, Adaptive steering of ships, chapter 3; Anderson & Moore 1990, Optimal Control, chapters 2
+and 3 (cross terms); Chu, Fan, Lin & Wang 2004, Structure-preserving algorithms for periodic discrete-time
+algebraic Riccati equations, International Journal of Control 77 (doubling: many designs at once, as adaptive
+autopilots make them while they sail).
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
@@ -25,9 +28,13 @@ from agents.controllers.linear_loop import (
 )
 from shipgym.arrays import Floats
 from shipgym.checks import check_number
+from shipgym.errors import InputError
 from shipgym.ships import ShipModel
 from shipgym.tasks.steering import RUDDER_WEIGHT
 from shipgym.tasks.task import control_interval
+
+DOUBLINGS = 40  # each doubles the horizon
+ACCURACY = 1e-13
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,37 +83,45 @@ class LQ(Controller):
         InputError
             If the model has no straight course, or an argument is out of its range.
         """
-        interval, weight = lq_settings(model, dt, integral_lengths, rudder_weight, rate_weight_s2)
-        ship = without_yaw_memory(model, interval)
-        gain = lq_gain(ship, weight, integral_lengths * length_time(model), rudder_weight)
-        return cls.designed(
-            model,
-            sample_ship(model, interval),
-            gains=dict(zip(SIGNALS, (-gain).tolist(), strict=True)),
-            design={
-                "integral_lengths": float(integral_lengths),
-                "rudder_weight": float(rudder_weight),
-                "rate_weight_s2": weight,
-            },
-        )
+        weights = Weights.of(model, dt, integral_lengths, rudder_weight, rate_weight_s2)
+        gains = weights.gains(without_yaw_memory(model, weights.dt), length_time(model))
+        return cls.designed(model, sample_ship(model, weights.dt), gains, weights.design)
 
 
-def lq_settings(
-    model: ShipModel,
-    dt: float | None,
-    integral_lengths: float,
-    rudder_weight: float,
-    rate_weight_s2: float | None,
-) -> tuple[float, float]:
-    """Control interval, s, and weight of the rudder rate, s^2, of a design; its arguments are checked.
+class Weights(NamedTuple):
+    """What an LQ design weighs beside the squared heading error."""
 
-    Raises InputError if an argument is out of its range.
-    """
-    check_number(integral_lengths, "integral_lengths", above=0.0)
-    check_number(rudder_weight, "rudder_weight", above=0.0)
-    interval = control_interval(model) if dt is None else check_number(dt, "dt", above=0.0)
-    weight = rate_weight(model) if rate_weight_s2 is None else rate_weight_s2
-    return interval, check_number(weight, "rate_weight_s2", above=0.0)
+    dt: float  # control interval, s
+    integral_lengths: float  # time for an offset to decay, in times to travel one ship length
+    rudder_weight: float  # of the squared rudder
+    rate_weight_s2: float  # of the squared rudder rate, s^2
+
+    @classmethod
+    def of(
+        cls,
+        model: ShipModel,
+        dt: float | None,
+        integral_lengths: float,
+        rudder_weight: float,
+        rate_weight_s2: float | None,
+    ) -> Weights:
+        """Those of a ship, as in `LQ.from_model`; raises InputError if one is out of its range."""
+        check_number(integral_lengths, "integral_lengths", above=0.0)
+        check_number(rudder_weight, "rudder_weight", above=0.0)
+        interval = control_interval(model) if dt is None else check_number(dt, "dt", above=0.0)
+        weight = rate_weight(model) if rate_weight_s2 is None else rate_weight_s2
+        weight = check_number(weight, "rate_weight_s2", above=0.0)
+        return cls(interval, float(integral_lengths), float(rudder_weight), weight)
+
+    def gains(self, ship: SampledShip, length_time: float) -> dict[str, float]:
+        """Gains of a sampled ship that travels her length in so many seconds, by signal."""
+        gain = lq_gain(ship, self.rate_weight_s2, self.integral_lengths * length_time, self.rudder_weight)
+        return dict(zip(SIGNALS, (-gain).tolist(), strict=True))
+
+    @property
+    def design(self) -> dict[str, float]:
+        """What a controller's file says of them."""
+        return {name: value for name, value in self._asdict().items() if name != "dt"}
 
 
 def without_yaw_memory(model: ShipModel, dt: float, speed: float | None = None) -> SampledShip:
@@ -117,21 +132,65 @@ def without_yaw_memory(model: ShipModel, dt: float, speed: float | None = None) 
 def lq_gain(
     ship: SampledShip, rate_weight: float, integral_time: float, rudder_weight: float = RUDDER_WEIGHT
 ) -> Floats:
-    """Gain G of order = -G x that minimises the environment's cost on the sampled linear ship.
+    """Gain G of order = -G x that minimises the environment's cost on the sampled linear ship, shape (5,).
+
+    `rate_weight`: of the rudder rate, s^2; `integral_time`: for an offset to decay, s. Raises InputError
+    where no feedback makes the loop stable.
+    """
+    row: Floats = -lq_rows(ship.A[None], ship.B.T, ship.dt, rate_weight, integral_time, rudder_weight)[0]
+    if not np.isfinite(row).all():
+        raise InputError("LQ: no gains found with which the loop is stable; choose other weights or dt")
+    return row
+
+
+def lq_rows(
+    A: Floats,
+    B: Floats,
+    dt: float,
+    rate_weight: float,
+    integral_time: float,
+    rudder_weight: float = RUDDER_WEIGHT,
+) -> Floats:
+    """Feedback rows of order = row x that minimise the environment's cost, one a ship.
 
     The reward of an interval is on the state at its end, so the cost is that of the outputs z[k] = C x[k] + D
     order[k] = (error, weighted rudder, weighted rudder rate, weighted integral)[k + 1], which couples state
-    and input. `rate_weight`: weight of the rudder rate, s^2; `integral_time`: time for an offset to decay, s;
-    `rudder_weight`: weight of the rudder; by default the environment's. Returns an array of shape (5,).
+    and input. `A`, `B`: sampled ships, shape (n, 5, 5) and (n, 5); `dt`: control interval, s; `rate_weight`:
+    of the rudder rate, s^2; `integral_time`: for an offset to decay, s. Returns the gains, shape (n, 5), NaN
+    where no stabilising one was found.
     """
-    import control  # here, because it takes a second to import
-
-    weights = np.array([1.0, np.sqrt(rudder_weight), np.sqrt(rate_weight) / ship.dt, 1.0 / integral_time])
+    weights = np.array([1.0, np.sqrt(rudder_weight), np.sqrt(rate_weight) / dt, 1.0 / integral_time])
     rows = [ERROR, RUDDER, RUDDER, INTEGRAL]
-    C, D = ship.A[rows], ship.B[rows]
-    C[2, RUDDER] -= 1.0
-    C, D = weights[:, None] * C, weights[:, None] * D
-    plant = control.ss(ship.A, ship.B, np.eye(len(SIGNALS)), 0.0, ship.dt)
-    gain, _, _ = control.lqr(plant, C.T @ C, D.T @ D, C.T @ D)
-    row: Floats = np.asarray(gain, dtype=np.float64)[0]
-    return row
+    C, D = A[:, rows].copy(), B[:, rows]
+    C[:, 2, RUDDER] -= 1.0
+    C, D, column = weights[:, None] * C, (weights * D)[:, :, None], B[:, :, None]
+    Ct, Dt, row = C.transpose(0, 2, 1), D.transpose(0, 2, 1), B[:, None, :]
+    R, S = Dt @ D, Dt @ C
+    plain = A - column @ (S / R)  # with commands that take the cross term away
+    X = riccati(plain, column @ (row / R), Ct @ C - S.transpose(0, 2, 1) @ (S / R))
+    gain: Floats = (row @ X @ A + S) / (R + row @ X @ column)
+    return -gain[:, 0]
+
+
+def riccati(A: Floats, G: Floats, H: Floats) -> Floats:
+    """Stabilising solutions X of X = A'X (I + G X)^-1 A + H, by doubling; all three are overwritten.
+
+    `G`, `H`: symmetric, not negative, as `A` of shape (n, m, m). Returns X, NaN where it did not converge.
+    """
+    eye = np.eye(A.shape[-1])
+    converged = np.zeros(len(A), dtype=np.bool_)
+    with np.errstate(over="ignore", invalid="ignore"):
+        for _ in range(DOUBLINGS):
+            going = ~converged & np.isfinite(H).all(axis=(1, 2))
+            if not going.any():
+                break
+            a, g, h = A[going], G[going], H[going]
+            left = np.linalg.solve(eye + g @ h, np.concatenate([a, g], axis=2))
+            wa, wg = left[:, :, : len(eye)], left[:, :, len(eye) :]
+            at = a.transpose(0, 2, 1)
+            more = at @ h @ wa
+            A[going], G[going], H[going] = a @ wa, g + a @ wg @ at, h + 0.5 * (more + more.transpose(0, 2, 1))
+            size = np.abs(H[going]).max(axis=(1, 2))
+            converged[going] = np.abs(more).max(axis=(1, 2)) <= ACCURACY * size
+    H[~converged] = np.nan
+    return H

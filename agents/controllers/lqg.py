@@ -15,20 +15,17 @@ import numpy as np
 from agents.controllers.controller import Controller, Range
 from agents.controllers.linear_loop import (
     ERROR,
-    INTEGRAL,
     RUDDER,
     SIGNALS,
     YAW_RATE,
     Compensator,
-    SampledShip,
     check_stable,
     length_time,
     sample_ship,
     sampled_ships,
 )
-from agents.controllers.lq import LQ, lq_gain, lq_settings
+from agents.controllers.lq import LQ, Weights
 from agents.controllers.memory import Flags, Floats, heading_error
-from agents.controllers.stateful import Stateful
 from shipgym.checks import check_number
 from shipgym.errors import InputError
 from shipgym.ships import ShipModel
@@ -46,7 +43,7 @@ WAVE_DAMPING = 0.1  # of the model of first-order motion (Fossen 2011, 8.2.6)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class LQG(Stateful):
+class LQG(Controller):
     """LQ feedback of estimated motions: a stationary Kalman filter on noisy heading and yaw rate.
 
     The measured sway speed is not used. The filter's states are sway, yaw rate and heading error and, where a
@@ -106,9 +103,7 @@ class LQG(Stateful):
 
         Parameters
         ----------
-        model : ShipModel
-            Stable or unstable on its course.
-        dt, integral_lengths, rudder_weight, rate_weight_s2
+        model, dt, integral_lengths, rudder_weight, rate_weight_s2
             As in `LQ.from_model`.
         noise : float
             Of heading and yaw rate, in multiples of a sea trial's sensors (`SEA_TRIAL`).
@@ -125,30 +120,32 @@ class LQG(Stateful):
         InputError
             If the model has no straight course, or an argument is out of its range.
         """
+        from scipy.linalg import block_diag
+
         check_number(noise, "noise", above=0.0)
         check_number(disturbance_deg, "disturbance_deg", above=0.0)
-        interval, weight = lq_settings(model, dt, integral_lengths, rudder_weight, rate_weight_s2)
-        ship = sample_ship(model, interval)
-        gain = lq_gain(ship, weight, integral_lengths * length_time(model), rudder_weight)
-        push = np.radians(disturbance_deg)
-        transition, effect, process, output = _steering_in_sea(model, ship, push)
+        weights = Weights.of(model, dt, integral_lengths, rudder_weight, rate_weight_s2)
+        ship, interval = sample_ship(model, weights.dt), weights.dt
+        transition, effect = rudder_response(model, ship.about, interval)
+        pushed = np.radians(disturbance_deg) * effect  # by the sea
+        pushed[2] = np.hypot(pushed[2], COURSE_NOISE)
+        process, output = np.diag(pushed**2), np.eye(3)[list(OUTPUTS)]
         if wave_period is not None:
             check_number(wave_period, "wave_period", above=2.0 * interval, hint="two control intervals, in s")
-            motion = wave_model(wave_period, np.radians(wave_heading_deg), interval)
-            transition, effect, process, output = _with_waves(transition, effect, process, output, motion)
+            motion, drive = wave_model(wave_period, np.radians(wave_heading_deg), interval)
+            transition, process = block_diag(transition, motion), block_diag(process, drive)
+            effect = np.append(effect, [0.0, 0.0])
+            output = np.hstack([output, [[0.0, 1.0], [-1.0, 0.0]]])
         deviation = noise * np.array([SEA_TRIAL["r"].noise, SEA_TRIAL["psi"].noise])
         kalman, deviations = kalman_gain(transition, process, output, np.diag(deviation**2))
-        design = {
-            "integral_lengths": float(integral_lengths),
-            "rate_weight_s2": weight,
+        design = weights.design | {
             "noise": float(noise),
             "disturbance_deg": float(disturbance_deg),
             "new_course_rad": max(NEW_COURSE, GATE * deviations[1]),
             **({} if wave_period is None else {"wave_period": float(wave_period)}),
         }
-        gains = dict(zip(SIGNALS, (-gain).tolist(), strict=True))
         filters = {"transition": transition, "input": effect, "kalman": kalman, "output": output}
-        return cls.designed(model, ship, gains=gains, design=design, **filters)
+        return cls.designed(model, ship, weights.gains(ship, length_time(model)), design, **filters)
 
     @property
     def memory_size(self) -> int:
@@ -178,52 +175,13 @@ class LQG(Stateful):
 
     def loop(self) -> Compensator:
         """Filter and feedback together; the course does not jump."""
-        n = len(self.input)
-        measure = np.zeros((2, len(SIGNALS)))
-        measure[[0, 1], list(OUTPUTS)] = 1.0
-        trusted = np.eye(n) - self.kalman @ self.output
-        rudder = np.eye(len(SIGNALS))[RUDDER]
-        remember = np.column_stack([trusted @ self.transition, 0.5 * trusted @ self.input])
-        correct = 0.5 * np.outer(trusted @ self.input, rudder) + self.kalman @ measure
-        row = np.zeros(n)
-        row[: ERROR + 1] = [self.gains[signal] for signal in SIGNALS[: ERROR + 1]]
-        at_once = self.gains["rudder"] * rudder
-        at_once[INTEGRAL] = self.gains["heading_error_integral"]
-        return Compensator(
-            A=np.vstack([remember, np.zeros(n + 1)]),
-            B=np.vstack([correct, rudder]),
-            C=(row @ remember)[None],
-            D=(row @ correct + at_once)[None],
-        )
-
-
-def _steering_in_sea(
-    model: ShipModel, ship: SampledShip, push: float
-) -> tuple[Floats, Floats, Floats, Floats]:
-    """Transition, effect of the rudder, covariance of the sea's push (rad of rudder) and what is measured."""
-    transition, effect = rudder_response(model, ship.about, ship.dt)
-    pushed = push * effect
-    pushed[2] = np.hypot(pushed[2], COURSE_NOISE)
-    return transition, effect, np.diag(pushed**2), np.eye(3)[list(OUTPUTS)]
-
-
-def _with_waves(
-    transition: Floats, effect: Floats, process: Floats, output: Floats, waves: tuple[Floats, Floats]
-) -> tuple[Floats, Floats, Floats, Floats]:
-    """The same with heading and rate of the first-order motion as further states."""
-    return (
-        _beside(transition, waves[0]),
-        np.append(effect, [0.0, 0.0]),
-        _beside(process, waves[1]),
-        np.hstack([output, [[0.0, 1.0], [-1.0, 0.0]]]),
-    )
+        return self.linearised()
 
 
 def rudder_response(model: ShipModel, about: StraightRunning, dt: float) -> tuple[Floats, Floats]:
-    """Sway, yaw rate and heading error with the rudder held over an interval.
+    """Sway, yaw rate and heading error with the rudder held over an interval of `dt`, s.
 
-    `about`: where small motions are about; `dt`: s. Returns `transition`: shape (3, 3); `effect`: of the
-    rudder angle, per rad, shape (3,).
+    Returns their transition, shape (3, 3), and the effect of the rudder angle, per rad, shape (3,).
     """
     A, B = sampled_ships(np.column_stack(linearise(model, about))[None], 0.0, dt)
     return A[0, :RUDDER, :RUDDER], B[0, :RUDDER]
@@ -249,10 +207,9 @@ def wave_model(period: float, deviation: float, dt: float) -> tuple[Floats, Floa
 def kalman_gain(transition: Floats, process: Floats, output: Floats, noise: Floats) -> tuple[Floats, Floats]:
     """Stationary Kalman gain on the innovation, for the estimate at the time of the measurement.
 
-    `transition`: shape (n, n); `process`: covariance of what disturbs the states in an interval, shape (n,
-    n); `output`: shape (m, n); `noise`: covariance of the measurements' noise, shape (m, m). Returns `gain`:
-    `transition @ gain` is the predictor's gain, that of `control.dlqe`, shape (n, m); `deviation`: standard
-    deviation of the innovations, shape (m,).
+    `transition`: shape (n, n); `process`: covariance of what disturbs the states in an interval; `output`:
+    shape (m, n); `noise`: covariance of the measurements' noise. Returns `gain`, shape (n, m), which is that
+    of `control.dlqe` times the inverse transition, and the standard deviation of the innovations.
     """
     import control
 
@@ -260,13 +217,6 @@ def kalman_gain(transition: Floats, process: Floats, output: Floats, noise: Floa
     innovation = output @ covariance @ output.T + noise
     gain: Floats = np.linalg.solve(innovation, output @ covariance).T
     return gain, np.sqrt(np.diag(innovation))
-
-
-def _beside(one: Floats, other: Floats) -> Floats:
-    """Block-diagonal of two matrices."""
-    from scipy.linalg import block_diag
-
-    return np.asarray(block_diag(one, other), dtype=np.float64)
 
 
 def _times(rows: Floats, matrix: Floats) -> Floats:

@@ -9,18 +9,28 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from shipgym.errors import InputError
+from shipgym.tasks.steering import INTEGRAL_ZONE
+from shipgym.tasks.task import OBSERVATION_NAMES
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
+Records = NDArray[np.void]
+
+
+def records(memory: Floats, record: np.dtype[Any]) -> Records:
+    """Memories of ships as records of named numbers, a view: (n, size) as (n,), (size,) as ()."""
+    return np.ascontiguousarray(memory).view(record)[..., 0]
+
+
+def size_of(record: np.dtype[Any]) -> int:
+    """How many numbers a record has."""
+    return record.itemsize // np.dtype(np.float64).itemsize
 
 
 def checked_observation(
     observation: ArrayLike, names: Sequence[str], dtype: type[np.generic] = np.float64
 ) -> NDArray[Any]:
-    """Observations as an array of shape (n_ships, n_observations) or (n_observations,), no fewer than names.
-
-    Raises InputError if there are fewer entries or another number of dimensions.
-    """
+    """Observations as an array of shape (n_ships, n) or (n,), with no fewer than there are names."""
     given, n = np.asarray(observation, dtype=dtype), len(names)
     if given.ndim not in (1, 2) or given.shape[-1] < n:
         raise InputError(
@@ -31,10 +41,7 @@ def checked_observation(
 
 
 def checked_starts(starts: Any, shape: tuple[int, ...]) -> Flags:
-    """Where episodes begin, an array of the shape of the ships; None is nowhere.
-
-    Raises InputError if there is neither one for all ships nor one for each.
-    """
+    """Where episodes begin, one for all ships or one for each, in the shape of the ships; None is nowhere."""
     flags = np.asarray(False if starts is None else starts, dtype=np.bool_)
     n = int(np.prod(shape))
     if flags.size not in (1, n):
@@ -43,10 +50,7 @@ def checked_starts(starts: Any, shape: tuple[int, ...]) -> Flags:
 
 
 def checked_memory(memory: Any, shape: tuple[int, ...]) -> NDArray[Any]:
-    """Return the memory of ships, which must have a shape.
-
-    Raises InputError if it is that of another number of ships, or of another controller.
-    """
+    """Return the memory of ships, which must have a shape: not that of other ships or another controller."""
     if np.shape(memory) != shape:
         raise InputError(
             f"state: shape {np.shape(memory)} found, expected {shape}: what the last predict of as many "
@@ -58,9 +62,8 @@ def checked_memory(memory: Any, shape: tuple[int, ...]) -> NDArray[Any]:
 def begun(memory: Any, starts: Any, shape: tuple[int, ...], size: int) -> tuple[Floats, Flags]:
     """Memory of each ship, a copy with zeros where an episode begins, and where it does.
 
-    `memory`: what the last `predict` returned; None where all episodes begin, shape (*shape, size); `starts`:
-    where an episode begins and the memory is that of the one before; `shape`: (n_ships,), or () for a single
-    ship; `size`: numbers remembered of a ship. Raises InputError as `checked_memory` and `checked_starts`.
+    `memory`: what the last `predict` returned, shape (*shape, size); None where all episodes begin; `starts`:
+    where the memory is that of the episode before; `shape`: (n_ships,), or () for a single ship.
     """
     if memory is None:
         return np.zeros((*shape, size)), np.ones(shape, dtype=np.bool_)
@@ -73,6 +76,23 @@ def heading_error(seen: dict[str, Floats]) -> Floats:
     """Heading error of each ship, rad, in (-pi, pi]."""
     error: Floats = np.arctan2(seen["heading_error_sin"], seen["heading_error_cos"])
     return error
+
+
+def on_course(seen: NDArray[Any], error: Floats, integral: Floats, reach: float) -> NDArray[np.float32]:
+    """Observations of ships with another heading error, rad, and its integral of at most `reach`, rad s."""
+    shown = seen.astype(np.float32)
+    values = np.sin(error), np.cos(error), integral / reach
+    for name, value in zip(
+        ("heading_error_sin", "heading_error_cos", "heading_error_integral"), values, strict=True
+    ):
+        shown[..., OBSERVATION_NAMES.index(name)] = value
+    return shown
+
+
+def gathered(integral: Floats, error: Floats, begins: Any, dt: float, reach: float) -> Floats:
+    """Integral of the heading error, rad s, an interval later, as environments have it."""
+    more = np.where((np.abs(error) > INTEGRAL_ZONE) | begins, 0.0, error * dt)
+    return np.clip(integral + more, -reach, reach)
 
 
 def deviations(seen: dict[str, Floats], rudder: Any, sway: Any) -> Floats:

@@ -22,9 +22,8 @@ import numpy as np
 
 from agents.controllers.controller import Controller, Range
 from agents.controllers.linear_loop import RUDDER, SIGNALS, check_stable, length_time, sample_ship
-from agents.controllers.lq import LQ, lq_gain, lq_settings, without_yaw_memory
+from agents.controllers.lq import LQ, Weights, without_yaw_memory
 from agents.controllers.memory import Flags, Floats, deviations
-from agents.controllers.stateful import Stateful
 from shipgym.checks import check_number
 from shipgym.errors import InputError
 from shipgym.ships import ShipModel
@@ -46,10 +45,8 @@ class Plan(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class MPC(Stateful):
+class MPC(Controller):
     """Plans the rudder over a horizon within its limit and rate; needs the extra `mpc` (OSQP).
-
-    It remembers nothing: the state of `predict` is empty.
 
     Attributes
     ----------
@@ -77,7 +74,7 @@ class MPC(Stateful):
         stays, moves = self.transition[RUDDER, RUDDER], self.effect[RUDDER]
         check_number(stays, "arrays.transition: share of the rudder that stays", at_least=0.0, at_most=1.0)
         check_number(moves, "arrays.effect: share of an order that is followed", at_least=1e-6, at_most=1.0)
-        check_stable(self.transition + np.outer(self.effect, self._row), "arrays.transition")
+        check_stable(self.transition + np.outer(self.effect, self.row), "arrays.transition")
 
     @classmethod
     def from_model(
@@ -94,11 +91,7 @@ class MPC(Stateful):
 
         Parameters
         ----------
-        model : ShipModel
-            Stable or unstable on its course.
-        dt : float, optional
-            Control interval, s; by default that of the environment.
-        integral_lengths, rudder_weight : float
+        model, dt, integral_lengths, rudder_weight
             As in `LQ.from_model`.
         horizon_lengths : float
             How far it plans within the limits, in times to travel one ship length; beyond, LQ's cost without
@@ -115,52 +108,44 @@ class MPC(Stateful):
         _solver_library()
         check_number(horizon_lengths, "horizon_lengths", above=0.0, at_most=20.0)
         weight = RATE_WEIGHT * length_time(model) ** 2 if rate_weight_s2 is None else rate_weight_s2
-        interval, weight = lq_settings(model, dt, integral_lengths, rudder_weight, weight)
+        weights = Weights.of(model, dt, integral_lengths, rudder_weight, weight)
+        interval, time = weights.dt, length_time(model)
         reduced = without_yaw_memory(model, interval)
-        gain = lq_gain(reduced, weight, integral_lengths * length_time(model), rudder_weight)
+        limits = {
+            "horizon_steps": float(max(2, round(horizon_lengths * time / interval))),
+            "rudder_rate_rad_s": model.steering.rate,
+        }
         return cls.designed(
             model,
             sample_ship(model, interval),
-            gains=dict(zip(SIGNALS, (-gain).tolist(), strict=True)),
-            design={
-                "integral_lengths": float(integral_lengths),
-                "rudder_weight": float(rudder_weight),
-                "rate_weight_s2": weight,
-                "horizon_steps": float(max(2, round(horizon_lengths * length_time(model) / interval))),
-                "rudder_rate_rad_s": model.steering.rate,
-            },
+            gains=weights.gains(reduced, time),
+            design=weights.design | limits,
             transition=reduced.A,
             effect=reduced.B[:, 0],
         )
 
-    @property
-    def memory_size(self) -> int:
-        """Nothing is remembered."""
-        return 0
-
     def steer(self, seen: dict[str, Floats], memory: Floats, begins: Flags) -> tuple[Floats, Floats]:
         """LQ's command where its plan keeps to the limits, else the first of the nearest plan that does."""
-        limit = self.observation_scales[self.observation_names.index("rudder")]
+        change = self.design["rudder_rate_rad_s"] * self.design["dt"]
+        low, high = -self.rudder_limit - self.neutral_rudder, self.rudder_limit - self.neutral_rudder
         state = deviations(seen, self.neutral_rudder, self.neutral_sway)
-        rudder = np.clip(state[:, RUDDER], -limit - self.neutral_rudder, limit - self.neutral_rudder)
-        state[:, RUDDER] = rudder
-        orders: Floats = np.einsum("ij,j->i", state, self._row)
-        lowest, highest = self._bounds(limit)
+        rudder = state[:, RUDDER] = np.clip(state[:, RUDDER], low, high)
+        orders: Floats = np.einsum("ij,j->i", state, self.row)
+        steps = int(self.design["horizon_steps"])
+        lowest, highest = np.repeat((low, -change), steps), np.repeat((high, change), steps)
         planned = np.einsum("ij,kj->ik", state, self.plan.by_state)
+        stays, moves = self.transition[RUDDER, RUDDER], self.effect[RUDDER]
         for ship in np.flatnonzero(np.any((planned < lowest) | (planned > highest), axis=1)):
-            orders[ship] += self._correction(lowest - planned[ship], highest - planned[ship])
-            orders[ship] = self._within(orders[ship], rudder[ship], limit)
+            self._solver.update(l=lowest - planned[ship], u=highest - planned[ship])
+            order = orders[ship] + self._solver.solve(raise_error=False).x[0]  # the smallest correction
+            least, most = ((rudder[ship] * (1.0 - stays) + way) / moves for way in (-change, change))
+            orders[ship] = min(max(order, least, low), most, high)  # to the last bit
         return self.neutral_rudder + orders, memory
-
-    @property
-    def _row(self) -> Floats:
-        """LQ's gains."""
-        return np.array([self.gains[signal] for signal in SIGNALS])
 
     @cached_property
     def plan(self) -> Plan:
         """How commands and rudder follow from the state and from corrections of LQ's commands."""
-        steps, row = int(self.design["horizon_steps"]), self._row
+        steps, row = int(self.design["horizon_steps"]), self.row
         closed = self.transition + np.outer(self.effect, row)
         limited = np.stack([row, closed[RUDDER] - np.eye(len(SIGNALS))[RUDDER]])  # command, rudder's change
         by_state = np.empty((2, steps, len(SIGNALS)))
@@ -175,23 +160,6 @@ class MPC(Stateful):
         later = np.subtract.outer(np.arange(steps), np.arange(steps))
         by_correction = np.where(later >= 0, answer[:, np.maximum(later, 0)], 0.0)
         return Plan(by_state.reshape(2 * steps, -1), by_correction.reshape(2 * steps, steps))
-
-    def _bounds(self, limit: float) -> tuple[Floats, Floats]:
-        """Of what is limited, shape (2 * horizon,) each."""
-        steps = int(self.design["horizon_steps"])
-        change = self.design["rudder_rate_rad_s"] * self.design["dt"]
-        neutral = self.neutral_rudder
-        low, high = (-limit - neutral, -change), (limit - neutral, change)
-        return np.repeat(low, steps), np.repeat(high, steps)
-
-    def _within(self, order: float, rudder: float, limit: float) -> float:
-        """A command within the limits to the last bit."""
-        change = self.design["rudder_rate_rad_s"] * self.design["dt"]
-        stays, moves = self.transition[RUDDER, RUDDER], self.effect[RUDDER]
-        lower, upper = ((rudder * (1.0 - stays) + way) / moves for way in (-change, change))
-        lower = max(lower, -limit - self.neutral_rudder)
-        upper = min(upper, limit - self.neutral_rudder)
-        return float(min(max(order, lower), upper))
 
     @cached_property
     def _solver(self) -> Any:
@@ -216,11 +184,6 @@ class MPC(Stateful):
             warm_starting=False,
         )
         return solver
-
-    def _correction(self, lowest: Floats, highest: Floats) -> float:
-        """First correction of the smallest ones that bring LQ's plan within its limits."""
-        self._solver.update(l=lowest, u=highest)
-        return float(self._solver.solve(raise_error=False).x[0])
 
     def __getstate__(self) -> dict[str, Any]:
         """Everything but the solver, which another process sets up again."""

@@ -107,8 +107,8 @@ def optimal_poles(response: Nomoto, rate_weight: float) -> tuple[float, float]:
     """Natural frequency and damping that the steering cost asks for.
 
     They are those of the dominant poles of the LQ regulator with weights on heading error, rudder and rudder
-    rate, for the first-order Nomoto form with the rudder rate as input. `response`: its first-order form is
-    used; `rate_weight`: weight of the rudder rate, s^2. Returns `frequency`: rad/s.
+    rate (`rate_weight`, s^2), for the first-order Nomoto form with the rudder rate as input; the first in
+    rad/s.
     """
     import control  # here, because it takes a second to import
 

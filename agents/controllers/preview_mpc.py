@@ -34,6 +34,8 @@ from shipgym.tasks.task import STEPS_PER_LENGTH, Task, course_keeping_task, path
 KNOTS, KNOT_STEPS = 6, int(STEPS_PER_LENGTH)  # of a plan, and control intervals from one to the next
 COARSE = 2  # control intervals in a step of the search
 CANDIDATES, ELITES, ROUNDS = 16, 4, 2
+_HALF = np.random.default_rng(0).standard_normal((ROUNDS, CANDIDATES // 2, KNOTS))
+DRAWS = np.concatenate([_HALF, -_HALF], axis=1)  # always the same, each with its mirror image
 LEAST_DEVIATION = np.radians(0.5)  # of a knot
 STREAM_GAIN = 0.5  # share of the current seen anew in each interval that is taken over
 DEEP, FAR = 1e6, 1e9  # m: of water that is not shallow; of a turn that lies behind
@@ -135,7 +137,7 @@ class PreviewMPC(WheelOver):
         """Plans bettered by the cross-entropy method, rad, shape (n, knots); the first knot stays."""
         rows, mean = np.arange(len(best)), best
         deviation, least = np.full(best.shape, self.design["deviation"]), np.full(len(best), np.inf)
-        for drawn in _draws():
+        for drawn in DRAWS:
             plans = mean[:, None] + deviation[:, None] * drawn
             plans[:, 0], plans[:, CANDIDATES // 2], plans[:, :, 0] = best, 0.0, best[:, :1]
             costs = self._costs(seen, stream, plans)
@@ -165,13 +167,6 @@ class PreviewMPC(WheelOver):
             if of["roll"] > 0.0:
                 cost += of["roll"] * ship.engine.read("phi") ** 2
         return np.where(np.isfinite(cost), cost, np.inf).reshape(plans.shape[:2])
-
-
-@lru_cache(maxsize=1)
-def _draws() -> Floats:
-    """Always the same, each with its mirror image, shape (rounds, candidates, knots)."""
-    half = np.random.default_rng(0).standard_normal((ROUNDS, CANDIDATES // 2, KNOTS))
-    return np.concatenate([half, -half], axis=1)
 
 
 @lru_cache(maxsize=8)

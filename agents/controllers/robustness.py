@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields
+from contextlib import suppress
+from dataclasses import astuple, dataclass, fields
 
 import numpy as np
 from numpy.typing import NDArray
@@ -74,10 +75,7 @@ def margin_uncertainty(controller: Controller, models: Sequence[ShipModel]) -> M
     names = [item.name for item in fields(Margins)]
     table = np.full((len(models), len(names)), np.nan)
     for row, model in zip(table, models, strict=True):
-        try:
-            found = controller.margins_on(model)
-        except InputError:
-            continue
-        row[:] = [getattr(found, name) for name in names]
+        with suppress(InputError):
+            row[:] = astuple(controller.margins_on(model))
     by_name = dict(zip(names, table.T.copy(), strict=True))
     return MarginUncertainty(controller.margins, by_name, ~np.isnan(table[:, 0]))

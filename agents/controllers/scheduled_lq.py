@@ -14,7 +14,7 @@ import numpy as np
 
 from agents.controllers.controller import Controller
 from agents.controllers.linear_loop import SIGNALS, Compensator, compensator_margins, sample_ship
-from agents.controllers.lq import LQ, lq_gain, lq_settings, without_yaw_memory
+from agents.controllers.lq import LQ, Weights, without_yaw_memory
 from agents.controllers.memory import Flags, Floats, deviations
 from shipgym.checks import check_number
 from shipgym.errors import InputError
@@ -73,9 +73,7 @@ class ScheduledLQ(Controller):
 
         Parameters
         ----------
-        model : ShipModel
-            Stable or unstable on its course.
-        dt, integral_lengths, rudder_weight, rate_weight_s2
+        model, dt, integral_lengths, rudder_weight, rate_weight_s2
             As in `LQ.from_model`, at each speed.
         speeds : sequence of float, optional
             m/s, rising, at least two; by default 0.6 to 1.1 times service speed. They should not leave the
@@ -91,28 +89,27 @@ class ScheduledLQ(Controller):
         InputError
             If the model has no straight course at one of the speeds, or an argument is out of its range.
         """
-        interval, weight = lq_settings(model, dt, integral_lengths, rudder_weight, rate_weight_s2)
-        service = model.particulars["speed"]
+        weights = Weights.of(model, dt, integral_lengths, rudder_weight, rate_weight_s2)
+        length, service = model.particulars["length"], model.particulars["speed"]
         listed = rising([service * part for part in SPEEDS] if speeds is None else speeds, "speeds")
         gains, neutral, margins = [], [], []
         for speed in listed.tolist():
-            ship = sample_ship(model, interval, speed=speed)
-            time = integral_lengths * model.particulars["length"] / speed
-            gains.append(-lq_gain(without_yaw_memory(model, interval, speed), weight, time, rudder_weight))
+            ship = sample_ship(model, weights.dt, speed=speed)
+            found = weights.gains(without_yaw_memory(model, weights.dt, speed), length / speed)
+            gains.append(np.array(list(found.values())))
             neutral.append((ship.about.rudder, ship.about.sway))
             name = f"ScheduledLQ on model '{model.name}' at {speed:g} m/s"
             margins.append(compensator_margins(ship, Compensator.static(gains[-1][None]), name))
         at_service = [float(np.interp(service, listed, column)) for column in np.array(gains).T]
+        worst = {
+            "least_gain_margin": min(1e6, *(m.gain_margin for m in margins)),
+            "least_phase_margin_deg": min(m.phase_margin_deg for m in margins),
+        }
         return cls.designed(
             model,
-            sample_ship(model, interval),
+            sample_ship(model, weights.dt),
             gains=dict(zip(SIGNALS, at_service, strict=True)),
-            design={
-                "integral_lengths": float(integral_lengths),
-                "rate_weight_s2": weight,
-                "least_gain_margin": min(1e6, *(m.gain_margin for m in margins)),
-                "least_phase_margin_deg": min(m.phase_margin_deg for m in margins),
-            },
+            design=weights.design | worst,
             speeds=listed,
             schedule=np.array(gains),
             neutral=np.array(neutral),

@@ -11,15 +11,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import ClassVar, Self
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
 from agents.controllers.controller import NUMBERS, Controller, Range
-from agents.controllers.linear_loop import ERROR, SIGNALS, YAW_RATE, Compensator, length_time, sample_ship
-from agents.controllers.memory import Flags, Floats, heading_error
+from agents.controllers.linear_loop import Compensator, length_time, sample_ship
+from agents.controllers.memory import Flags, Floats, heading_error, records
 from agents.controllers.scheduled_lq import rising
-from agents.controllers.stateful import Stateful
 from shipgym.checks import check_number
 from shipgym.errors import InputError
 from shipgym.ships import ShipModel
@@ -34,7 +33,7 @@ SLOWER = 4.0  # time of the heading over that of the rate
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class TurnRate(Stateful):
+class TurnRate(Controller):
     """Steers a rate of turn, and a heading by means of it.
 
     order = rudder of the steady turn + proportional * (wanted rate - yaw rate) + its integral.
@@ -53,6 +52,9 @@ class TurnRate(Stateful):
     }  # fmt: skip
     reads: ClassVar[tuple[str, ...]] = ("yaw_rate", "rate_of_turn")
     arrays: ClassVar[Mapping[str, tuple[str | int, ...]]] = {"rates": ("rates",), "rudders": ("rates",)}
+
+    #: Integral part of the rudder, rad, and the rate that follows the wanted one smoothly, rad/s.
+    record: ClassVar[np.dtype[Any]] = np.dtype([("gathered", "f8"), ("followed", "f8")])
 
     rates: Floats
     rudders: Floats
@@ -73,10 +75,8 @@ class TurnRate(Stateful):
 
         Parameters
         ----------
-        model : ShipModel
-            Stable or unstable on its course.
-        dt : float, optional
-            Control interval, s; by default that of the environment.
+        model, dt
+            As in `LQ.from_model`.
         frequency : float, optional
             Natural frequency of the pair of poles of the yaw rate, rad/s; by default as the lag of the
             steering gear and the ship's length allow.
@@ -113,11 +113,6 @@ class TurnRate(Stateful):
         return cls.designed(model, ship, gains, design, rates=rates, rudders=rudders)
 
     @property
-    def memory_size(self) -> int:
-        """The integral part of the rudder, rad, and the rate that follows the wanted one smoothly, rad/s."""
-        return 2
-
-    @property
     def smoothing(self) -> float:
         """Share of the way to the wanted rate that is taken in an interval."""
         step = self.design["dt"] * self.design["frequency"]
@@ -125,31 +120,22 @@ class TurnRate(Stateful):
 
     def steer(self, seen: dict[str, Floats], memory: Floats, begins: Flags) -> tuple[Floats, Floats]:
         """Rudder for the ordered rate of turn, `rate_of_turn` in rad/s, or, where it is 0, the heading."""
-        gains, rate = self.gains, seen["yaw_rate"]
-        limit = self.observation_scales[self.observation_names.index("rudder")]
+        gains, rate, kept = self.gains, seen["yaw_rate"], records(memory, self.record)
         to_heading = np.clip(heading_error(seen) / gains["heading_time"], -gains["rate"], gains["rate"])
         ordered = seen.get("rate_of_turn", np.zeros_like(to_heading))
-        wanted, kept = np.where(ordered == 0.0, to_heading, ordered), memory[:, 0]
-        before = np.where(begins, rate, memory[:, 1])
+        wanted = np.where(ordered == 0.0, to_heading, ordered)
+        before = np.where(begins, rate, kept["followed"])
         followed = before + self.smoothing * (wanted - before)
         off = followed - rate
-        order = np.interp(followed, self.rates, self.rudders) + gains["proportional"] * off + kept
-        gathered = np.where(np.abs(order) < limit, gains["integral"] * self.design["dt"] * off, 0.0)
-        return order, np.column_stack([kept + gathered, followed])
+        order = np.interp(followed, self.rates, self.rudders) + gains["proportional"] * off + kept["gathered"]
+        gathered = np.where(
+            np.abs(order) < self.rudder_limit, gains["integral"] * self.design["dt"] * off, 0.0
+        )
+        return order, np.column_stack([kept["gathered"] + gathered, followed])
 
     def loop(self) -> Compensator:
-        """Small changes of a heading; the memory is that of `steer`."""
-        gains, share = self.gains, self.smoothing
-        step, signals = self.design["dt"] * gains["integral"], np.eye(len(SIGNALS))
-        wanted, rate = share / gains["heading_time"] * signals[ERROR], signals[YAW_RATE]
-        at = np.interp([-1e-6, 1e-6], self.rates, self.rudders)
-        per_rate = gains["proportional"] + (at[1] - at[0]) / 2e-6
-        return Compensator(
-            A=np.array([[1.0, step * (1.0 - share)], [0.0, 1.0 - share]]),
-            B=np.vstack([step * (wanted - rate), wanted]),
-            C=np.array([[1.0, per_rate * (1.0 - share)]]),
-            D=(per_rate * wanted - gains["proportional"] * rate)[None],
-        )
+        """Small changes of a heading."""
+        return self.linearised()
 
 
 def steady_turns(model: ShipModel, neutral: float) -> tuple[Floats, Floats]:

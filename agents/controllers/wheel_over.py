@@ -77,12 +77,8 @@ class WheelOver(Guided):
 
         Parameters
         ----------
-        model : ShipModel
-            The ship.
-        autopilot : Policy, optional
-            Any heading autopilot, also one that was learned; by default `LQ.from_model(model)`.
-        task : Task, optional
-            Its lookahead, corridor and control interval are used; by default the environment's own.
+        model, autopilot, task
+            As in `LineOfSight.from_model`.
         lookahead_lengths, turn_lookahead_lengths : float, optional
             Lookahead on a leg, and towards the next leg in a turn, ship lengths; by default the task's.
         radius_lengths, reach_lengths : float, optional
@@ -179,13 +175,11 @@ def own_turn(model: ShipModel, share: float = TURN_RUDDER) -> tuple[float, float
     Half the tactical diameter, and the advance less that, means of both sides. `share`: of the rudder limit.
     Raises InputError if the ship does not turn round.
     """
-    length, speed, rudder = (
-        model.particulars["length"], model.particulars["speed"], np.degrees(share * model.steering.limit),
-    )  # fmt: skip
+    length, speed = model.particulars["length"], model.particulars["speed"]
     time, step = TURN_LENGTHS * length / speed, TURN_STEP * length / speed
-    found = [
-        turning_indices(turning_circle(model, side * rudder, time, step), length) for side in (1.0, -1.0)
-    ]
+    rudder = np.degrees(share * model.steering.limit)
+    turns = [turning_circle(model, side * rudder, time, step) for side in (1.0, -1.0)]
+    found = [turning_indices(turn, length) for turn in turns]
     across = [one.tactical_diameter_lengths for one in found]
     ahead = [one.advance_lengths for one in found]
     if None in (*across, *ahead):

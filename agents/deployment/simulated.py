@@ -17,7 +17,7 @@ from shipgym.engine.passages import SEA_CHANNELS
 from shipgym.errors import InputError
 from shipgym.sea.conditions import Weather
 from shipgym.ships import ShipModel
-from shipgym.ships.conditions import Conditions, Passage
+from shipgym.ships.simulate import Conditions, Passage
 
 STEP = 0.1  # s, between two sentences of a compass
 SLOW = 10  # steps between two of the log and the GNSS receiver

@@ -68,13 +68,12 @@ class Network:
 
 def _check_layer(weight: Any, bias: Any, where: str) -> None:
     for name, array, ndim in (("weight", weight, 2), ("bias", bias, 1)):
-        if not isinstance(array, np.ndarray) or array.dtype != np.float32 or array.ndim != ndim:
+        known = isinstance(array, np.ndarray) and array.dtype == np.float32
+        if not known or array.ndim != ndim or array.size == 0:
             found = getattr(array, "dtype", type(array).__name__), getattr(array, "shape", ())
             raise InputError(
                 f"{where}.{name}: {found[0]} of shape {found[1]} found, expected float32 with {ndim} axes"
             )
-        if array.size == 0:
-            raise InputError(f"{where}.{name}: shape {array.shape} found, expected numbers")
         if not np.isfinite(array).all():
             wrong = tuple(np.argwhere(~np.isfinite(array))[0].tolist())
             raise InputError(

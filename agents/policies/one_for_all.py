@@ -145,7 +145,7 @@ class OneForAll:
         return found
 
     def save(self, path: str | Path) -> None:
-        """Write NAME.json and, beside it, NAME.safetensors (format in `agents.policies.policy_file`)."""
+        """Write NAME.json and, beside it, NAME.safetensors (fields in docs/policies.md)."""
         network, tensors = network_fields(self.network)
         content = {
             "format": FORMAT,

@@ -13,7 +13,6 @@ from typing import Any
 import numpy as np
 
 from agents.policies.policy import ORDERS, LearnedPolicy
-from agents.policies.weights_file import as_json
 from shipgym.errors import InputError
 from shipgym.files import write_bytes
 
@@ -45,13 +44,13 @@ def onnx_model(policy: Any) -> Any:
         raise InputError("onnx is not installed, the export needs it: pip install 'shipgym[onnx]'") from None
     real = onnx.TensorProto.FLOAT
     width = policy.frame_stack * len(policy.observation_names)
-    inputs = [helper.make_tensor_value_info("observations", real, ["batch", width])]
+    ends = [{"observations": width}, {"action": 2 if policy.action == "rudder-shaft" else 1}]
     if policy.base is not None:
-        inputs.append(helper.make_tensor_value_info("base_action", real, ["batch", 1]))
-    n_commands = 2 if policy.action == "rudder-shaft" else 1
-    outputs = [helper.make_tensor_value_info("action", real, ["batch", n_commands])]
-    if policy.base is not None:
-        outputs.append(helper.make_tensor_value_info("part", real, ["batch", 1]))
+        ends = [ends[0] | {"base_action": 1}, ends[1] | {"part": 1}]
+    inputs, outputs = (
+        [helper.make_tensor_value_info(name, real, ["batch", size]) for name, size in end.items()]
+        for end in ends
+    )
     nodes, constants = _nodes(policy, helper)
     initializers = [onnx.numpy_helper.from_array(array, name) for name, array in constants.items()]
     graph = helper.make_graph(nodes, "policy", inputs, outputs, initializers)
@@ -65,53 +64,40 @@ def onnx_model(policy: Any) -> Any:
 def _nodes(policy: LearnedPolicy, helper: Any) -> tuple[list[Any], dict[str, Any]]:
     """Operators from the inputs to the action, and the constants they use by name."""
     constants = {"low": np.array(-1.0, dtype=np.float32), "high": np.array(1.0, dtype=np.float32)}
-    nodes = []
-    x = "observations"
+    nodes: list[Any] = []
+
+    def add(operator: str, inputs: list[str], output: str, **attributes: Any) -> str:
+        nodes.append(helper.make_node(operator, inputs, [output], **attributes))
+        return output
+
+    x, network = "observations", policy.network
     if policy.base is not None:
-        nodes.append(helper.make_node("Concat", [x, "base_action"], ["seen"], axis=1))
-        x = "seen"
-    network = policy.network
-    last = len(network.layers) - 1
-    for i, (weight, bias) in enumerate(network.layers):
+        x = add("Concat", [x, "base_action"], "seen", axis=1)
+    between = [OPERATORS[network.activation]] * (len(network.layers) - 1)
+    after = "Tanh" if network.output == "tanh" else ""
+    for i, ((weight, bias), operator) in enumerate(zip(network.layers, [*between, after], strict=True)):
         names = [f"layers.{i}.weight", f"layers.{i}.bias"]
         constants |= dict(zip(names, (weight, bias), strict=True))
-        nodes.append(helper.make_node("Gemm", [x, *names], [f"sum.{i}"], transB=1))
-        x = f"sum.{i}"
-        operator = (
-            OPERATORS[network.activation] if i < last else ("Tanh" if network.output == "tanh" else None)
-        )
-        if operator is not None:
-            nodes.append(helper.make_node(operator, [x], [f"layer.{i}"]))
-            x = f"layer.{i}"
+        x = add("Gemm", [x, *names], f"sum.{i}", transB=1)
+        x = add(operator, [x], f"layer.{i}") if operator else x
     if policy.action == "rudder-discrete":
         constants["orders"] = ORDERS
-        nodes.append(helper.make_node("ArgMax", [x], ["number"], axis=1, keepdims=1))
-        nodes.append(helper.make_node("Gather", ["orders", "number"], ["action"], axis=0))
+        add("Gather", ["orders", add("ArgMax", [x], "number", axis=1, keepdims=1)], "action", axis=0)
     elif policy.base is None:
-        nodes.append(helper.make_node("Clip", [x, "low", "high"], ["action"]))
+        add("Clip", [x, "low", "high"], "action")
     else:
         constants["authority"] = np.array(policy.authority, dtype=np.float32)
-        nodes.append(helper.make_node("Clip", [x, "low", "high"], ["limited"]))
-        nodes.append(helper.make_node("Mul", ["limited", "authority"], ["part"]))
-        nodes.append(helper.make_node("Add", ["base_action", "part"], ["wanted"]))
-        nodes.append(helper.make_node("Clip", ["wanted", "low", "high"], ["action"]))
+        part = add("Mul", [add("Clip", [x, "low", "high"], "limited"), "authority"], "part")
+        add("Clip", [add("Add", ["base_action", part], "wanted"), "low", "high"], "action")
     used = {name for node in nodes for name in node.input}
     return nodes, {name: array for name, array in constants.items() if name in used}
 
 
 def _metadata(policy: LearnedPolicy) -> dict[str, str]:
+    """What its file says of it, and two names that older readers know."""
+    content, _ = policy.file_fields()
     values = {
-        "observation_names": list(policy.observation_names),
-        "observation_scales": list(policy.observation_scales),
-        "frame_stack": policy.frame_stack,
-        "action": policy.action,
-        "authority": policy.authority,
-        "action_repeat": policy.action_repeat,
-        "rate_limit": policy.rate_limit,
-        "history": policy.frame_stack,
-        "hold": policy.action_repeat,
-        "base": None if policy.base is None else policy.base.to_dict(),
-        "environment": {"id": policy.env_id, "options": as_json(policy.env_options)},
-        "model": {"name": policy.model_name, "sha256": policy.model_sha256},
+        name: content[name] for name in content if name not in ("format", "kind", "network", "training")
     }
+    values |= {"history": policy.frame_stack, "hold": policy.action_repeat}
     return {name: json.dumps(value) for name, value in values.items()}

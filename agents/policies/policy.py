@@ -13,7 +13,7 @@ al. 2019, Residual reinforcement learning for robot control, ICRA.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple, Self
@@ -21,7 +21,7 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from agents.controllers.controller import FORMAT, Action, Controller, check_observed
+from agents.controllers.controller import FORMAT, Action, Agent, Controller
 from agents.controllers.memory import checked_memory, checked_observation, checked_starts
 from agents.policies.network import Network
 from agents.policies.policy_extraction import sb3_fields, task_showing
@@ -30,7 +30,7 @@ from shipgym.checks import check_choice, check_number, check_whole
 from shipgym.errors import InputError
 from shipgym.ships import ShipModel
 from shipgym.tasks.definition import read_definition
-from shipgym.tasks.task import ACTIONS, RUDDER_ORDERS, Observed, Task
+from shipgym.tasks.task import ACTIONS, RUDDER_ORDERS, Task
 
 Numbers = NDArray[np.float32]
 
@@ -56,7 +56,7 @@ class Memory(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class LearnedPolicy:
+class LearnedPolicy(Agent):
     """A learned autopilot in the signature of `Controller.predict`; steers without torch.
 
     Attributes
@@ -111,10 +111,7 @@ class LearnedPolicy:
 
     def __post_init__(self) -> None:
         check_choice(self.action, ACTIONS, "action")
-        check_whole(self.frame_stack, "frame_stack", at_least=1)
-        check_whole(self.action_repeat, "action_repeat", at_least=1)
-        check_number(self.authority, "authority", above=0.0, at_most=LARGEST_AUTHORITY)
-        check_number(self.rate_limit, "rate_limit", above=0.0, at_most=NO_LIMIT)
+        check_part(self)
         if self.action == "rudder-discrete" and self.rate_limit < NO_LIMIT:
             raise InputError(f"rate_limit: {self.rate_limit:g} found with discrete orders, expected 2")
         n = len(self.observation_names)
@@ -122,17 +119,18 @@ class LearnedPolicy:
             raise InputError(
                 f"observation_scales: {len(self.observation_scales)} found, expected {n} numbers"
             )
-        if self.base is None and self.authority != 1.0:
-            raise InputError(f"authority: {self.authority:g} found without a base, expected 1, or a base")
         if self.base is not None:
             if self.action != "rudder":
                 raise InputError(f"action: '{self.action}' found beside a base, expected 'rudder'")
             self.base.check_fits(self.observation_names, self.observation_scales, "base")
         n_in = self.frame_stack * n + (self.base is not None)
-        _check_size(
-            "inputs", self.network.sizes[0], n_in, f"{self.frame_stack} x {n} observations and the base's"
-        )
-        _check_size("outputs", self.network.sizes[-1], OUTPUTS[self.action], f"for action '{self.action}'")
+        n_out, has = OUTPUTS[self.action], self.network.sizes
+        if has[0] != n_in:
+            why = f"{self.frame_stack} x {n} observations and the base's"
+            raise InputError(f"network: {has[0]} inputs found, expected {n_in}: {why}")
+        if has[-1] != n_out:
+            why = f"for action '{self.action}'"
+            raise InputError(f"network: {has[-1]} outputs found, expected {n_out}: {why}")
 
     @classmethod
     def from_sb3(cls, agent: Any, env: Any = None, training: Mapping[str, Any] | None = None) -> Self:
@@ -147,9 +145,6 @@ class LearnedPolicy:
     def name(self) -> str:
         """Short name: the algorithm, or `learned`."""
         return str(self.training.get("algorithm", "learned"))
-
-    def reset(self) -> None:
-        """The state with which an episode begins: None, whatever the number of ships."""
 
     def predict(
         self, observation: ArrayLike, state: Any = None, episode_start: Any = None, deterministic: bool = True
@@ -185,13 +180,10 @@ class LearnedPolicy:
         if due.any():
             left = np.where(due[:, None], np.float32(self.action_repeat), left)
             outputs = np.where(due[:, None], self.network(inputs), outputs)
-        return np.concatenate([left - 1.0, outputs, self._in_force(outputs, before)], axis=1)
-
-    def _in_force(self, outputs: Numbers, before: Numbers) -> Numbers:
-        """Outputs limited in size and rate; those before that were not a number limit nothing."""
-        if self.rate_limit == NO_LIMIT:
-            return outputs
-        return toward(outputs, np.where(np.isfinite(before), before, 0.0), self.rate_limit)
+        in_force = outputs
+        if self.rate_limit < NO_LIMIT:  # limited from those before, if they were numbers
+            in_force = toward(outputs, np.where(np.isfinite(before), before, 0.0), self.rate_limit)
+        return np.concatenate([left - 1.0, outputs, in_force], axis=1)
 
     def commands(self, output: Numbers, proposed: Numbers | None) -> Action:
         """What is commanded for the network's outputs and the base's action, each of shape (n, ...)."""
@@ -221,34 +213,27 @@ class LearnedPolicy:
         held = np.where(flags[:, None], nothing, np.reshape(held, nothing.shape))
         return np.where(flags[:, None, None], present, np.reshape(seen, expected)), inner, held
 
-    def check_fits(self, names: Sequence[str], scales: Sequence[float], where: str = "observations") -> None:
-        """Refuse what shows other quantities first, or in other scales, than those it learned with.
-
-        Arguments and errors as in `Controller.check_fits`.
-        """
-        check_observed(
-            self, names, scales, where,
+    @property
+    def made_for(self) -> str:
+        """See `Agent.made_for`."""
+        return (
             f"policy '{self.name}' learned with {{}} (model '{self.model_name}', {self.env_id}): another "
-            f"ship or task; train one in this environment",
-        )  # fmt: skip
+            f"ship or task; train one in this environment"
+        )
 
     def check_fits_model(self, model: ShipModel) -> None:
         """Refuse a ship with other observation scales in the environment that it learned in."""
-        shown = self._observed(model)
-        names, scales = [one.name for one in shown], [one.scale for one in shown]
-        self.check_fits(names, scales, f"model '{model.name}'")
-
-    def _observed(self, model: ShipModel) -> tuple[Observed, ...]:
-        """What its environment shows of a ship."""
         definition = read_definition(task_showing(self.observation_names))
         known = {"action": self.action, "roll": "roll" in self.observation_names, **self.env_options}
         names = [name for name in SHOWING if name in known and name in Task.option_names(definition)]
         task = Task.of(definition, **{name: known[name] for name in names})
         task.check_fits(model)
-        return task.observed(model)
+        shown = task.observed(model)
+        names, scales = [one.name for one in shown], [one.scale for one in shown]
+        self.check_fits(names, scales, f"model '{model.name}'")
 
     def save(self, path: str | Path) -> None:
-        """Write NAME.json and, beside it, NAME.safetensors (format in `agents.policies.policy_file`)."""
+        """Write NAME.json and, beside it, NAME.safetensors (fields in docs/policies.md)."""
         write_policy(*self.file_fields(), Path(path))
 
     def file_fields(self) -> tuple[dict[str, Any], Tensors]:
@@ -271,6 +256,16 @@ class LearnedPolicy:
             "training": as_json(self.training),
         }  # fmt: skip
         return content, tensors
+
+
+def check_part(agent: Any) -> None:
+    """Refuse an impossible share of the rudder, frame stack, repeat or rate, of a policy or of its ships."""
+    check_number(agent.authority, "authority", above=0.0, at_most=LARGEST_AUTHORITY)
+    check_whole(agent.frame_stack, "frame_stack", at_least=1)
+    check_whole(agent.action_repeat, "action_repeat", at_least=1)
+    check_number(agent.rate_limit, "rate_limit", above=0.0, at_most=NO_LIMIT)
+    if agent.base is None and agent.authority != 1.0:
+        raise InputError(f"authority: {agent.authority:g} found without a base, expected 1, or a base")
 
 
 def toward(outputs: Numbers, before: Numbers, rate_limit: float) -> Numbers:
@@ -298,8 +293,3 @@ def order_numbers(action: ArrayLike) -> NDArray[np.int64]:
     given = np.asarray(action, dtype=np.float32)
     numbers: NDArray[np.int64] = np.abs(given - ORDERS).argmin(axis=-1)
     return numbers
-
-
-def _check_size(what: str, found: int, expected: int, why: str) -> None:
-    if found != expected:
-        raise InputError(f"network: {found} {what} found, expected {expected}: {why}")

@@ -95,10 +95,8 @@ def _residual(stack: Sequence[Any]) -> dict[str, Any]:
         if all(name in vars(wrapper) for name in RESIDUAL):
             base = wrapper.base
             if base is not None and not isinstance(base, Controller):
-                raise InputError(
-                    f"base: {type(base).__name__} found, expected a controller of shipgym, which a file can "
-                    "hold"
-                )
+                kind = type(base).__name__
+                raise InputError(f"base: {kind} found, expected a controller of shipgym, for its file")
             whole = {name: int(getattr(wrapper, name)) for name in ("frame_stack", "action_repeat")}
             parts = {name: float(getattr(wrapper, name)) for name in ("authority", "rate_limit")}
             return {"base": base, **whole, **parts}
@@ -134,7 +132,9 @@ def _network(agent: Any) -> Network:
     """The layers from observation to command."""
     policy = agent.policy
     actor: Any = getattr(policy, "actor", None)
-    _check_features(policy if actor is None else actor)
+    name = type(getattr(policy if actor is None else actor, "features_extractor", None)).__name__
+    if name not in ("FlattenExtractor", "NoneType"):
+        raise InputError(f"agent: features extractor {name} found, expected none: use 'MlpPolicy' as it is")
     if getattr(agent, "use_sde", False):
         raise InputError(f"agent: {SDE}")
     what = f"{type(agent).__name__} with {type(policy).__name__}"
@@ -161,12 +161,6 @@ def actor_network(weights: Mapping[str, Any], activation: str | None, what: str)
         raise InputError(f"agent: weights {quoted(sorted(odd))} missing or not known, expected {DENSE}")
     pairs = tuple((_array(weights[weight]), _array(weights[bias])) for weight, bias in layers)
     return Network(pairs, ACTIVATION_OF[between], output)
-
-
-def _check_features(owner: Any) -> None:
-    name = type(getattr(owner, "features_extractor", None)).__name__
-    if name not in ("FlattenExtractor", "NoneType"):
-        raise InputError(f"agent: features extractor {name} found, expected none: use 'MlpPolicy' as it is")
 
 
 def _array(parameter: Any) -> NDArray[np.float32]:

@@ -1,19 +1,8 @@
 """A safety shield: a policy whose rudder a fallback takes over where it leads the ship astray.
 
-It uses observations alone and takes over
-
-* where the state has been farther out of the data the model was identified from than `Limits.envelope_out`
-  for `Limits.out_lengths` (`Envelope.distance` of u, v, r and delta; a model without an envelope has no such
-  limit);
-* where the heading runs away: since she was last within `Limits.back_deg` of her course, or was turning
-  towards it, the ship has turned away from it by `Limits.runaway_deg`. Changes of the course itself do not
-  count, however large, and within `Limits.turn_lengths` of a planned turn that is observed any heading up to
-  the course beyond it is on course;
-* where the policy's command is not a number.
-
-It hands back after the ship has been within `Limits.back_deg` of her course and within
-`Limits.envelope_back` of the data for `Limits.calm_lengths` times to travel a ship length without a break.
-The limits to hand back lie inside those to take over, so that it does not chatter.
+It uses observations alone. When it takes over and hands back stands in docs/policies.md and in `Limits`; the
+limits to hand back lie inside those to take over, so that it does not chatter. Changes of the course itself
+do not count as turning away, and before a planned turn any heading up to the course beyond it is on course.
 """
 
 from __future__ import annotations
@@ -26,9 +15,9 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from agents.controllers.controller import FORMAT, Action, Controller, Policy
+from agents.controllers.controller import FORMAT, Action, Agent, Controller, Policy
 from agents.controllers.lq import LQ
-from agents.controllers.memory import Flags, Floats, begun, heading_error
+from agents.controllers.memory import Flags, Floats, Records, begun, heading_error, records, size_of
 from agents.policies.policy import LearnedPolicy
 from agents.policies.weights_file import Tensors, write_policy
 from shipgym.checks import check_number
@@ -36,9 +25,13 @@ from shipgym.errors import InputError
 from shipgym.ships import Envelope, ShipModel
 from shipgym.tasks.task import OBSERVATION_NAMES, control_interval
 
-# what is remembered of each ship
-STEERED, QUIET, OUTSIDE, TURNED, LAST_RATE, COUNT, INTERVALS = range(7)
-N_WATCHED = 7
+#: What is remembered of each ship; the last two since her episode began.
+WATCH = np.dtype([
+    ("steered", "f8"),  # whether the fallback steers
+    ("quiet", "f8"), ("outside", "f8"),  # intervals in which she was fit to be handed back, and was not
+    ("turned", "f8"), ("rate", "f8"),  # angle turned away from the course, and the last yaw rate
+    ("count", "f8"), ("intervals", "f8"),  # how often it took over, and how long it steered
+])  # fmt: skip
 TURNS = (("turn_distance", "turn_angle"), ("next_turn_distance", "next_turn_angle"))  # as tasks name them
 
 
@@ -66,8 +59,7 @@ class Limits:
         )
         check_number(self.runaway_deg, "limits.runaway_deg", above=0.0, at_most=180.0)
         check_number(self.back_deg, "limits.back_deg", above=0.0, below=self.runaway_deg, hint=hint)
-        check_number(self.out_lengths, "limits.out_lengths", at_least=0.0)
-        for name in ("calm_lengths", "turn_lengths"):
+        for name in ("out_lengths", "calm_lengths", "turn_lengths"):
             check_number(getattr(self, name), f"limits.{name}", at_least=0.0)
 
 
@@ -91,13 +83,13 @@ class Interventions:
 
 def interventions(state: ShieldState) -> Interventions:
     """Read from the state that `Shielded.predict` returned how often and how long the fallback steered."""
-    watch = state.watch
-    count, intervals = watch[..., COUNT].astype(np.int64), watch[..., INTERVALS].astype(np.int64)
-    return Interventions(count, intervals, watch[..., STEERED] > 0.0)
+    watch = records(state.watch, WATCH)
+    count, intervals = (watch[name].astype(np.int64) for name in ("count", "intervals"))
+    return Interventions(count, intervals, watch["steered"] > 0.0)
 
 
 @dataclass(frozen=True, eq=False)
-class Shielded:
+class Shielded(Agent):
     """A policy under a safety shield.
 
     Attributes
@@ -183,9 +175,6 @@ class Shielded:
         """Physical value of each observation of 1, SI units."""
         return tuple(getattr(self.policy, "observation_scales", self.fallback.observation_scales))
 
-    def reset(self) -> None:
-        """The state with which an episode begins: None, whatever the number of ships."""
-
     def predict(
         self, observation: ArrayLike, state: Any = None, episode_start: Any = None, deterministic: bool = True
     ) -> tuple[Action, ShieldState]:
@@ -195,13 +184,13 @@ class Shielded:
         ours, outer = self.fallback.predict(given, outer, episode_start, deterministic)
         theirs, inner = self.policy.predict(given, inner, episode_start, deterministic)
         action = np.array(theirs, dtype=np.float32)
-        watch, _ = begun(watch, episode_start, given.shape[:-1], N_WATCHED)
-        self._update(given, np.asarray(~np.isfinite(action).all(axis=-1)), watch)
-        steered = watch[..., STEERED] > 0.0
-        action[..., 0] = np.where(steered, ours[..., 0], action[..., 0])
+        watch, _ = begun(watch, episode_start, given.shape[:-1], size_of(WATCH))
+        known = records(watch, WATCH)
+        self._update(given, np.asarray(~np.isfinite(action).all(axis=-1)), known)
+        action[..., 0] = np.where(known["steered"] > 0.0, ours[..., 0], action[..., 0])
         return np.where(np.isfinite(action), action, 0.0), ShieldState(inner, outer, watch)
 
-    def _update(self, observation: NDArray[Any], broken: Flags, watch: Floats) -> None:
+    def _update(self, observation: NDArray[Any], broken: Flags, watch: Records) -> None:
         """Decide for each ship who steers, and count."""
         limits, n = self.limits, len(OBSERVATION_NAMES)
         si = observation[..., :n].astype(np.float64) * self.fallback.observation_scales[:n]
@@ -210,24 +199,24 @@ class Shielded:
         turn = self._planned_turn(observation)
         error = error - np.clip(error, np.minimum(-turn, 0.0), np.maximum(-turn, 0.0))
         near = np.abs(error) <= np.radians(limits.back_deg)
-        turn = 0.5 * self.dt * (seen["yaw_rate"] + watch[..., LAST_RATE])
-        watch[..., LAST_RATE] = seen["yaw_rate"]
-        watch[..., TURNED] = np.where(near, 0.0, np.maximum(watch[..., TURNED] - np.sign(error) * turn, 0.0))
-        out = broken | (watch[..., TURNED] >= np.radians(limits.runaway_deg))
+        turn = 0.5 * self.dt * (seen["yaw_rate"] + watch["rate"])
+        watch["rate"] = seen["yaw_rate"]
+        watch["turned"] = np.where(near, 0.0, np.maximum(watch["turned"] - np.sign(error) * turn, 0.0))
+        out = broken | (watch["turned"] >= np.radians(limits.runaway_deg))
         calm = near & ~broken
         if self.envelope is not None:
             distance = self.envelope.distance(seen["surge"], seen["sway"], seen["yaw_rate"], seen["rudder"])
             beyond = distance > limits.envelope_out
-            watch[..., OUTSIDE] = np.where(beyond, watch[..., OUTSIDE] + 1.0, 0.0)
-            out |= beyond & (watch[..., OUTSIDE] >= self._intervals(limits.out_lengths))
+            watch["outside"] = np.where(beyond, watch["outside"] + 1.0, 0.0)
+            out |= beyond & (watch["outside"] >= self._intervals(limits.out_lengths))
             calm &= distance <= limits.envelope_back
-        steered = watch[..., STEERED] > 0.0
-        watch[..., QUIET] = np.where(steered & calm, watch[..., QUIET] + 1.0, 0.0)
-        over = watch[..., QUIET] >= self._intervals(limits.calm_lengths)
+        steered = watch["steered"] > 0.0
+        watch["quiet"] = np.where(steered & calm, watch["quiet"] + 1.0, 0.0)
+        over = watch["quiet"] >= self._intervals(limits.calm_lengths)
         now = (steered & ~over) | out
-        watch[..., STEERED] = now
-        watch[..., COUNT] += now & ~steered
-        watch[..., INTERVALS] += now
+        watch["steered"] = now
+        watch["count"] += now & ~steered
+        watch["intervals"] += now
 
     def _planned_turn(self, observation: NDArray[Any]) -> Any:
         """Angle of a turn that may begin, rad; 0 where none is near or none is observed."""
@@ -246,13 +235,7 @@ class Shielded:
         return max(1.0, lengths * length_time / self.dt)
 
     def check_fits(self, names: Sequence[str], scales: Sequence[float], where: str = "observations") -> None:
-        """Refuse what shows other quantities first, or in other scales, than policy and fallback know.
-
-        Raises
-        ------
-        InputError
-            Naming the first difference.
-        """
+        """Refuse what policy or fallback was not made for, see `Agent.check_fits`."""
         for one in (self.policy, self.fallback):
             if (check := getattr(one, "check_fits", None)) is not None:
                 check(names, scales, where)
@@ -264,12 +247,17 @@ class Shielded:
                 check(model)
 
     def save(self, path: str | Path) -> None:
-        """Write policy and fallback as one file (format in `agents.policies.policy_file`)."""
+        """Write policy and fallback as one file (fields in docs/policies.md)."""
         write_policy(*self.file_fields(), Path(path))
 
     def file_fields(self) -> tuple[dict[str, Any], Tensors]:
         """What stands in its JSON, and the weights of its policy by name."""
-        policy, tensors = _file_fields(self.policy)
+        if not isinstance(self.policy, Controller | LearnedPolicy | Shielded):
+            raise InputError(
+                f"policy: {type(self.policy).__name__} found, expected a learned policy or a controller of "
+                f"shipgym for a file"
+            )
+        policy, tensors = self.policy.file_fields()
         content = {
             "format": FORMAT,
             "kind": "shielded",
@@ -280,14 +268,3 @@ class Shielded:
             "limits": asdict(self.limits),
         }
         return content, {f"policy.{name}": tensor for name, tensor in tensors.items()}
-
-
-def _file_fields(policy: Policy) -> tuple[dict[str, Any], Tensors]:
-    if isinstance(policy, Controller):
-        return policy.to_dict(), {}
-    if isinstance(policy, LearnedPolicy | Shielded):
-        return policy.file_fields()
-    raise InputError(
-        f"policy: {type(policy).__name__} found, expected a learned policy or a controller of shipgym for a "
-        f"file"
-    )

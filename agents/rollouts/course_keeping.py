@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -10,6 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from agents.controllers.controller import Policy
+from agents.controllers.linear_loop import length_time
+from agents.controllers.memory import gathered, on_course
 from agents.rollouts.metrics import costs, mean, steering
 from agents.rollouts.rollout import Rollout, check_fits, rollout
 from shipgym.arrays import Floats
@@ -17,8 +19,7 @@ from shipgym.checks import check_number
 from shipgym.envs.engine import Engine
 from shipgym.errors import InputError
 from shipgym.ships import ShipModel
-from shipgym.tasks.steering import INTEGRAL_ZONE
-from shipgym.tasks.task import OBSERVATION_NAMES, Task, course_keeping_task, observation_scales
+from shipgym.tasks.task import Task, course_keeping_task, observation_scales
 
 RECORDED = ("psi", "delta", "set_point", *course_keeping_task().info_names)
 AT_ONCE = 1024  # ships, of a structure and its recordings, that fit into little memory
@@ -176,16 +177,12 @@ def step_response(
     ----------
     controller : Policy
         Anything with `predict`.
-    models : ShipModel or sequence of ShipModel
-        Of one structure.
+    models, task, allow_unstable
+        As in `sail`; of the task its control interval and bounds are used.
     step_deg : float
         Change of course, degrees, positive to starboard.
     duration : float, optional
         In s; by default the time to travel 16 ship lengths.
-    task : Task, optional
-        Its control interval and bounds are used.
-    allow_unstable : bool
-        As in `sail`.
 
     Returns
     -------
@@ -198,18 +195,17 @@ def step_response(
     """
     fleet = _fleet(models)
     check_number(step_deg, "step_deg", at_least=-LARGEST_STEP_DEG, at_most=LARGEST_STEP_DEG)
-    check_fits(controller, task or course_keeping_task(), fleet[0], f"model '{fleet[0].name}'")
-    length_time = fleet[0].particulars["length"] / fleet[0].particulars["speed"]
-    if duration is None:
-        duration = STEP_LENGTHS * length_time
-    check_number(duration, "duration", above=0.0)
     asked = task or course_keeping_task()
+    check_fits(controller, asked, fleet[0], f"model '{fleet[0].name}'")
+    if duration is None:
+        duration = STEP_LENGTHS * length_time(fleet[0])
+    check_number(duration, "duration", above=0.0)
     steps = int(np.ceil(duration / asked.interval(fleet[0])))
     straight = asked.changed(course_change_deg=0.0, episode_steps=steps)
     engine = Engine(fleet, len(fleet), straight, allow_unstable=allow_unstable)
-    course = _ShiftedCourse(engine, np.radians(step_deg))
     seeds = np.zeros(len(fleet), dtype=np.int64)
-    states = rollout(controller, engine, seeds, record=RECORDED, show=course.shown).states
+    course = _other_course(engine, np.radians(step_deg))
+    states = rollout(controller, engine, seeds, record=RECORDED, show=course).states
     left = ((0, steps + 1 - len(states["psi"])), (0, 0))  # after all were lost, if they were
     heading, rudder = (
         np.pad(values, left, mode="edge").T
@@ -219,32 +215,18 @@ def step_response(
     return StepResponses(t, heading, rudder)
 
 
-class _ShiftedCourse:
-    """Shows ships that keep their course in the engine another course, the same step away for all."""
+def _other_course(engine: Engine, step: float) -> Callable[[NDArray[np.float32]], NDArray[np.float32]]:
+    """What ships that keep their course in the engine observe of another one, a step away, rad."""
+    reach, integral, begins = observation_scales(engine.model)[-1], np.zeros(engine.num_envs), True
 
-    def __init__(self, engine: Engine, step: float) -> None:
-        self.engine = engine
-        self.step = step
-        self.reach = observation_scales(engine.model)[-1]
-        self.integral: Floats | None = None
+    def shown(observations: NDArray[np.float32]) -> NDArray[np.float32]:
+        nonlocal integral, begins
+        state = engine.physical_state()
+        error = step - (state["psi"] - state["set_point"])
+        integral, begins = gathered(integral, error, begins, engine.dt, reach), False
+        return on_course(observations, error, integral, reach)
 
-    def shown(self, observations: NDArray[np.float32]) -> NDArray[np.float32]:
-        """Observations with the heading error of the other course, and its integral by the task's rule."""
-        state = self.engine.physical_state()
-        error = self.step - (state["psi"] - state["set_point"])
-        if self.integral is None:
-            self.integral = np.zeros_like(error)
-        else:
-            gathered = np.where(np.abs(error) <= INTEGRAL_ZONE, error * self.engine.dt, 0.0)
-            self.integral = np.clip(self.integral + gathered, -self.reach, self.reach)
-        observations = observations.copy()
-        for name, values in (
-            ("heading_error_sin", np.sin(error)),
-            ("heading_error_cos", np.cos(error)),
-            ("heading_error_integral", self.integral / self.reach),
-        ):
-            observations[:, OBSERVATION_NAMES.index(name)] = values
-        return observations
+    return shown
 
 
 def _fleet(models: ShipModel | Sequence[ShipModel]) -> list[ShipModel]:

@@ -32,6 +32,8 @@ STATES = ("psi", "u", "v", "n", "delta", "set_point")
 DEAD_BAND = np.radians(0.5)  # the rudder has turned round once it came back by so much
 SMALLEST_CHANGE = np.radians(5.0)  # of course, whose overshoot and settling count
 SETTLED_SHARE, SETTLED_LEAST = 0.05, np.radians(1.0)  # of the change of course, and rad
+OF_COURSES = ("overshoot_percent", "settling_s", "unsettled")
+OF_PATHS = ("cross_track_rmse_m", "outside_corridor", "left_corridor", "grounded")
 WORST_PROGRESS = 2.0  # cost of a step against the path
 
 
@@ -53,42 +55,24 @@ def _on_path(task: Task) -> bool:
 
 
 def metrics(run: Rollout) -> dict[str, Floats]:
-    """Figures of each episode by name, each of shape (n,).
+    """Figures of each episode by name, each of shape (n,); docs/benchmark.md says what they are.
 
-    Parameters
-    ----------
-    run : Rollout
-        That recorded `recorded_for_metrics`.
-
-    Returns
-    -------
-    dict of str to array
-        cost, cost_heading and so on : minus the sum of the rewards, and its parts. An episode in which the
-            policy failed is charged as if it had lost control then.
-        heading_rmse_deg : against the set-point, on a path against its line-of-sight course.
-        rudder_travel_deg_min, rudder_reversals_min : way of the rudder, and how often it turns round (by
-            0.5 degrees at least), a minute.
-        overshoot_percent, settling_s, unsettled : see `course_changes`.
-        cross_track_rmse_m : on a path.
-        outside_corridor, left_corridor, grounded : share of the time; whether at all.
-        success : on a path, whether its end was reached; else whether control was kept to the end.
-        fuel : see `fuel_per_distance`.
-        extrapolating : share of the time outside the model's envelope.
-        shielded : share of the time in which a safety shield steered; interventions: how often it took over.
-        terminated, failed : control lost, the ship ran away or aground; no command.
-        duration_s : time sailed.
+    `run`: that recorded `recorded_for_metrics`. An episode in which the policy failed is charged as if it had
+    lost control then.
     """
     shielded = run.shielded & run.sailing
+    kept = (~(run.terminated | run.failed)).astype(np.float64)
+    own = path_following(run) if _on_path(run.task) else {**course_changes(run), "success": kept}
     return {
         **costs(run),
         **steering(run),
-        **course_changes(run),
-        **path_following(run),
+        **dict.fromkeys((*OF_COURSES, *OF_PATHS), np.full(len(run.seeds), np.nan)),
+        **own,
         "fuel": fuel_per_distance(run),
         "extrapolating": mean(run, run.infos["extrapolating"]),
         "shielded": ratio(total(shielded), run.steps),
         "interventions": total(shielded[1:] & ~shielded[:-1]) + total(shielded[:1]),
-        "terminated": lost(run).astype(np.float64),
+        "terminated": (run.terminated & ~(_on_path(run.task) & (own["success"] > 0.0))).astype(np.float64),
         "failed": run.failed.astype(np.float64),
         "duration_s": run.steps * run.dt,
     }
@@ -116,19 +100,11 @@ def steering(run: Rollout) -> dict[str, Floats]:
     }
 
 
-def lost(run: Rollout) -> Flags:
-    """Whether control was lost, the ship ran away or aground, shape (n,)."""
-    found: Flags = (
-        run.terminated & ~(path_following(run)["success"] > 0.0) if _on_path(run.task) else run.terminated
-    )
-    return found
-
-
 def reversals(angle: Floats, counts: Flags, dead_band: float = DEAD_BAND) -> Floats:
     """How often an angle turns round, by more than a dead band each time.
 
     `angle`: rad, shape (n_steps + 1, n); `counts`: intervals that count, shape (n_steps, n); `dead_band`:
-    rad; a smaller return does not count. Returns an array of shape (n,).
+    rad; a smaller return does not count. Returns shape (n,).
     """
     low, high = angle[0], angle[0]  # since the last turn
     way: Floats = np.zeros(angle.shape[1])  # -1, 0 or 1
@@ -151,14 +127,10 @@ def course_changes(run: Rollout) -> dict[str, Floats]:
     end of the episode. Its overshoot is the largest heading error on the other side, in percent of the first
     error; it has settled at the time from which on the error stays within 5 % of the first one, but no less
     than 1 degree. One that has not counts as unsettled, with the whole of its duration as the time. Returns
-    overshoot_percent, settling_s, unsettled (share of the changes); NaN on paths, shape (n,).
+    `OF_COURSES`, the last a share of the changes, each of shape (n,).
     """
-    n = len(run.seeds)
-    names = ("overshoot_percent", "settling_s", "unsettled")
-    if _on_path(run.task):
-        return {name: np.full(n, np.nan) for name in names}
-    means = np.full((3, n), np.nan)
-    for episode in range(n):
+    means = np.full((3, len(run.seeds)), np.nan)
+    for episode in range(len(run.seeds)):
         last = int(run.steps[episode])
         course = run.states["set_point"][: last + 1, episode]
         error = wrapped(course - run.states["psi"][: last + 1, episode])
@@ -171,7 +143,7 @@ def course_changes(run: Rollout) -> dict[str, Floats]:
                 found.append(step_figures(stretch, run.dt))
         if found:
             means[:, episode] = np.mean(found, axis=0)
-    return dict(zip(names, means, strict=True))
+    return dict(zip(OF_COURSES, means, strict=True))
 
 
 def step_figures(error: Floats, dt: float) -> tuple[float, float, float]:
@@ -210,12 +182,7 @@ def fuel_per_distance(run: Rollout) -> Floats:
 
 
 def path_following(run: Rollout) -> dict[str, Floats]:
-    """How each episode followed its path, see `metrics`; in course keeping NaN but for success."""
-    if not _on_path(run.task):
-        names = ("cross_track_rmse_m", "outside_corridor", "left_corridor", "grounded")
-        none = np.full(len(run.seeds), np.nan)
-        kept = ~(run.terminated | run.failed)
-        return {**dict.fromkeys(names, none), "success": kept.astype(np.float64)}
+    """How each episode followed its path, see `metrics`."""
     outside = (run.infos["in_corridor"][1:] == 0.0) & run.sailing
 
     def ever(name: str) -> Floats:

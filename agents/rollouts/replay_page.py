@@ -39,11 +39,7 @@ def write_replay(paths: Sequence[str | Path], out: str | Path) -> None:
 
 
 def replay_page(episodes: Mapping[str, Episode]) -> str:
-    """The page of episodes by name.
-
-    `episodes`: what the legend calls each. Returns HTML that loads nothing. Raises InputError if there is
-    none.
-    """
+    """HTML that loads nothing, of episodes by what the legend calls them; InputError if there is none."""
     if not episodes:
         raise InputError("episodes: none found, expected at least one")
     runs = [run(name, episode) for name, episode in episodes.items()]
@@ -52,11 +48,7 @@ def replay_page(episodes: Mapping[str, Episode]) -> str:
 
 
 def player(title: str, data: Any) -> str:
-    """The page that replays runs.
-
-    `title`: of the window; `data`: `runs` and `quantities` (`agents.rollouts.replay_series`); or a
-    placeholder for them. Returns HTML that loads nothing.
-    """
+    """HTML that loads nothing and replays `runs` and `quantities` (`replay_series`), or a placeholder."""
     return render("agents.rollouts/replay.html", title=title, data=data)
 
 

@@ -42,10 +42,6 @@ QUANTITIES = (
 )
 
 
-def _points(path: Floats | None) -> list[list[float]] | None:
-    return None if path is None else [rounded(point) for point in path]
-
-
 def run(name: str, episode: Episode) -> dict[str, Any]:
     """An episode ready for the page's JSON.
 
@@ -68,11 +64,11 @@ def run(name: str, episode: Episode) -> dict[str, Any]:
         "rudderLimit": float(np.degrees(episode.rudder_limit)),
         "outcome": outcome(episode),
         "total": float(np.sum(episode.rewards)),
-        "waypoints": _points(episode.waypoints),
-        "path": _points(episode.path),
+        "waypoints": None if episode.waypoints is None else rounded(episode.waypoints),
+        "path": None if episode.path is None else rounded(episode.path),
         "corridor": episode.corridor,
         "series": {key: rounded(values) for key, values in series(episode).items()},
-        "parts": {key: rounded(values) for key, values in _after_steps(episode.reward_parts).items()},
+        "parts": {key: rounded(np.append(0.0, values)) for key, values in episode.reward_parts.items()},
         "rewards": rounded(np.append(0.0, episode.rewards)),
         "other": {key: rounded(values) for key, values in other.items()},
     }
@@ -141,14 +137,13 @@ def _first(names: Sequence[str], states: Mapping[str, Floats]) -> str | None:
 def _weather(states: Mapping[str, Floats]) -> dict[str, Floats]:
     """Wind and current where they are recorded and not zero throughout."""
     found: dict[str, Floats] = {}
-    if "wind_speed" in states and "wind_from" in states and np.any(states["wind_speed"]):
+    if {"wind_speed", "wind_from"} <= states.keys() and np.any(states["wind_speed"]):
         found["wind_speed"] = states["wind_speed"]
         found["wind_from"] = np.degrees(states["wind_from"]) % 360.0
-    if "current_north" in states and "current_east" in states:
+    if {"current_north", "current_east"} <= states.keys():
         north, east = states["current_north"], states["current_east"]
-        speed = np.hypot(north, east)
-        if np.any(speed):
-            found["current_speed"] = speed
+        if np.any(north) or np.any(east):
+            found["current_speed"] = np.hypot(north, east)
             found["current_towards"] = np.degrees(np.arctan2(east, north)) % 360.0
     return found
 
@@ -158,15 +153,10 @@ def _before_steps(values: Floats) -> Floats:
     return np.append(values, values[-1:])
 
 
-def _after_steps(parts: Mapping[str, Floats]) -> dict[str, Floats]:
-    """Rewards of steps at the samples where these end; nothing at the beginning."""
-    return {name: np.append(0.0, values) for name, values in parts.items()}
-
-
-def rounded(values: Floats) -> list[float]:
+def rounded(values: Floats) -> list[Any]:
     """Numbers with the digits that the page keeps."""
     array = np.asarray(values, dtype=float)
     size = np.floor(np.log10(np.maximum(np.abs(array), 1e-12)))
     power = 10.0 ** np.clip(DIGITS - 1.0 - size, 0.0, DIGITS + 2.0)
-    short: list[float] = (np.round(array * power) / power).tolist()
+    short: list[Any] = (np.round(array * power) / power).tolist()
     return short

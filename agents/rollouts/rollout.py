@@ -114,15 +114,12 @@ def rollout(
     log = _Log(engine, record, tolerant)
     seen, memory, starts = engine.reset(seeds), None, log.sailing
     log.look()
-    while True:
-        actions, memory = log.ask(policy, seen if show is None else show(seen), memory, starts)
-        command = log.checked(actions, type(policy).__name__)
-        if not log.sailing.any():
+    while log.sailing.any():
+        command, memory = log.ask(policy, seen if show is None else show(seen), memory, starts)
+        if not log.sailing.any():  # the policy has failed in all episodes
             break
         seen, rewards, terminated, truncated = engine.step(command)
-        log.note(command, rewards, memory, terminated, truncated)
-        if not log.sailing.any():
-            break
+        log.note(command, memory, rewards, terminated, truncated)
         starts = np.zeros(engine.num_envs, dtype=np.bool_)
     return log.rollout(np.asarray(seeds))
 
@@ -153,11 +150,9 @@ class _Log:
         self.sailing = np.ones(engine.num_envs, dtype=np.bool_)
         self.terminated = self.truncated = self.failed = ~self.sailing
         self.costs = np.zeros(engine.num_envs)
-        self.failure, self.error, self.seconds, self.asked = "", "", 0.0, 0
+        self.failure, self.seconds, self.asked = "", 0.0, 0
         self.sailed: list[Flags] = []
-        self.actions: list[NDArray[np.float32]] = []
-        self.rewards: list[Floats] = []
-        self.shielded: list[Flags] = []
+        self.intervals: list[tuple[NDArray[np.float32], Floats, Flags]] = []  # actions, rewards, shielded
         self.states: list[dict[str, Floats]] = []
         self.infos: list[list[Floats]] = []
 
@@ -171,30 +166,25 @@ class _Log:
             self.states.append({name: values for name, values in state.items() if self._keeps(name)})
             self.infos.append([self.engine.info(name).copy() for name in self.names])
 
-    def ask(self, policy: Policy, shown: Any, memory: Any, starts: Flags) -> tuple[Any, Any]:
-        """A policy's answer; what goes wrong is its own failure."""
-        began = time.process_time()
-        self.error = ""
+    def ask(self, policy: Policy, shown: Any, memory: Any, starts: Flags) -> tuple[NDArray[np.float32], Any]:
+        """A policy's commands, 0 for ships that do not sail; episodes without a command have failed."""
+        began, why = time.process_time(), ""
         try:
             actions, memory = policy.predict(shown, memory, starts, True)
         except Exception as error:  # whatever a user's policy raises
             if not self.tolerant:
                 raise
-            actions, self.error = None, f"{type(error).__name__}: {error} (at step {len(self.sailed)})"
+            actions, why = None, f"{type(error).__name__}: {error} (at step {len(self.sailed)})"
         self.seconds += time.process_time() - began
         self.asked += int(self.sailing.sum())
-        return actions, memory
-
-    def checked(self, actions: Any, who: str) -> NDArray[np.float32]:
-        """The commands, 0 for ships that do not sail any more; episodes without a command have failed."""
-        command, bad, why = self._commands(actions)
+        command, bad, found = self._commands(actions)
         if bad.any():
             if not self.tolerant:
-                raise InputError(f"{who}.predict: {why}")
-            self.failure = self.failure or self.error or why
+                raise InputError(f"{type(policy).__name__}.predict: {found}")
+            self.failure = self.failure or why or found
             self.failed, self.sailing = self.failed | bad, self.sailing & ~bad
         command[~self.sailing] = 0.0
-        return command
+        return command, memory
 
     def _commands(self, actions: Any) -> tuple[NDArray[np.float32], Flags, str]:
         """Commands, of which ships that sail there is none, and why."""
@@ -206,11 +196,8 @@ class _Log:
         except (TypeError, ValueError):
             return nothing, self.sailing, f"actions of type {type(actions).__name__} {at}, expected numbers"
         if found.shape != expected:
-            seen = self.engine.observations.shape
-            said = (
-                f"actions of shape {found.shape} {at}, expected {expected} for observations of shape {seen}"
-            )
-            return nothing, self.sailing, said
+            seen = f"for observations of shape {self.engine.observations.shape}"
+            return nothing, self.sailing, f"actions of shape {found.shape} {at}, expected {expected} {seen}"
         wrong = self.sailing[:, None] & ~np.isfinite(found)
         bad: Flags = np.any(wrong, axis=1)
         if not bad.any():
@@ -223,7 +210,7 @@ class _Log:
         return found, bad, said
 
     def note(
-        self, command: NDArray[np.float32], rewards: Floats, memory: Any, terminated: Flags, truncated: Flags
+        self, command: NDArray[np.float32], memory: Any, rewards: Floats, terminated: Flags, truncated: Flags
     ) -> None:
         """Note what came of an interval."""
         self.sailed.append(self.sailing)
@@ -232,15 +219,15 @@ class _Log:
         self.truncated = self.truncated | self.sailing & truncated
         if self.record:
             shield = isinstance(memory, ShieldState)
-            self.actions.append(command)
-            self.rewards.append(rewards)
-            self.shielded.append(interventions(memory).steering if shield else np.zeros_like(terminated))
+            shielded = interventions(memory).steering if shield else np.zeros_like(terminated)
+            self.intervals.append((command, rewards, shielded))
         self.look()
         self.sailing = self.sailing & ~(terminated | truncated)
 
     def rollout(self, seeds: NDArray[np.int64]) -> Rollout:
         """All that was noted."""
         engine, n = self.engine, self.engine.num_envs
+        actions, rewards, shielded = zip(*self.intervals, strict=True) if self.intervals else ((), (), ())
         return Rollout(
             task=engine.task,
             model=engine.model,
@@ -253,9 +240,9 @@ class _Log:
             failed=self.failed,
             failure=self.failure,
             seconds_per_action=self.seconds / max(self.asked, 1),
-            actions=np.array(self.actions, dtype=np.float32).reshape(-1, n, len(engine.command)),
-            rewards=np.array(self.rewards).reshape(-1, n),
-            shielded=np.array(self.shielded, dtype=np.bool_).reshape(-1, n),
+            actions=np.array(actions, dtype=np.float32).reshape(-1, n, len(engine.command)),
+            rewards=np.array(rewards).reshape(-1, n),
+            shielded=np.array(shielded, dtype=np.bool_).reshape(-1, n),
             states={name: np.array([one[name] for one in self.states]) for name in (self.states or [{}])[0]},
             infos={name: np.array([one[k] for one in self.infos]) for k, name in enumerate(self.names)},
         )

@@ -1,22 +1,8 @@
 """Suites: named tasks with their ship, their sea and the seeds of their episodes, fixed once and for all.
 
-A suite is a TOML file of `agents/suites`:
-
-    name = "shipgym-v1"
-
-    [tasks.mariner-calm]
-    environment = "course-keeping"          # or "path-following"
-    model = "mariner"                       # name of a shipped model
-    why = "sanity: ..."                     # what the task is there for
-    sea = "rough"                           # optional: a sea state, or a table `[tasks.NAME.sea]` as weather
-                                            # has it: current, wind, waves
-    ship = "mariner"                        # optional: the ship behind an identified model
-    [tasks.mariner-calm.options]            # optional: any other keywords of the environment
-    course_change_deg = 30.0
-    [tasks.mariner-calm.far]                # with a ship: keywords, and `gear`, far from the design
-
-A task with a ship is three (`SETS`): contestants are made for the model and evaluated on the ship, on the
-model, and on the ship far from what they were made for.
+A suite is a TOML file of `agents/suites`, as docs/benchmark.md describes it. A task with a ship is three
+(`SETS`): contestants are made for the model and evaluated on the ship, on the model, and on the ship far from
+what they were made for.
 """
 
 from __future__ import annotations
@@ -31,19 +17,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from shipgym.checks import (
-    check_choice,
-    check_keys,
-    check_table,
-    check_text,
-    data_only,
-    did_you_mean,
-    placed,
-    quoted,
-)
+from shipgym.checks import check_choice, check_keys, check_table, check_text, data_only, placed
 from shipgym.envs.engine import Engine
+from shipgym.envs.environment import read_options
 from shipgym.envs.randomisation import Randomisation
-from shipgym.envs.ship_env import read_options
 from shipgym.errors import InputError
 from shipgym.files import parse_toml
 from shipgym.sea.conditions import Weather
@@ -152,12 +129,7 @@ class Suite:
         Raises InputError for an unknown name, with the nearest known one.
         """
         known = {task.name: task for task in self.tasks}
-        if name not in known:
-            raise InputError(
-                f"task: '{name}' found, expected one of suite '{self.name}': {quoted(known)}."
-                f"{did_you_mean(name, known)}"
-            )
-        return known[name]
+        return known[check_choice(name, known, f"suite '{self.name}': task")]
 
 
 def list_suites() -> list[str]:
@@ -209,10 +181,7 @@ def _suite_text(name: str) -> str:
 
 
 def parse_suite(text: str, where: str) -> Suite:
-    """A suite from its TOML text (format in the module's docstring).
-
-    Raises InputError naming the field at fault.
-    """
+    """A suite from its TOML text; raises InputError naming the field at fault."""
     content = parse_toml(text, f"{where}:")
     check_keys(content, ("name", "tasks"), where)
     tasks = check_table(content.get("tasks"), f"{where}: tasks")
@@ -246,10 +215,8 @@ def _options(table: Mapping[str, Any], where: str) -> dict[str, Any]:
 
 
 def _task(name: str, value: Any, where: str) -> BenchmarkTask:
-    table = check_table(value, where)
-    check_keys(table, FIELDS, where)
-    for needed in ("environment", "model"):
-        check_text(table.get(needed), f"{where}.{needed}")
+    table = check_table(value, where, FIELDS)
+    environment, model = (check_text(table.get(one), f"{where}.{one}") for one in ("environment", "model"))
     data_only(table, where)
     sea = {"sea": table["sea"]} if "sea" in table else {}
     options = _options({**check_table(table.get("options", {}), f"{where}.options"), **sea}, where)
@@ -257,6 +224,4 @@ def _task(name: str, value: Any, where: str) -> BenchmarkTask:
     if table.get("far") and not behind:
         raise InputError(f"{where}.far: found without a ship, expected `ship`, the one behind the model")
     with placed(where):
-        return BenchmarkTask(
-            name, table["environment"], table["model"], table.get("why", ""), options, behind
-        )
+        return BenchmarkTask(name, environment, model, table.get("why", ""), options, behind)

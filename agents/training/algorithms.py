@@ -53,24 +53,13 @@ class StaggeredShips(ShipVecEnv):
 
 def make_ships(plan: Plan, base: Controller | None) -> VecEnv:
     """The ships that a plan's agent learns from, as it sees and steers them."""
+    settings, options = plan.settings, training_options(plan)
     ships: VecEnv = StaggeredShips(
-        plan.task.env_id,
-        plan.settings.ships,
-        model=plan.task.ship,
-        threads=plan.threads,
-        **training_options(plan),
+        plan.task.env_id, settings.ships, model=plan.task.ship, threads=plan.threads, **options
     )
-    settings = plan.settings
-    changed = settings.frame_stack > 1 or settings.action_repeat > 1 or settings.rate_limit < NO_LIMIT
-    if base is not None or changed:
-        ships = ResidualVecEnv(
-            ships,
-            base,
-            authority=settings.authority,
-            frame_stack=settings.frame_stack,
-            action_repeat=settings.action_repeat,
-            rate_limit=settings.rate_limit,
-        )
+    part = {name: getattr(settings, name) for name in ("frame_stack", "action_repeat", "rate_limit")}
+    if base is not None or part != {"frame_stack": 1, "action_repeat": 1, "rate_limit": NO_LIMIT}:
+        ships = ResidualVecEnv(ships, base, authority=settings.authority, **part)
     return scaled_rewards(ships, settings)
 
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import random
 from collections import deque
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -20,13 +21,8 @@ from agents.training.safe_file import check_like
 
 Memory = dict[str, Any]
 COUNTERS = (
-    "num_timesteps",
-    "_n_updates",
-    "_episode_num",
-    "_last_obs",
-    "_last_episode_starts",
-    "_last_original_obs",
-)
+    "num_timesteps", "_n_updates", "_episode_num", "_last_obs", "_last_episode_starts", "_last_original_obs",
+)  # fmt: skip
 LARGEST_WEIGHT, LARGEST_LOG_STD = 1e9, 20.0
 STORED = ("observations", "next_observations", "actions", "rewards", "dones", "timeouts")
 
@@ -46,7 +42,12 @@ def take(agent: Any) -> Memory:
         "successes": [float(one) for one in agent.ep_success_buffer],
         "ships": [_layer_memory(layer) for layer in _layers(agent.env)],
         "replay": _replay_memory(getattr(agent, "replay_buffer", None)),
-        "random": _random_memory(agent),
+        "random": {
+            "python": random.getstate(),
+            "numpy": np.random.get_state(),
+            "torch": torch.get_rng_state(),
+            "actions": agent.action_space.np_random.bit_generator.state,
+        },
     }
 
 
@@ -57,9 +58,10 @@ def put_back(agent: Any, memory: Memory) -> None:
     own.
     """
     memory = _with_own_settings(agent, memory)
-    check_like(memory, _own(agent, memory), "agent")
+    check_like(memory, _own(agent), "agent")
     _check_weights(memory["parameters"])
-    _check_observed(agent, memory["counters"]["_last_obs"])
+    if not all(map(agent.observation_space.contains, memory["counters"]["_last_obs"])):
+        raise ValueError("counters._last_obs: expected numbers within the bounds of the observations")
     for number, kept in enumerate(memory["ships"]):
         if not np.isfinite(kept.get("states", 0.0)).all():  # positions, velocities, orders and what is asked
             raise ValueError(f"agent.ships[{number}].states: expected finite numbers")
@@ -89,78 +91,63 @@ def _check_weights(parameters: Memory) -> None:
                     )
 
 
-def _check_observed(agent: Any, observed: Any) -> None:
-    """Raise ValueError for what an environment of the agent does not show."""
-    for row in observed:
-        if not agent.observation_space.contains(row):
-            raise ValueError("counters._last_obs: expected numbers within the bounds of the observations")
-
-
 def check_record(record: Any) -> None:
     """Raise ValueError, naming the place, unless this is what a training tells of its evaluations."""
-    row: Memory = {"steps": 0, "seconds": 0.0, "cost": 0.0}
-    curve = [row | {"mean_return": _number(one, "mean_return")} for one in _list(record, "curve")]
-    own = {"best_cost": _number(record, "best_cost"), "best_steps": 0, "curve": curve, "seconds": 0.0}
+    row: Memory = {"steps": 0, "seconds": 0.0, "cost": 0.0, "mean_return": _maybe}
+    own = {"best_cost": _maybe, "best_steps": 0, "curve": _every(row), "seconds": 0.0}
     check_like(record, own, "run")
+
+
+def _maybe(found: Any) -> float | None:
+    """What is expected where a number or none may stand."""
+    return None if found is None else 0.0
+
+
+def _every(one: Any) -> Callable[[Any], list[Any]]:
+    """A list of any length, each entry like this one."""
+    return lambda found: [one] * (len(found) if isinstance(found, list) else 0)
 
 
 def _with_own_settings(agent: Any, memory: Any) -> Any:
     """A memory with an agent's own settings of optimisers; of the memory's only learning rates are taken."""
-    if not isinstance(parameters := _at(memory, "parameters"), dict):
+    try:
+        taken = dict(memory["parameters"])
+        for name, own in agent.get_parameters().items():
+            if "param_groups" in own:
+                pairs = zip(own["param_groups"], taken[name]["param_groups"], strict=True)
+                groups = [group | {"lr": found["lr"]} for group, found in pairs]
+                taken[name] = {**taken[name], "param_groups": groups}
+        return {**memory, "parameters": taken}
+    except (LookupError, TypeError, ValueError):  # `check_like` says where
         return memory
-    taken = dict(parameters)
-    for name, own in agent.get_parameters().items():
-        if "param_groups" in own and isinstance(found := parameters.get(name), dict):
-            rates = [_at(group, "lr") for group in _list(found, "param_groups")]
-            pairs = zip(own["param_groups"], rates, strict=False)
-            taken[name] = {**found, "param_groups": [group | {"lr": rate} for group, rate in pairs]}
-    return {**memory, "parameters": taken}
 
 
-def _own(agent: Any, memory: Any) -> Memory:
-    """What a memory of this agent is like, its lists as long as those of one; ships begin an episode."""
+def _own(agent: Any) -> Memory:
+    """What a memory of this agent is like; its ships begin an episode."""
     agent._last_obs = agent._last_original_obs = agent.env.reset()
     agent._last_episode_starts = np.zeros(agent.n_envs, np.bool_)
-    agent.ep_info_buffer = [{"r": 0.0, "l": 0, "t": 0.0} for _ in _list(memory, "episodes")]
-    agent.ep_success_buffer = [0.0 for _ in _list(memory, "successes")]
+    agent.ep_info_buffer = agent.ep_success_buffer = ()
     own = take(agent)
+    own["episodes"], own["successes"] = _every({"r": 0.0, "l": 0, "t": 0.0}), _every(0.0)
     for name, one in own["parameters"].items():
-        if "param_groups" in one:  # an optimiser: Adam keeps this of each weight that had a step
-            groups, known = (
-                recursive_getattr(agent, name).param_groups,
-                _at(memory, "parameters", name, "state"),
-            )
-            moments = enumerate(weight.data for group in groups for weight in group["params"])
-            one["state"] = {
-                number: {"step": torch.zeros(()), "exp_avg": weight, "exp_avg_sq": weight}
-                for number, weight in moments
-                if not isinstance(known, dict) or number in known
-            }
+        if "param_groups" in one:
+            groups = recursive_getattr(agent, name).param_groups
+            one["state"] = _moments([weight.data for group in groups for weight in group["params"]])
     for name in STORED if own["replay"] else ():
-        own["replay"][name] = getattr(agent.replay_buffer, name)[: len(_list(memory, "replay", name))]
-    own["random"]["python"] = (*own["random"]["python"][:2], _number(memory, "random", "python", 2))
+        own["replay"][name] = _beginning(getattr(agent.replay_buffer, name))
+    own["random"]["python"] = (*own["random"]["python"][:2], _maybe)
     return own
 
 
-def _at(value: Any, *path: Any) -> Any:
-    """What stands in a place within a value of any kind; None if there is no such place."""
-    for key in path:
-        try:
-            value = value[key]
-        except (LookupError, TypeError):
-            return None
-    return value
+def _moments(weights: list[torch.Tensor]) -> Callable[[Any], dict[int, Memory]]:
+    """What an optimiser, Adam, keeps of each weight that had a step."""
+    kept = [{"step": torch.zeros(()), "exp_avg": one, "exp_avg_sq": one} for one in weights]
+    return lambda found: {k: one for k, one in enumerate(kept) if not isinstance(found, dict) or k in found}
 
 
-def _list(value: Any, *path: Any) -> Any:
-    """A list, or an array of rows, in such a place; an empty one for anything else."""
-    found = _at(value, *path)
-    return found if getattr(found, "ndim", isinstance(found, list)) else []
-
-
-def _number(value: Any, *path: Any) -> float | None:
-    """What is expected where a number or none may stand."""
-    return None if _at(value, *path) is None else 0.0
+def _beginning(stored: Any) -> Callable[[Any], Any]:
+    """As much of a store of past steps as is found."""
+    return lambda found: stored[: len(found) if getattr(found, "ndim", 0) else 0]
 
 
 def _layers(env: Any) -> list[Any]:
@@ -208,15 +195,6 @@ def _put_replay_back(buffer: Any, memory: Memory | None) -> None:
     buffer.pos, buffer.full = memory["pos"], memory["full"]
     for name in STORED:
         getattr(buffer, name)[: len(memory[name])] = memory[name]
-
-
-def _random_memory(agent: Any) -> Memory:
-    return {
-        "python": random.getstate(),
-        "numpy": np.random.get_state(),
-        "torch": torch.get_rng_state(),
-        "actions": agent.action_space.np_random.bit_generator.state,
-    }
 
 
 def _put_random_back(agent: Any, memory: Memory) -> None:

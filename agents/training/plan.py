@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -32,6 +33,7 @@ N_EVALUATIONS = 100
 SPEED_RANGE = (0.8, 1.1)
 SEAS = ("calm", "slight", "moderate", "rough")
 NO_TASK = ""
+RUN = ("seed", "randomise", "threads")  # of a plan, whatever is learned
 
 
 @dataclass(frozen=True)
@@ -56,23 +58,12 @@ class Plan:
                 f"settings: {type(self.settings).__name__} found, expected {kind.__name__} for "
                 f"{self.algorithm}"
             )
-        if check_whole(self.seed, "seed", at_least=0) > LARGEST_SEED:
-            raise InputError(f"seed: {self.seed} found, expected 0 to {LARGEST_SEED}")
-        check_whole(self.settings.ships, "ships", at_least=1)
-        if self.settings.ships > SEEDS_EACH:
-            raise InputError(f"ships: {self.settings.ships} found, expected at most {SEEDS_EACH}")
+        check_whole(self.seed, "seed", at_least=0, at_most=LARGEST_SEED)
+        check_whole(self.settings.ships, "ships", at_least=1, at_most=SEEDS_EACH)
         check_whole(self.threads, "threads", at_least=1)
-        longest = self.task.task.episode_steps
-        if self.settings.action_repeat > longest:
-            raise InputError(
-                f"action_repeat: {self.settings.action_repeat} found, expected at most an episode's "
-                f"{longest} steps"
-            )
-        self._check_action()
+        longest, hint = self.task.task.episode_steps, "no longer than an episode"
+        check_whole(self.settings.action_repeat, "action_repeat", at_least=1, at_most=longest, hint=hint)
         self.task.task.check_fits(self.task.ship)
-
-    def _check_action(self) -> None:
-        """Refuse commands that the algorithm, or the base, does not have."""
         action, base = self.task.task.action, self.settings.base
         if action == "rudder-discrete" and self.algorithm != "ppo":
             raise InputError(f"action: '{action}' found, which {self.algorithm} does not learn; take ppo")
@@ -129,23 +120,10 @@ class Given:
 
 
 def make_plan(given: Given, stored: Plan | None = None) -> Plan:
-    """The run that a user asks for.
+    """The run that a user asks for; what is not given is as in `stored`, the run that is resumed.
 
-    Parameters
-    ----------
-    given : Given
-    stored : Plan, optional
-        The run that is resumed: what is not given is as it was.
-
-    Returns
-    -------
-    Plan
-
-    Raises
-    ------
-    InputError
-        For an unknown algorithm, environment, task, model, option or setting, with the nearest known one,
-        or a value out of its range.
+    Raises InputError for an unknown algorithm, environment, task, model, option or setting, with the nearest
+    known one, or a value out of its range.
     """
     check_choice(given.algorithm, ALGORITHMS, "algorithm")
     task = _task(given, stored)
@@ -155,18 +133,16 @@ def make_plan(given: Given, stored: Plan | None = None) -> Plan:
         settings = load_settings(given.algorithm, task.environment, task.name, own, task.task.action)
     else:
         settings = changed(stored.settings, own)
-    before = (0, False, 1) if stored is None else (stored.seed, stored.randomise, stored.threads)
-    asked = (given.seed, given.randomise, given.threads)
-    seed, randomise, threads = (old if new is None else new for new, old in zip(asked, before, strict=True))
-    return Plan(given.algorithm, task, settings, int(seed), bool(randomise), int(threads))
+    kept = {} if stored is None else {name: getattr(stored, name) for name in RUN}
+    asked = {name: value for name in RUN if (value := getattr(given, name)) is not None}
+    return Plan(given.algorithm, task, settings, **kept | asked)
 
 
 def _task(given: Given, stored: Plan | None) -> BenchmarkTask:
     """Environment, model and options."""
     named = {"--env": given.environment, "--model": given.model, "--sea": given.sea}
-    beside = [name for name, value in named.items() if value is not None] + (
-        ["--option"] * bool(given.options)
-    )
+    beside = [name for name, value in named.items() if value is not None]
+    beside += ["--option"] * bool(given.options)
     if given.task is not None:
         if beside:
             raise InputError(f"--task: found beside {beside[0]}, which the task says; leave one of them out")
@@ -177,9 +153,8 @@ def _task(given: Given, stored: Plan | None) -> BenchmarkTask:
     environment, variant = read_environment(given.environment or before.environment)
     sea = {} if given.sea is None else {"sea": given.sea}
     options = ({} if stored is None else dict(before.options)) | variant | sea | dict(given.options)
-    model = given.model or options.pop("model", before.model)
-    options.pop("model", None)
-    return BenchmarkTask(before.name, environment, model, "", options)
+    model = options.pop("model", before.model)
+    return BenchmarkTask(before.name, environment, given.model or model, "", options)
 
 
 def read_environment(name: str) -> tuple[str, dict[str, Any]]:
@@ -212,19 +187,13 @@ def training_options(plan: Plan) -> dict[str, Any]:
     options.setdefault("speed_range", SPEED_RANGE)
     names = {sea.name for sea in task.seas}
     current = task.weather.current
-    others = [replace(as_weather(name, "sea", None), current=current) for name in SEAS if name not in names]
-    options["sea"] = [*task.seas, *(sea for sea in others if _sails(plan, sea))]
+    options["sea"] = [*task.seas]
+    for name in (name for name in SEAS if name not in names):
+        sea = replace(as_weather(name, "sea", None), current=current)
+        with suppress(InputError):
+            weather_column(ship, sea, task.substep(ship), task.water_depth)
+            options["sea"].append(sea)
     return options
-
-
-def _sails(plan: Plan, sea: Weather) -> bool:
-    """Whether the weather's forces on the ship can be worked out."""
-    ship, task = plan.task.ship, plan.task.task
-    try:
-        weather_column(ship, sea, task.substep(ship), task.water_depth)
-    except InputError:
-        return False
-    return True
 
 
 def _read(value: Any, name: str) -> Any:
@@ -239,8 +208,7 @@ def first_difference(found: Mapping[str, Any], expected: Mapping[str, Any], wher
     for name in [*expected, *(name for name in found if name not in expected)]:
         one, other = found.get(name), expected.get(name)
         if isinstance(one, Mapping) and isinstance(other, Mapping):
-            inner = first_difference(one, other, f"{where}{name}.")
-            if inner is not None:
+            if (inner := first_difference(one, other, f"{where}{name}.")) is not None:
                 return inner
         elif one != other:
             return f"{where}{name} is {other!r} there, {one!r} here"
@@ -250,8 +218,7 @@ def first_difference(found: Mapping[str, Any], expected: Mapping[str, Any], wher
 def check_same(found: Mapping[str, Any], expected: Mapping[str, Any], where: str) -> None:
     """Refuse to go on with another configuration than that of a run, naming the first difference."""
     check_keys(found, tuple(expected), where)
-    difference = first_difference(found, expected)
-    if difference is not None:
+    if (difference := first_difference(found, expected)) is not None:
         raise InputError(
             f"{where}: a run of another configuration: {difference}; resume it with its own, or name another "
             "folder"

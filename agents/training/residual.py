@@ -1,12 +1,4 @@
-"""What a learned policy sees and does in training: past observations, a classical controller to add to.
-
-The network acts on what `LearnedPolicy` gives it when it steers: the last observations, oldest
-first, then the base controller's action. The rudder is that action and the network's part of it, which may
-be repeated for several control intervals while the base goes on with its feedback.
-
-Sources: Silver, Allen, Tenenbaum & Kaelbling 2018, Residual policy learning, arXiv:1812.06298; Johannink et
-al. 2019, Residual reinforcement learning for robot control, ICRA.
-"""
+"""What a policy sees and does while it learns: the same as when it steers (`agents.policies.policy`)."""
 
 from __future__ import annotations
 
@@ -19,8 +11,7 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from agents.controllers.controller import Policy
-from agents.policies.policy import NO_LIMIT, toward
-from shipgym.checks import check_number, check_whole
+from agents.policies.policy import NO_LIMIT, check_part, toward
 from shipgym.errors import InputError
 
 try:
@@ -37,29 +28,16 @@ Flags = NDArray[np.bool_]
 class ResidualVecEnv(VecEnvWrapper):  # type: ignore[misc]  # stable-baselines3 is not type-checked here
     """Ships steered by a base controller to which an agent adds; the agent remembers observations.
 
-    The agent sees `[observation(t - frame_stack + 1), ..., observation(t), base action(t)]`; where an episode
-    begins the first observation fills the stack. The command is
-    `clip(base action + authority * clip(output, -1, 1), -1, 1)`, with the same output for `action_repeat`
-    control intervals, approached by at most `rate_limit` in each of them. A step is these intervals, its
-    reward their sum. Where an episode ends among them, the rest of the step is not counted: the next episode
-    begins with the base alone (without base: the output).
+    What it sees, and what becomes of its output, stands in `agents.policies.policy`. A step has
+    `action_repeat` control intervals, its reward is their sum. Where an episode ends among them, the rest of
+    the step is not counted: the next episode begins with the base alone (without base: the output).
 
     Parameters
     ----------
     venv : VecEnv
         Ships, such as `shipgym.ShipVecEnv`.
-    base : Policy, optional
-        Any controller with or without a memory, in the signature of `Controller.predict`; None: the agent's
-        output is the action.
-    authority : float
-        Share of the action's range by which the agent may differ from the base, above 0, at most 2; without a
-        base it has to be 1.
-    frame_stack : int
-        Number of observations that are shown, the newest last.
-    action_repeat : int
-        Control intervals of a step.
-    rate_limit : float
-        Largest change of the output in force in a control interval, above 0; 2 does not limit it.
+    base, authority, frame_stack, action_repeat, rate_limit
+        As in `LearnedPolicy`; the base is any controller in the signature of `Controller.predict`.
 
     Raises
     ------
@@ -78,16 +56,14 @@ class ResidualVecEnv(VecEnvWrapper):  # type: ignore[misc]  # stable-baselines3 
         action_repeat: int = 1,
         rate_limit: float = NO_LIMIT,
     ) -> None:
-        self.base = base
-        self.authority = check_number(authority, "authority", above=0.0, at_most=2.0)
-        self.frame_stack = check_whole(frame_stack, "frame_stack", at_least=1)
-        self.action_repeat = check_whole(action_repeat, "action_repeat", at_least=1)
-        self.rate_limit = check_number(rate_limit, "rate_limit", above=0.0, at_most=NO_LIMIT)
-        low, high = (np.tile(bound, self.frame_stack) for bound in _bounds(venv))
-        if base is None:
-            if self.authority != 1.0:
-                raise InputError(f"authority: {authority:g} found without a base, expected 1, or a base")
-        else:
+        self.base, self.authority, self.frame_stack = base, authority, frame_stack
+        self.action_repeat, self.rate_limit = action_repeat, rate_limit
+        check_part(self)
+        space = venv.observation_space
+        if not isinstance(space, spaces.Box) or len(space.shape) != 1:
+            raise InputError(f"venv: observations in {space} found, expected a flat Box of numbers")
+        low, high = (np.tile(bound, frame_stack) for bound in (space.low, space.high))
+        if base is not None:
             _check_base(venv, base)
             low, high = np.append(low, venv.action_space.low), np.append(high, venv.action_space.high)
         super().__init__(venv, observation_space=spaces.Box(low.astype(np.float32), high.astype(np.float32)))
@@ -134,11 +110,10 @@ class ResidualVecEnv(VecEnvWrapper):  # type: ignore[misc]  # stable-baselines3 
         observations, rewards, dones, infos = self.venv.step_wait()
         self._in_force[dones] = 0.0
         self._past[:, :-1] = self._past[:, 1:]
+        self._past[:, -1] = observations
         ended = np.flatnonzero(dones)
         if len(ended) == 0:
-            self._past[:, -1] = observations
             return self._shown(None), rewards, dones, infos
-        self._past[:, -1] = observations
         for row in ended:
             self._past[row, -1] = infos[row]["terminal_observation"]
         kept = copy.deepcopy(self._state)  # a base may write into its state
@@ -185,14 +160,6 @@ class ResidualVecEnv(VecEnvWrapper):  # type: ignore[misc]  # stable-baselines3 
         return np.concatenate([seen, self._proposed], axis=1)
 
 
-def _bounds(venv: VecEnv) -> tuple[NDArray[Any], NDArray[Any]]:
-    """Least and largest observation of the ships inside."""
-    space = venv.observation_space
-    if not isinstance(space, spaces.Box) or len(space.shape) != 1:
-        raise InputError(f"venv: observations in {space} found, expected a flat Box of numbers")
-    return space.low, space.high
-
-
 def _check_base(venv: VecEnv, base: Policy) -> None:
     """Refuse commands that cannot be added to, and a controller of another ship."""
     space = venv.action_space
@@ -204,7 +171,6 @@ def _check_base(venv: VecEnv, base: Policy) -> None:
         raise InputError(
             f"base: {type(base).__name__} found, expected a controller, such as LQ.from_model(model)"
         )
-    check_fits = getattr(base, "check_fits", None)
-    if check_fits is not None:
+    if (check_fits := getattr(base, "check_fits", None)) is not None:
         names, scales = venv.get_attr("observation_names", 0)[0], venv.get_attr("observation_scales", 0)[0]
         check_fits(names, scales, "base")

@@ -1,12 +1,4 @@
-"""The folder of a run of training.
-
-run.json                configuration, command, versions
-checkpoint.safetensors  the run at its last boundary kept
-progress.json           the learning curve
-agent.json, .safetensors    the best policy so far
-last.json, .safetensors     the newest one
-tensorboard/            TensorBoard's log
-"""
+"""The folder of a run of training; its files are listed in docs/training.md."""
 
 from __future__ import annotations
 
@@ -19,7 +11,16 @@ from typing import Any
 from agents.output import check_writable, present
 from agents.training.plan import Given, Plan, check_same
 from agents.training.settings import LATER, present_names
-from shipgym.checks import Shape, check_keys, check_shape, check_table, check_whole, data_only, placed
+from shipgym.checks import (
+    Shape,
+    check_format,
+    check_keys,
+    check_shape,
+    check_table,
+    check_whole,
+    data_only,
+    placed,
+)
 from shipgym.errors import InputError
 from shipgym.files import make_folder, read_json, write_json
 
@@ -75,8 +76,7 @@ def read_plan(folder: Path, given: Given | None = None) -> Plan:
     model has changed since.
     """
     content = _content(folder)
-    where = f"{folder / RUN}"
-    configuration = content["configuration"]
+    where, configuration = f"{folder / RUN}", content["configuration"]
     named = {name: configuration.get(name) for name in ("model", "options")}
     data_only(named, f"{where}: configuration", given and {"model": given.model, "options": given.options})
     with placed(where):
@@ -109,12 +109,8 @@ def _content(folder: Path) -> Mapping[str, Any]:
     if not path.is_file():
         raise InputError(f"{folder}: no run of training is there; leave --resume out to begin one")
     content = read_json(path, "run file", REMEDY)
-    check_keys(content, FIELDS, str(path))
-    for name in FIELDS:
-        if name not in content:
-            raise InputError(f"{path}: field '{name}' is missing; {REMEDY}")
-    if content["format"] != FORMAT:
-        raise InputError(f"{path}: format {content['format']!r} found, expected {FORMAT}; {REMEDY}")
+    check_keys(content, FIELDS, str(path), FIELDS)
+    check_format(content, FORMAT, str(path))
     configuration = dict(check_table(content["configuration"], f"{path}: configuration"))
     if isinstance(settings := configuration.get("settings"), Mapping):
         configuration["settings"] = {**LATER, **present_names(settings)}

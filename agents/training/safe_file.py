@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import json
 import math
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +17,8 @@ Arrays = dict[str, Any]
 #: Entries of the file's metadata: what is not an array, as JSON, and the SHA-256 of all.
 CONTENT, SHA256 = "content", "sha256"
 DEEPEST = 20  # values within values
+#: What reading anything else raises.
+MALFORMED = (OSError, LookupError, TypeError, ValueError, AttributeError, RecursionError)
 TYPES = ("BOOL", "U8", "U32", "U64", "I32", "I64", "F32", "F64")  # of arrays
 
 
@@ -53,15 +54,7 @@ def read_values(path: Path, what: str) -> Any:
         if about.get(SHA256, sha256 := _hash(about[CONTENT], arrays)) != sha256:  # older files have none
             raise ValueError("its SHA-256 is not that of its content")
         return _unpacked(json.loads(about[CONTENT]), arrays)
-    except (
-        SafetensorError,
-        OSError,
-        LookupError,
-        TypeError,
-        ValueError,
-        AttributeError,
-        RecursionError,
-    ) as error:
+    except (SafetensorError, *MALFORMED) as error:
         raise InputError(f"{path}: not a {what}, or one that is cut short ({error})") from None
 
 
@@ -77,32 +70,35 @@ def check_like(found: Any, own: Any, where: str) -> None:
     """Raise ValueError, naming the first place, unless one value is like another.
 
     The same names and texts, lists of one length, arrays and tensors of the same type and shape, numbers of a
-    kind: finite, whole ones not negative.
+    kind: finite, whole ones not negative. A function in `own` is asked what is expected, of what is found.
     """
-    has, needs = dict(_kinds(found, where)), dict(_kinds(own, where))
-    for place in (*needs, *has):
-        if has.get(place) != needs.get(place):
-            told, expected = (one.get(place, "nothing") for one in (has, needs))
-            raise ValueError(f"{place}: {told} found, expected {expected}")
+    own = own(found) if callable(own) else own
+    told, expected = _kind(found), _kind(own)
+    if told != expected:
+        raise ValueError(f"{where}: {told} found, expected {expected}")
+    if isinstance(own, dict):
+        for name in own:
+            place = where + (f".{name}" if isinstance(name, str) else f"[{name}]")
+            if name not in found:
+                raise ValueError(f"{place}: nothing found, beside {', '.join(map(str, found))[:200]}")
+            check_like(found[name], own[name], place)
+    elif isinstance(own, list | tuple):
+        for number, one in enumerate(own):
+            check_like(found[number], one, f"{where}[{number}]")
 
 
-def _kinds(value: Any, where: str) -> Iterator[tuple[str, str]]:
-    """Where each value within a value stands, and what it is."""
+def _kind(value: Any) -> str:
+    """What a value is, of a dictionary, list or tuple how long."""
     if isinstance(value, dict):
-        yield where, f"a table of {len(value)}"
-        for name, one in value.items():
-            yield from _kinds(one, where + (f".{name}" if isinstance(name, str) else f"[{name}]"))
-    elif isinstance(value, list | tuple):
-        yield where, f"{type(value).__name__} of {len(value)}"
-        for number, one in enumerate(value):
-            yield from _kinds(one, f"{where}[{number}]")
-    elif np.ndim(value) or hasattr(value, "detach"):
-        yield where, f"{type(value).__name__} of {value.dtype}, shape {tuple(value.shape)}"
-    else:
-        number = value.item() if isinstance(value, np.ndarray | np.generic) else value
-        whole = isinstance(number, int) and number >= 0
-        known = whole or (isinstance(number, float) and math.isfinite(number))
-        yield where, type(number).__name__ if known else repr(number)[:80]
+        return f"a table of {len(value)}"
+    if isinstance(value, list | tuple):
+        return f"{type(value).__name__} of {len(value)}"
+    if np.ndim(value) or hasattr(value, "detach"):
+        return f"{type(value).__name__} of {value.dtype}, shape {tuple(value.shape)}"
+    number = value.item() if isinstance(value, np.ndarray | np.generic) else value
+    whole = isinstance(number, int) and number >= 0
+    known = whole or (isinstance(number, float) and math.isfinite(number))
+    return type(number).__name__ if known else repr(number)[:80]
 
 
 def _packed(value: Any, name: str, arrays: Arrays) -> Any:

@@ -1,13 +1,8 @@
-"""Settings of learning: one frozen dataclass an algorithm, read from TOML.
+"""Settings of learning: one frozen dataclass an algorithm, read from TOML as docs/training.md says.
 
-The files in `hyperparameters/` have the tuned ones, later tables before earlier ones:
-
-    [defaults]                          # every setting of the algorithm, to learn from scratch
-    [residual.path-following]           # those that differ there beside a base, by default for the rudder
-    [suites.shipgym-v1]                 # those that differ on every task of a suite
-    [tasks.mariner-rough]               # those that differ on one of them
-
-A file of a user's own, and `--set`, name settings without tables.
+The files in `hyperparameters/` have the tuned ones, later tables before earlier ones: `defaults`, every
+setting of the algorithm to learn from scratch; those that differ beside a base in an environment
+(`residual`), on every task of a suite (`suites`), on one of them (`tasks`).
 """
 
 from __future__ import annotations
@@ -93,9 +88,8 @@ class Settings:
 
     def to_dict(self) -> dict[str, Any]:
         """The settings by name, ready for JSON."""
-        return {
-            name: list(value) if isinstance(value, tuple) else value for name, value in asdict(self).items()
-        }
+        pairs = asdict(self).items()
+        return {name: list(value) if isinstance(value, tuple) else value for name, value in pairs}
 
 
 @dataclass(frozen=True)
@@ -225,18 +219,17 @@ def _checked(value: Any, one: Field[Any]) -> Any:
 def _number_or_word(value: Any, name: str, allowed: dict[str, Any]) -> Any:
     """A number, or a word; one that ends in an underscore has a positive number after it, or neither."""
     word = allowed.pop("word")
-    start, sign, number = value.partition("_") if isinstance(value, str) else ("", "", "")
-    if value == word.rstrip("_"):
+    alone = word.rstrip("_")
+    if value == alone:
         return value
-    if sign and word == f"{start}_":
+    if word != alone and isinstance(value, str) and value.startswith(word):
         try:
-            check_number(float(number), name, above=0.0)
+            check_number(float(value.removeprefix(word)), name, above=0.0)
         except (ValueError, InputError):
-            raise InputError(
-                f"{name}: {value!r} found, expected a number, '{start}' or such as '{start}_0.1'"
-            ) from None
+            said = f"{name}: {value!r} found, expected a number, '{alone}' or such as '{word}0.1'"
+            raise InputError(said) from None
         return value
-    return check_number(value, name, **allowed, hint=f"or '{word.rstrip('_')}'")
+    return check_number(value, name, **allowed, hint=f"or '{alone}'")
 
 
 def load_settings(
@@ -246,43 +239,34 @@ def load_settings(
     given: Mapping[str, Any] | None = None,
     action: str = "rudder",
 ) -> Settings:
-    """The tuned settings of an algorithm, with those that are given in their place.
+    """The tuned settings of an algorithm, with those that are given, by name, in their place.
 
-    Parameters
-    ----------
-    algorithm : {"ppo", "sac", "td3", "tqc"}
-    environment : {"course-keeping", "path-following"}
-    task : str
-        Name of a suite's task; one without settings of its own has those of its environment.
-    given : mapping of str to Any, optional
-        Settings by name that go before the tuned ones.
-    action : {"rudder", "rudder-discrete", "rudder-shaft"}
-        What is commanded. With others than the rudder, or `base` given as "none", a policy learns from
-        scratch.
-
-    Raises
-    ------
-    InputError
-        For an unknown algorithm or setting, with the nearest known one, or a value out of its range.
+    `environment`: "course-keeping" or "path-following"; `task`: name of a suite's task; one without settings
+    of its own has those of its environment; `action`: what is commanded. With other actions than the rudder,
+    or `base` given as "none", a policy learns from scratch. Raises InputError for an unknown algorithm or
+    setting, with the nearest known one, or a value out of its range.
     """
-    kind = ALGORITHMS[check_choice(algorithm, ALGORITHMS, "algorithm")]
+    settings_of(algorithm)
     check_choice(environment, ENVIRONMENTS, "environment")
     check_choice(action, ACTIONS, "action")
-    where = f"hyperparameters/{algorithm}.toml"
-    text = files("agents.training").joinpath("hyperparameters", f"{algorithm}.toml").read_text("utf-8")
-    content = parse_toml(text, f"{where}:")
-    check_keys(content, ("defaults", "residual", "suites", "tasks"), where)
-    chosen = _settings(content.get("defaults", {}), kind, f"{where}: defaults")
+    content = hyperparameters(algorithm)
+    chosen = dict(content["defaults"])
     if action == "rudder" and (given or {}).get("base") != "none":
         followed = environment.removesuffix("-v1")
-        for table, name in (("residual", followed), ("suites", suite_of(task) or ""), ("tasks", task)):
-            chosen |= _settings(_of(content, table, name, where), kind, f"{where}: {table}.{name}")
+        for table, name in (("residual", followed), ("suites", suite_of(task)), ("tasks", task)):
+            chosen |= content.get(table, {}).get(name, {})
     return make_settings(algorithm, chosen | dict(given or {}))
 
 
-def _of(content: Mapping[str, Any], table: str, name: str, where: str) -> Any:
-    """A table's table of that name."""
-    return check_table(content.get(table, {}), f"{where}: {table}").get(name, {})
+def hyperparameters(name: str) -> dict[str, Any]:
+    """The content of a file of `hyperparameters/`."""
+    file = files("agents.training").joinpath("hyperparameters", f"{name}.toml")
+    return parse_toml(file.read_text("utf-8"), f"{file}:")
+
+
+def settings_of(algorithm: str) -> type[Settings]:
+    """The class of an algorithm's settings; InputError for an unknown one, with the nearest known one."""
+    return ALGORITHMS[check_choice(algorithm, ALGORITHMS, "algorithm")]
 
 
 def make_settings(algorithm: str, values: Mapping[str, Any]) -> Settings:
@@ -290,11 +274,9 @@ def make_settings(algorithm: str, values: Mapping[str, Any]) -> Settings:
 
     Raises InputError for an unknown one, one that is missing, or a value out of its range.
     """
-    kind = ALGORITHMS[check_choice(algorithm, ALGORITHMS, "algorithm")]
-    table = _settings(values, kind, f"settings of {algorithm}")
-    for one in fields(kind):
-        if one.name not in table and one.default is MISSING:
-            raise InputError(f"settings of {algorithm}: '{one.name}' is missing")
+    kind, where = settings_of(algorithm), f"settings of {algorithm}"
+    table = _settings(values, kind, where)
+    check_keys(table, table, where, [one.name for one in fields(kind) if one.default is MISSING])
     return kind(**table)
 
 
@@ -311,8 +293,7 @@ def read_settings_file(path: Path, algorithm: str) -> dict[str, Any]:
 
     Raises InputError if it cannot be read, or names an unknown setting.
     """
-    kind = ALGORITHMS[check_choice(algorithm, ALGORITHMS, "algorithm")]
-    return _settings(read_toml(path, "settings file"), kind, str(path))
+    return _settings(read_toml(path, "settings file"), settings_of(algorithm), str(path))
 
 
 def parsed_settings(texts: Sequence[str], where: str = "--set") -> dict[str, Any]:

@@ -8,21 +8,25 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager, nullcontext
+from contextlib import contextmanager, nullcontext, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from agents.agent_file import load_agent
+from agents.controllers.controller import Policy
+from agents.controllers.designs import design, design_base
 from agents.output import in_use
 from agents.policies.policy import LearnedPolicy
+from agents.rollouts.rollout import episode_costs
+from agents.suites.suite import BenchmarkTask
 from agents.training import run_folder
-from agents.training.bases import design_base
-from agents.training.evaluation import HeldOut
 from agents.training.plan import EVALUATION_SEED, N_EVALUATIONS, Plan
 from agents.training.safe_file import read_values, write_values
+from shipgym.envs.engine import Engine
 from shipgym.errors import InputError
 from shipgym.files import write_json
 
@@ -38,6 +42,29 @@ except ModuleNotFoundError as error:
 
 REACHED = 1.001  # of LQ's cost: a network that has learned nothing yet adds nearly nothing
 CHECKPOINT_SECONDS = 45.0  # with a rollout on top a checkpoint is at most a minute old
+
+
+@dataclass(frozen=True)
+class HeldOut:
+    """Episodes of a task that are not learned from, and what LQ costs on them."""
+
+    engine: Engine  # with a lane for each
+    seeds: NDArray[np.int64]  # shape (n,)
+    lq_cost: float | None  # mean cost of LQ designed on the task's ship; None where there is none for her
+
+    @classmethod
+    def of(cls, task: BenchmarkTask, first: int, number: int, threads: int = 1) -> HeldOut:
+        """The episodes with seeds from `first` on; LQ follows paths by the course that the task shows."""
+        found = cls(task.engine(number, threads=threads), first + np.arange(number), None)
+        lq = None
+        if task.task.action == "rudder":
+            with suppress(InputError):
+                lq = design("lq", task)
+        return found if lq is None else replace(found, lq_cost=found.cost(lq))
+
+    def cost(self, policy: Policy) -> float:
+        """Mean cost of a policy."""
+        return float(episode_costs(policy, self.engine, self.seeds).mean())
 
 
 class Progress(NamedTuple):
@@ -127,13 +154,14 @@ def train(
     if resume and folder is None:
         raise InputError("resume: found without a folder, expected the one of the run")
     with _torch_threads(plan.threads), nullcontext() if folder is None else in_use(folder):
-        if folder is not None:
-            run_folder.check_resumable(folder, plan) if resume else run_folder.check_new(folder)
+        if folder is None:
+            return _Training(plan, None, tell, max_seconds).run()
+        run_folder.check_resumable(folder, plan) if resume else run_folder.check_new(folder)
         training = _Training(plan, folder, tell, max_seconds)
-        if folder is not None and not resume:
-            run_folder.begin_folder(folder, plan, command or f"train({plan.algorithm!r})")
-        if folder is not None and resume:
+        if resume:
             training.restore(folder / run_folder.CHECKPOINT)
+        else:
+            run_folder.begin_folder(folder, plan, command or f"train({plan.algorithm!r})")
         return training.run()
 
 
@@ -171,9 +199,8 @@ class _Training:
         self.held_out = HeldOut.of(plan.task, EVALUATION_SEED, N_EVALUATIONS, plan.threads)
         self.agent = make_agent(plan, base)
         self.policy: LearnedPolicy | None = None
-        self.curve: list[dict[str, Any]] = []
-        self.best_cost: float | None = None
-        self.best_steps = 0
+        #: What evaluations found so far.
+        self.found: dict[str, Any] = {"best_cost": None, "best_steps": 0, "curve": []}
         self.seconds_before = 0.0
         self.kept_at = -CHECKPOINT_SECONDS
         self.resumed_from: int | None = None
@@ -191,7 +218,7 @@ class _Training:
             if "invalid values" not in str(error):
                 raise
             raise self._diverged() from error
-        if not self.curve or self.curve[-1]["steps"] < self.agent.num_timesteps:
+        if self._evaluated("steps", -1) < self.agent.num_timesteps:
             self.evaluate()
         self.keep()
         return self._result(finished=True)
@@ -208,12 +235,15 @@ class _Training:
         policy: Any = self.policy
         if policy is None and self.folder is not None:  # found before the run was resumed
             policy = load_agent(self.folder / run_folder.AGENT)
-        assert isinstance(policy, LearnedPolicy)
-        assert self.best_cost is not None
+        found = self.found | {"curve": tuple(self.found["curve"])}
         return TrainingResult(
-            self.plan, policy, tuple(self.curve), self.best_cost, self.best_steps, self.agent.num_timesteps,
-            self.held_out.lq_cost, self.seconds, finished, self.resumed_from,
+            self.plan, policy, steps=self.agent.num_timesteps, lq_cost=self.held_out.lq_cost,
+            seconds=self.seconds, finished=finished, resumed_from=self.resumed_from, **found,
         )  # fmt: skip
+
+    def _evaluated(self, name: str, otherwise: Any) -> Any:
+        """A figure of the last evaluation."""
+        return self.found["curve"][-1][name] if self.found["curve"] else otherwise
 
     @property
     def seconds(self) -> float:
@@ -223,25 +253,19 @@ class _Training:
     def at_boundary(self) -> None:
         """Evaluate and keep the run when it is time to; stop when the time is up."""
         steps, every = self.agent.num_timesteps, self.plan.settings.evaluate_every
-        evaluated = self.curve[-1]["steps"] if self.curve else -every
-        due = steps // every > evaluated // every
+        due = steps // every > self._evaluated("steps", -every) // every
         if due:
             self.evaluate()
         if self.tell is not None:
-            self.tell(self._progress(due))
+            cost, best = self._evaluated("cost", None), self.found["best_cost"]
+            total, lq = self.plan.settings.total_steps, self.held_out.lq_cost
+            self.tell(Progress(steps, total, self.seconds, cost, best, lq, due))
         if time.monotonic() - self.kept_at >= CHECKPOINT_SECONDS:
             self.keep()
         set_deviation(self.agent, self.plan.settings)
         if self.max_seconds is not None and time.monotonic() - self.started >= self.max_seconds:
             self.keep()
             raise _TimeIsUpError
-
-    def _progress(self, evaluated: bool) -> Progress:
-        cost = self.curve[-1]["cost"] if self.curve else None
-        return Progress(
-            self.agent.num_timesteps, self.plan.settings.total_steps, self.seconds, cost, self.best_cost,
-            self.held_out.lq_cost, evaluated,
-        )  # fmt: skip
 
     def evaluate(self) -> None:
         """Run the held-out episodes; keep the policy if it is the best."""
@@ -253,16 +277,17 @@ class _Training:
         returns = [episode["r"] for episode in self.agent.ep_info_buffer]
         mean = sum(returns) / len(returns) if returns else None
         row = {"steps": steps, "seconds": round(self.seconds, 3), "cost": cost, "mean_return": mean}
-        self.curve.append(row)
+        self.found["curve"].append(row)
         self.agent.logger.record("evaluation/cost", cost)
         policy = replace(policy, training=self._record())
-        best = self.best_cost is None or cost < self.best_cost
+        best = self.found["best_cost"] is None or cost < self.found["best_cost"]
         if best:
-            self.policy, self.best_cost, self.best_steps = policy, cost, steps
+            self.policy = policy
+            self.found |= {"best_cost": cost, "best_steps": steps}
         if self.folder is not None:
             for name in [run_folder.LAST] + [run_folder.AGENT] * best:
                 policy.save(self.folder / name)
-            progress = {"lq_cost": self.held_out.lq_cost, **self._found}
+            progress = {"lq_cost": self.held_out.lq_cost, **self.found}
             write_json(progress, self.folder / run_folder.PROGRESS)
 
     def _record(self) -> dict[str, Any]:
@@ -273,23 +298,18 @@ class _Training:
             "training_seeds": [plan.training_seed, plan.training_seed + plan.settings.ships - 1],
             "evaluation_seeds": [EVALUATION_SEED, EVALUATION_SEED + N_EVALUATIONS - 1],
             "steps": self.agent.num_timesteps,
-            "cost": self.curve[-1]["cost"],
+            "cost": self._evaluated("cost", None),
             "lq_cost": self.held_out.lq_cost,
-            "curve": [[row["steps"], row["cost"]] for row in self.curve],
+            "curve": [[row["steps"], row["cost"]] for row in self.found["curve"]],
             "versions": run_folder.versions(),
         }
-
-    @property
-    def _found(self) -> dict[str, Any]:
-        """What evaluations found so far."""
-        return {"best_cost": self.best_cost, "best_steps": self.best_steps, "curve": self.curve}
 
     def keep(self) -> None:
         """Write the run as it is, whole or not at all."""
         self.kept_at = time.monotonic()
         if self.folder is None:
             return
-        own = {**self._found, "seconds": self.seconds}
+        own = {**self.found, "seconds": self.seconds}
         write_values({"run": own, "agent": checkpoints.take(self.agent)}, self.folder / run_folder.CHECKPOINT)
 
     def restore(self, checkpoint: Path) -> None:
@@ -302,7 +322,7 @@ class _Training:
             own = content["run"]
             checkpoints.check_record(own)
             checkpoints.put_back(self.agent, content["agent"])
-            self.curve, self.best_cost, self.best_steps = own["curve"], own["best_cost"], own["best_steps"]
+            self.found = {name: own[name] for name in self.found}
             self.seconds_before = own["seconds"]
         except (KeyError, TypeError, ValueError, RuntimeError, AttributeError) as error:
             why = str(error).partition("\n")[0].rstrip(" :")  # torch lists every network's layer after it

@@ -20,15 +20,14 @@ import numpy as np
 from agents.engines.jobs import HERE, JobEngine
 from agents.output import in_use, present
 from agents.training.plan import Plan, check_same
-from agents.training.settings import changed
+from agents.training.settings import OffPolicySettings, Settings, changed, hyperparameters, settings_of
 from shipgym.checks import Shape, check_shape, check_whole
 from shipgym.errors import InputError
 from shipgym.files import make_folder, read_json, write_json, write_text
 
 try:
     import optuna
-
-    from agents.training.search_space import search_space, with_parameters
+    from optuna import distributions
 except ModuleNotFoundError:
     raise InputError("optuna is not installed, tuning needs it: pip install 'shipgym[tune]'") from None
 
@@ -41,6 +40,9 @@ TRIALS_BEFORE_STOPPING, SHARE_BEFORE_STOPPING = 4, 0.25
 EVALUATIONS = 10  # of a trial
 
 CONFIGURATION, STUDY, KEPT, BEST = "study.json", "study.db", "trials", "best.toml"
+
+#: Settings that stand behind parameters of other names.
+STANDS_FOR = {"one_minus_gamma": "gamma", "minibatches": "batch_size"}
 
 LAST = 2**62  # steps, after all evaluations
 #: What a training returns.
@@ -120,7 +122,8 @@ def tune(
                 if progress is not None:
                     progress(before + done, trials, best)
 
-            jobs = [_job(plan, settings, found) for _, settings in proposed]
+            bounds = limits(found, plan.settings.total_steps)
+            jobs = [_job(plan, settings, bounds) for _, settings in proposed]
             results = replace(where, keep=folder / KEPT).run(training or train_trial, jobs, tell)
             for k, ((parameters, settings), result) in enumerate(zip(proposed, results, strict=True)):
                 found.append(_trial(first + k, parameters, settings, result))
@@ -186,14 +189,11 @@ def _best_until(curve: Curve, steps: int) -> float:
     return min((cost for mark, cost in curve if mark <= steps), default=np.inf)
 
 
-def _job(plan: Plan, settings: Mapping[str, Any], found: Sequence[Trial]) -> dict[str, Any]:
-    configuration = {**plan.configuration(), "settings": dict(settings)}
-    return {"configuration": configuration, "limits": limits(found, plan.settings.total_steps)}
+def _job(plan: Plan, settings: Mapping[str, Any], bounds: Curve) -> dict[str, Any]:
+    return {"configuration": {**plan.configuration(), "settings": dict(settings)}, "limits": bounds}
 
 
-def _trial(
-    number: int, parameters: Mapping[str, Any], settings: Mapping[str, Any], result: Mapping[str, Any]
-) -> Trial:
+def _trial(number: int, parameters: Mapping[str, Any], settings: Mapping[str, Any], result: Any) -> Trial:
     check_shape(result, TRIAL, f"trial {number}")
     curve = tuple((int(steps), float(cost)) for steps, cost in result["curve"])
     return Trial(number, parameters, settings, result["cost"], curve, result["ended"])
@@ -219,9 +219,9 @@ def _proposed(
 
 def _frozen(trial: Trial, space: Mapping[str, Any]) -> optuna.trial.FrozenTrial:
     """A trial as Optuna knows it."""
-    finished = trial.cost is not None
+    states = optuna.trial.TrialState
     return optuna.trial.create_trial(
-        state=optuna.trial.TrialState.COMPLETE if finished else optuna.trial.TrialState.PRUNED,
+        state=states.PRUNED if trial.cost is None else states.COMPLETE,
         value=trial.cost,
         params=dict(trial.parameters),
         distributions={name: space[name] for name in trial.parameters},
@@ -273,3 +273,36 @@ def _write_best(folder: Path, plan: Plan, found: Sequence[Trial]) -> None:
     )
     lines = [f"{name} = {json.dumps(value)}\n" for name, value in best.settings.items()]  # as TOML has them
     write_text(head + "".join(line for line in lines if not line.startswith("evaluate_every")), folder / BEST)
+
+
+def search_space(algorithm: str, fixed: Sequence[str] = ()) -> dict[str, Any]:
+    """The parameters that are varied, without those whose setting is fixed."""
+    tables = hyperparameters("search")
+    shared = tables["off-policy"] if issubclass(settings_of(algorithm), OffPolicySettings) else {}
+    space = {**tables["all"], **shared, **tables[algorithm]}
+    return {
+        name: _distribution(one) for name, one in space.items() if STANDS_FOR.get(name, name) not in fixed
+    }
+
+
+def _distribution(given: Any) -> distributions.BaseDistribution:
+    if isinstance(given, list):
+        return distributions.CategoricalDistribution(given)
+    whole = isinstance(given["high"], int)
+    return distributions.IntDistribution(**given) if whole else distributions.FloatDistribution(**given)
+
+
+def with_parameters(settings: Settings, parameters: Mapping[str, Any]) -> Settings:
+    """The settings that parameters stand for.
+
+    Raises InputError if they conflict with the settings that are not varied.
+    """
+    given = {name: value for name, value in parameters.items() if name not in STANDS_FOR}
+    if "one_minus_gamma" in parameters:
+        given["gamma"] = 1.0 - parameters["one_minus_gamma"]
+    for name in given.keys() & {"net_arch", "critic_arch"}:
+        given[name] = [int(width) for width in parameters[name].split()]
+    if "minibatches" in parameters:
+        n_steps = given.get("n_steps", settings.to_dict()["n_steps"])
+        given["batch_size"] = settings.ships * n_steps // parameters["minibatches"]
+    return changed(settings, given)

@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 from rich.table import Table
 
+from identification.design.reduction import table_of
 from identification.regression.samples import Samples, build_samples
 from identification.text import as_text, lined_table
 from identification.validation.diagnostics import scaled_features
@@ -25,7 +26,7 @@ from shipgym.arrays import Floats
 from shipgym.checks import check_choice
 from shipgym.errors import InputError, UnstableModelError
 from shipgym.manoeuvres import prbs_rudder, turning_circle, zigzag
-from shipgym.ships import ShipModel, Structure
+from shipgym.ships import ShipModel
 from shipgym.trials.trial import Trial
 
 Manoeuvre = Callable[[ShipModel], Trial]
@@ -52,34 +53,17 @@ class TrialInformation:
 
 @dataclass(frozen=True, eq=False)
 class Advice:
-    """Which manoeuvres to run next.
+    """Which manoeuvres to run next."""
 
-    Attributes
-    ----------
-    criterion : str
-        "c", "D" or "E".
-    coefficient : str
-        That which "c" shrinks.
-    trials : tuple of TrialInformation
-        Of the trials so far.
-    before : dict of str to float
-        Relative standard error of each coefficient from the trials so far.
-    steps : tuple of dict of str to float
-        Of each choice the gain of all candidates, the largest is best: by what factor the standard error
-        ("c"), the mean axis ("D") or the longest axis ("E") of the relative errors shrinks.
-    chosen : tuple of str
-        The candidates to run, in this order.
-    after : dict of str to float
-        Relative standard errors with them.
-    """
-
-    criterion: str
-    coefficient: str
-    trials: tuple[TrialInformation, ...]
-    before: dict[str, float]
+    criterion: str  # "c", "D" or "E"
+    coefficient: str  # that which "c" shrinks
+    trials: tuple[TrialInformation, ...]  # so far
+    before: dict[str, float]  # relative standard error of each coefficient from the trials so far
+    #: of each choice the gain of all candidates, the largest is best: by what factor the standard error
+    #: ("c"), the mean axis ("D") or the longest axis ("E") of the relative errors shrinks
     steps: tuple[dict[str, float], ...]
-    chosen: tuple[str, ...]
-    after: dict[str, float]
+    chosen: tuple[str, ...]  # the candidates to run, in this order
+    after: dict[str, float]  # relative standard errors with them
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values, ready for JSON; of each trial's information the diagonal."""
@@ -140,11 +124,10 @@ def fisher_information(model: ShipModel, samples: Samples, noise: Mapping[str, f
     """
     matrix = model.acceleration_matrix
     moments = np.zeros(matrix.shape)
-    for q, rows in _table(model).regression_rows.items():
+    for q, rows in table_of(model).regression_rows.items():
         X = samples.features[q]
         moments[rows, rows] = X.T @ X / noise[q]
-    information: Floats = matrix.T @ moments @ matrix
-    return information
+    return np.asarray(matrix.T @ moments @ matrix)
 
 
 def standard_candidates(model: ShipModel) -> dict[str, Manoeuvre]:
@@ -230,7 +213,7 @@ def advise(
 
 def _most_felt(model: ShipModel, errors: Floats) -> str:
     """The coefficient whose error, shape (n_coefficients,), changes the accelerations of a hard turn most."""
-    table, matrix = _table(model), model.acceleration_matrix
+    table, matrix = table_of(model), model.acceleration_matrix
     sizes = hard_turn_features(table, model.particulars, model.service_shaft_speed)
     values, felt = matrix @ np.array(list(model.coefficients.values())), np.zeros(len(errors))
     for q, rows in table.regression_rows.items():
@@ -246,18 +229,12 @@ def _gains(
     return {name: now / _uncertainty(total + extra, size, criterion, at) for name, extra in offers.items()}
 
 
-def _table(model: ShipModel) -> Structure:
-    if not isinstance(model.dynamics, Structure):
-        raise InputError(f"model {model.name!r}: equations written by hand found, expected a table of terms")
-    return model.table
-
-
 def _regression(model: ShipModel, trial: Trial) -> Samples:
     """Regression over windows of the same time, whatever the sampling."""
     window = max(round(WINDOW * model.travel_time / float(np.median(np.diff(trial.t)))), 1)
     window = min(window, max(len(trial) // 10, 1))
     return build_samples(
-        [trial], _table(model), model.particulars, "integral", window, shaft_speed=model.service_shaft_speed
+        [trial], table_of(model), model.particulars, "integral", window, shaft_speed=model.service_shaft_speed
     )
 
 
@@ -265,7 +242,7 @@ def _noise(model: ShipModel, regressions: Sequence[Samples]) -> dict[str, float]
     """Variance of what the model leaves of the targets, by equation."""
     values = model.acceleration_matrix @ np.array(list(model.coefficients.values()))
     noise = {}
-    for q, rows in _table(model).regression_rows.items():
+    for q, rows in table_of(model).regression_rows.items():
         targets = np.concatenate([s.targets[q] for s in regressions])
         errors = targets - np.concatenate([s.features[q] for s in regressions]) @ values[rows]
         # data without noise leave rounding errors only
@@ -320,8 +297,7 @@ def _covariance(information: Floats, size: Floats) -> Floats:
     """Covariance of the relative errors; what is not excited gets a large one instead of an infinite."""
     values, vectors = np.linalg.eigh(information * np.outer(size, size))
     values = np.maximum(values, FLOOR * max(values[-1], np.finfo(float).tiny))
-    covariance: Floats = (vectors / values) @ vectors.T
-    return covariance
+    return np.asarray((vectors / values) @ vectors.T)
 
 
 def _errors(information: Floats, size: Floats) -> Floats:

@@ -19,31 +19,25 @@ from shipgym.trials.trial import Trial
 
 @dataclass(frozen=True, eq=False)
 class ReducedIdentification:
-    """A structure reduced on its trials, and both models.
+    """A structure reduced on its trials, and both models."""
 
-    Attributes
-    ----------
-    full : IdentificationResult
-        With all terms.
-    reductions : dict of str to Reduction
-        By equation, the path and the terms chosen.
-    structure : Structure
-        Of the terms chosen, registered by its name.
-    reduced : IdentificationResult
-        With it.
-    """
-
-    full: IdentificationResult
-    reductions: dict[str, Reduction]
-    structure: Structure
-    reduced: IdentificationResult
+    full: IdentificationResult  # with all terms
+    reductions: dict[str, Reduction]  # by equation, the path and the terms chosen
+    structure: Structure  # of the terms chosen, registered by its name
+    reduced: IdentificationResult  # with it
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values, ready for JSON."""
         return {
             "structure": self.structure.name,
             "equations": {
-                q: {"chosen": found.chosen, "path": [_plain(step) for step in found.path]}
+                q: {
+                    "chosen": found.chosen,
+                    "path": [
+                        asdict(step) | {"relative_errors": _finite(step.relative_errors)}
+                        for step in found.path
+                    ],
+                }
                 for q, found in self.reductions.items()
             },
             "terms": {"full": len(self.full.coefficients), "reduced": len(self.reduced.coefficients)},
@@ -57,21 +51,10 @@ def identify_reduced(
 ) -> ReducedIdentification:
     """Identify a structure, reduce it on the same samples, and identify the smaller one.
 
-    Parameters
-    ----------
-    trials : sequence of Trial
-        As for `identify`. Those held out have no part in the reduction either.
-    direction : {"backward", "forward"}
-        Elimination or selection (`reduction`).
-    tolerance : float
-        By how much the R2 of stretches held out may fall.
-    **arguments
-        Of `identify`.
-
-    Raises
-    ------
-    InputError
-        For a grey box, whose table is what its reference ship leaves, and fewer than five samples a term.
+    Trials that are held out have no part in the reduction either. `direction` is "backward" for elimination
+    or "forward" for selection; `tolerance` is by how much the R2 of stretches held out may fall; `arguments`
+    are those of `identify`. Raises InputError for a grey box, whose table is what its reference ship leaves,
+    and fewer than five samples a term.
     """
     full = identify(trials, **arguments)
     table = full.model.table
@@ -81,7 +64,10 @@ def identify_reduced(
             "its own to reduce, such as 'abkowitz'"
         )
     reductions = reduce(full.samples, table, direction, tolerance)
-    small = _registered(table, reductions)
+    small = reduced_structure(table, reductions, table.name)
+    terms = repr([(q, [term.name for term in small.terms(q)]) for q in small.equations])
+    own = f"{table.name}-{hashlib.sha256(terms.encode()).hexdigest()[:6]}"  # among all reductions
+    small = register_structure(own, small.equations, small.source, small.normalisation, small.quantity)
     reduced = identify(trials, **{**arguments, "structure": small.name})
     return ReducedIdentification(full, reductions, small, reduced)
 
@@ -92,19 +78,9 @@ def zigzag_sensitivity(model: ShipModel) -> dict[str, float | None]:
         effects = sensitivity(model, partial(zigzag, rudder_deg=20.0, heading_deg=20.0, must_reverse=False))
     except UnstableModelError:
         return {}
-    return {name: value if value < float("inf") else None for name, value in effects.items()}
+    return _finite(effects)
 
 
-def _registered(table: Structure, reductions: dict[str, Reduction]) -> Structure:
-    """The reduced structure, under a name that is its own among all reductions."""
-    small = reduced_structure(table, reductions, table.name)
-    terms = repr([(q, [term.name for term in small.terms(q)]) for q in small.equations])
-    name = f"{table.name}-{hashlib.sha256(terms.encode()).hexdigest()[:6]}"
-    return register_structure(name, small.equations, small.source, small.normalisation, small.quantity)
-
-
-def _plain(step: Any) -> dict[str, Any]:
-    found = asdict(step)
-    errors = found["relative_errors"]
-    found["relative_errors"] = {name: e if e < float("inf") else None for name, e in errors.items()}
-    return found
+def _finite(values: dict[str, float]) -> dict[str, float | None]:
+    """As JSON knows them: None where a value is infinite."""
+    return {name: value if value < float("inf") else None for name, value in values.items()}

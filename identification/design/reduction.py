@@ -47,18 +47,10 @@ class ReductionStep:
 
 @dataclass(frozen=True)
 class Reduction:
-    """The whole path of a reduction and the model that it chose.
+    """The whole path of a reduction and the model that it chose."""
 
-    Attributes
-    ----------
-    path : tuple of ReductionStep
-        In the order in which terms were dropped or added.
-    chosen : int
-        Which of them.
-    """
-
-    path: tuple[ReductionStep, ...]
-    chosen: int
+    path: tuple[ReductionStep, ...]  # in the order in which terms were dropped or added
+    chosen: int  # which of them
 
     @property
     def terms(self) -> tuple[str, ...]:
@@ -117,7 +109,8 @@ def backward_elimination(
         For shapes that do not fit and fewer samples than terms.
     """
     features, targets, labels = _checked(X, y, names)
-    _check_tolerances(tolerance, threshold)
+    check_number(tolerance, "tolerance", at_least=0.0)
+    check_number(threshold, "threshold", at_least=0.0)
     kept = list(range(len(labels)))
     path = [_step(features, targets, labels, kept, "", 0.0)]
     best = path[0].held_out
@@ -143,22 +136,12 @@ def forward_selection(
 ) -> Reduction:
     """Add terms by error reduction ratio; choose the shortest model near the best on what is held out.
 
-    Parameters
-    ----------
-    X, y, names
-        As in `backward_elimination`.
-    tolerance : float
-        By how much the held-out R2 of the chosen model may lie below the best of the path.
-    most : int, optional
-        Terms at which to stop.
-
-    Returns
-    -------
-    Reduction
-        The path goes on beyond the chosen model.
+    `X`, `y` and `names` are as in `backward_elimination`. The held-out R2 of the chosen model may lie below
+    the best of the path, which goes on beyond it, by `tolerance`; `most` is the number of terms at which to
+    stop. Raises InputError for shapes that do not fit and fewer samples than terms.
     """
     features, targets, labels = _checked(X, y, names)
-    _check_tolerances(tolerance, 1.0)
+    check_number(tolerance, "tolerance", at_least=0.0)
     rest = features / np.sqrt(np.mean(features**2, axis=0))
     left, power = targets.copy(), float(targets @ targets)
     chosen: list[int] = []
@@ -214,34 +197,25 @@ def reduced_structure(structure: Structure, reductions: dict[str, Reduction], na
     return replace(structure, name=name, source=f"{structure.source}; reduced", equations=equations)
 
 
+def table_of(model: ShipModel) -> Structure:
+    """The table of terms of a model; InputError for a ship with equations written by hand."""
+    if not isinstance(model.dynamics, Structure):
+        raise InputError(f"model {model.name!r}: equations written by hand found, expected a table of terms")
+    return model.table
+
+
 def sensitivity(
     model: ShipModel, manoeuvre: Callable[[ShipModel], Trial], change: float = 0.01
 ) -> dict[str, float]:
     """Change of a simulated manoeuvre per per cent of each coefficient (Cao 2015).
 
-    Parameters
-    ----------
-    model : ShipModel
-        With a table of terms.
-    manoeuvre : callable
-        Simulates it with a model, such as ``zigzag``.
-    change : float
-        Relative step to either side.
-
-    Returns
-    -------
-    dict of str to float
-        By coefficient, the largest first: root mean square change of u, v, r and psi, each by its span, in
-        per cent per per cent. Infinite where the changed ship runs away.
-
-    Raises
-    ------
-    InputError
-        For a reference ship, whose coefficients are compiled in.
+    `manoeuvre` simulates it with a model, such as ``zigzag``; `change` is the relative step to either side.
+    Returns, by coefficient, the largest first, the root mean square change of u, v, r and psi, each by its
+    span, in per cent per per cent; infinite where the changed ship runs away. Raises InputError for a
+    reference ship, whose coefficients are compiled in.
     """
     check_number(change, "change", above=0.0, below=1.0)
-    if not isinstance(model.dynamics, Structure):
-        raise InputError(f"model {model.name!r}: equations written by hand found, expected a table of terms")
+    table_of(model)
     base = manoeuvre(model)
     spans = {c: float(np.ptp(base[c])) for c in SENSED}
     found = {}
@@ -265,9 +239,11 @@ def sensitivity(
 def _step(
     features: Floats, targets: Floats, labels: Sequence[str], kept: Sequence[int], changed: str, before: float
 ) -> ReductionStep:
-    X = features[:, kept]
+    from sklearn.model_selection import KFold, cross_val_predict
+
+    X, names = features[:, kept], tuple(labels[i] for i in kept)
     estimator = TruncatedLSSVM(selection="full", fit_intercept=False).fit(X, targets)
-    names = tuple(labels[i] for i in kept)
+    left_out = targets - cross_val_predict(estimator, X, targets, cv=KFold(FOLDS))
     deviation = np.sqrt(np.diag(estimator.covariance_))
     size = np.abs(estimator.coef_)
     relative = np.divide(deviation, size, out=np.full(len(names), np.inf), where=size > 0.0)
@@ -280,20 +256,9 @@ def _step(
         dict(zip(names, estimator.coef_.tolist(), strict=True)),
         dict(zip(names, relative.tolist(), strict=True)),
         r_squared,
-        1.0 - _held_out_error(X, targets) / power,
+        1.0 - float(left_out @ left_out) / power,
         r_squared - before if changed else r_squared,
     )
-
-
-def _held_out_error(X: Floats, y: Floats) -> float:
-    """Sum of squared errors of stretches of the samples, each predicted from the others."""
-    total = 0.0
-    for rows in np.array_split(np.arange(len(y)), FOLDS):
-        others = np.ones(len(y), dtype=bool)
-        others[rows] = False
-        fitted = TruncatedLSSVM(selection="full", fit_intercept=False).fit(X[others], y[others])
-        total += float(np.sum((y[rows] - X[rows] @ fitted.coef_) ** 2))
-    return total
 
 
 def _collinear(features: Floats, kept: Sequence[int]) -> set[int]:
@@ -324,8 +289,3 @@ def _checked(X: ArrayLike, y: ArrayLike, names: Sequence[str]) -> tuple[Floats, 
     if silent or not targets.any():
         raise InputError(f"X, y: {silent[0] if silent else 'y'} is 0 throughout, expected it to be excited")
     return features, targets, labels
-
-
-def _check_tolerances(tolerance: float, threshold: float) -> None:
-    check_number(tolerance, "tolerance", at_least=0.0)
-    check_number(threshold, "threshold", at_least=0.0)

@@ -22,23 +22,12 @@ from shipgym.trials.trial import Trial
 
 @dataclass(frozen=True, eq=False)
 class CoefficientHistory:
-    """Coefficients over time.
+    """Coefficients over time."""
 
-    Attributes
-    ----------
-    names : tuple of str
-        Of the coefficients.
-    t : array of shape (n_rows,)
-        End of each row's window, s, in the time of its trial.
-    trial : array of shape (n_rows,)
-        Index of the trial.
-    values : array of shape (n_rows, n_coefficients)
-        Estimate after each row, in the normalisation of the structure.
-    """
-
-    names: tuple[str, ...]
-    t: Floats
-    trial: NDArray[np.int64]
+    names: tuple[str, ...]  # of the coefficients
+    t: Floats  # end of each row's window, s, in the time of its trial, shape (n_rows,)
+    trial: NDArray[np.int64]  # index of the trial, shape (n_rows,)
+    #: estimate after each row, in the normalisation of the structure, shape (n_rows, n_coefficients)
     values: Floats
 
     def __getitem__(self, name: str) -> Floats:
@@ -94,16 +83,9 @@ def coefficient_history(
             f"method: {method!r} found, which fits all samples at once; expected a recursive one"
         )
     ship = particulars.completed() if table.quantity == "force" else particulars
-    if isinstance(source, Samples):
-        regression = source
-    else:
+    if not isinstance(source, Samples):
         trials = [source] if isinstance(source, Trial) else list(source)
-        regression = build_samples(trials, table, ship, shaft_speed=shaft_speed, **sampling)
-    histories = [
-        clone(estimator).fit_history(regression.features[q], regression.targets[q]) for q in table.equations
-    ]
-    matrix = table.acceleration_matrix(ship, shaft_speed)
-    values = np.linalg.solve(matrix, np.hstack(histories).T).T
-    return CoefficientHistory(
-        table.coefficient_names, regression.start + regression.duration, regression.trial, values
-    )
+        source = build_samples(trials, table, ship, shaft_speed=shaft_speed, **sampling)
+    found = [clone(estimator).fit_history(source.features[q], source.targets[q]) for q in table.equations]
+    values = np.linalg.solve(table.acceleration_matrix(ship, shaft_speed), np.hstack(found).T).T
+    return CoefficientHistory(table.coefficient_names, source.start + source.duration, source.trial, values)

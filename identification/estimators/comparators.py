@@ -75,14 +75,8 @@ class LinearSupportVectorMachine(LinearRegressor):
         self.converged_ = not caught
         self.coef_ = estimator.coef_ * size / scale
         self.intercept_ = mean + size * float(np.sum(estimator.intercept_)) - float(centre @ self.coef_)
-        self._estimate_covariance(scaled, (y - X @ self.coef_ - self.intercept_) / size, scale, size)
-        return self
-
-    def _estimate_covariance(self, scaled: Floats, error: Floats, scale: Floats, size: float) -> None:
-        """Weights, moment and covariance of Huber's estimator at the errors found."""
-        scale_of_error = MAD * float(np.median(np.abs(error)))
-        large = np.abs(error) > scale_of_error
-        self.weights_ = np.where(large, scale_of_error / np.where(large, np.abs(error), 1.0), 1.0)
+        error = (y - X @ self.coef_ - self.intercept_) / size
+        self.weights_ = _huber_weights(error)
         moment = (scaled.T * self.weights_) @ scaled
         inverse = np.linalg.pinv(moment, hermitian=True) / scale / scale[:, None]
         self.inverse_moment_ = inverse
@@ -90,3 +84,9 @@ class LinearSupportVectorMachine(LinearRegressor):
         variance = size**2 * float(np.sum((self.weights_ * error) ** 2)) / freedom
         unscaled = scaled * scale
         self.covariance_ = variance * inverse @ (unscaled.T @ unscaled) @ inverse
+        return self
+
+
+def _huber_weights(error: Floats) -> Floats:
+    scale, size = MAD * float(np.median(np.abs(error))), np.abs(error)
+    return np.where(size > scale, scale / np.where(size > scale, size, 1.0), 1.0)

@@ -33,11 +33,10 @@ class Decomposition:
     projections: Floats  # targets in the left singular vectors, shape (n_directions,)
     outside: float  # squared norm of the targets that no direction reaches
     n_free: int  # samples, less one where there is an intercept
-    #: what was subtracted from the features, and what they were divided by, shape (n_features,)
-    centre: Floats
+    centre: Floats  # what was subtracted from the features, shape (n_features,)
     mean: float  # what was subtracted from the targets
-    scale: Floats
-    n_samples: int  # number of samples
+    scale: Floats  # what the features were divided by, shape (n_features,)
+    n_samples: int
 
     @property
     def numerical_rank(self) -> int:
@@ -47,10 +46,9 @@ class Decomposition:
         return max(int(np.sum(s > threshold)), 1)
 
     def filters(self, C: ArrayLike, rank: int) -> Floats:
-        """Factors s / (s^2 + 1/C) of the first directions, shape (..., n_directions).
+        """Factors s / (s^2 + 1/C) of the first directions, 0 beyond `rank` and for what is lost in rounding.
 
-        They are 0 beyond `rank` and for what is lost in rounding; several C of shape (..., 1) give a row
-        each.
+        Several C of shape (..., 1) give a row each, shape (..., n_directions).
         """
         s = self.singular_values
         with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
@@ -58,18 +56,20 @@ class Decomposition:
         filters[..., min(rank, self.numerical_rank) :] = 0.0
         return filters
 
+    def coefficients(self, filters: Floats) -> Floats:
+        """Coefficients of the features as given, shape (n_features,)."""
+        scaled: Floats = self.directions.T @ (filters * self.projections)
+        return scaled / self.scale
+
 
 def triangle(X: Floats, y: Floats, fit_intercept: bool, weights: Floats | None = None) -> Floats:
     """Triangle of an orthogonal decomposition of [1 X y], without the ones where there is no intercept.
 
-    Features of shape (n_samples, n_features) and targets of shape (n_samples,); the weights are those of the
-    squared errors.
+    The weights, shape (n_samples,), are those of the squared errors.
     """
     first = int(fit_intercept)
     table = np.empty((len(y), X.shape[1] + 1 + first), order="F")
-    table[:, :first] = 1.0
-    table[:, first:-1] = X
-    table[:, -1] = y
+    table[:, :first], table[:, first:-1], table[:, -1] = 1.0, X, y
     if weights is not None:
         table *= np.sqrt(weights)[:, None]
     return _triangle_of(table)
@@ -126,7 +126,7 @@ def decompose_triangle(
 
 
 def centre_and_scale(X: Floats, scale: bool | ArrayLike, fit_intercept: bool) -> tuple[Floats, Floats]:
-    """Means and scales of the features, arrays of shape (n_features,); zero means without intercept."""
+    """Means and scales of the features, shape (n_features,); zero means without intercept."""
     centre = X.mean(axis=0) if fit_intercept else np.zeros(X.shape[1])
     size = np.sqrt(np.mean((X - centre) ** 2, axis=0))
     # what is constant is centred to rounding errors, which must not be blown up

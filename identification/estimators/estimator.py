@@ -32,11 +32,9 @@ class Estimator(Protocol):
 
     def fit(self, X: ArrayLike, y: ArrayLike) -> Self:
         """Fit to features of shape (n_samples, n_features) and targets of shape (n_samples,)."""
-        ...
 
     def predict(self, X: ArrayLike) -> Floats:
         """Targets of features of shape (n_samples, n_features)."""
-        ...
 
 
 def weights(estimator: Estimator, features: Floats) -> Floats:

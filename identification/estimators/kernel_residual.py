@@ -17,7 +17,7 @@ from sklearn.cluster import KMeans
 
 from identification.estimators.estimator import Estimators
 from identification.estimators.lssvm import LSSVM
-from identification.estimators.rm_svm import ERROR_TOLERANCE, heading_error
+from identification.estimators.rm_svm import heading_error, most_regularised
 from identification.regression.grey_box import structure_samples
 from identification.regression.preprocess import smoothed_channels
 from identification.regression.samples import Samples
@@ -50,19 +50,16 @@ EVERY_CENTRE_NEEDS = 3  # rows of the regression
 
 @dataclass(frozen=True, eq=False)
 class KernelFit:
-    """A kernel fitted to what a reference ship leaves."""
+    """A kernel fitted to what a reference ship leaves, or before that, without estimators and report."""
 
     model: ShipModel
     samples: Samples
-    estimators: Estimators = field(default_factory=dict)  # none where it is not fitted yet
+    estimators: Estimators = field(default_factory=dict)
     report: dict[str, Any] = field(default_factory=dict)  # for the provenance
 
 
 def reference_options(options: Options) -> Options:
-    """The options by which the reference ship beneath a kernel is identified; a grey box names hers.
-
-    Raises InputError for a kernel that does not exist, and for a method that has none.
-    """
+    """The options by which the reference ship beneath a kernel is identified; a grey box names hers."""
     if options.kernel != RBF:
         raise InputError(f"kernel: {options.kernel!r} found, expected {RBF!r}, or none")
     if options.method not in METHODS:
@@ -75,8 +72,8 @@ def reference_options(options: Options) -> Options:
     structure, method = options.structure, options.method
     if structure in (Options.structure, AUTO):  # none was named
         structure = BLACK_BOX if options.reference_model is None else GREY_BOX
-    if structure != GREY_BOX:
-        method = "ls-svm" if method == "rm-svm" else method
+    if structure != GREY_BOX and method == "rm-svm":
+        method = "ls-svm"
     cleared: dict[str, Any] = dict.fromkeys(OWN)
     return replace(options, structure=structure, method=method, **cleared)
 
@@ -110,9 +107,8 @@ def fit_kernel(
     """Fit a kernel to what the reference ship of a grey box leaves, length and weight of the errors chosen.
 
     Where not given these are the smoothest whose simulated headings of the trials held out are within a tenth
-    of the best; a fitted reference ship knows these trials. `blank`: the ship, whose structure is not used;
-    `trials`: to fit; `box`: has the reference ship; `options`: `centres`, `kernel_length`, `C`, `folds`;
-    `sampling`: as of `build_samples`. Raises InputError for too few samples and settings that cannot be.
+    of the best; a fitted reference ship knows these trials. Of `blank`, the ship, the structure is not used.
+    Raises InputError for too few samples and settings that cannot be.
     """
     search = _Search(blank, trials, box, sampling, options.folds or TRIALS)
     kernels = _kernels(search, options)
@@ -121,9 +117,8 @@ def fit_kernel(
     pairs = [(length, weight) for weight in weights for length in stages]  # the smoothest first
     (length, weight), errors = pairs[0], {}
     if len(pairs) > 1:
-        tried = {pair: search.error(stages[pair[0]], pair[1]) for pair in pairs}
-        least = ERROR_TOLERANCE * min(tried.values())
-        length, weight = next((pair for pair in pairs if tried[pair] <= least), pairs[0])
+        tried = {(length, weight): search.error(stages[length], weight) for length, weight in pairs}
+        length, weight = most_regularised(pairs, [*tried.values()])
         errors = {"kernel": tried[length, weight]}
     errors["reference"] = search.error(stages[length], 0.0)
     remarks = []
@@ -146,14 +141,12 @@ def _kernels(search: _Search, options: Options) -> dict[float, Kernel]:
     number = CENTRES if options.centres is None else options.centres
     check_whole(number, "centres", at_least=2)
     check_number(number, "centres", at_most=SIZES[-1])
-    smooth = search.sampling["smooth"]
-    method = smooth if isinstance(smooth, str) else "spline" if smooth else "none"
-    channels = [smoothed_channels(trial, ("u", "v", "r", "delta"), method) for trial in search.trials]
+    names, smooth = ("u", "v", "r", "delta"), search.sampling["smooth"]
+    channels = [smoothed_channels(trial, names, smooth) for trial in search.trials]
     x = np.concatenate([kernel_inputs(one, search.blank.particulars) for one in channels])
     offset, scale, centres = chosen_centres(x, number)
-    lengths: tuple[float, ...] = LENGTHS
-    if options.kernel_length is not None:
-        lengths = (check_number(options.kernel_length, "kernel_length", above=0.0),)
+    given = options.kernel_length
+    lengths = LENGTHS if given is None else (check_number(given, "kernel_length", above=0.0),)
     return {
         length: principal(Kernel(offset, scale * length, centres / length, np.eye(len(centres))), x)
         for length in lengths
@@ -161,10 +154,9 @@ def _kernels(search: _Search, options: Options) -> dict[float, Kernel]:
 
 
 def chosen_centres(x: Floats, number: int) -> tuple[Floats, Floats, Floats]:
-    """Offset and scale of inputs, and centres in these, mirrored to the other side in pairs.
+    """Offset and scale of inputs x, shape (n_samples, 4), and centres in these, mirrored in pairs.
 
-    x has shape (n_samples, 4). Centres are those of k-means of all samples brought to one side. Raises
-    InputError for fewer samples than it takes.
+    Centres are those of k-means of all samples brought to one side. Raises InputError for too few samples.
     """
     offset = np.array([0.0, 0.0, 0.0, x[:, 3].mean()])
     scale = np.maximum(np.sqrt(np.mean((x - offset) ** 2, axis=0)), LEAST_SCALE)
@@ -181,12 +173,10 @@ def chosen_centres(x: Floats, number: int) -> tuple[Floats, Floats, Floats]:
 
 def principal(kernel: Kernel, x: Floats) -> Kernel:
     """The kernel with the leading principal components of the samples x in feature space as features."""
-    both = _thinned((x - kernel.offset) / kernel.scale)
-    both = np.concatenate([both, both * MIRROR])
-    values = gaussians(both, kernel.centres)
+    z = _thinned((x - kernel.offset) / kernel.scale)
+    values = gaussians(np.concatenate([z, z * MIRROR]), kernel.centres)
     own = gaussians(kernel.centres, kernel.centres)
-    moment = values.T @ values / len(values)
-    _, vectors = eigh(moment, own + 1e-9 * np.eye(len(own)))
+    _, vectors = eigh(values.T @ values / len(values), own + 1e-9 * np.eye(len(own)))
     return replace(kernel, basis=np.ascontiguousarray(vectors[:, ::-1][:, :MOST_FEATURES]))
 
 
@@ -206,15 +196,13 @@ class _Search:
 
     def stage(self, kernel: Kernel) -> KernelFit:
         """The regression, and the model but for its coefficients."""
-        table = kernel_box(self.box, kernel)
+        table, ship = kernel_box(self.box, kernel), self.blank.particulars
         blank = replace(
             self.blank, structure=table.name, own_table=table, covariance=None, provenance=None,
             coefficients=dict.fromkeys(table.coefficient_names, 0.0),
         )  # fmt: skip
-        samples = structure_samples(
-            self.trials, table, blank.particulars, shaft_speed=blank.service_shaft_speed, **self.sampling
-        )
-        return KernelFit(blank, samples)
+        given = {"shaft_speed": blank.service_shaft_speed, **self.sampling}
+        return KernelFit(blank, structure_samples(self.trials, table, ship, **given))
 
     def unit(self, samples: Samples) -> float:
         """What the weight of the errors, by ship length and in the prime system, is in SI units by row."""
@@ -226,11 +214,9 @@ class _Search:
         samples, C, errors = stage.samples, weight * self.unit(stage.samples), []
         for rows, held in held_out_rows(self.trials, samples, self.folds):
             found: dict[str, Floats] = {}
-            for q, X in samples.features.items():
-                moment = X[rows].T @ X[rows] * C + np.eye(X.shape[1])
-                found[q] = np.asarray(
-                    np.linalg.solve(moment, C * (X[rows].T @ samples.targets[q][rows])), float
-                )
+            for q, X in samples.select(rows).features.items():
+                moment = X.T @ X * C + np.eye(X.shape[1])
+                found[q] = np.linalg.solve(moment, C * (X.T @ samples.targets[q][rows])).astype(float)
             errors.append(heading_error(stage.model.with_accelerations(found), held, "rmse"))
         return float(np.mean(errors))
 

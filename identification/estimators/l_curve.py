@@ -22,12 +22,7 @@ class LCurve:
 
 
 def l_curve(singular_values: Floats, projections: Floats, filters: Floats, outside: float) -> LCurve:
-    """Norms for every rank from one singular value decomposition.
-
-    `singular_values`, `projections`, `filters`: of the scaled features, descending; targets in the left
-    singular vectors, U'y; s / (s^2 + 1/C), shape (n_ranks,); `outside`: squared norm of the part of the
-    targets that no direction reaches.
-    """
+    """Norms for every rank from what a `Decomposition` says of the directions, shape (n_ranks,)."""
     missed = projections**2
     explained_miss = (projections * (1.0 - singular_values * filters)) ** 2
     total = missed.sum() - np.cumsum(missed) + np.cumsum(explained_miss) + max(outside, 0.0)
@@ -61,10 +56,7 @@ def corner_rank(curve: LCurve, n_samples: int) -> int:
 
 
 def gcv_rank(curve: LCurve, n_samples: int) -> int:
-    """Rank that minimises generalised cross-validation (Golub, Heath & Wahba 1979).
-
-    Below the number of samples where possible.
-    """
+    """Rank that minimises generalised cross-validation (Golub, Heath & Wahba 1979)."""
     freedom = n_samples - np.arange(1, len(curve.residual_norm) + 1)
     with np.errstate(divide="ignore"):
         score = np.where(freedom > 0, curve.residual_norm**2 / np.maximum(freedom, 1) ** 2, np.inf)
@@ -72,10 +64,7 @@ def gcv_rank(curve: LCurve, n_samples: int) -> int:
 
 
 def variance_rank(singular_values: Floats, share: float) -> int:
-    """Least rank that holds a share, 0 to 1, of the variance of the features.
-
-    As in principal component regression.
-    """
+    """Least rank that holds a share, 0 to 1, of the variance of the features."""
     held = np.cumsum(singular_values**2)
     # the last sum is compared with itself, so that a share of 1 keeps all
     return min(int(np.searchsorted(held, share * held[-1])) + 1, len(held))

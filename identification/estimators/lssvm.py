@@ -7,7 +7,8 @@ V diag(s / (s^2 + 1/C)) U' y, at a cost of O(n m^2) instead of the O(n^3) of the
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from itertools import combinations_with_replacement
+from math import factorial, prod
 from typing import Any, Self
 
 import numpy as np
@@ -19,7 +20,7 @@ from sklearn.utils.validation import check_is_fitted, validate_data
 from identification.estimators.decomposition import Decomposition, centre_and_scale, decompose
 from identification.estimators.l_curve import corner_rank, gcv_rank, l_curve, variance_rank
 from identification.estimators.linear import LinearRegressor, check_weight, settings, validated
-from identification.estimators.robust import reweighted
+from identification.estimators.robust import fit_weighted
 from shipgym.arrays import Floats
 from shipgym.checks import check_choice, check_whole
 from shipgym.errors import InputError
@@ -107,7 +108,7 @@ class LSSVM(LinearRegressor):
             raise InputError(f"C: {self.C} found, expected a finite number with kernel {self.kernel!r}")
         self.centre_, self.scale_ = centre_and_scale(X, self.scale, self.fit_intercept)
         self.support_ = (X - self.centre_) / self.scale_
-        ridge = np.full(len(y), 1.0 / self.C) if weights is None else 1.0 / (self.C * weights)
+        ridge = 1.0 / (self.C * (np.ones(len(y)) if weights is None else weights))
         kernel = self._kernel(self.support_)
         factor = cho_factor(kernel + np.diag(ridge))
         if self.fit_intercept:  # two solves eliminate b from the bordered system
@@ -212,7 +213,9 @@ class TruncatedLSSVM(LinearRegressor):
         self.rank_ = self._choose(problem, distinct)
         filters[self.rank_ :] = 0.0
         self.directions_ = problem.directions
-        self.collinear_groups_ = tuple(_members(row) for row in problem.directions[self.rank_ :])
+        dropped = np.abs(problem.directions[self.rank_ :])
+        shares = dropped / dropped.max(axis=1, keepdims=True)
+        self.collinear_groups_ = tuple(tuple(np.flatnonzero(row >= LEAST_SHARE).tolist()) for row in shares)
         return take(self, problem, filters, X, y, weights)
 
     @property
@@ -223,10 +226,8 @@ class TruncatedLSSVM(LinearRegressor):
         return tuple(tuple(str(names[i]) for i in group) for group in self.collinear_groups_)
 
     def _choose(self, problem: Decomposition, distinct: int) -> int:
-        if self.rank is not None:
-            return min(self.rank, distinct)
-        if self.selection == "full":
-            return distinct
+        if self.rank is not None or self.selection == "full":
+            return min(self.rank or distinct, distinct)
         if self.selection == "l-curve":
             return corner_rank(self.l_curve_, problem.n_free)
         if self.selection == "gcv":
@@ -238,18 +239,16 @@ def take(
     estimator: Any, problem: Decomposition, filters: Floats, X: Floats, y: Floats, weights: Floats | None
 ) -> Floats:
     """Set the attributes of a linear estimator from its filtered decomposition; returns the residuals."""
-    scaled = problem.directions.T @ (filters * problem.projections)
-    shrink = problem.singular_values * filters
     root = (problem.directions.T * filters) / problem.scale[:, None]
     with np.errstate(divide="ignore", invalid="ignore"):
         inverse = np.where(filters > 0.0, filters / problem.singular_values, 0.0)
     unscaled = problem.directions / problem.scale
-    estimator.coef_ = scaled / problem.scale
+    estimator.coef_ = problem.coefficients(filters)
     estimator.intercept_ = problem.mean - float(problem.centre @ estimator.coef_)
     estimator.singular_values_ = problem.singular_values
     estimator.inverse_moment_ = (unscaled.T * inverse) @ unscaled
     residual: Floats = y - X @ estimator.coef_ - estimator.intercept_
-    freedom = problem.n_free - float(np.sum(shrink))
+    freedom = problem.n_free - float(np.sum(problem.singular_values * filters))
     effective = residual if weights is None else residual * weights
     estimator.noise_variance_ = float(effective @ effective) / freedom if freedom > 0.5 else np.nan
     # Huber's sandwich: the residuals that count are the weighted ones, the moment is that of all samples
@@ -258,14 +257,39 @@ def take(
     return residual
 
 
-def fit_weighted(fit: Callable[[Floats | None], Floats], y: Floats, robust: bool) -> Floats:
-    """Fit once, or until the weights of the samples converge; returns the weights."""
-    if robust:
-        return reweighted(fit, float(np.max(np.abs(y))))
-    fit(None)
-    return np.ones(len(y))
+def polynomial_coefficients(estimator: LSSVM) -> dict[tuple[int, ...], float]:
+    """Coefficients of the polynomial that a fitted LS-SVM with polynomial kernel is (Zhu 2018, eq. 5.5-5.7).
 
+    The kernel (gamma x_i.x + coef0)^d is multiplied out and summed over the samples.
 
-def _members(direction: Floats) -> tuple[int, ...]:
-    share = np.abs(direction) / np.max(np.abs(direction))
-    return tuple(int(i) for i in np.flatnonzero(share >= LEAST_SHARE))
+    Parameters
+    ----------
+    estimator : LSSVM
+        Fitted, with kernel "poly".
+
+    Returns
+    -------
+    dict
+        Coefficient by the powers of the features, as they were given: (2, 1) is that of x0^2 x1.
+
+    Raises
+    ------
+    InputError
+        For another kernel.
+    """
+    if estimator.kernel != "poly":
+        raise InputError(f"kernel: {estimator.kernel!r} found, expected 'poly': only a polynomial has them")
+    check_is_fitted(estimator)
+    degree, n_features = int(estimator.degree), estimator.n_features_in_
+    gamma = 1.0 / n_features if estimator.gamma is None else estimator.gamma
+    slope = gamma * estimator.support_ / estimator.scale_  # x as given, not centred
+    constant = estimator.coef0 - slope @ estimator.centre_
+    found = {}
+    for total in range(degree + 1):
+        for chosen in combinations_with_replacement(range(n_features), total):
+            powers = tuple(chosen.count(j) for j in range(n_features))
+            ways = factorial(degree) / (prod(map(factorial, powers)) * factorial(degree - total))
+            terms = np.prod(slope ** np.array(powers), axis=1) * constant ** (degree - total)
+            found[powers] = ways * float(estimator.dual_coef_ @ terms)
+    found[(0,) * n_features] += estimator.intercept_
+    return found

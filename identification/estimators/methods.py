@@ -5,15 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
+from numpy.typing import ArrayLike
 from sklearn.base import clone
 
-from identification.estimators.adapter import without_constant
 from identification.estimators.comparators import LinearSupportVectorMachine
 from identification.estimators.estimator import Estimator, Estimators, FitTask
-from identification.estimators.free_running import fit_free_running
 from identification.estimators.lssvm import LSSVM, TruncatedLSSVM
 from identification.estimators.recursive import (
     MultiInnovationLeastSquares,
@@ -21,11 +20,16 @@ from identification.estimators.recursive import (
     StochasticGradient,
 )
 from identification.estimators.rm_svm import RMSVM, fit_rm_svm
-from identification.estimators.tuned import TunedLSSVM
+from identification.estimators.tuned import TunedLSSVM, fit_tuned
 from identification.regression.samples import Samples
 from shipgym.arrays import Floats
 from shipgym.checks import check_choice, check_number, quoted
 from shipgym.errors import InputError
+
+
+def fit_all(estimator: Callable[[], Estimator], samples: Samples) -> Estimators:
+    """One estimator for each equation, fitted."""
+    return {q: estimator().fit(X, samples.targets[q]) for q, X in samples.features.items()}
 
 
 def each_equation(make: Callable[[], Estimator], task: FitTask) -> Estimators:
@@ -40,16 +44,12 @@ class Method:
     name: str  # as `identify` knows it
     estimator: Callable[..., Estimator]  # makes an unfitted estimator from settings
     regularised: bool = True  # whether the guard against models that run away may penalise it
-    #: fits estimators, made by its first argument, to the task that is its second, and returns them by
-    #: equation. By default each equation by itself, from the samples alone
+    #: fits estimators, made by its first argument, to the task that is its second
     fit: Callable[[Callable[[], Estimator], FitTask], Estimators] = each_equation
     refined: bool = False  # whether what was fitted is the start of a refinement by simulation (`refine`)
 
     def fitted(self, settings: Mapping[str, Any], task: FitTask) -> Estimators:
-        """Estimators of all equations, fitted with the settings.
-
-        Raises InputError for settings that the method does not know.
-        """
+        """Estimators of all equations, fitted; InputError for settings that the method does not know."""
         unknown = [name for name in settings if not self.knows(name)]
         if unknown:
             raise InputError(
@@ -80,21 +80,8 @@ def _ridge(alpha: float = 1e-6, **settings: Any) -> Estimator:
     return LSSVM(C=1.0 / alpha if alpha else np.inf, fit_intercept=False, **settings)
 
 
-def searched(make: Callable[[], Estimator], task: FitTask) -> Estimators:
-    """Fit estimators that choose their own C, which may use the trials as blocks or simulate them."""
-    template, samples = make(), task.samples
-    assert isinstance(template, TunedLSSVM)
-    if template.objective == "free-running":
-        return dict(fit_free_running(template, task))
-    return {
-        q: clone(template).fit(samples.features[q], samples.targets[q], samples.trial)
-        for q in samples.features
-    }
-
-
 _TLS_SVM = partial(TruncatedLSSVM, fit_intercept=False)
 _TUNED = partial(TunedLSSVM, fit_intercept=False)
-_MILS = partial(MultiInnovationLeastSquares, inverse_free=False)
 
 METHODS = {
     method.name: method
@@ -103,15 +90,15 @@ METHODS = {
         Method("ridge", _ridge),
         Method("ls-svm", partial(LSSVM, fit_intercept=False)),
         Method("tls-svm", _TLS_SVM),
-        Method("cv-lssvr", partial(_TUNED, optimiser="grid"), fit=searched),
-        Method("pso-lssvr", partial(_TUNED, optimiser="pso"), fit=searched),
-        Method("abc-lssvr", partial(_TUNED, optimiser="abc"), fit=searched),
-        Method("de-lssvr", partial(_TUNED, optimiser="de"), fit=searched),
+        Method("cv-lssvr", partial(_TUNED, optimiser="grid"), fit=fit_tuned),
+        Method("pso-lssvr", partial(_TUNED, optimiser="pso"), fit=fit_tuned),
+        Method("abc-lssvr", partial(_TUNED, optimiser="abc"), fit=fit_tuned),
+        Method("de-lssvr", partial(_TUNED, optimiser="de"), fit=fit_tuned),
         Method("svr", partial(LinearSupportVectorMachine, fit_intercept=False)),
         Method("rls", RecursiveLeastSquares, regularised=False),
         Method("sg", StochasticGradient, regularised=False),
         Method("nisg", partial(StochasticGradient, omega=0.5), regularised=False),
-        Method("mils", _MILS, regularised=False),
+        Method("mils", partial(MultiInnovationLeastSquares, inverse_free=False), regularised=False),
         Method("tmils", MultiInnovationLeastSquares, regularised=False),
         Method("output-error", _TLS_SVM, refined=True),
         Method("rm-svm", RMSVM, fit=fit_rm_svm),
@@ -119,15 +106,13 @@ METHODS = {
 }
 
 #: Estimators that use more than the samples of one equation.
-FITTED_TOGETHER: Mapping[type, Callable[..., Estimators]] = {TunedLSSVM: searched, RMSVM: fit_rm_svm}
+FITTED_TOGETHER: Mapping[type, Callable[..., Estimators]] = {TunedLSSVM: fit_tuned, RMSVM: fit_rm_svm}
 
 
 def get_method(method: str | Any) -> Method:
-    """A method by name, or that of an estimator object.
+    """A method by name, or that of an estimator object, of which each equation has a copy.
 
-    The estimator of each equation is a copy of the object, without a constant term: the equations of motion
-    have none but that of the structure. Raises InputError if there is none of that name, and for an object
-    without `fit`.
+    Without a constant term: the equations of motion have none but that of the structure.
     """
     if isinstance(method, str):
         return METHODS[check_choice(method, METHODS, "method")]
@@ -141,14 +126,8 @@ def get_method(method: str | Any) -> Method:
             f"method: LSSVM with kernel {method.kernel!r} found, which has no coefficient for each term; "
             "write identify(..., kernel='rbf') for a ship with a kernel"
         )
-    together = [fit for kind, fit in FITTED_TOGETHER.items() if isinstance(method, kind)]
-    fit = together[0] if together else each_equation
+    fit = next((fit for kind, fit in FITTED_TOGETHER.items() if isinstance(method, kind)), each_equation)
     return Method(type(method).__name__, lambda: without_constant(method), regularised=False, fit=fit)
-
-
-def fit_all(estimator: Callable[[], Estimator], samples: Samples) -> Estimators:
-    """One estimator for each equation, fitted."""
-    return {q: estimator().fit(samples.features[q], samples.targets[q]) for q in samples.features}
 
 
 def fit_held(samples: Samples, sizes: dict[str, Floats], strength: float) -> Estimators:
@@ -161,8 +140,53 @@ def fit_held(samples: Samples, sizes: dict[str, Floats], strength: float) -> Est
     window = float(np.mean(samples.duration))
     C = 1.0 / (len(samples) * strength**2)
     return {
-        q: LSSVM(C=C, scale=sizes[q] * window, fit_intercept=False).fit(
-            samples.features[q], samples.targets[q]
-        )
-        for q in samples.features
+        q: LSSVM(C=C, scale=sizes[q] * window, fit_intercept=False).fit(X, samples.targets[q])
+        for q, X in samples.features.items()
     }
+
+
+class Adapted:
+    """An estimator with scikit-learn's interface, and the moment and covariance that it lacks.
+
+    These are those of least squares on the features whose coefficients are not 0: an approximation for an
+    estimator that shrinks its coefficients. `inner` has a `fit(X, y)` that sets `coef_`.
+    """
+
+    def __init__(self, inner: Any) -> None:
+        self.inner = inner
+
+    def fit(self, X: ArrayLike, y: ArrayLike) -> Self:
+        """Fit; InputError for an estimator that sets no `coef_` of a finite number for each feature."""
+        features, targets = np.asarray(X, dtype=float), np.asarray(y, dtype=float)
+        self.inner.fit(features, targets)
+        found = np.asarray(getattr(self.inner, "coef_", np.nan), dtype=float).ravel()
+        if found.shape != features.shape[1:] or not np.isfinite(found).all():
+            raise InputError(
+                f"method: {self.inner!r} found, whose fit sets no finite coefficient for each of the "
+                f"{features.shape[1]} terms, expected a linear estimator with coef_"
+            )
+        used = np.flatnonzero(found)
+        self.coef_ = found
+        self.inverse_moment_ = np.zeros((len(found), len(found)))
+        moment = features[:, used].T @ features[:, used]
+        self.inverse_moment_[np.ix_(used, used)] = np.linalg.pinv(moment, hermitian=True)
+        residual = targets - features @ found
+        freedom = max(len(targets) - len(used), 1)
+        self.covariance_ = float(residual @ residual) / freedom * self.inverse_moment_
+        return self
+
+    def predict(self, X: ArrayLike) -> Floats:
+        """Targets, shape (n_samples,)."""
+        prediction: Floats = np.asarray(X, dtype=float) @ self.coef_
+        return prediction
+
+
+def without_constant(estimator: Any) -> Estimator:
+    """An unfitted copy of an estimator object, with its `fit_intercept`, if it has one, set to False."""
+    copied = clone(estimator, safe=False)
+    if hasattr(copied, "get_params") and "fit_intercept" in copied.get_params(deep=False):
+        copied.set_params(fit_intercept=False)
+    # our own estimators know their moment; that of others is estimated
+    known = type(copied).__module__.partition(".")[0] == "identification"
+    adapted: Estimator = copied if known else Adapted(copied)
+    return adapted

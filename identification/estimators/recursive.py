@@ -82,10 +82,9 @@ class Recursion(LinearRegressor):
         return self
 
     def fit_history(self, X: ArrayLike, y: ArrayLike) -> Floats:
-        """Fit, and return the estimate after each sample.
+        """Fit, and return the estimate after each sample, shape (n_samples, n_features).
 
-        `X`, `y`: as in `fit`. Returns the coefficients after each sample (while LS-SVR gathers its samples,
-        those that it will find from them), shape (n_samples, n_features).
+        While LS-SVR gathers its samples these are the coefficients that it will find from them.
         """
         self._check()
         features, targets = validated(self, X, y)
@@ -97,8 +96,7 @@ class Recursion(LinearRegressor):
         start = np.tile(self.coef_, (gathered, 1))
         rest = self._run(features[gathered:, None], targets[gathered:, None])[:, 0]
         multiplicity = np.zeros(len(targets))
-        multiplicity[picked] = 1.0
-        multiplicity[gathered:] = 1.0
+        multiplicity[picked] = multiplicity[gathered:] = 1.0
         self._summarise(features, targets, multiplicity)
         return np.concatenate([start, rest])
 
@@ -147,8 +145,8 @@ class Recursion(LinearRegressor):
 
     def _begin(self, features: Floats, targets: Floats) -> None:
         """Zero coefficients with the covariance C, in scales that the samples give."""
-        axes = tuple(range(features.ndim - 1))
-        self.scale_ = scales_of(np.sqrt(np.mean(features**2, axis=axes)), self.scale)
+        size = np.sqrt(np.mean(features**2, axis=tuple(range(features.ndim - 1))))
+        self.scale_ = scales_of(size, self.scale)
         unit = np.sqrt(np.mean(targets**2, axis=0))
         self._unit = np.where(unit > 0.0, unit, 1.0)
         signals, m = targets.shape[1], features.shape[-1]
@@ -186,9 +184,8 @@ class Recursion(LinearRegressor):
         unscale = np.outer(self.scale_, self.scale_)
         self.inverse_moment_ = inverse / unscale
         error = targets - features @ self.coef_
-        freedom = max(
-            self.weights_.sum() - float(np.sum(inverse * (moment - np.eye(len(moment)) / self.C))), 1.0
-        )
+        effective = float(np.sum(inverse * (moment - np.eye(len(moment)) / self.C)))
+        freedom = max(self.weights_.sum() - effective, 1.0)
         self.noise_variance_ = float(self.weights_ @ error**2) / freedom
         middle = (scaled.T * self.weights_**2) @ scaled
         self.covariance_ = self.noise_variance_ * (inverse @ middle @ inverse) / unscale
@@ -200,8 +197,11 @@ class Recursion(LinearRegressor):
     def _advance(self, phi: Floats, y: Floats, history: Floats) -> None: ...
 
 
-class _LeastSquares(Recursion):
-    """Least squares that correct by the last few innovations together."""
+class RecursiveLeastSquares(Recursion):
+    """Recursive least squares with forgetting, started from zero or from LS-SVR (Zhu 2018, section 7.3).
+
+    Its parameters are those of `Recursion`.
+    """
 
     innovations: int = 1
     omega: float = 0.0
@@ -231,20 +231,13 @@ class _LeastSquares(Recursion):
         self._past = (phi[len(y) - kept :].copy(), y[len(y) - kept :].copy())
 
     def _summarise(self, features: Floats, targets: Floats, multiplicity: Floats) -> None:
-        gathered = len(targets) - np.arange(len(targets))
-        used = np.minimum(self.innovations, gathered)  # a sample is seen again while it is among the last
+        # a sample is seen again while it is among the last
+        used = np.minimum(self.innovations, len(targets) - np.arange(len(targets)))
         super()._summarise(features, targets, multiplicity * used)
 
 
-class RecursiveLeastSquares(_LeastSquares):
-    """Recursive least squares with forgetting, started from zero or from LS-SVR (Zhu 2018, section 7.3).
-
-    Its parameters are those of `Recursion`.
-    """
-
-
 @settings()
-class MultiInnovationLeastSquares(_LeastSquares):
+class MultiInnovationLeastSquares(RecursiveLeastSquares):
     """Multi-innovation least squares: each step corrects by the last few innovations together.
 
     Parameters
@@ -298,15 +291,11 @@ class StochasticGradient(Recursion):
 
 def _shaped(phi: ArrayLike, y: ArrayLike) -> tuple[Floats, Floats]:
     """Samples of shape (n_samples, n_signals, n_features) and (n_samples, n_signals)."""
-    targets = np.asarray(y, dtype=float)
-    targets = targets.reshape(1, 1) if targets.ndim == 0 else targets
-    features = np.asarray(phi, dtype=float)
+    features, targets = np.asarray(phi, dtype=float), np.atleast_1d(np.asarray(y, dtype=float))
     if features.ndim == 1:
-        features = features[None]
-        targets = targets.reshape(1, -1)
+        features, targets = features[None], targets.reshape(1, -1)
+    features = features[:, None] if features.ndim == 2 else features
     targets = targets[:, None] if targets.ndim == 1 else targets
-    if features.ndim == 2:
-        features = features[:, None]
     if features.ndim != 3 or targets.ndim != 2 or len(features) != len(targets):
         raise InputError(
             f"phi, y: shapes {np.shape(phi)} and {np.shape(y)} found, expected (n_samples, n_features) and "

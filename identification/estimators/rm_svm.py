@@ -9,8 +9,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Sequence
-from dataclasses import replace
-from typing import Any, Self
+from typing import Any, Self, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -38,6 +37,8 @@ ERROR_TOLERANCE = 1.1  # times the least error counts as equally good
 FIRST_BAND = 0.1
 MOST_ROWS = 600  # of the regression: sequential minimal optimisation takes the square of it
 MOST_SWEEPS = 20_000  # of coordinate descent through the samples
+
+Choice = TypeVar("Choice")
 
 
 @settings()
@@ -88,12 +89,7 @@ class RMSVM(LinearRegressor):
     folds: str = TRIALS
 
     def check(self) -> None:
-        """Refuse settings that cannot be.
-
-        Raises
-        ------
-        InputError
-        """
+        """Refuse settings that cannot be by an InputError."""
         check_choice(self.objective, OBJECTIVES, "objective")
         check_choice(self.regression, REGRESSIONS, "regression")
         check_choice(self.folds, FOLDS, "folds")
@@ -138,14 +134,14 @@ class RMSVM(LinearRegressor):
         """Slopes and offset for standardised features and targets."""
         if not Z.shape[1]:
             return np.zeros(0), 0.0
-        has_offset = self.constant is not None
-        if self.regression == "ls-svm":
-            ridge = Ridge(alpha=len(e) / weight, fit_intercept=has_offset).fit(Z, e)
-            return np.asarray(ridge.coef_, dtype=float), float(ridge.intercept_)
-        if not has_offset:
-            return _through_zero(Z, e, weight / len(e), band), 0.0
-        estimator = SVR(kernel="linear", C=weight / len(e), epsilon=band).fit(Z, e)
-        return np.asarray(estimator.coef_, dtype=float).ravel(), float(estimator.intercept_[0])
+        has_offset, C = self.constant is not None, weight / len(e)
+        if self.regression == "svr" and not has_offset:
+            return _through_zero(Z, e, C, band), 0.0
+        solver = Ridge(alpha=1.0 / C, fit_intercept=has_offset)
+        if self.regression == "svr":
+            solver = SVR(kernel="linear", C=C, epsilon=band)
+        solver.fit(Z, e)
+        return np.asarray(solver.coef_, dtype=float).ravel(), float(np.sum(solver.intercept_))
 
 
 def _through_zero(Z: Floats, e: Floats, C: float, band: float) -> Floats:
@@ -170,10 +166,9 @@ def fit_rm_svm(make: Callable[[], Estimator], task: FitTask) -> Estimators:
     """Fit the corrections of all equations, with weight and insensitive bands chosen where not given.
 
     `make`: makes an unfitted `RMSVM` with the settings asked for; `task`: its model is the bare reference
-    ship as a model of the target. What was chosen is in `chosen_`. Raises InputError for a model without a
-    reference ship.
+    ship as a model of the target. Raises InputError for a model without a reference ship.
     """
-    asked, samples = make(), task.samples
+    asked = make()
     assert isinstance(asked, RMSVM)
     asked.check()
     if not isinstance(task.blank.table, GreyBox):
@@ -186,11 +181,11 @@ def fit_rm_svm(make: Callable[[], Estimator], task: FitTask) -> Estimators:
     weight = tuner.weight() if asked.C is None else float(asked.C)
     bands, search = tuner.bands(weight)
     estimators: Estimators = {}
-    for k, (q, band) in enumerate(zip(samples.features, bands.tolist(), strict=True)):
-        estimator = tuner.fitted(q, weight, band, np.ones(len(samples), dtype=bool))
+    for k, (q, band) in enumerate(zip(task.samples.features, bands, strict=True)):
+        estimator = tuner.fitted(q, weight, band, tuner.everything)
         estimator.chosen_ = {"C": weight, "epsilon": band}
         if search is not None:
-            estimator.search_ = replace(search, x=search.x[[k]], course=search.course[:, [k]], variable=BAND)
+            estimator.search_ = search.of(k, BAND)
         estimators[q] = estimator
     return estimators
 
@@ -201,6 +196,9 @@ class _Tuner:
     def __init__(self, asked: RMSVM, task: FitTask) -> None:
         self.asked, self.samples, self.blank, self.trials = asked, task.samples, task.blank, task.trials
         self.thin = max(1, -(-len(task.samples) // MOST_ROWS))
+        self.everything = np.ones(len(task.samples), dtype=bool)
+        band = FIRST_BAND if asked.epsilon is None else asked.epsilon
+        self.first_bands = [band] * len(task.samples.features)
         self._known: dict[tuple[Any, ...], RMSVM] = {}
 
     def fitted(self, equation: str, weight: float, band: float, rows: NDArray[np.bool_]) -> RMSVM:
@@ -218,9 +216,8 @@ class _Tuner:
     def model(self, weight: float, bands: Sequence[float], rows: NDArray[np.bool_]) -> ShipModel:
         """The grey box with the corrections fitted to some of the rows."""
         equations = zip(self.samples.features, bands, strict=True)
-        return self.blank.with_accelerations(
-            {q: self.fitted(q, weight, band, rows).coef_ for q, band in equations}
-        )
+        coefficients = {q: self.fitted(q, weight, band, rows).coef_ for q, band in equations}
+        return self.blank.with_accelerations(coefficients)
 
     def weight(self) -> float:
         """The least weight of the errors nearly as good as the best on what is held out.
@@ -228,31 +225,33 @@ class _Tuner:
         Simulated headings are compared, not accelerations: collinear terms hardly change these. Where it
         makes no difference the reference ship is to be believed, because the hard turn is in no zigzag.
         """
-        bands = [FIRST_BAND if self.asked.epsilon is None else self.asked.epsilon] * len(
-            self.samples.features
-        )
         folds = list(held_out_rows(self.trials, self.samples, self.asked.folds))
-        errors = np.array([
-            np.mean([heading_error(self.model(weight, bands, rows), held, "rmse") for rows, held in folds])
-            for weight in WEIGHTS
-        ])  # fmt: skip
-        if not np.isfinite(errors.min()):
-            return NO_CORRECTION
-        return float(WEIGHTS[int(np.flatnonzero(errors <= ERROR_TOLERANCE * errors.min())[0])])
 
-    def bands(self, weight: float) -> tuple[Floats, SearchResult | None]:
+        def error(weight: float) -> float:
+            models = ((self.model(weight, self.first_bands, rows), held) for rows, held in folds)
+            return float(np.mean([heading_error(model, held, "rmse") for model, held in models]))
+
+        return float(most_regularised(WEIGHTS, [error(weight) for weight in WEIGHTS]))
+
+    def bands(self, weight: float) -> tuple[list[float], SearchResult | None]:
         """The insensitive bands, by a pattern search on the simulated heading of the trials."""
-        count = len(self.samples.features)
+        first = self.first_bands
         if self.asked.epsilon is not None or weight == NO_CORRECTION or self.asked.regression == "ls-svm":
-            return np.full(count, FIRST_BAND if self.asked.epsilon is None else self.asked.epsilon), None
-        everything = np.ones(len(self.samples), dtype=bool)
+            return first, None
 
         def error(bands: Floats) -> float:
-            model = self.model(weight, bands.tolist(), everything)
+            model = self.model(weight, bands.tolist(), self.everything)
             return float(np.mean([heading_error(model, t, self.asked.objective) for t in self.trials]))
 
-        search = pattern_search(error, np.full(count, FIRST_BAND), np.zeros(count), np.ones(count))
-        return search.x, search
+        search = pattern_search(error, first, np.zeros(len(first)), np.ones(len(first)))
+        return search.x.tolist(), search
+
+
+def most_regularised(choices: Sequence[Choice], errors: Sequence[float]) -> Choice:
+    """The first of choices, the most regularised first, whose error is nearly the least, if any is finite."""
+    allowed = ERROR_TOLERANCE * min(errors)
+    found = (choice for choice, error in zip(choices, errors, strict=True) if error <= allowed)
+    return next(found, choices[0])
 
 
 def heading_error(model: ShipModel, trial: Trial, objective: str) -> float:

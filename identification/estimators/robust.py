@@ -19,8 +19,8 @@ SETTLED = 1e-3  # change of a weight
 def hampel_weights(residuals: Floats, largest: float) -> Floats:
     """Weights of samples by their residuals (Suykens et al. 2002, Neurocomputing 48, eq. 14).
 
-    1 within 2.5 scales, 1e-4 beyond 3, straight in between. The scale is estimated by the median absolute
-    deviation; residuals of the rounding of the `largest` target all have the weight 1.
+    The scale is estimated by the median absolute deviation; residuals of the rounding of the `largest` target
+    all have the weight 1.
     """
     scale = MAD * float(np.median(np.abs(residuals - np.median(residuals))))
     if scale <= ROUNDING * largest:
@@ -30,13 +30,17 @@ def hampel_weights(residuals: Floats, largest: float) -> Floats:
     return weights
 
 
-def reweighted(fit: Callable[[Floats | None], Floats], largest: float) -> Floats:
-    """Fit, weight the samples by their residuals and fit again until the weights converge.
+def fit_weighted(fit: Callable[[Floats | None], Floats], y: Floats, robust: bool) -> Floats:
+    """Fit; if robust weight the samples by their residuals and fit again until the weights converge.
 
-    `fit` takes weights, None for equal ones, and returns the residuals; `largest` is the size of the largest
-    target. Returns the weights of the last fit; after 50 rounds without settling the last ones are taken.
+    `fit` takes weights, None for equal ones, and returns the residuals. Returns the weights of the last fit;
+    after 50 rounds without settling the last ones are taken.
     """
-    weights = hampel_weights(fit(None), largest)
+    residuals = fit(None)
+    if not robust:
+        return np.ones(len(y))
+    largest = float(np.max(np.abs(y)))
+    weights = hampel_weights(residuals, largest)
     for _ in range(MOST_ROUNDS):
         previous, weights = weights, hampel_weights(fit(weights), largest)
         if float(np.max(np.abs(weights - previous))) < SETTLED:

@@ -2,22 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
+from sklearn.base import clone
 
+from identification.estimators.decomposition import decompose
+from identification.estimators.estimator import Estimator, Estimators, FitTask
 from identification.estimators.linear import LinearRegressor, check_weight, settings, validated
 from identification.estimators.lssvm import LSSVM
 from identification.search import get_optimiser
 from identification.search.objectives import ErrorOfC, held_out_error, time_blocks, training_error
-from identification.search.search import Optimiser
+from identification.search.search import Optimiser, SearchResult
+from identification.validation.prediction import predict
 from shipgym.arrays import Floats
 from shipgym.checks import check_choice, check_whole
 from shipgym.errors import InputError
+from shipgym.ships import ShipModel
+from shipgym.trials.trial import Trial
 
 OBJECTIVES = ("k-fold", "training", "free-running")
+COMPARED = ("u", "v", "r")
+RAN_AWAY = 1e3  # error, relative to the motion, of a ship that ran away
 
 
 @settings()
@@ -86,7 +94,7 @@ class TunedLSSVM(LinearRegressor):
         X, y = validated(self, X, y)
         objective = self._objective(X, y, groups, self._estimator(10.0 ** bounds[1]))
         search = optimiser.minimise(objective, [bounds], self.seed)
-        return self.fit_with(X, y, 10.0 ** float(search.x[0]), search)
+        return self.fit_with(X, y, search)
 
     def log_bounds(self) -> tuple[float, float]:
         """Bounds of log10 C, checked."""
@@ -103,9 +111,10 @@ class TunedLSSVM(LinearRegressor):
             )
         return float(np.log10(low)), float(np.log10(high))
 
-    def fit_with(self, X: ArrayLike, y: ArrayLike, C: float, search: Any) -> Self:
+    def fit_with(self, X: ArrayLike, y: ArrayLike, search: SearchResult) -> Self:
         """Take C as a search found it, and fit."""
         X, y = validated(self, X, y)
+        C = 10.0 ** float(search.x[0])
         fitted = vars(self._estimator(C).fit(X, y))
         self.__dict__.update({name: value for name, value in fitted.items() if name.endswith("_")})
         self.C_, self.search_ = C, search
@@ -123,3 +132,59 @@ class TunedLSSVM(LinearRegressor):
         folds = min(self.folds, len(y)) if isinstance(self.folds, int) else self.folds
         blocks = time_blocks(len(y), folds, groups)
         return held_out_error(X, y, self.scale, self.fit_intercept, blocks, weights)
+
+
+def fit_tuned(make: Callable[[], Estimator], task: FitTask) -> Estimators:
+    """Fit estimators that choose their own C, which may use the trials as blocks or simulate them."""
+    template, samples = make(), task.samples
+    assert isinstance(template, TunedLSSVM)
+    if template.objective == "free-running":
+        return _fit_free_running(template, task)
+    return {q: clone(template).fit(X, samples.targets[q], samples.trial) for q, X in samples.features.items()}
+
+
+def free_running_error(model: ShipModel, trials: Sequence[Trial]) -> float:
+    """Mean squared error of open-loop predictions, each channel relative to its variance in the trial.
+
+    0 for a perfect model, 1 for one that predicts the mean; 1e3 for each trial that ran away.
+    """
+    errors = []
+    for trial in trials:
+        prediction = predict(model, trial)
+        if prediction is None:
+            errors.append(RAN_AWAY)
+            continue
+        motion = [c for c in COMPARED if np.ptp(trial[c]) > 0.0]
+        errors.append(
+            float(np.mean([np.mean((prediction[c] - trial[c]) ** 2) / np.var(trial[c]) for c in motion]))
+        )
+    return float(np.mean(np.minimum(errors, RAN_AWAY)))
+
+
+def _fit_free_running(settings: TunedLSSVM, task: FitTask) -> Estimators:
+    """Estimators of all equations, their C chosen together by the error of simulated trials.
+
+    The variables of their common search are log10 C in the order of the equations.
+    """
+    samples = task.samples
+    whitened = {
+        q: decompose(X, samples.targets[q], settings.scale, settings.fit_intercept)
+        for q, X in samples.features.items()
+    }
+
+    def error(log_c: Floats) -> float:
+        accelerations = {}
+        for q, exponent in zip(whitened, log_c, strict=True):
+            fit = whitened[q]
+            accelerations[q] = fit.coefficients(fit.filters(10.0**exponent, len(fit.singular_values)))
+        return free_running_error(task.blank.with_accelerations(accelerations), task.trials)
+
+    search = get_optimiser(settings.optimiser).minimise(
+        lambda candidates: np.array([error(x) for x in candidates]),
+        [settings.log_bounds()] * len(whitened),
+        settings.seed,
+    )
+    return {
+        q: clone(settings).fit_with(X, samples.targets[q], search.of(k))
+        for k, (q, X) in enumerate(samples.features.items())
+    }

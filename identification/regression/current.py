@@ -45,11 +45,10 @@ class CurrentEstimate(NamedTuple):
 def estimate_current(
     trials: Sequence[Trial], length: float, speed: float, shared: bool, known: Floats | None = None
 ) -> CurrentEstimate:
-    """The current of each trial, or of all.
+    """The current of each trial, or of all, from psi, r, delta and velocities over ground.
 
-    The trials have psi, r, delta and velocities over ground; n, accelerations by wind and a speed u through
-    the water are used where they are there. `length`, m, and `speed` in service, m/s, are the ship's;
-    `known`, shape (18,), are coefficients of another estimate, which are then not fitted.
+    n, accelerations by wind and a speed u through the water are used where they are there. `known`, shape
+    (18,), are coefficients of another estimate, which are then not fitted.
     """
     runs = _Runs(trials, length, speed, shared, known)
     x, slopes, residuals = runs.fitted()
@@ -108,9 +107,9 @@ class _Runs:
             ahead, aside = over_ground(trial)
             c, s = np.cos(trial["psi"]), np.sin(trial["psi"])
             north, east = ahead * c - aside * s, ahead * s + aside * c
-            logged = trial["u"] if "v" in trial.derived and "u" not in trial.derived else None
-            rows = [trial["r"] * travel, trial["delta"], n, *wind, trial["psi"], north / speed, east / speed]
-            rows += [np.full(len(trial), np.nan) if logged is None else logged / speed]
+            logged = np.where("v" in trial.derived and "u" not in trial.derived, trial["u"], np.nan)
+            seen_at = [row / speed for row in (north, east, logged)]
+            rows = [trial["r"] * travel, trial["delta"], n, *wind, trial["psi"], *seen_at]
             times = (trial.t - trial.t[0]) / travel
             on_grid = np.array([np.interp(grid, times, row) for row in rows])
             self.measured[:, :, 0, k], self.psi[:, k] = on_grid[:5].T, on_grid[5]

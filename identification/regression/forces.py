@@ -14,6 +14,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
+from sklearn.metrics import r2_score
 
 from identification.estimators.estimator import Estimator
 from identification.estimators.lssvm import TruncatedLSSVM
@@ -36,27 +37,14 @@ METHODS = {"ls": "full", "tls-svm": "l-curve"}  # how each chooses the direction
 
 @dataclass(frozen=True, eq=False)
 class ForceRegression:
-    """Forces of captive tests as a linear function of the coefficients, prime system.
+    """Forces of captive tests as a linear function of the coefficients, prime system."""
 
-    Attributes
-    ----------
-    features : array of shape (n_rows, n_coefficients)
-        The share of each coefficient; rows of all X, then all Y, then all N.
-    targets : array of shape (n_rows,)
-        Hydrodynamic force or moment.
-    names : tuple of str
-        Of the coefficients, in the order of the columns.
-    equation : array of shape (n_rows,)
-        0, 1, 2 for X, Y, N.
-    trial : array of shape (n_rows,)
-        Index of the trial.
-    """
-
+    #: share of each coefficient; rows of all X, then all Y, then all N, shape (n_rows, n_coefficients)
     features: Floats
-    targets: Floats
-    names: tuple[str, ...]
-    equation: NDArray[np.int64]
-    trial: NDArray[np.int64]
+    targets: Floats  # hydrodynamic force or moment, shape (n_rows,)
+    names: tuple[str, ...]  # of the coefficients, in the order of the columns
+    equation: NDArray[np.int64]  # 0, 1, 2 for X, Y, N, shape (n_rows,)
+    trial: NDArray[np.int64]  # index of the trial, shape (n_rows,)
 
     def __len__(self) -> int:
         return len(self.targets)
@@ -68,13 +56,9 @@ class ForceRegression:
 
     def r_squared(self, coefficients: Floats) -> dict[str, float]:
         """Share of the variance of X, Y and N that is explained (equation 22)."""
-        errors = self.targets - self.features @ coefficients
-        found = {}
-        for i, force in enumerate(FORCES):
-            rows = self.equation == i
-            about = self.targets[rows] - self.targets[rows].mean()
-            found[force] = 1.0 - float(errors[rows] @ errors[rows]) / max(float(about @ about), 1e-300)
-        return found
+        fitted, forces = self.features @ coefficients, [self.equation == i for i in range(len(FORCES))]
+        explained = [float(r2_score(self.targets[rows], fitted[rows])) for rows in forces]
+        return dict(zip(FORCES, explained, strict=True))
 
 
 def force_regression(
@@ -102,29 +86,25 @@ def force_regression(
     """
     if not trials:
         raise InputError("trials: none found, expected captive tests with the channels u, v, r, X, Y, N")
-    ship = particulars.completed()
-    parts = []
-    for index, trial in enumerate(trials):
+    ship, names = particulars.completed(), structure.coefficient_names
+    parts, index = [], []
+    for i, trial in enumerate(trials):
         missing = [name for name in NEEDED if name not in trial]
         if missing:
             raise InputError(
                 f"trial {trial.name!r}: channel {missing[0]!r} is missing, structure {structure.name!r} "
                 f"needs {', '.join(NEEDED)}; give captive tests"
             )
-        pieces = [_one_piece(trial, rows, structure, ship, model_inertia) for rows in _between_jumps(trial)]
-        parts += [(index, *piece) for piece in pieces]
+        for rows in _between_jumps(trial):
+            parts.append(_one_piece(trial, rows, structure, ship, model_inertia))
+            index += [i] * (rows.stop - rows.start)
     if not parts:
         raise InputError(
             f"trial {trials[0].name!r}: nowhere {FEWEST} samples between jumps of the velocity, expected more"
         )
-    counts = [(i, len(targets[0])) for i, _, targets in parts]
-    return ForceRegression(
-        np.concatenate([features[axis] for axis in range(3) for _, features, _ in parts]),
-        np.concatenate([targets[axis] for axis in range(3) for _, _, targets in parts]),
-        structure.coefficient_names,
-        np.repeat(np.arange(3), sum(n for _, n in counts)),
-        np.tile(np.concatenate([np.full(n, i) for i, n in counts]), 3),
-    )
+    features, targets = (np.concatenate(part, axis=1) for part in zip(*parts, strict=True))
+    equation, trial_index = np.repeat(np.arange(3), len(index)), np.tile(index, 3)
+    return ForceRegression(features.reshape(-1, len(names)), targets.ravel(), names, equation, trial_index)
 
 
 def _between_jumps(trial: Trial) -> list[slice]:
@@ -140,8 +120,8 @@ def _between_jumps(trial: Trial) -> list[slice]:
 
 def _one_piece(
     trial: Trial, rows: slice, structure: SharedStructure, ship: Particulars, model_inertia: bool
-) -> tuple[list[Floats], list[Floats]]:
-    """Features and targets of X, Y, N over one stretch, prime system."""
+) -> tuple[Floats, Floats]:
+    """Features and targets of X, Y, N over one stretch, prime system; the first axis is the force."""
     t, length = trial.t[rows], ship.length
     u, v, r = (trial[name][rows] for name in "uvr")
     speed = np.hypot(u, v)
@@ -154,20 +134,15 @@ def _one_piece(
     prime |= dict(zip(ACCELERATIONS, (rates[0], rates[1], rates[2] * length), strict=True))
     prime |= {f"|{name}|": np.abs(prime[name]) for name in "uvr"}
     unit = 0.5 * ship.require("water_density") * length**2 * speed**2
-    targets = [trial[force][rows] / unit / (length if force == "N" else 1.0) for force in FORCES]
+    targets = np.array([trial[force][rows] / unit / (length if force == "N" else 1.0) for force in FORCES])
     if model_inertia:
-        own = _rigid_body_forces(prime, ship)
-        targets = [target + ours for target, ours in zip(targets, own, strict=True)]
+        targets += _rigid_body_forces(prime, ship)
     column = {name: i for i, name in enumerate(structure.coefficient_names)}
-    features = []
-    for axis in AXES:
-        matrix = np.zeros((len(t), len(column)))
+    features = np.zeros((len(AXES), len(t), len(column)))
+    for own, axis in zip(features, AXES, strict=True):
         for share in structure.shares[axis]:
-            product = np.ones(len(t))
-            for symbol, power in share.term.powers:
-                product = product * prime[symbol] ** float(power)
-            matrix[:, column[share.coefficient]] += share.sign * product
-        features.append(matrix)
+            factors = [prime[symbol] ** float(power) for symbol, power in share.term.powers]
+            own[:, column[share.coefficient]] += share.sign * np.prod(factors, axis=0)
     return features, targets
 
 
@@ -182,34 +157,29 @@ def _rigid_body_forces(prime: dict[str, Floats], ship: Particulars) -> list[Floa
 def fit_forces(regression: ForceRegression, estimator: Estimator) -> tuple[Floats, Floats]:
     """Coefficients and their covariance; X, Y and N count alike, each by its root mean square.
 
-    `regression`: of captive tests; `estimator`: without intercept; it is fitted. Returns `coefficients`:
-    shape (n_coefficients,); `covariance`: for white errors, whose size is that of each force's own residuals,
-    shape (n_coefficients, n_coefficients).
+    `estimator` has no intercept. The covariance is for white errors of the size of each force's residuals.
     """
     scales = regression.scales()
     features, targets = regression.features / scales[:, None], regression.targets / scales
     estimator.fit(features, targets)
     half = features @ estimator.inverse_moment_
-    variances = force_variances(
-        regression.equation, targets - estimator.predict(features), np.sum(half * features, axis=1)
-    )
+    left, leverages = targets - estimator.predict(features), np.sum(half * features, axis=1)
+    variances = force_variances(regression.equation, left, leverages)
     covariance = (half.T * variances[regression.equation]) @ half
     return estimator.coef_, 0.5 * (covariance + covariance.T)
 
 
 def force_variances(equation: NDArray[np.int64], residuals: Floats, leverages: Floats) -> Floats:
-    """Variances of the errors of X, Y and N, each by its residuals.
+    """Variances of the errors of X, Y and N, each by its residuals, shape (3, ...).
 
     `equation`: 0, 1, 2 for X, Y, N, shape (n_rows,); `residuals`: of the fit, shape (n_rows, ...);
-    `leverages`: diagonal of the matrix that maps targets to fitted values, shape (n_rows,). Returns an array
-    of shape (3, ...).
+    `leverages`: diagonal of the matrix that maps targets to fitted values, shape (n_rows,).
     """
-    found = []
-    for i in range(len(FORCES)):
-        rows = equation == i
-        freedom = max(float(np.sum(1.0 - leverages[rows])), 1.0)
-        found.append(np.sum(residuals[rows] ** 2, axis=0) / freedom)
-    return np.array(found)
+    forces = [equation == i for i in range(len(FORCES))]
+    freedom = [max(float(np.sum(1.0 - leverages[rows])), 1.0) for rows in forces]
+    return np.array(
+        [np.sum(residuals[rows] ** 2, axis=0) / n for rows, n in zip(forces, freedom, strict=True)]
+    )
 
 
 @single_threaded()

@@ -39,12 +39,10 @@ class _Widened:
 def chosen_box(
     reference: str | ShipModel | None, particulars: Particulars, trials: Sequence[Trial]
 ) -> tuple[GreyBox, dict[str, float]]:
-    """The grey box of a named reference ship, or of the one most like the target.
+    """The grey box of a reference ship, and the correlations of the candidates where she was not named.
 
-    `reference`: a model, its name or file; "auto" chooses by `select_reference`; `particulars`: of the
-    target; `trials`: of the target; whether its shaft speed and roll are known. Returns `correlations`: of
-    the candidates, empty where the ship was named. Raises InputError for no reference, or one that does not
-    exist.
+    `reference`: a model, its name or file; "auto" chooses the one most like the target by `select_reference`;
+    the target's trials tell whether its shaft speed and roll are known.
     """
     if reference is None:
         raise InputError(
@@ -54,7 +52,11 @@ def chosen_box(
     recorded = set.intersection(*(set(trial.channels) for trial in trials)) if trials else set()
     found: dict[str, float] = {}
     if reference == AUTO:
-        reference, found = select_reference(_with_block_coefficient(particulars), recorded)
+        try:  # with what can be estimated
+            ship = particulars.completed()
+        except InputError:  # too little is known for that
+            ship = particulars
+        reference, found = select_reference(ship, recorded)
         check_alike(reference, found[reference], 'choose structure "abkowitz" or "cubic"')
     box = grey_box(reference)
     return replace(box, shaft=box.shaft and "n" in recorded), found
@@ -63,10 +65,9 @@ def chosen_box(
 def structure_samples(
     trials: Sequence[Trial], structure: Structure, particulars: Particulars, **sampling: Any
 ) -> Samples:
-    """The regression of any structure; arguments as in `build_samples`.
+    """The regression of any structure, as `build_samples`.
 
-    For a grey box the target is what the reference ship's acceleration, converted to the target and
-    integrated over the same window, leaves of the change of velocity.
+    Of a grey box it is that of what the reference ship's converted acceleration leaves of the changes.
     """
     if not isinstance(structure, GreyBox):
         return build_samples(trials, structure, particulars, **sampling)
@@ -99,19 +100,8 @@ def explained_samples(
     return own, estimators
 
 
-def _with_block_coefficient(particulars: Particulars) -> Particulars:
-    """Particulars with what can be estimated; as they are where too little is known for that."""
-    try:
-        return particulars.completed()
-    except InputError:
-        return particulars
-
-
 def bare_metrics(model: ShipModel, trials: Sequence[Trial]) -> dict[str, Any]:
-    """How well the reference ship of a grey box alone predicts trials.
-
-    Its name, and `trial_metrics` by trial.
-    """
+    """Name of the reference ship of a grey box, and how well she alone predicts trials (`trial_metrics`)."""
     assert isinstance(model.table, GreyBox)
     bare = replace(model, coefficients=dict.fromkeys(model.coefficients, 0.0), covariance=None)
     return {

@@ -22,10 +22,7 @@ NODES, WEIGHTS = np.polynomial.legendre.leggauss(5)
 def step_integrals(
     t: Floats, channels: Channels, equations: Iterable[str], terms: Terms, euler: bool
 ) -> Integrals:
-    """Integrals over each step by the value at its start or by the trapezoid rule, and their first moments.
-
-    Arguments and result as of `spline_integrals`.
-    """
+    """As `spline_integrals`, by the value at the start of each step or by the trapezoid rule."""
     integrals, moments = {}, {}
     for q in equations:
         values = terms(q, channels)
@@ -38,19 +35,14 @@ def step_integrals(
 def spline_integrals(
     t: Floats, channels: Channels, equations: Iterable[str], terms: Terms, rudder: Rudder
 ) -> Integrals:
-    """Integrals over each step by Gauss quadrature on splines through the samples.
+    """Integrals over each step by Gauss quadrature on splines, broken where the rudder has corners.
 
-    `t`: s, shape (n_samples,); `channels`: by name, shape (n_samples,); `equations`: whose terms are
-    integrated; `terms`: the terms of an equation from the channels; `rudder`: where the splines are broken.
-    Returns `integrals, moments`: by equation; moments about the end of the step, shape (n_samples - 1,
-    n_terms).
+    Returns `integrals, moments` by equation, shape (n_samples - 1, n_terms); moments about the step's end.
     """
     edges = np.union1d(t, rudder.corners)
     middle, half = 0.5 * (edges[1:] + edges[:-1]), 0.5 * np.diff(edges)
     times = middle[:, None] + half[:, None] * NODES
-    at_nodes: dict[str, Floats] = {}
-    for name, values in channels.items():
-        at_nodes[name] = _between(t, name, values, rudder)(times.ravel())
+    at_nodes = {name: _between(t, name, values, rudder)(times.ravel()) for name, values in channels.items()}
     step = np.searchsorted(t, middle, side="right") - 1
     starts = np.flatnonzero(np.diff(step, prepend=-1))
     weights = half[:, None] * WEIGHTS
@@ -75,8 +67,8 @@ def _between(t: Floats, name: str, values: Floats, rudder: Rudder) -> Callable[[
 def broken_spline(t: Floats, values: Floats, rudder: Rudder) -> BSpline:
     """Cubic spline through the samples of a velocity, broken where the rudder has a corner.
 
-    Where the rate of the rudder jumps the second derivative of a velocity jumps; where the acceleration of
-    the rudder jumps, the third does.
+    Where the rate of the rudder jumps the second derivative of a velocity does; at a jump of its acceleration
+    the third does.
     """
     if len(t) <= DEGREE:
         return make_interp_spline(t, values, k=1)

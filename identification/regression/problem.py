@@ -54,17 +54,13 @@ class Problem:
 def pose(
     trials: Sequence[Trial], options: Options, particulars: Given, steering: SteeringGear | None
 ) -> Problem:
-    """Check what was given and make the regression; arguments as in `identify`.
-
-    Raises InputError for trials that excite nothing, lack channels or samples or are of another ship, and for
-    particulars that do not suffice.
-    """
+    """Check what was given and make the regression; arguments and errors as in `identify`."""
     everything, sea = in_still_water(held_out(trials, options.hold_out), options, particulars)
     if not isinstance(steering, SteeringGear | None):
         raise InputError(
             f"steering: {steering!r} found, expected a SteeringGear, or None to estimate it from the rudders"
         )
-    used = [repaired(trial) if options.repair else trial for trial in _used(everything)]
+    used = [repaired(trial) if options.repair else trial for trial in everything if trial.use == "fit"]
     table, similarity = _table(options.structure, options.reference_model, particulars, used)
     used, everything = (
         [_at_constant_speed(one, table, particulars) for one in group] for group in (used, everything)
@@ -75,23 +71,15 @@ def pose(
         check_scale(trial, ship, f"trial {trial.name!r}")
     shaft = _shaft_speed(options.service_shaft_speed, used, table)
     smooth = options.preprocessing or options.smooth
-    sampling: dict[str, Any] = {
-        "samples": options.samples,
-        "window": options.window,
-        "gear": steering,
-        "smooth": smooth,
-    }
-
-    def regress(trials: Sequence[Trial]) -> Samples:
-        return structure_samples(trials, table, ship, shaft_speed=shaft, **sampling)
-
-    regression = regress(used)
+    sampling = dict[str, Any](samples=options.samples, window=options.window, gear=steering, smooth=smooth)
+    regression = structure_samples(used, table, ship, shaft_speed=shaft, **sampling)
     if options.wind == "constant":
         constants = constant_wind(used, regression, options.structure)
         used, everything = (
-            [with_constant_wind(trial, constants) for trial in group] for group in (used, everything)
+            [with_constant_wind(one, constants) for one in group] for group in (used, everything)
         )
-        regression, sea["wind"] = regress(used), {"option": "constant", "accelerations": constants}
+        regression = structure_samples(used, table, ship, shaft_speed=shaft, **sampling)
+        sea["wind"] = {"option": "constant", "accelerations": constants}
     check_samples(regression, used, table)
     gear = steering or (estimated_gear(used) if table.has_rudder else SteeringGear())
     blank = _blank(options.name or ship["name"], table, ship, gear, shaft, used)
@@ -104,8 +92,7 @@ def _at_constant_speed(trial: Trial, table: Structure, particulars: Given) -> Tr
     speed = (particulars or {}).get("speed")
     if {"u", "v"} & trial.channels.keys() or set(table.symbols) > {"r", "delta"} or speed is None:
         return trial
-    still = {"u": np.full(len(trial), float(speed)), "v": np.zeros(len(trial))}
-    return trial.with_channels(still)
+    return trial.with_channels({"u": np.full(len(trial), float(speed)), "v": np.zeros(len(trial))})
 
 
 def _blank(
@@ -125,19 +112,20 @@ def _blank(
     )
 
 
-def _check_list(trials: Any) -> None:
-    """Refuse what is not a list of trials."""
+def held_out(trials: Any, names: Sequence[str]) -> Sequence[Trial]:
+    """The trials, those named marked to validate only; InputError for what is no list of different trials."""
     wrong = [trials] if isinstance(trials, Trial | str) else [t for t in trials if not isinstance(t, Trial)]
     if wrong:
         raise InputError(
             f"trials: {wrong[0]!r} found, expected a list of Trials, such as ship.trials() of a ship file"
         )
-
-
-def held_out(trials: Sequence[Trial], names: Sequence[str]) -> Sequence[Trial]:
-    """The trials, those named marked to validate only."""
-    _check_list(trials)
     known = [trial.name for trial in trials]
+    twice = [name for name in known if known.count(name) > 1]
+    if twice:
+        raise InputError(
+            f"trials: {len(known)} trials found, two of them named {twice[0]!r}, expected different names; "
+            "rename one with trial.with_(name=...)"
+        )
     wanted = [names] if isinstance(names, str) else list(names)
     for name in wanted:
         check_choice(name, known, "hold_out")
@@ -157,20 +145,9 @@ def _table(
                 "structure 'grey-box'; or leave it out (to pull coefficients to a ship's, give prior)"
             )
         return structure if isinstance(structure, Structure) else get_structure(structure), {}
-    check_trials(used, get_structure("linear-steering"))
-    return chosen_box(reference, _ship(particulars, used, get_structure("linear-steering")), used)
-
-
-def _used(trials: Sequence[Trial]) -> list[Trial]:
-    """Trials to fit, after checking that all trials have different names."""
-    names = [trial.name for trial in trials]
-    twice = [name for name in names if names.count(name) > 1]
-    if twice:
-        raise InputError(
-            f"trials: {len(names)} trials found, two of them named {twice[0]!r}, expected different names; "
-            "rename one with trial.with_(name=...)"
-        )
-    return [trial for trial in trials if trial.use == "fit"]
+    steering = get_structure("linear-steering")
+    check_trials(used, steering)
+    return chosen_box(reference, _ship(particulars, used, steering), used)
 
 
 def _ship(particulars: Given, trials: Sequence[Trial], table: Structure) -> Particulars:

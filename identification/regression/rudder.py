@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import brentq, minimize_scalar
+from scipy.special import lambertw
 
 from identification.regression.preprocess import is_noisy
 from shipgym.arrays import Floats
@@ -26,7 +27,6 @@ TOLERANCE = 1e-3  # of the rudder's range: orders closer than this are one order
 RAMP = 1e-4  # a rate within this part of the gear's rate is the gear's rate
 EXPLAINED = 0.85  # share of the intervals that the gear has to explain
 FEWEST_SAMPLES = 8  # per change of order: with fewer the gear explains noise
-BISECTIONS = 60
 USUAL_LIMIT_DEG = 35.0
 MOVING = 0.5  # of the fastest move: faster ones are taken for the gear's own rate
 FAST_QUANTILE = 0.995  # of the rates of records with noise
@@ -61,9 +61,11 @@ class Rudder:
             between: Floats = np.interp(times, self.t, self.delta)
             return between
         k = np.clip(np.searchsorted(self.t, times, side="right") - 1, 0, len(self.t) - 2)
-        elapsed = times - self.t[k]
-        gear = (self.rate, self.time_constant)
-        first = np.minimum(elapsed, self.switch[k])
+        return self._within(k, times - self.t[k])
+
+    def _within(self, k: NDArray[np.int64], elapsed: Floats) -> Floats:
+        """The angle some time after the start of intervals."""
+        gear, first = (self.rate, self.time_constant), np.minimum(elapsed, self.switch[k])
         middle = _flow(self.delta[k], self.before[k], first, *gear)
         return _flow(middle, self.after[k], elapsed - first, *gear)
 
@@ -74,15 +76,13 @@ def rebuild(t: ArrayLike, delta: ArrayLike, gear: SteeringGear | None = None) ->
     A given gear is tried first; one estimated from the samples takes its place where it explains them better.
     """
     t, delta = np.asarray(t, dtype=float), np.asarray(delta, dtype=float)
-    candidates = [estimate_gear(t, delta)]
-    if gear is not None:
-        candidates.insert(0, (gear.rate, gear.time_constant))
+    given = [] if gear is None else [(gear.rate, gear.time_constant)]
+    candidates = [*given, estimate_gear(t, delta)]
     shares = [_explained(t, delta, *candidate) for candidate in candidates]
     rate, lag = candidates[int(np.argmax(shares))]
     if max(shares) >= EXPLAINED:
         rudder = _with_gear(t, delta, rate, lag)
-        ends = _flow(rudder.delta[:-1], rudder.before, rudder.switch, rate, lag)
-        ends = _flow(ends, rudder.after, np.diff(t) - rudder.switch, rate, lag)
+        ends = rudder._within(np.arange(len(t) - 1), np.diff(t))
         reproduced = np.all(np.abs(ends - delta[1:]) <= TOLERANCE * np.ptp(delta))
         if reproduced and FEWEST_SAMPLES * np.sum(rudder.smoothness == 0) <= len(t):
             return rudder
@@ -115,10 +115,9 @@ def estimate_gear(t: Floats, delta: Floats) -> tuple[float, float]:
         jumps = np.abs(np.where(both, orders[1:], 0.0) - np.where(both, orders[:-1], 0.0))
         return float(np.minimum(jumps, 10 * tolerance).sum())
 
-    lags = np.geomspace(0.1, 20.0, 48) * float(np.median(steps))
-    scores = np.array([unsteadiness(lag) for lag in lags])
-    best = int(np.argmin(scores))
-    low, high = float(lags[max(best - 1, 0)]), float(lags[min(best + 1, len(lags) - 1)])
+    lags = (np.geomspace(0.1, 20.0, 48) * float(np.median(steps))).tolist()
+    best = int(np.argmin([unsteadiness(lag) for lag in lags]))
+    low, high = lags[max(best - 1, 0)], lags[min(best + 1, len(lags) - 1)]
     refined = minimize_scalar(
         unsteadiness, bounds=(low, high), method="bounded", options={"xatol": 1e-10 * high}
     )
@@ -141,16 +140,12 @@ def _orders(t: Floats, delta: Floats, rate: float, lag: float) -> Floats:
     """The single order that explains each interval; infinite where the rudder ramps all the way."""
     steps, move = np.diff(t), np.diff(delta)
     size, side = np.abs(move), np.sign(move)
-    if lag == 0.0:
-        distance = size
-    else:
-        distance = size / -np.expm1(-steps / lag)
-        low, high = np.zeros_like(steps), steps.copy()
-        for _ in range(BISECTIONS if np.any(distance > rate * lag) else 0):
-            ramping = 0.5 * (low + high)
-            short = rate * (ramping - lag * np.expm1(-(steps - ramping) / lag)) < size
-            low, high = np.where(short, ramping, low), np.where(short, high, ramping)
-        distance = np.where(distance > rate * lag, rate * (0.5 * (low + high) + lag), distance)
+    distance = size / -np.expm1(-steps / lag) if lag > 0.0 else size
+    if lag > 0.0 and np.any(distance > rate * lag):
+        # the ramp lasts x seconds, of x - lag exp((x - step) / lag) = size / rate - lag
+        short = size / rate - lag
+        ramping = short - lag * lambertw(-np.exp(np.minimum((short - steps) / lag, -1.0)), 0).real
+        distance = np.where(distance > rate * lag, rate * (ramping + lag), distance)
     ramps = size >= (1.0 - RAMP) * rate * steps
     return np.where(ramps, np.copysign(np.inf, move), delta[:-1] + side * distance)
 
@@ -184,18 +179,15 @@ def _with_gear(t: Floats, delta: Floats, rate: float, lag: float) -> Rudder:
             continue
         if not follows[k - 1] and k > 1:
             continue  # the end of a change inside the interval before
-        nxt = orders[min(k + 1, len(orders) - 1)]
-        time = _switch_time(delta[k], delta[k + 1], orders[k - 1], nxt, steps[k], rate, lag)
-        if time is None:
-            corners.append((float(t[k]), 0))
-            continue
-        before[k], after[k], switch[k] = orders[k - 1], nxt, time
-        corners.append((float(t[k] + time), 0))
+        following = orders[min(k + 1, len(orders) - 1)]
+        time = _switch_time(delta[k], delta[k + 1], orders[k - 1], following, steps[k], rate, lag)
+        if time is not None:
+            before[k], after[k], switch[k] = orders[k - 1], following, time
+        corners.append((float(t[k] + (time or 0.0)), 0))
     corners += _ramp_ends(t, delta, before, after, switch, rate, lag)
     corners = [corner for corner in sorted(corners) if t[0] < corner[0] < t[-1]]
-    times = np.array([time for time, _ in corners])
-    smoothness = np.array([order for _, order in corners], dtype=np.int64)
-    return Rudder(t, delta, rate, lag, True, before, after, switch, times, smoothness)
+    times, smoothness = np.reshape(corners, (-1, 2)).T
+    return Rudder(t, delta, rate, lag, True, before, after, switch, times, smoothness.astype(np.int64))
 
 
 def _switch_time(
@@ -231,8 +223,7 @@ def estimated_gear(trials: Sequence[Trial]) -> SteeringGear:
     """Limit, rate and lag of a steering gear from the rudder angles of trials.
 
     The limit is 35 degrees or the largest angle recorded. Rate and lag are those that explain records without
-    noise exactly; records with noise give the median rate of the fast moves, and no lag. `trials`: with
-    `delta`.
+    noise exactly; records with noise give the median rate of the fast moves, and no lag.
     """
     limit = max(USUAL_LIMIT_DEG, *(float(np.degrees(np.abs(trial["delta"]).max())) for trial in trials))
     clean = [t for t in trials if not is_noisy(t.t, (t[channel] for channel in "uvr"))]

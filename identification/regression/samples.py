@@ -27,11 +27,11 @@ from identification.regression.integrals import (
 )
 from identification.regression.rudder import rebuild, straight
 from shipgym.arrays import Floats, integral
-from shipgym.checks import check_choice, check_whole
+from shipgym.checks import check_whole
 from shipgym.errors import InputError
 from shipgym.ships.particulars import Particulars
 from shipgym.ships.steering import SteeringGear
-from shipgym.ships.structures import Structure
+from shipgym.ships.term_table import Structure
 from shipgym.trials.trial import Trial
 
 SAMPLE_STRUCTURES = ("euler", "integral", "spline")
@@ -44,30 +44,14 @@ FEWEST_SAMPLES = 10  # between gaps; fewer are left out
 
 @dataclass(frozen=True, eq=False)
 class Samples:
-    """A regression for each equation of motion, all with the same rows.
+    """A regression for each equation of motion (`u`, `v`, `r`, `p`), all with the same rows."""
 
-    Attributes
-    ----------
-    features : dict of str to array of shape (n_rows, n_terms)
-        Integrals of the terms over each row's window, by equation (`u`, `v`, `r`, `p`).
-    targets : dict of str to array of shape (n_rows,)
-        Change of the velocity over the window, less that by measured wind.
-    start : array of shape (n_rows,)
-        Time at which the window begins, s.
-    duration : array of shape (n_rows,)
-        Length of the window, s.
-    trial : array of shape (n_rows,)
-        Index of the trial.
-    window : int
-        Steps per window of the longest-windowed trial.
-    """
-
-    features: dict[str, Floats]
-    targets: dict[str, Floats]
-    start: Floats
-    duration: Floats
-    trial: NDArray[np.int64]
-    window: int
+    features: dict[str, Floats]  # integrals of the terms over each row's window, shape (n_rows, n_terms)
+    targets: dict[str, Floats]  # change of the velocity there, less that by measured wind, shape (n_rows,)
+    start: Floats  # time at which the window begins, s, shape (n_rows,)
+    duration: Floats  # length of the window, s, shape (n_rows,)
+    trial: NDArray[np.int64]  # index of the trial, shape (n_rows,)
+    window: int  # steps per window of the longest-windowed trial
 
     def __len__(self) -> int:
         return len(self.start)
@@ -129,9 +113,7 @@ def build_samples(
         raise InputError(f"samples: {samples!r} found, expected one of {', '.join(SAMPLE_STRUCTURES)}")
     if window is not None:
         check_whole(window, "window", at_least=1, hint="in sampling steps")
-    preprocessing = smooth if isinstance(smooth, str) else "spline" if smooth else "none"
-    check_choice(preprocessing, preprocess.PREPROCESSING, "preprocessing")
-    sampling = _Sampling(structure, particulars, samples, window, gear, preprocessing, shaft_speed)
+    sampling = _Sampling(structure, particulars, samples, window, gear, smooth, shaft_speed)
     parts = [part for index, trial in enumerate(trials) for part in sampling.parts(trial, index)]
     return Samples(
         {q: np.concatenate([part.features[q] for part in parts]) for q in structure.regressed},
@@ -152,7 +134,7 @@ class _Sampling:
     samples: str
     window: int | None
     gear: SteeringGear | None
-    preprocessing: str
+    smooth: bool | str
     shaft_speed: float
 
     def parts(self, trial: Trial, index: int) -> list[Samples]:
@@ -169,7 +151,7 @@ class _Sampling:
 
     def _part(self, trial: Trial, index: int, window: int) -> Samples:
         t, equations = trial.t, self.structure.equations
-        channels = preprocess.smoothed_channels(trial, self.structure.required_channels, self.preprocessing)
+        channels = preprocess.smoothed_channels(trial, self.structure.required_channels, self.smooth)
         integrals, moments = self._integrals(trial, channels)
         if "q" in integrals:
             memory = twice_integrated(t, integrals.pop("q"), moments["q"])
@@ -178,12 +160,12 @@ class _Sampling:
         last = first + window
         features, targets = {}, {}
         for q, steps in integrals.items():
-            summed = np.concatenate([np.zeros((1, steps.shape[1])), np.cumsum(steps, axis=0)])
+            summed = np.pad(np.cumsum(steps, axis=0), ((1, 0), (0, 0)))
             features[q] = steps if window == 1 else summed[last] - summed[first]
             targets[q] = channels[q][last] - channels[q][first]
             if f"wind_{q}dot" in trial:
                 by_wind = integral(t, trial[f"wind_{q}dot"])
-                targets[q] = targets[q] - (by_wind[last] - by_wind[first])
+                targets[q] -= by_wind[last] - by_wind[first]
         part = Samples(features, targets, t[first], t[last] - t[first], np.full(len(first), index), window)
         return without_memory(part) if "q" in equations else part
 
@@ -204,9 +186,8 @@ def between_gaps(trial: Trial, particulars: Particulars, fewest: int = FEWEST_SA
     """Cut a trial where samples are missing; the trial itself if it has no gap.
 
     A gap is a time step of more than 5 usual ones, the median of the trial or of those around, and more than
-    0.15 of the time to sail one ship length. With a usual step of up to a twentieth of that time no step of
-    the regression is longer than a quarter of it. Pieces shorter than `fewest`, or 10, samples are left out.
-    Raises InputError where no piece is left.
+    0.15 of the time to sail one ship length. Pieces shorter than `fewest`, or 10, samples are left out;
+    InputError where no piece is left.
     """
     steps = np.diff(trial.t)
     usual = np.maximum(np.median(steps), median_filter(steps, NEIGHBOURS, mode="mirror"))
@@ -228,10 +209,7 @@ def between_gaps(trial: Trial, particulars: Particulars, fewest: int = FEWEST_SA
 
 
 def default_window(trial: Trial, particulars: Particulars) -> int:
-    """Sampling steps over which a trial's velocities change by much more than their noise.
-
-    1 without noise; at most a third of the time to sail one ship length.
-    """
+    """Sampling steps over which a trial's velocities change by much more than their noise; 1 without."""
     step = float(np.median(np.diff(trial.t)))
     longest = max(int(LONGEST_WINDOW * particulars["length"] / particulars["speed"] / step), 1)
     longest = min(longest, max(len(trial) // 20, 1))
@@ -252,8 +230,7 @@ def without_memory(part: Samples) -> Samples:
     integrated from the start of the trial, stand on the right; so their difference is free of it. That is the
     regression of the second-order equation weighted by two boxes convolved, a modulating function (Shinbrot
     1957, On the analysis of linear and nonlinear systems, Trans. ASME 79): no derivative of a measured
-    channel is formed. The rows returned are those with a window after theirs. Raises InputError for a trial
-    of fewer than two windows.
+    channel is formed. The rows returned are those with a window after theirs.
     """
     end = part.start + part.duration
     following = np.searchsorted(part.start, end - 1e-9 * part.duration)

@@ -39,8 +39,7 @@ def in_still_water(
     """The trials without current and with the accelerations by wind, and what was found, for the provenance.
 
     Trials that are skipped keep both; of those whose velocities are through the water a current in columns is
-    taken out of the track. Raises InputError for a current that cannot be told, is larger than the ship's
-    speed or contradicts its columns, and for wind that cannot be taken out though it was asked for.
+    taken out of the track.
     """
     if isinstance(options.current, str):
         check_choice(options.current, OPTIONS["current"].choices, "current")
@@ -180,8 +179,7 @@ def _probability(mean: Floats, covariance: Floats) -> float:
 def through_water(trial: Trial, north: Any, east: Any) -> Trial:
     """The trial without a current, m/s, each a number or of shape (n_samples,).
 
-    A track is as if the water stood still since the start; velocities over ground become those through the
-    water, but for one that was logged.
+    Its track starts where it did; velocities over ground, but for one logged, become those through the water.
     """
     north, east = (np.broadcast_to(np.asarray(part, dtype=float), trial.t.shape) for part in (north, east))
     channels = dict(zip(COLUMNS, (north, east), strict=True))

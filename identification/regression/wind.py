@@ -10,8 +10,7 @@ import numpy as np
 from identification.regression.samples import Samples
 from shipgym.checks import check_flag, check_keys
 from shipgym.errors import InputError
-from shipgym.sea.wind import AIR_DENSITY, wind_curves
-from shipgym.sea.wind_tables import WindTable
+from shipgym.sea.wind import AIR_DENSITY, WindTable, wind_curves
 from shipgym.ships.inertia import particulars_inertia
 from shipgym.ships.mmg import MMG
 from shipgym.ships.particulars import Particulars
@@ -27,8 +26,7 @@ def measured_wind(trial: Trial, particulars: Particulars, option: str | Mapping[
 
     `option`: coefficients as in `shipgym.sea.Wind`, or a table of ``coefficients``, by name or a table
     themselves, and ``relative``: whether speed and direction are those felt on board, the latter from the
-    bow. Velocities through the water are completed by a current in columns. Raises InputError for particulars
-    from which no areas follow, and for an option that is not known.
+    bow. Velocities through the water are completed by a current in columns.
     """
     table = dict(option) if isinstance(option, Mapping) else {"coefficients": option}
     check_keys(table, ("coefficients", "relative"), "wind")
@@ -56,8 +54,7 @@ def measured_wind(trial: Trial, particulars: Particulars, option: str | Mapping[
 def constant_wind(trials: Sequence[Trial], samples: Samples, structure: str) -> dict[str, dict[str, float]]:
     """The constant sway and yaw acceleration that the regression of each trial asks for, by its name.
 
-    `samples` are those of the trials; a constant of the structure's own takes their mean. Raises InputError
-    for the MMG form, which has no regression.
+    A constant of the structure's own takes their mean. The MMG form has no regression: InputError.
     """
     if structure == MMG:
         raise InputError(

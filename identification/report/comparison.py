@@ -3,18 +3,14 @@
 from __future__ import annotations
 
 from pathlib import PurePath
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from identification.validation.ranking import Ranking
 from shipgym.arrays import Floats
 from shipgym.pages import render
-from shipgym.plots import PALETTE, axis, graph_objects, label, layout, line, panels
-
-if TYPE_CHECKING:
-    from plotly.graph_objects import Figure
-
+from shipgym.plots import PALETTE, Panel, axis, graph_objects, line, panels
+from shipgym.plots.style import Figure
 
 SHOWN = 4  # methods in a figure of predictions
 LARGEST = 2.0  # error that the figure shows; larger ones lie on its edge
@@ -39,51 +35,34 @@ def comparison_page(comparison: Ranking) -> str:
 
 def errors_figure(comparison: Ranking) -> Figure:
     """Error of each trial held out, one row for each method."""
-    go = graph_objects()
-    figure, names = go.Figure(), list(comparison.results)
-    trials = list(comparison.standings[0].errors)
+    names, told = list(comparison.results), {"hovertemplate": "%{y}: %{x:.4f}<extra></extra>"}
     means = [min(s.error, LARGEST) if s.error is not None else None for s in comparison.standings]
-    figure.add_trace(
-        go.Bar(
-            x=means, y=names, orientation="h", marker={"color": "#d5dde6"}, name="mean", width=0.5,
-            hovertemplate="%{y}: %{x:.4f}<extra></extra>",
-        )
-    )  # fmt: skip
-    for k, trial in enumerate(trials):
+    bar = {"orientation": "h", "marker": {"color": "#d5dde6"}, "name": "mean", "width": 0.5, **told}
+    traces = [graph_objects().Bar(x=means, y=names, **bar)]
+    for k, trial in enumerate(comparison.standings[0].errors):
         errors = [s.errors.get(trial) for s in comparison.standings]
-        shown = [(n, min(e, LARGEST)) for n, e in zip(names, errors, strict=True) if e is not None]
-        figure.add_trace(
-            go.Scatter(
-                x=[e for _, e in shown], y=[n for n, _ in shown], mode="markers",
-                name=PurePath(trial).name, marker={"color": PALETTE[k % len(PALETTE)], "size": 8},
-                hovertemplate="%{y}: %{x:.4f}<extra></extra>", cliponaxis=False,
-            )
-        )  # fmt: skip
-    height = 34 * len(names) + 130
-    figure.update_layout(layout(height, left=96, hovermode="closest"))
+        shown = {n: min(e, LARGEST) for n, e in zip(names, errors, strict=True) if e is not None}
+        dots = {"mode": "markers", "marker": {"color": PALETTE[k % len(PALETTE)], "size": 8}, **told}
+        x, y, name = list(shown.values()), list(shown), PurePath(trial).name
+        traces.append(graph_objects().Scatter(x=x, y=y, name=name, cliponaxis=False, **dots))
     errors_axis = axis("error, in standard deviations of the measurement", rangemode="tozero")
-    label(figure, errors_axis, axis(autorange="reversed"))
-    return figure
+    panel = Panel(traces, errors_axis, axis(autorange="reversed"))
+    return panels([panel], 34 * len(names) + 130, left=96, hovermode="closest")
 
 
 def headings_figure(comparison: Ranking) -> Figure:
     """Error of the predicted heading over time, of the trials held out by the best methods."""
     held = [t for t in comparison.best.trials if t.use == "validate" and "psi" in t]
-    figure, places, rows = panels([PurePath(trial.name).name for trial in held])
-    best = list(comparison.results)[:SHOWN]
-    for trial, place in zip(held, places, strict=True):
+    best, shown = list(comparison.results)[:SHOWN], []
+    for trial in held:
+        lines = []
         for method, colour in zip(best, PALETTE, strict=False):
             prediction = comparison.results[method].predictions[trial.name]
             if prediction is not None:
                 error = _smoothed(np.degrees(prediction["psi"] - trial["psi"]))
-                time = _smoothed(trial.t)
-                figure.add_trace(
-                    line(time, error, method, colour, 1.5, showlegend=place is places[0]), **place
-                )
-        below, beside = "time, s" if place["row"] == rows else "", "deg" if place["col"] == 1 else ""
-        label(figure, below, axis(beside, zero=True), **place)
-    figure.update_layout(layout(230 * rows + 80, titled=True))
-    return figure
+                lines.append(line(_smoothed(trial.t), error, method, colour, 1.5))
+        shown.append(Panel(lines, "time, s", axis("deg", zero=True), PurePath(trial.name).name))
+    return panels(shown, 230 * max(-(-len(shown) // 2), 1) + 80, 2, outer=True)
 
 
 def _smoothed(values: Floats) -> Floats:

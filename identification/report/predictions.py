@@ -4,15 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import PurePath
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from shipgym.plots import AXES, MEASURED, MODEL, axis, label, layout, line, panels, subplots
+from shipgym.plots import AXES, MEASURED, MODEL, Panel, axis, line, panels
+from shipgym.plots.style import Figure
+from shipgym.trials.navigation import rotate_to_body
 from shipgym.trials.trial import Trial
-
-if TYPE_CHECKING:
-    from plotly.graph_objects import Figure
 
 RUDDER = "#9aa5b1"
 
@@ -24,42 +23,34 @@ def overview_figure(trials: Sequence[Trial], predictions: Mapping[str, Trial | N
     """
     if not all("psi" in trial and "delta" in trial for trial in trials):
         return None
-    figure, places, rows = panels([PurePath(trial.name).name for trial in trials])
-    for trial, place in zip(trials, places, strict=True):
-        first, start = place is places[0], trial["psi"][0]
-        rudder, heading = np.degrees(trial["delta"]), np.degrees(trial["psi"] - start)
-        for values, name, colour, width in (
-            (rudder, "rudder", RUDDER, 1.2),
-            (heading, "heading change, measured", MEASURED, 1.5),
-        ):
-            figure.add_trace(line(trial.t, values, name, colour, width, showlegend=first), **place)
-        prediction = predictions.get(trial.name)
-        if prediction is not None:
-            values = np.degrees(prediction["psi"] - start)
-            figure.add_trace(
-                line(prediction.t, values, "heading change, model", MODEL, 1.9, showlegend=first), **place
-            )
-        label(figure, "time, s" if place["row"] == rows else "", "deg" if place["col"] == 1 else "", **place)
-    figure.update_layout(layout(230 * rows + 80, titled=True))
-    return figure
+    shown = []
+    for trial in trials:
+        start, found = trial["psi"][0], predictions.get(trial.name)
+        lines = [
+            line(trial.t, np.degrees(trial["delta"]), "rudder", RUDDER, 1.2),
+            line(trial.t, np.degrees(trial["psi"] - start), "heading change, measured", MEASURED, 1.5),
+        ]
+        if found is not None:
+            lines.append(line(found.t, np.degrees(found["psi"] - start), "heading change, model", MODEL))
+        shown.append(Panel(lines, "time, s", "deg", PurePath(trial.name).name))
+    return panels(shown, 230 * -(-len(shown) // 2) + 80, 2, outer=True)
 
 
 def prediction_figure(measured: Trial, predicted: Trial | None) -> Figure:
     """A recorded trial and its open-loop prediction: five channels and the path."""
-    figure = subplots(3, 2, vertical_spacing=0.1)
+    shown = []
     for k, channel in enumerate(("psi", "r", "u", "v", "delta")):
-        if channel not in measured.channels:
-            continue
         title, factor = AXES[channel]
-        place = {"row": k // 2 + 1, "col": k % 2 + 1}
-        for run, *style in _runs(measured, None if channel == "delta" else predicted):
-            figure.add_trace(line(run.t, factor * run[channel], *style, showlegend=k == 0), **place)
-        title = title if channel != "delta" else "rudder (given), deg"
-        label(figure, "time, s" if k > 2 else "", title, **place)
-    if "x" in measured.channels and "y" in measured.channels:
-        _add_paths(figure, measured, predicted)
-    figure.update_layout(layout(600, hovermode="closest"))
-    return figure
+        given = channel == "delta"
+        lines = [
+            line(run.t, factor * run[channel], *style)
+            for run, *style in _runs(measured, None if given else predicted)
+            if channel in measured.channels
+        ]
+        shown.append(Panel(lines, "time, s" if k > 2 else "", "rudder (given), deg" if given else title))
+    if {"x", "y"} <= measured.channels.keys():
+        shown.append(_paths(measured, predicted))
+    return panels(shown, 600, 2, grid={"vertical_spacing": 0.1}, hovermode="closest")
 
 
 def _runs(measured: Trial, predicted: Trial | None) -> list[tuple[Any, ...]]:
@@ -68,18 +59,13 @@ def _runs(measured: Trial, predicted: Trial | None) -> list[tuple[Any, ...]]:
     return [(measured, "measured", MEASURED, 1.3), *ours]
 
 
-def _add_paths(figure: Figure, measured: Trial, predicted: Trial | None) -> None:
-    """The paths in the last panel, along and across the first course; a turning circle to one scale."""
-    place = {"row": 3, "col": 2}
-    c, s = np.cos(measured["psi"][0]), np.sin(measured["psi"][0])
-    turning = measured.kind == "turning-circle"
+def _paths(measured: Trial, predicted: Trial | None) -> Panel:
+    """The paths along and across the first course; a turning circle to one scale."""
+    start, turning, lines = measured["psi"][:1], measured.kind == "turning-circle", []
     for run, *style in _runs(measured, predicted):
-        north, east = run["x"] - measured["x"][0], run["y"] - measured["y"][0]
-        ahead, aside = north * c + east * s, east * c - north * s
-        x, y = (aside, ahead) if turning else (ahead, aside)
-        figure.add_trace(line(x, y, *style, showlegend=False), **place)
-    ahead_axis, aside_axis = "along the first course, m", "to starboard, m"
+        way = rotate_to_body(run["x"] - measured["x"][0], run["y"] - measured["y"][0], start)
+        lines.append(line(*(way[::-1] if turning else way), *style))
+    ahead, aside = "along the first course, m", "to starboard, m"
     if turning:
-        label(figure, aside_axis, axis(ahead_axis, scaleanchor="x6", scaleratio=1), **place)
-    else:
-        label(figure, ahead_axis, axis(aside_axis, autorange="reversed"), **place)
+        return Panel(lines, aside, axis(ahead, scaleanchor="x6", scaleratio=1))
+    return Panel(lines, ahead, axis(aside, autorange="reversed"))

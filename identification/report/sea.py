@@ -4,16 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import PurePath
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from identification.fit import Fit
 from identification.regression.still_water import SIGNIFICANT
-from shipgym.plots import LIMIT, MEASURED, MODEL, axis, label, layout, line, panels
-
-if TYPE_CHECKING:
-    from plotly.graph_objects import Figure
+from shipgym.plots import LIMIT, MEASURED, MODEL, Panel, axis, line, panels
+from shipgym.plots.style import Figure
 
 KNOT = 1852.0 / 3600.0
 NORMAL_95 = 1.96
@@ -63,20 +61,16 @@ def track_figure(fit: Fit) -> Figure | None:
     trials = [trial for trial in fit.trials if trial.name in rows and {"x", "y"} <= trial.channels.keys()]
     if not trials:
         return None
-    titles = [f"{PurePath(t.name).name}: {_set_and_drift(rows[t.name])}" for t in trials]
-    figure, places, lines = panels(titles)
-    for k, (trial, place) in enumerate(zip(trials, places, strict=True)):
+    shown = []
+    for k, trial in enumerate(trials):
         row = rows[trial.name]
-        drift = np.array([row["east"], row["north"]]) * trial.duration
-        end = np.array([trial["y"][-1], trial["x"][-1]])
-        tracks: list[tuple[Any, Any, str, str]] = [
-            (trial.raw["y"], trial.raw["x"], "over ground", MEASURED),
-            (trial["y"], trial["x"], "through the water", MODEL),
-            (*np.array([end, end + drift]).T, "the water meanwhile", LIMIT),
+        east, north = (np.array([0.0, row[way] * trial.duration]) for way in ("east", "north"))
+        tracks = [
+            line(trial.raw["y"], trial.raw["x"], "over ground", MEASURED, 1.7),
+            line(trial["y"], trial["x"], "through the water", MODEL, 1.7),
+            line(trial["y"][-1] + east, trial["x"][-1] + north, "the water meanwhile", LIMIT, 1.7),
         ]
-        for east, north, name, colour in tracks:
-            figure.add_trace(line(east, north, name, colour, 1.7, showlegend=k == 0), **place)
-        own_axis = axis("north, m", scaleanchor=f"x{k + 1 if k else ''}", scaleratio=1)
-        label(figure, "east, m", own_axis, **place)
-    figure.update_layout(layout(300 * lines + 80, titled=True, hovermode="closest"))
-    return figure
+        north_axis = axis("north, m", scaleanchor=f"x{k + 1 if k else ''}", scaleratio=1)
+        title = f"{PurePath(trial.name).name}: {_set_and_drift(row)}"
+        shown.append(Panel(tracks, "east, m", north_axis, title))
+    return panels(shown, 300 * -(-len(shown) // 2) + 80, 2, hovermode="closest")

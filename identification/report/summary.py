@@ -11,6 +11,7 @@ from identification.fit import Fit
 from identification.report.sea import sea_sentences
 from identification.text import as_text, lined_table
 from identification.validation.warnings import EQUATIONS, exactly_collinear, undetermined
+from shipgym.ships import ShipModel
 from shipgym.ships.particulars import ADDED_MASSES
 
 INERTIA = ("mass", "xg", "yaw_gyradius", "speed")
@@ -46,11 +47,16 @@ def kernel_text(report: dict[str, Any]) -> str:
     )
 
 
+def are_derivatives(model: ShipModel) -> bool:
+    """Whether coefficients are hydrodynamic derivatives in the prime system, printed times 1e-5."""
+    return (model.dynamics.normalisation, model.dynamics.quantity) == ("prime", "force")
+
+
 def _coefficients(fit: Fit) -> Table:
     structure = fit.model.dynamics
-    title, unit = "Hydrodynamic derivatives, prime system, 1e-5", PRIME
-    if (structure.normalisation, structure.quantity) != ("prime", "force"):
-        title, unit = f"Coefficients of {structure.quantity}s, {structure.normalisation}", 1.0
+    title, unit = f"Coefficients of {structure.quantity}s, {structure.normalisation}", 1.0
+    if are_derivatives(fit.model):
+        title, unit = "Hydrodynamic derivatives, prime system, 1e-5", PRIME
     table = lined_table(title, "name", ">value", ">standard error", ">t")
     for name, error in fit.standard_errors.items():
         value = fit.coefficients[name]

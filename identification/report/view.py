@@ -11,14 +11,13 @@ import numpy as np
 from identification.fit import Fit
 from identification.report.predictions import overview_figure, prediction_figure
 from identification.report.sea import sea_sentences, track_figure
-from identification.report.summary import kernel_text
+from identification.report.summary import PRIME, are_derivatives, kernel_text
 from identification.validation.warnings import EQUATIONS, heading_errors_deg, model_warnings
 from shipgym.ships import ShipModel
 from shipgym.ships.particulars import ADDED_MASSES
 from shipgym.trials.trial import Trial
 
 KNOT = 1852.0 / 3600.0
-PRIME = 1e-5
 SIGNIFICANT_T = 2.0  # a coefficient with a smaller |t| is not significantly different from zero
 FORCES = {"X": "Surge force X", "Y": "Sway force Y", "N": "Yaw moment N", "K": "Roll moment K"}
 INDICES = {
@@ -61,7 +60,7 @@ def fit_view(fit: Fit) -> dict[str, Any]:
             for name in ADDED_MASSES
             if fit.model.particulars[name] is not None
         ],
-        "derivatives": _derivatives(fit.model),
+        "derivatives": are_derivatives(fit.model),
         "coefficients": _coefficients(fit),
         "kernel": kernel_text(found) if (found := (fit.model.provenance or {}).get("kernel")) else None,
     }
@@ -149,15 +148,10 @@ def _particulars(model: ShipModel) -> list[tuple[str, bool, str, str]]:
     ]
 
 
-def _derivatives(model: ShipModel) -> bool:
-    """Whether coefficients are hydrodynamic derivatives in the prime system, printed times 1e-5."""
-    return (model.dynamics.normalisation, model.dynamics.quantity) == ("prime", "force")
-
-
 def _coefficients(fit: Fit) -> dict[str, list[dict[str, Any]]]:
     """Rows of coefficients by the title of their table: one for each force, or one for all."""
     tables: dict[str, list[dict[str, Any]]] = {}
-    forces = FORCES if _derivatives(fit.model) else {}
+    forces = FORCES if are_derivatives(fit.model) else {}
     for name, value in fit.coefficients.items():
         force, error = name.partition("_")[0], fit.standard_errors[name]
         t = value / error if error > 0.0 else None

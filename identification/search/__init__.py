@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Any
+from typing import Any, cast
 
 from numpy.typing import ArrayLike
 
-from identification.search.bee_colony import ArtificialBeeColony
-from identification.search.differential_evolution import DifferentialEvolution
-from identification.search.grid_search import GridSearch
-from identification.search.particle_swarm import ParticleSwarm
+from identification.search.optimisers import (
+    ArtificialBeeColony,
+    DifferentialEvolution,
+    GridSearch,
+    ParticleSwarm,
+)
 from identification.search.search import Objective, Optimiser, SearchResult
 from shipgym.checks import check_choice
 from shipgym.errors import InputError
@@ -21,20 +23,14 @@ __all__ = [
 ]  # fmt: skip
 
 OPTIMISERS: dict[str, Callable[..., Optimiser]] = {
-    "abc": ArtificialBeeColony,
-    "pso": ParticleSwarm,
-    "grid": GridSearch,
-    "de": DifferentialEvolution,
-}
+    "abc": ArtificialBeeColony, "pso": ParticleSwarm, "grid": GridSearch, "de": DifferentialEvolution,
+}  # fmt: skip
 
 
 def get_optimiser(optimiser: str | Mapping[str, Any] | Optimiser) -> Optimiser:
-    """An optimiser by name with its usual settings, as a table `{"name": "abc", "rounds": 60}`, or as given.
-
-    Raises InputError for a name or a setting that is not known.
-    """
+    """An optimiser by name, as a table with settings, `{"name": "abc", "rounds": 60}`, or as given."""
     if hasattr(optimiser, "minimise"):
-        return optimiser
+        return cast(Optimiser, optimiser)
     settings = dict(optimiser) if isinstance(optimiser, Mapping) else {"name": optimiser}
     name = check_choice(settings.pop("name", None), OPTIMISERS, "optimiser")
     try:

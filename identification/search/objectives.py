@@ -15,10 +15,7 @@ from shipgym.errors import InputError
 
 @dataclass(frozen=True, eq=False)
 class ErrorOfC:
-    """Mean squared error of the fits for each C, on the samples they were fitted to or on others.
-
-    Its arrays are as large as the triangles of the folds, whatever the number of samples.
-    """
+    """Mean squared error of the fits for each C, on the samples they were fitted to or on others."""
 
     offset: Floats  # error of the mean alone, shape (n_folds, 1, n_rows)
     #: what each direction explains of it, by 1 / (s^2 + 1/C), shape (n_folds, n_directions, n_rows)
@@ -53,11 +50,7 @@ def held_out_error(
     blocks: NDArray[np.int64],
     weights: Floats | None = None,
 ) -> ErrorOfC:
-    """Error on each block of samples of the fit to all others.
-
-    `blocks` is the index of each sample's block, 0 to n_blocks - 1; the other arguments are those of `LSSVM`
-    and `decomposition.triangle`.
-    """
+    """Error on each block of samples, by their indices from 0, of the fit to all others."""
     rows = [blocks == k for k in range(int(blocks.max()) + 1)]
     parts = [triangle(X[r], y[r], fit_intercept, None if weights is None else weights[r]) for r in rows]
     others = [stacked([part for part in parts if part is not own]) for own in parts]
@@ -88,12 +81,10 @@ def _errors(
 
 
 def time_blocks(n_samples: int, folds: int | str = 5, groups: ArrayLike | None = None) -> NDArray[np.int64]:
-    """Blocks of samples that follow each other, never shuffled: neighbours in time are alike.
+    """Index of each sample's block; blocks follow each other, never shuffled: neighbours in time are alike.
 
-    `n_samples`: in the order of time, one trial after the other; `folds`: number of blocks, equally long but
-    for one sample; "trials" makes a block of each trial; `groups`: trial of each sample; needed for
-    folds="trials", shape (n_samples,). Returns the index of the block of each sample, shape (n_samples,).
-    Raises InputError for fewer than 2 blocks, and for more blocks than samples.
+    `folds`: number of blocks, equally long but for one sample; "trials" makes a block of each trial, by
+    `groups`, shape (n_samples,). Raises InputError for fewer than 2 blocks, and for more than samples.
     """
     if folds == "trials":
         found = np.zeros(0) if groups is None else np.unique(np.asarray(groups))

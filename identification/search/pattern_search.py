@@ -7,11 +7,13 @@ Source: Torczon 1997, On the convergence of pattern search algorithms, SIAM J. O
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
+from functools import cache
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from identification.search.search import SearchResult
+from identification.search.search import Recorder, SearchResult
 from shipgym.arrays import Floats
 
 
@@ -31,26 +33,15 @@ def pattern_search(
     at twice. The objective may be infinite.
     """
     lowest, highest = np.asarray(low, dtype=float), np.asarray(high, dtype=float)
-    known: dict[tuple[float, ...], float] = {}
-
-    def value_at(x: Floats) -> float:
-        key = tuple(x.tolist())
-        if key not in known:
-            known[key] = objective(x)
-        return known[key]
-
-    x = np.clip(np.asarray(start, dtype=float), lowest, highest)
-    value = value_at(x)
-    history, course = [value], [x]
-    while mesh >= finest and len(known) < most_evaluations:
-        steps = mesh * (highest - lowest) * np.vstack([np.eye(len(x)), -np.eye(len(x))])
-        neighbours = np.clip(x + steps, lowest, highest)
-        values = [value_at(neighbour) for neighbour in neighbours]
-        best = int(np.argmin(values))
-        if values[best] < value:
-            x, value = neighbours[best], values[best]
-        else:
+    value_at = cache(lambda *x: objective(np.array(x)))
+    record = Recorder(lambda points: np.array([value_at(*x) for x in points.tolist()]))
+    record(np.clip(np.asarray(start, dtype=float), lowest, highest)[None])
+    record.end_round()
+    directions = (highest - lowest) * np.vstack([np.eye(len(lowest)), -np.eye(len(lowest))])
+    while mesh >= finest and value_at.cache_info().currsize < most_evaluations:
+        before = record.value
+        record(np.clip(record.x + mesh * directions, lowest, highest))
+        if not record.value < before:
             mesh *= 0.5
-        history.append(value)
-        course.append(x)
-    return SearchResult(x, value, np.array(history), np.array(course), len(known))
+        record.end_round()
+    return replace(record.result(), evaluations=value_at.cache_info().currsize)

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable
-from dataclasses import dataclass, field
-from typing import Protocol
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -21,51 +21,28 @@ Objective = Callable[[Floats], Floats]
 
 @dataclass(frozen=True, eq=False)
 class SearchResult:
-    """The outcome of a search.
+    """The outcome of a search."""
 
-    Attributes
-    ----------
-    x : array of shape (n_dimensions,)
-        The best candidate.
-    value : float
-        Its objective.
-    history : array of shape (n_rounds,)
-        Best objective after each round; the first is that of the starting candidates.
-    course : array of shape (n_rounds, n_dimensions)
-        Best candidate after each round.
-    evaluations : int
-        Candidates evaluated.
-    variable : str
-        What a candidate holds: the logarithm of the weight C, or an insensitive band.
-    """
-
-    x: Floats
-    value: float
+    x: Floats  # the best candidate, shape (n_dimensions,)
+    value: float  # its objective
+    #: best objective after each round, first of the starting candidates, shape (n_rounds,), and the candidate
+    #: that has it, shape (n_rounds, n_dimensions)
     history: Floats
     course: Floats
-    evaluations: int
-    variable: str = LOG_C
+    evaluations: int  # candidates evaluated
+    variable: str = LOG_C  # what a candidate holds: the logarithm of the weight C, or an insensitive band
 
-
-class Optimiser(Protocol):
-    """Minimises an objective within a box."""
-
-    def minimise(self, objective: Objective, bounds: ArrayLike, seed: int = 0) -> SearchResult:
-        """Minimise.
-
-        `objective`: values, shape (n_candidates,), of candidates of shape (n_candidates, n_dimensions);
-        `bounds`: lower and upper bound of each dimension, shape (n_dimensions, 2); `seed`: the same seed
-        gives the same search.
-        """
-        ...
+    def of(self, dimension: int, variable: str = LOG_C) -> SearchResult:
+        """What was found of one dimension."""
+        return replace(self, x=self.x[[dimension]], course=self.course[:, [dimension]], variable=variable)
 
 
 @dataclass(eq=False)
 class Recorder:
     """Evaluates candidates and keeps the best."""
 
-    objective: Objective  # as of `Optimiser.minimise`
-    x: Floats = field(default_factory=lambda: np.empty(0))  # the best candidate so far, shape (n_dimensions,)
+    objective: Objective
+    x: Floats = field(default_factory=lambda: np.empty(0))  # the best candidate so far
     value: float = np.inf  # its objective
     evaluations: int = 0
     _history: list[float] = field(default_factory=list)
@@ -98,11 +75,27 @@ class Recorder:
         )
 
 
-def check_bounds(bounds: ArrayLike) -> tuple[Floats, Floats]:
-    """Lower and upper bounds, arrays of shape (n_dimensions,).
+class Optimiser(ABC):
+    """Minimises an objective within a box."""
 
-    Raises InputError for bounds that are not finite, or of which the lower is not the lower one.
-    """
+    def minimise(self, objective: Objective, bounds: ArrayLike, seed: int = 0) -> SearchResult:
+        """Minimise.
+
+        `objective`: values, shape (n_candidates,), of candidates of shape (n_candidates, n_dimensions);
+        `bounds`: lower and upper bound of each dimension, shape (n_dimensions, 2); `seed`: the same seed
+        gives the same search. Raises InputError for bounds and settings that cannot be.
+        """
+        record = Recorder(objective)
+        self._search(record, *check_bounds(bounds), np.random.default_rng(seed))
+        return record.result()
+
+    @abstractmethod
+    def _search(self, record: Recorder, low: Floats, high: Floats, rng: np.random.Generator) -> None:
+        """Evaluate candidates by `record`, which is told the end of each round."""
+
+
+def check_bounds(bounds: ArrayLike) -> tuple[Floats, Floats]:
+    """Lower and upper bounds, arrays of shape (n_dimensions,)."""
     try:
         box = np.asarray(bounds, dtype=float)
     except (TypeError, ValueError):

@@ -53,14 +53,6 @@ class Estimate:
     evaluations: int
 
 
-@dataclass(frozen=True, eq=False)
-class Posterior:
-    """The model of greatest probability and its covariance."""
-
-    model: ShipModel
-    report: dict[str, Any]  # for the provenance
-
-
 def checked_mmg(options: Options) -> Options:
     """The options of an identification of the MMG form; InputError for those that it does not have."""
     method = name_of(options.method)
@@ -84,67 +76,43 @@ def checked_mmg(options: Options) -> Options:
     return replace(options, method=MAP)
 
 
-def fit_mmg(problem: Problem, options: Options) -> Posterior:
-    """The MMG form of greatest probability; options by `checked_mmg`.
+def fit_mmg(problem: Problem, options: Options) -> tuple[ShipModel, dict[str, Any]]:
+    """The MMG form of greatest probability, with its covariance, and the report for the provenance.
 
-    The prior is that of the `reference_model`, or of `prior`: a reference ship, or formulas, by default those
-    of Yoshimura & Masumoto 2012.
+    Options by `checked_mmg`. The prior is that of the `reference_model`, or of `prior`: a reference ship, or
+    formulas, by default those of Yoshimura & Masumoto 2012. By its strength its standard deviations are
+    divided; by default it is the strongest of 1, 2, 3 whose error, each trial predicted from the others, is
+    within a tenth of the least.
     """
     prior = mmg_prior(options.reference_model or options.prior or YOSHIMURA, problem.blank.particulars)
-    blank = replace(problem.blank, particulars=prior.ship)
-    return maximum_a_posteriori(blank, problem.used, prior, options.prior_strength)
-
-
-def maximum_a_posteriori(
-    blank: ShipModel, trials: Sequence[Trial], prior: MMGPrior, strength: float | None = None
-) -> Posterior:
-    """Fit the MMG form to trials.
-
-    Parameters
-    ----------
-    blank : ShipModel
-        Of structure `mmg`, complete but for its coefficients.
-    trials : sequence of Trial
-        With u, v, r, delta, n, and psi where known.
-    prior : MMGPrior
-        Before the trials.
-    strength : float, optional
-        Of the prior, by which its standard deviations are divided; by default the strongest of 1, 2, 3 whose
-        error, each trial predicted from the others, is within a tenth of the least.
-    """
+    strength = options.prior_strength
     if strength is not None:
         check_number(strength, "prior_strength", above=0.0)
-    problem = _Problem(blank, trials, prior)
-    estimates: dict[float, Estimate] = {}
-    errors: dict[float, float] = {}
-    factors: dict[float, float] = {}
-    start, evaluations = np.zeros(len(IDENTIFIED)), 0
+    cost = _Problem(replace(problem.blank, particulars=prior.ship), problem.used, prior)
+    estimates: list[Estimate] = []
+    errors, factors = [], []
     for value in STRENGTHS if strength is None else (strength,):
-        found = problem.solve(start, value)
-        estimates[value], start = found, found.z
-        errors[value], factors[value] = problem.held_out(found, estimates[min(estimates)].scales)
-        evaluations += found.evaluations
-    least = min(errors.values())
-    chosen = max(value for value, error in errors.items() if error <= (1.0 + MARGIN) * least)
-    best = estimates[chosen]
+        estimates.append(cost.solve(estimates[-1].z if estimates else np.zeros(len(IDENTIFIED)), value))
+        error, factor = cost.held_out(estimates[-1], estimates[0].scales)
+        errors.append(error)
+        factors.append(factor)
+    chosen = max(k for k, error in enumerate(errors) if error <= (1.0 + MARGIN) * min(errors))
+    best, factor = estimates[chosen], factors[chosen]
     report = {
         "prior": prior.source,
         **({"similarity": dict(prior.similarity)} if prior.similarity else {}),
         **({"prior_remarks": list(prior.remarks)} if prior.remarks else {}),
-        "prior_strength": chosen,
-        "errors_held_out": {f"{value:g}": error for value, error in errors.items()},
-        "model_error": {"factor": factors[chosen], "how": "simulated segments of trials left out in turn"},
-        "segments": len(problem.segments),
-        "evaluations": evaluations,
-        "residual_rms": dict(zip(problem.channels, best.scales.tolist(), strict=True)),
+        "prior_strength": best.strength,
+        "errors_held_out": {f"{e.strength:g}": error for e, error in zip(estimates, errors, strict=True)},
+        "model_error": {"factor": factor, "how": "simulated segments of trials left out in turn"},
+        "segments": len(cost.segments),
+        "evaluations": sum(estimate.evaluations for estimate in estimates),
+        "residual_rms": dict(zip(cost.channels, best.scales.tolist(), strict=True)),
         "deviations_from_prior": dict(zip(IDENTIFIED, best.z.round(3).tolist(), strict=True)),
     }
-    covariance = np.zeros((len(prior.mean),) * 2)
-    inner = slice(len(IDENTIFIED))
-    covariance[inner, inner] = (
-        factors[chosen] ** 2 * best.covariance * np.outer(prior.deviation, prior.deviation)
-    )
-    return Posterior(replace(problem.model(best.z), covariance=covariance), report)
+    covariance, inner = np.zeros((len(prior.mean),) * 2), slice(len(IDENTIFIED))
+    covariance[inner, inner] = factor**2 * best.covariance * np.outer(prior.deviation, prior.deviation)
+    return replace(cost.model(best.z), covariance=covariance), report
 
 
 class _Problem:

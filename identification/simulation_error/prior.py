@@ -25,8 +25,7 @@ from identification.regression.samples import Samples, build_samples
 from identification.simulation_error.formulas import FORMULAS, formula_coefficients
 from identification.simulation_error.similarity import AUTO, select_reference
 from identification.validation.folds import FOLDS, LARGEST_RUDDER, TRIALS, of_largest_rudder
-from identification.validation.guard import hard_turn_features, reasons_unstable
-from identification.validation.guarded_fit import with_coefficients
+from identification.validation.guard import hard_turn_features, reasons_unstable, with_coefficients
 from shipgym.arrays import Floats
 from shipgym.checks import check_choice, check_number
 from shipgym.errors import InputError

@@ -29,8 +29,7 @@ from identification.simulation_error.segments import (
     cut,
 )
 from identification.uncertainty.covariance import newey_west
-from identification.validation.guard import reasons_unstable
-from identification.validation.guarded_fit import GuardedFit
+from identification.validation.guard import GuardedFit, reasons_unstable
 from shipgym.arrays import Floats
 from shipgym.checks import check_choice, check_number
 from shipgym.errors import InputError
@@ -314,7 +313,7 @@ class _Problem:
 def stretch(model: ShipModel, segments: Sequence[Segment]) -> float:
     """Width of the bins of time in which residuals are added up, s: a block, or a sampling step."""
     steps = [float(np.median(np.diff(s.times))) for s in segments if len(s.times) > 1]
-    return float(max(BLOCK * model.particulars["length"] / model.particulars["speed"], *steps, 0.0))
+    return float(max(BLOCK * model.travel_time, *steps))
 
 
 def _term_sizes(samples: Samples, equation: str) -> Floats:

@@ -64,7 +64,6 @@ def select_reference(
     particulars: Particulars,
     channels: Collection[str] | None = None,
     candidates: Collection[str] = tuple(REFERENCE_SHIPS),
-    printed: bool = False,
 ) -> tuple[str, dict[str, float]]:
     """The shipped reference ship most like a ship.
 
@@ -76,8 +75,6 @@ def select_reference(
         Recorded of the target: a reference ship that rolls needs p and phi.
     candidates : collection of str
         Names of models to choose from.
-    printed : bool
-        As in `similarity_vector`.
 
     Returns
     -------
@@ -99,8 +96,8 @@ def select_reference(
             f"reference_model: none of {quoted(ships)} can be evaluated at {quoted(channels or ())}, "
             "because all of them roll; record p and phi, or allow other candidates"
         )
-    vectors = {name: similarity_vector(_known(name, ship), printed) for name, ship in usable.items()}
-    found = correlations(similarity_vector(particulars, printed), vectors)
+    vectors = {name: similarity_vector(_known(name, ship)) for name, ship in usable.items()}
+    found = correlations(similarity_vector(particulars), vectors)
     best = max(found.values())
     closest = [name for name, value in found.items() if value > best - CORRELATION_TOLERANCE]
     lengths = {name: usable[name].particulars.length / particulars.length for name in closest}

@@ -24,9 +24,8 @@ LONGEST_LEG = 2.0  # times the measured one; a heading that is not reached by th
 def closed_loop(model: ShipModel, trial: Trial) -> Trial | None:
     """A zigzag with the measured rudder angles, reversed at the measured headings by the model's gear.
 
-    `trial`: with u, v, r, psi and the rudder, from whose first sample the model starts (`with_start`). None
-    where the model runs away or a heading is never reached, without a reversal, and for a model whose state
-    is not recorded.
+    None where the model runs away or a heading is never reached, without a reversal, and for a model whose
+    state is not recorded.
     """
     if not set(model.state_names) <= {*trial.channels, "x", "y"}:
         return None
@@ -34,7 +33,7 @@ def closed_loop(model: ShipModel, trial: Trial) -> Trial | None:
     delta, edges = rudder(trial), [float(trial.t[0]), start, *turns, float(trial.t[-1])]
     begun = with_start(model, trial)
     state = np.array([begun[c][0] if c in trial.channels else 0.0 for c in model.state_names])
-    t, states, orders = [edges[0]], [state], []
+    t, states, orders = np.array(edges[:1]), state[None], []
     for leg, (begin, end) in enumerate(pairwise(edges)):
         held = (trial.t >= 0.5 * (begin + end)) & (trial.t <= end)
         if end <= begin or not held.any():
@@ -47,12 +46,11 @@ def closed_loop(model: ShipModel, trial: Trial) -> Trial | None:
             return None
         if not len(times):
             return None
-        t += times.tolist()
-        states += list(sailed)
+        t, states = np.append(t, times), np.vstack([states, sailed])
         orders += [order] * len(times)
-    channels = dict(zip(model.state_names, np.array(states).T, strict=True))
+    channels = dict(zip(model.state_names, states.T, strict=True))
     channels["delta_command"] = np.array([*orders, orders[-1]])
-    return Trial(np.array(t), channels, name=trial.name, kind=trial.kind, length=model.particulars["length"])
+    return Trial(t, channels, name=trial.name, kind=trial.kind, length=model.particulars["length"])
 
 
 def _leg(
@@ -63,14 +61,11 @@ def _leg(
     time: tuple[float, float],
     target: float | None,
 ) -> tuple[Floats, Floats]:
-    """Times and states of a leg from its begin and measured duration, up to a heading where one is given.
-
-    Neither holds a row where it is never reached.
-    """
+    """Times and states of a leg of some begin and measured duration; none where a target is not reached."""
     begin, duration = time
-    dt = STEP * model.particulars["length"] / model.particulars["speed"]
+    dt = STEP * model.travel_time
     count = max(int(np.ceil((duration if target is None else LONGEST_LEG * duration) / dt)), 2)
-    t = begin + dt * np.arange(count + 1)
+    t = begin + dt * np.arange(count + 1, dtype=float)
     commands = np.tile(model.service_command, (count, 1))
     commands[:, 0] = order
     if "n" in model.command_names and "n" in trial.channels:

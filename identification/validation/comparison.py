@@ -38,15 +38,10 @@ class Comparison(Ranking):
     """Structures and methods on the same trials, ranked; `Ranking` lists its attributes."""
 
     def save(self, folder: str | Path) -> None:
-        """Write `comparison.json`, `comparison.html` and models.
+        """Write `comparison.json`, `comparison.html` and each method's `model-METHOD.json`.
 
-        These are each method's `model-METHOD.json`, of several structures the best one's of each,
-        `model-STRUCTURE.json`.
-
-        Raises
-        ------
-        InputError
-            If plotly is not installed.
+        Of several structures these are the best model of each, `model-STRUCTURE.json`. Raises InputError if
+        plotly is not installed.
         """
         folder = Path(folder)
         folder.mkdir(parents=True, exist_ok=True)
@@ -144,11 +139,10 @@ def cross_validate(trials: Sequence[Trial], folds: int | None = None, **argument
     used = [trial for trial in trials if trial.use == "fit"]
     if len(used) < 2:
         raise InputError(f"trials: {len(used)} to fit found, expected at least 2 to hold one out")
-    n = len(used)
-    if folds is not None:
-        n = int(check_number(folds, "folds", at_least=2, at_most=len(used), hint="at most one per trial"))
+    groups = len(used) if folds is None else folds
+    groups = int(check_number(groups, "folds", at_least=2, at_most=len(used), hint="at most one per trial"))
     own = {"model_error": False, **arguments}
-    return in_turn(lambda held: identify(used, hold_out=held, **own), used, n)[0]
+    return in_turn(lambda held: identify(used, hold_out=held, **own), used, groups)[0]
 
 
 def _pairs(structures: Sequence[Any], methods: Sequence[Any] | None, several: bool) -> list[tuple[Any, Any]]:
@@ -156,13 +150,12 @@ def _pairs(structures: Sequence[Any], methods: Sequence[Any] | None, several: bo
     pairs: list[tuple[Any, Any]] = []
     for structure in {name_of(one): one for one in structures}.values():
         own = methods
-        if methods is None and several:
-            own = methods_of(structure, Options.method)
-        elif methods is None:
-            own = (*USUAL, RM_SVM) if structure == GREY_BOX else USUAL
+        if own is None:
+            usual = (*USUAL, RM_SVM) if structure == GREY_BOX else USUAL
+            own = methods_of(structure, Options.method) if several else usual
         elif several and structure == MMG:
-            own = methods[:1]
-        pairs += [(structure, one) for one in {get_method(one).name: one for one in own or ()}.values()]
+            own = own[:1]
+        pairs += [(structure, one) for one in {get_method(one).name: one for one in own}.values()]
     return pairs
 
 
@@ -170,13 +163,13 @@ def _left_out(chosen: Sequence[Method], arguments: Mapping[str, Any]) -> dict[st
     """Settings that each method does not have but another one does."""
     settings = [name for name in arguments if name in OPTIONS and OPTIONS[name].setting]
     of_refinement = {item.name for item in fields(Refinement)}
-
-    def known(method: Method, setting: str) -> bool:
-        return method.knows(setting) or (method.refined and setting in of_refinement)
-
+    left = {
+        method.name: tuple(
+            one for one in settings if not (method.knows(one) or (method.refined and one in of_refinement))
+        )
+        for method in chosen
+    }
     for setting in settings:
-        if not any(known(method, setting) for method in chosen):
-            names = ", ".join(dict.fromkeys(method.name for method in chosen))
-            raise InputError(f"settings: {setting} found, which none of the methods {names} knows")
-    left = {method.name: tuple(s for s in settings if not known(method, s)) for method in chosen}
+        if all(setting in unknown for unknown in left.values()):
+            raise InputError(f"settings: {setting} found, which none of the methods {', '.join(left)} knows")
     return {name: unknown for name, unknown in left.items() if unknown}

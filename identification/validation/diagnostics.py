@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.signal import correlate
 
 from identification.estimators.estimator import Estimator
 from identification.regression import preprocess
@@ -15,7 +16,7 @@ from identification.regression.samples import Samples
 from identification.uncertainty.covariance import residuals
 from shipgym.arrays import Floats
 from shipgym.errors import InputError
-from shipgym.ships.structures import Structure
+from shipgym.ships import Structure
 from shipgym.trials.trial import Trial
 
 LEAST_RUDDER = np.radians(0.5)  # a rudder that moves less than this excites nothing
@@ -52,10 +53,7 @@ class EquationDiagnostics:
 
 
 def check_trials(trials: Sequence[Trial], structure: Structure) -> None:
-    """Refuse trials from which nothing can be identified.
-
-    Raises InputError for no trial, a missing channel, times that nearly coincide, or rudders that never move.
-    """
+    """Refuse no trial, a missing channel, times that nearly coincide, and rudders that never move."""
     if structure.captive:
         raise InputError(
             f"structure: '{structure.name}' found, which is identified from captive tests with the channels "
@@ -106,10 +104,7 @@ def _is_still(t: Floats, delta: Floats) -> bool:
 
 
 def check_samples(samples: Samples, trials: Sequence[Trial], structure: Structure) -> None:
-    """Refuse a regression with fewer rows than terms, or of a motion that never changes.
-
-    Raises InputError naming the shortest trial, or the channel.
-    """
+    """Refuse a regression with fewer rows than terms, or of a motion that never changes."""
     for q, change in samples.targets.items():
         if not np.any(change):
             raise InputError(
@@ -174,25 +169,18 @@ def autocorrelation(values: Floats, lags: int) -> tuple[float, ...]:
 def cross_correlation(first: Floats, second: Floats, lags: NDArray[np.int64]) -> Floats:
     """Correlation, shape (n_lags,), of one series with another at the same times that is shifted.
 
-    Lags are samples by which the first comes after the second, negative where it comes before. 0 where a
-    series is constant or shorter than the lag.
+    Lags are samples by which the first comes after the second. 0 for a constant or shorter series.
     """
     a, b = first - first.mean(), second - second.mean()
     power = float(np.sqrt((a @ a) * (b @ b)))
-    if power == 0.0:
-        return np.zeros(len(lags))
-    n = len(a)
-    return np.array([_shifted(a, b, int(k)) / power if abs(k) < n else 0.0 for k in lags])
-
-
-def _shifted(a: Floats, b: Floats, lag: int) -> float:
-    return float(a[lag:] @ b[: len(b) - lag]) if lag >= 0 else float(a[:lag] @ b[-lag:])
+    shifted = correlate(a, b, method="fft") / (power or 1.0)
+    return np.where(np.abs(lags) < len(a), shifted.take(lags + len(a) - 1, mode="clip"), 0.0)
 
 
 def variance_inflation(scaled: Floats) -> Floats:
     """Factor by which the other features increase the variance of each coefficient.
 
-    1 for an orthogonal one. Features of shape (n_samples, n_features) with a root mean square of 1.
+    Features have a root mean square of 1.
     """
     moment = scaled.T @ scaled / len(scaled)
     factors: Floats = np.diag(np.linalg.pinv(moment, rcond=1e-14)) * np.diag(moment)
@@ -207,8 +195,5 @@ def without_overlap(samples: Samples) -> NDArray[np.int64]:
 
 def _collinear_pairs(scaled: Floats, names: Sequence[str]) -> tuple[tuple[str, str, float], ...]:
     moment = scaled.T @ scaled / len(scaled)
-    first, second = np.nonzero(np.triu(np.abs(moment) > COLLINEAR, k=1))
-    return tuple(
-        (names[i], names[j], float(moment[i, j]))
-        for i, j in zip(first.tolist(), second.tolist(), strict=True)
-    )
+    pairs = np.argwhere(np.triu(np.abs(moment) > COLLINEAR, k=1)).tolist()
+    return tuple((names[i], names[j], float(moment[i, j])) for i, j in pairs)

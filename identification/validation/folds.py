@@ -23,8 +23,7 @@ def of_largest_rudder(trials: Sequence[Trial], where: str) -> NDArray[np.bool_]:
     """The trials with the largest rudder: what is learnt from the others is extrapolated to them.
 
     The hard turn is in no zigzag. How well small rudders predict larger ones is the closest substitute in the
-    data. `where` is the argument that asks for it, for messages. Raises InputError if all of them have the
-    same rudder.
+    data. `where`: the argument that asks for it. Raises InputError if all of them have the same rudder.
     """
     rudders = np.array([np.abs(trial["delta"]).max() for trial in trials], dtype=float)
     largest: NDArray[np.bool_] = rudders > LEAST_RUDDER_SHARE * rudders.max()
@@ -45,14 +44,11 @@ def held_out_rows(
         largest = of_largest_rudder(trials, "folds")
         rows = ~largest[samples.trial]
         yield from ((rows, trial) for trial, held in zip(trials, largest, strict=True) if held)
-        return
-    if len(trials) > 1:
-        for index, trial in enumerate(trials):
-            yield samples.trial != index, trial
-        return
-    start, end = samples.start, samples.start + samples.duration
-    for piece in pieces(trials[0]):
-        yield (end <= piece.t[0]) | (start >= piece.t[-1]), piece
+    elif len(trials) > 1:
+        yield from ((samples.trial != index, trial) for index, trial in enumerate(trials))
+    else:
+        start, end = samples.start, samples.start + samples.duration
+        yield from (((end <= one.t[0]) | (start >= one.t[-1]), one) for one in pieces(trials[0]))
 
 
 def pieces(trial: Trial) -> list[Trial]:

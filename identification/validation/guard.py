@@ -1,15 +1,19 @@
-"""Models that run away: how they are noticed, and what the regression is given to hold them.
+"""Models that run away: how they are noticed, and the fit again with a penalty.
 
 A fit of zigzags extrapolates in hard turns, where terms that hardly mattered in the data take over.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from functools import partial
+from typing import Any
 
 import numpy as np
 
+from identification.estimators.estimator import Estimators, FitTask
+from identification.estimators.methods import Method, fit_held
 from shipgym.arrays import Floats
 from shipgym.errors import UnstableModelError
 from shipgym.manoeuvres import turning_circle
@@ -19,12 +23,9 @@ from shipgym.ships.particulars import Particulars
 from shipgym.ships.simulate import open_loop
 from shipgym.trials.trial import Trial
 
-#: Rudder angles of the trial manoeuvres, degrees; the first is cut to the rudder's limit.
-RUDDERS_DEG = (35.0, 10.0)
-#: Ship lengths sailed at service speed between reversals of the rudder.
-REVERSALS = (2.5, 5.0, 10.0, 20.0)
-#: Length of a trial manoeuvre, ship lengths at service speed.
-DURATION_LENGTHS = 50.0
+RUDDERS_DEG = (35.0, 10.0)  # of the trial manoeuvres; the first is cut to the rudder's limit
+REVERSALS = (2.5, 5.0, 10.0, 20.0)  # ship lengths sailed at service speed between those of the rudder
+DURATION_LENGTHS = 50.0  # of a trial manoeuvre, at service speed
 STEP = 0.02  # of the time to sail one ship length
 
 #: A full ship's steady hard turn: speed by service speed, drift angle, yaw rate r L / U, rudder. KVLCC2 of
@@ -59,8 +60,7 @@ def hard_turn_features(
         q: np.abs(structure.features(q, channels, particulars, shaft_speed)[0]) for q in structure.equations
     }
     if "q" in sizes:
-        memory = sizes.pop("q") * particulars["length"] / speed
-        sizes["r"] = np.concatenate([sizes["r"], memory])
+        sizes["r"] = np.append(sizes["r"], sizes.pop("q") * particulars["length"] / speed)
     return sizes
 
 
@@ -89,10 +89,8 @@ def reasons_unstable(model: ShipModel, trials: Sequence[Trial]) -> list[str]:
         for gap in REVERSALS
     )
     for kind in (predictions, turns, reversals):
-        reasons = [
-            f"{name}: {cause}" for name, run, least in kind if (cause := _runs_away(model, run, least))
-        ]
-        if reasons:
+        tried = ((name, _runs_away(model, run, least)) for name, run, least in kind)
+        if reasons := [f"{name}: {cause}" for name, cause in tried if cause]:
             return reasons
     return []
 
@@ -102,7 +100,7 @@ def _reversed(model: ShipModel, rudder_deg: float, interval: float) -> Trial:
     steps = np.arange(round(DURATION_LENGTHS / STEP))
     commands = np.tile(model.service_command, (len(steps), 1))
     commands[:, 0] = np.where(steps // round(interval / STEP) % 2 == 0, 1.0, -1.0) * np.radians(rudder_deg)
-    return model.simulate(commands, STEP * model.particulars["length"] / model.particulars["speed"])
+    return model.simulate(commands, STEP * model.travel_time)
 
 
 def _runs_away(model: ShipModel, run: Callable[[], Trial], least_surge: float) -> str | None:
@@ -119,3 +117,45 @@ def _runs_away(model: ShipModel, run: Callable[[], Trial], least_surge: float) -
     if np.abs(trial["r"]).max() * length > QUICKEST_TURN * speed:
         return f"yaw rate of {np.degrees(np.abs(trial['r']).max()):.3g} deg/s"
     return None
+
+
+@dataclass(frozen=True)
+class GuardedFit:
+    """A fit and what the guard did to it."""
+
+    model: ShipModel  # with the identified coefficients
+    estimators: Estimators
+    stable: bool  # whether the model passed the guard
+    #: for the provenance: `decision`, `strength` of the penalty, and why the fit without it was rejected
+    report: dict[str, Any]
+
+
+def guarded_fit(
+    method: Method, settings: Mapping[str, Any], task: FitTask, guarded: bool = True
+) -> GuardedFit:
+    """Fit by a method; if the model runs away, with the weakest penalty under which it does not.
+
+    Not stable, and without a penalty, where none helped or it is not `guarded`.
+    """
+    blank, trials = task.blank, task.trials
+    estimators = method.fitted(settings, task)
+    model = with_coefficients(blank, estimators)
+    reasons = reasons_unstable(model, trials)
+    if not reasons:
+        return GuardedFit(model, estimators, True, {"decision": "stable as fitted"})
+    rejected = {"rejected": reasons}
+    if not (guarded and method.regularised):
+        return GuardedFit(model, estimators, False, {"decision": "runs away, not guarded", **rejected})
+    sizes = hard_turn_features(blank.table, blank.particulars, blank.service_shaft_speed)
+    for strength in STRENGTHS:
+        held = fit_held(task.samples, sizes, strength)
+        candidate = with_coefficients(blank, held)
+        if not reasons_unstable(candidate, trials):
+            report = {"decision": "penalised by hard turn", "strength": strength, **rejected}
+            return GuardedFit(candidate, held, True, report)
+    return GuardedFit(model, estimators, False, {"decision": "runs away under every penalty", **rejected})
+
+
+def with_coefficients(blank: ShipModel, estimators: Estimators) -> ShipModel:
+    """The model with the hydrodynamic derivatives that follow from the fitted accelerations."""
+    return blank.with_accelerations({q: estimator.coef_ for q, estimator in estimators.items()})

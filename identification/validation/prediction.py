@@ -34,29 +34,26 @@ def predict(model: ShipModel, trial: Trial) -> Trial | None:
 def trial_metrics(model: ShipModel, trial: Trial, prediction: Trial | None) -> dict[str, Any]:
     """Errors of a prediction and the indices of measurement and prediction by the same function.
 
-    `model`: gives the ship's length; `trial`: as measured; `prediction`: from `predict`. Returns `use`,
-    `diverged`, `rmse` (SI; by channel) and for each index `measured` and `predicted`, of overshoots also
-    `closed_loop` (the rudder reversed at the measured headings, `closed_loop`), None where the manoeuvre
-    has no such index or never got there.
+    Returns `use`, `diverged`, `rmse` (SI; by channel) and for each index `measured` and `predicted`, of
+    overshoots also `closed_loop` (the rudder reversed at the measured headings), None where the manoeuvre has
+    no such index or never got there.
     """
-    metrics: dict[str, Any] = {"use": trial.use, "diverged": prediction is None}
-    metrics["rmse"] = {
-        channel: None
-        if prediction is None or channel not in trial
-        else float(np.sqrt(np.mean((prediction[channel] - trial[channel]) ** 2)))
-        for channel in COMPARED
-    }
-    indices: dict[str, Any] = dict.fromkeys((*ZIGZAG, *TURNING))
+    errors: dict[str, float | None] = dict.fromkeys(COMPARED)
+    if prediction is not None:
+        for channel in [name for name in COMPARED if name in trial]:
+            errors[channel] = float(np.sqrt(np.mean((prediction[channel] - trial[channel]) ** 2)))
+    metrics: dict[str, Any] = {"use": trial.use, "diverged": prediction is None, "rmse": errors}
+    metrics |= dict.fromkeys((*ZIGZAG, *TURNING))
     read, zigzag = index_reader(model, trial), trial.kind == "zigzag"
     measured = None if read is None else read(trial)
     if read is None or measured is None:
-        return metrics | indices
+        return metrics
     runs = {"measured": measured, "predicted": read(prediction)}
     if zigzag:
         runs["closed_loop"] = None if prediction is None else read(closed_loop(model, trial))
     for name in ZIGZAG if zigzag else TURNING:
-        indices[name] = {kind: getattr(found, name, None) for kind, found in runs.items()}
-    return metrics | indices
+        metrics[name] = {kind: getattr(found, name, None) for kind, found in runs.items()}
+    return metrics
 
 
 def index_reader(model: ShipModel, trial: Trial) -> Callable[[Trial | None], Any] | None:

@@ -90,14 +90,10 @@ def named(structure: str, method: str) -> str:
 def standing(
     results: Sequence[IdentificationResult], seen: Mapping[str, Any], trials: Sequence[Trial]
 ) -> Standing:
-    """How well a method predicts trials.
-
-    `results`: identified by it; `seen`: metrics of the trials held out, by name; `trials`: those and others.
-    """
+    """How well a method that gave `results` predicts trials; `seen`: metrics of those held out, by name."""
     measured = {trial.name: trial for trial in trials}
     errors = {trial: _error(metrics, measured[trial]) for trial, metrics in seen.items()}
     known = [error for error in errors.values() if error is not None]
-    whole = len(known) == len(errors)
     provenance = results[0].model.provenance or {}
     return Standing(
         structure=provenance["structure"],
@@ -105,7 +101,7 @@ def standing(
         coefficients=len(results[0].coefficients),
         stable=all(result.stable for result in results),
         ran_away=sum(metrics["diverged"] for metrics in seen.values()),
-        error=float(np.mean(known)) if whole else None,
+        error=float(np.mean(known)) if len(known) == len(errors) else None,
         heading_deg=_mean_degrees(seen, "psi"),
         yaw_rate_deg_s=_mean_degrees(seen, "r"),
         errors=errors,

@@ -39,12 +39,10 @@ def select(
     """The options with the structure and method that predict best, and the ranking, for the provenance.
 
     Every structure that trials and particulars allow is fitted by its usual method, a table that comes first
-    by others too, and each trial predicted by fits without it. The choice is the one with the fewest
-    coefficients whose error exceeds the least by no more than one standard error of their difference over the
-    trials, or by 2 %.
-    `identify`: from trials and options of one structure; `trials`: to fit, a single one is cut into three;
-    `options`: a method other than the default is the only one, and what does not know a setting is refused.
-    Raises InputError where nothing can be fitted, with the first reason.
+    by others too, and each trial (each third of a single one) predicted by fits without it. The choice is the
+    one with the fewest coefficients whose error exceeds the least by no more than one standard error of their
+    difference over the trials, or by 2 %. A method other than the default is the only one, and what does not
+    know a setting is refused; InputError where nothing can be fitted, with the first reason.
     """
     free = options.method == Options.method and not options.settings()
     parts = [trial.with_(kind=None) for trial in (pieces(trials[0]) if len(trials) == 1 else trials)]

@@ -36,13 +36,11 @@ def with_start(model: ShipModel, trial: Trial) -> Trial:
     floors = np.vstack([[[FLOORS["psi"]]], floors * (speed if track == "uv" else 1.0)])
     channels = ["psi", *track]
     opening = Trial(trial.t[rows], {name: values[rows] for name, values in trial.channels.items()})
-    measured = np.array([opening[name] for name in channels])
     start, scales = np.array([trial[name][0] for name in names]), floors
 
     def errors(start: Floats) -> Floats:
         run = open_loop(model, _begun(opening, names, start))
-        found: Floats = np.array([run[name] for name in channels])[:, 1:] - measured[:, 1:]
-        return found
+        return np.array([run[name] - opening[name] for name in channels])[:, 1:]
 
     try:
         for _ in range(ROUNDS):

@@ -35,12 +35,7 @@ def why_unstable(fit: Fit) -> str | None:
 
 
 def model_warnings(fit: Fit) -> list[str]:
-    """What a user has to know of a stable model before using it.
-
-    `fit`: of a stable model. Returns one sentence each, without capital and full stop: a rudder that steers
-    to the wrong side, a fit that had to be penalised, terms that the data cannot separate, a heading that is
-    lost, channels that were not measured, no trial to validate, values that were estimated.
-    """
+    """What a user has to know of a stable model before using it, a sentence each without capital and stop."""
     model, provenance = fit.model, fit.model.provenance or {}
     found = []
     if _steers_to_port(model):
@@ -55,12 +50,9 @@ def model_warnings(fit: Fit) -> list[str]:
             "held back; predictions far from the recorded manoeuvres are doubtful"
         )
     found += _not_corrected(fit) + _not_refined(provenance) + _shaft_ignored(fit)
-    remarks = [
-        *provenance.get("sea_remarks", []),
-        *provenance.get("prior_remarks", []),
-        *provenance.get("kernel", {}).get("remarks", []),
-    ]
-    found += [*remarks, *exactly_collinear(fit), *_lost_headings(fit)]
+    found += [*provenance.get("sea_remarks", []), *provenance.get("prior_remarks", [])]
+    found += provenance.get("kernel", {}).get("remarks", [])
+    found += exactly_collinear(fit) + _lost_headings(fit)
     derived = {name for trial in provenance.get("trials", []) for name in trial["derived"]}
     if derived:
         found.append(

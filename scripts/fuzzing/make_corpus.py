@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from papers.xu2020_tank import xu_ship
 
 import agents
 import shipgym
@@ -27,7 +28,6 @@ from agents.training import training
 from agents.training.plan import Given, make_plan
 from agents.training.training import train
 from shipgym import Episode, Particulars, ShipFile, ShipModel
-from shipgym.ships.catalogue import xu_ship
 from shipgym.tasks.task import OBSERVATION_NAMES, Task, observation_scales
 
 CORPUS = Path(__file__).parents[2] / "tests" / "corpus"

@@ -18,7 +18,7 @@ from identification.regression.samples import build_samples
 from identification.result import IdentificationResult
 from identification.simulation_error.similarity import select_reference
 from identification.validation.folds import LARGEST_RUDDER, TRIALS
-from identification.validation.guarded_fit import with_coefficients
+from identification.validation.guard import with_coefficients
 from shipgym.errors import UnstableModelError
 from shipgym.manoeuvres import turning_circle, turning_indices, zigzag, zigzag_indices
 from shipgym.ships import GreyBox, ShipModel, converted_model, load_model

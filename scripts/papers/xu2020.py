@@ -25,6 +25,7 @@ from papers.xu2020_tank import (
     NOISE,
     SEED,
     STEPS,
+    TABLE_11,
     Step,
     all_at_once,
     final_terms,
@@ -33,7 +34,6 @@ from papers.xu2020_tank import (
     noise_sizes,
     step_by_step,
 )
-from shipgym.ships.pmm import TABLE_11
 
 Floats = NDArray[np.float64]
 

@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,13 +19,23 @@ from numpy.typing import NDArray
 from identification.design.reduction import Reduction, backward_elimination
 from identification.regression.forces import FORCES, ForceRegression, force_regression
 from shipgym.manoeuvres.towing_tank import Tank, pure_surge, pure_sway, pure_yaw, yaw_with_drift
-from shipgym.ships.catalogue import xu_ship
+from shipgym.ships import ShipModel, get_structure
 from shipgym.ships.particulars import Particulars
-from shipgym.ships.pmm import PMM38, TABLE_11
+from shipgym.ships.steering import SteeringGear
 from shipgym.trials.trial import Trial
 
 Floats = NDArray[np.float64]
 
+PMM18: Any = get_structure("pmm18")
+PMM38: Any = get_structure("pmm38")
+#: Table 11: the reduced model of the ship towed at SINTEF Ocean, prime system.
+TABLE_11 = {
+    "X_udot": -1.04e-2, "X_uuu": -2.67e-4, "X_uvv": -9.29e-3, "X_rvu": 5.84e-2, "X_urr": -1.22e-3,
+    "Y_vdot": -3.82e-2, "Y_rdot": -2.66e-4, "Y_uuv": -6.16e-2, "Y_v|v|": -1.22e-1, "Y_uur": 3.13e-2,
+    "Y_r|v|": 1.12e-3,
+    "N_rdot": -1.20e-3, "N_vdot": 1.87e-3, "N_uur": -8.41e-3, "N_r|r|": -1.00e-3, "N_uuv": 2.14e-2,
+    "N_v|r|": -1.69e-2, "N_r|v|": 1.11e-2,
+}  # fmt: skip
 #: A small research ship; the paper prints no particulars.
 PARTICULARS = Particulars(
     length=28.9, beam=9.6, draught=2.7, mass=417e3, speed=5.0, xg=-0.5, yaw_gyradius=7.2, water_density=1025.0
@@ -105,6 +116,12 @@ STEPS = (
           "rdot .19 .19 uur .21 .2 r|r| 2.03 2.5 vdot .63 .65 uuv .11 .1 vrr 2.64 - vvr 9.63 - v|r| .79 .4"
           " r|v| 1.42 .73"),
 )  # fmt: skip
+
+
+def xu_ship(particulars: Particulars) -> ShipModel:
+    """The ship of Table 11, which has neither rudder nor propeller; the paper prints no particulars."""
+    source = {"source": PMM18.source.replace("equations 39 to 41", "Table 11")}
+    return ShipModel("xu-2020", "pmm18", particulars, SteeringGear(), TABLE_11, provenance=source)
 
 
 @cache

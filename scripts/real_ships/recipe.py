@@ -18,13 +18,12 @@ from identification.pipeline import identify
 from identification.regression.samples import build_samples
 from identification.result import IdentificationResult
 from identification.simulation_error.prior import Prior, Pulled, reference_prior
-from identification.validation.guard import reasons_unstable
-from identification.validation.guarded_fit import with_coefficients
+from identification.validation.guard import reasons_unstable, with_coefficients
 from real_ships.data import MeasuredShip
 from real_ships.measures import zigzag_errors
 from shipgym.ships import ShipModel, get_structure, register_structure
 from shipgym.ships.steering import SteeringGear
-from shipgym.ships.structures import prime_terms
+from shipgym.ships.terms import short_terms
 
 REFERENCE = "kvlcc2-l7"
 STRENGTHS = (0.0, 0.01, 0.03, 0.1, 0.2)
@@ -51,8 +50,8 @@ def known(structure: str) -> str:
     """The name of a structure, made known where it is one of this study's."""
     if structure in OWN:
         sway_and_yaw, source = OWN[structure]
-        terms = prime_terms(sway_and_yaw)
-        table = {"u": prime_terms(SURGE), "v": terms, "r": terms}
+        terms = short_terms(sway_and_yaw)
+        table = {"u": short_terms(SURGE), "v": terms, "r": terms}
         register_structure(structure, table, source, normalisation="prime", quantity="force")
     return structure
 

@@ -1,15 +1,18 @@
 """How loops are compiled for a ship, a sea and a task, and kept on disk, never stale.
 
 The machine code of a loop lies in the cache under a name that hashes all that it depends on: the bytecode of
-the loop and of every function put into it, the fields of their records, the versions of Python and Numba, and
-the processor. A file that is there is right, whoever made it and when; so a cache that was filled beforehand
-and may only be read is used as it is.
+the loop and of every function put into it, the fields of their records, the code generators of this folder,
+the versions of Python and Numba, and the processor. A file that is there is right, whoever made it and when;
+so a cache that was filled beforehand and may only be read is used as it is.
 """
 
 from __future__ import annotations
 
+import gc
 import re
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -17,7 +20,7 @@ from typing import Any
 import numpy as np
 
 from shipgym.engine.cache_folder import lock_of, locked, usable_folder
-from shipgym.engine.specialise import SEMANTICS, Parts, Specialisation, fingerprint
+from shipgym.engine.specialise import SEMANTICS, Parts, Specialisation, fingerprint, is_shipped
 from shipgym.errors import InputError
 
 SECONDS = 4  # about what a loop takes to compile on a laptop; what is told to who waits
@@ -42,7 +45,8 @@ def compiled(loop: Any, signature: str, parts: Parts, what: str) -> Any:
 
     without_scipy()
     jit = partial(numba.njit, pipeline_class=LeanCompiler)
-    dispatcher = jit(nogil=True, **SEMANTICS)(Specialisation(parts, tag, jit).copy(loop))
+    options = {"nogil": True, "_nrt": not is_shipped(loop), **SEMANTICS}
+    dispatcher = jit(**options)(Specialisation(parts, tag, jit).copy(loop))
     folder = usable_folder()
     if folder is None:
         _announce(what, None)
@@ -79,10 +83,22 @@ def _compile(dispatcher: Any, signature: str, what: str) -> None:
 
     name = dispatcher.py_func.__qualname__
     try:
-        with global_compiler_lock, lean(name.rpartition("_")[2], name):
+        with global_compiler_lock, _uncollected(), lean(name.rpartition("_")[2], name):
             dispatcher.compile(signature)
     except (NumbaError, TypeError) as error:  # TypeError: a record made of other fields
         raise InputError(explanation(error, what)) from None
+
+
+@contextmanager
+def _uncollected() -> Iterator[None]:
+    """Collect no garbage: to look for it among all that a compilation makes takes a tenth of its time."""
+    enabled = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if enabled:
+            gc.enable()
 
 
 def explanation(error: Exception, what: str) -> str:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from functools import cache
 from typing import Any
 
-from shipgym.engine import batches, passages, rate_steering, segments, trajectories, zigzag
+from shipgym.engine import batches, passages, trajectories
 from shipgym.engine.compiling import compiled
 from shipgym.engine.parts import Part
 from shipgym.engine.records import LANES
@@ -45,18 +45,18 @@ LOOPS = {
         parts=MEASURED_GEAR,
     ),
     "zigzag": Loop(
-        zigzag.zigzag,
+        trajectories.zigzag,
         "UniTuple(int64, 2)(float64[:, ::1], float64[::1], float64, float64, float64, float64, boolean,"
         f" {SEA}, float64[::1])",
         parts={"advanced": Part(passages.advanced, inline=False)},
     ),
     "steer_rate": Loop(
-        rate_steering.steer_rate,
+        trajectories.steer_rate,
         "int64(float64[:, ::1], float64[::1], float64[::1], float64, float64, float64, float64, float64,"
         f" {SEA}, float64[::1])",
     ),
     "segments": Loop(
-        segments.sail_segment,
+        batches.sail_segment,
         "void(float64[::1], float64[::1], float64[::1], float64[:, ::1], int64[::1], float64[:, ::1])",
         LANES,
         shared=False,

@@ -14,6 +14,7 @@ import platform
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cache
+from pathlib import Path
 from types import CodeType, FunctionType, ModuleType
 from typing import Any
 
@@ -29,6 +30,8 @@ INNER = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 # error_model "numpy" keeps loops free of branches; contraction is the only fast-math liberty taken, because
 # the others would optimise NaN checks away and make results depend on the batch size.
 SEMANTICS = {"error_model": "numpy", "fastmath": {"contract"}}
+#: Modules that write machine code, or say how it is written.
+GENERATORS = ("addresses", "compiling", "lean_numba", "record_code", "specialise")
 
 
 @dataclass
@@ -48,7 +51,11 @@ class Specialisation:
         elif key not in self.made:
             copy = self.copy(part.function)
             if self.jit is not None:
-                copy = self.jit(**({"forceinline": True} if part.inline else {}), **INNER, **SEMANTICS)(copy)
+                # the package's functions make no arrays: Numba's counting of references, taken out again by
+                # its passes, takes a tenth of the time
+                counted = not is_shipped(part.function)
+                inline = {"forceinline": True} if part.inline else {}
+                copy = self.jit(**inline, _nrt=counted, **INNER, **SEMANTICS)(copy)
             self.made[key] = copy
         return self.made[key]
 
@@ -74,12 +81,16 @@ def named_globals(function: Any, parts: Parts) -> Iterator[tuple[str, Any]]:
             f"{function.__module__}.{function.__name__}: uses variables of the function around it "
             f"({', '.join(function.__code__.co_freevars)}), expected a function at the top of a file"
         )
-    shipped = function.__module__.partition(".")[0] == "shipgym"  # a user's names are the user's
     for name in _loaded_names(function.__code__):
-        if shipped and name in parts:
+        if is_shipped(function) and name in parts:  # a user's names are the user's
             yield name, parts[name]
         elif name in function.__globals__:
             yield name, function.__globals__[name]
+
+
+def is_shipped(function: Any) -> bool:
+    """Whether a function is one of the package's, and not a user's."""
+    return bool(function.__module__.partition(".")[0] == "shipgym")
 
 
 def _is_plain(value: Any) -> bool:
@@ -139,11 +150,12 @@ def fingerprint(function: Any, parts: Parts) -> str:
 
 @cache
 def _machine() -> str:
-    """Versions and processor that machine code is made for."""
+    """What writes machine code, versions, and the processor that it is made for."""
     import llvmlite.binding as llvm
     import numba
 
+    sources = b"".join(Path(__file__).with_name(f"{name}.py").read_bytes() for name in GENERATORS)
+    written = hashlib.sha256(sources).hexdigest()
     features = sorted(llvm.get_host_cpu_features().items())
-    return repr(
-        (platform.python_version(), numba.__version__, platform.machine(), llvm.get_host_cpu_name(), features)
-    )
+    versions = (written, platform.python_version(), numba.__version__)
+    return repr((*versions, platform.machine(), llvm.get_host_cpu_name(), features))

@@ -1,7 +1,7 @@
-"""One ship through time with given commands.
+"""One ship through time: with given commands, with a measured rudder, through a zigzag, held to a yaw rate.
 
-Each loop but `derivatives` writes a state a sample into the rows of `out` (`passages`), and returns the last
-row at which the ship had not yet run away.
+Each loop but `derivatives` begins with the state in row 0 of `out` and writes one a sample into the others
+(`passages`); it returns the last row at which the ship had not yet run away.
 """
 
 from __future__ import annotations
@@ -10,10 +10,22 @@ from math import ceil, fabs
 from typing import Any
 
 from shipgym.engine.mathematics import clip, sin_cos
-from shipgym.engine.motion import HAS_SHAFT, Motion, Push, ground_velocity, lost, rates, rudder_velocity, sail
-from shipgym.engine.passages import NO_LIMIT, felt, follow, in_depth, replaced, with_gear
+from shipgym.engine.motion import (
+    HAS_SHAFT,
+    Motion,
+    Push,
+    Ship,
+    ground_velocity,
+    lost,
+    rates,
+    rudder_velocity,
+    sail,
+)
+from shipgym.engine.passages import NO_LIMIT, advanced, felt, follow, in_depth, replaced, with_gear
 from shipgym.engine.places import load_motion, store_motion
 from shipgym.engine.vessel import read_ship
+
+SWITCH_ITERATIONS = 12
 
 
 def derivatives(states: Any, commands: Any, depths: Any, numbers: Any, out: Any) -> None:
@@ -33,7 +45,7 @@ def derivatives(states: Any, commands: Any, depths: Any, numbers: Any, out: Any)
 
 
 def simulate(out: Any, commands: Any, h: float, sea: Any, words: Any, parameters: Any, numbers: Any) -> int:
-    """From the state in row 0 with one row of commands (rudder, shaft speed) a step of h seconds."""
+    """One row of commands (rudder, shaft speed) a step of h seconds."""
     ship, coefficients = read_ship(numbers)
     motion = load_motion(out[0], 0)
     for i in range(commands.shape[0]):
@@ -46,7 +58,7 @@ def simulate(out: Any, commands: Any, h: float, sea: Any, words: Any, parameters
 
 
 def open_loop(out: Any, t: Any, delta: Any, n: Any, wind: Any, longest_step: float, numbers: Any) -> int:
-    """From the state in row 0 with the rudder measured at times t, straight between the samples.
+    """The rudder is measured at times t, and moves straight between the samples.
 
     A measured rudder is a steering gear without limit or lag that moves at the measured rate. The water is
     calm; `wind` holds the accelerations by measured wind in surge, sway and yaw, one row a step, of which a
@@ -67,3 +79,97 @@ def open_loop(out: Any, t: Any, delta: Any, n: Any, wind: Any, longest_step: flo
         motion = replaced(motion, motion.psi, delta[i + 1], motion.n)
         store_motion(out[i + 1], 0, motion)
     return len(t) - 1
+
+
+def switched(
+    motion: Motion, command: float, threshold: float, n: float, h: float, pushed: Push, coefficients: Any,
+    ship: Ship,
+) -> Motion:  # fmt: skip
+    """State after a step within which the heading crosses the threshold and the rudder reverses.
+
+    The instant is found by the Illinois variant of regula falsi on the heading after part of the step.
+    """
+    side = 1.0 if command > 0.0 else -1.0
+    low, high = 0.0, 1.0
+    miss_low = side * motion.psi - threshold
+    miss_high = side * advanced(motion, command, n, h, pushed, coefficients, ship).psi - threshold
+    part = 1.0
+    for _ in range(SWITCH_ITERATIONS):
+        part = low - miss_low * (high - low) / (miss_high - miss_low)
+        after = advanced(motion, command, n, part * h, pushed, coefficients, ship)
+        miss = side * after.psi - threshold
+        if miss > 0.0:
+            high, miss_high, miss_low = part, miss, 0.5 * miss_low
+        elif miss < 0.0:
+            low, miss_low, miss_high = part, miss, 0.5 * miss_high
+        else:
+            break
+    at_switch = advanced(motion, command, n, part * h, pushed, coefficients, ship)
+    return advanced(at_switch, -command, n, (1.0 - part) * h, pushed, coefficients, ship)
+
+
+def zigzag(
+    out: Any, commands: Any, angle: float, threshold: float, n: float, h: float, inside_step: bool,
+    sea: Any, words: Any, parameters: Any, numbers: Any,
+) -> tuple[int, int]:  # fmt: skip
+    """A zigzag; `commands` receives the rudder angle held from each sample on.
+
+    The first order is `angle`; the rudder reverses when the heading has moved by `threshold` to the
+    side of the order, at that instant (`inside_step`) or at the next sample. The second number
+    returned counts the reversals.
+    """
+    ship, coefficients = read_ship(numbers)
+    first = load_motion(out[0], 0)
+    start = first.psi
+    motion = replaced(first, 0.0, first.delta, first.n)
+    out[0, 2] = 0.0
+    command = angle
+    reversals = 0
+    last = out.shape[0] - 1
+    for i in range(last):
+        commands[i] = command
+        pushed = felt(motion, sea, parameters)
+        following = advanced(motion, command, n, h, pushed, coefficients, ship)
+        side = 1.0 if command > 0.0 else -1.0
+        if side * following.psi >= threshold:
+            if inside_step:
+                following = switched(motion, command, threshold, n, h, pushed, coefficients, ship)
+            command = -command
+            reversals += 1
+        if lost(following, ship):
+            last = i
+            break
+        motion = following
+        follow(out, i + 1, motion, h, sea, words, parameters)
+    for i in range(last, len(commands)):
+        commands[i] = command
+    for i in range(last + 1):
+        out[i, 2] += start
+    return last, reversals
+
+
+def steer_rate(
+    out: Any, commands: Any, memory: Any, rate: float, n: float, h: float, gain: float, reset_time: float,
+    sea: Any, words: Any, parameters: Any, numbers: Any,
+) -> int:  # fmt: skip
+    """A proportional-integral helmsman holds the yaw rate at `rate`, as in the reverse spiral of Bech.
+
+    `commands` receives the rudder angle held from each sample on; `memory` holds the integral part of the
+    helmsman's rudder and is changed.
+    """
+    ship, coefficients = read_ship(numbers)
+    motion = load_motion(out[0], 0)
+    limit = ship.rudder_limit
+    kept = memory[0]
+    last = len(out) - 1
+    for i in range(last):
+        error = rate - motion.r
+        kept = clip(kept + gain * error * h / reset_time, -limit, limit)
+        commands[i] = clip(gain * error + kept, -limit, limit)
+        motion = sail(motion, commands[i], n, h, felt(motion, sea, parameters), coefficients, ship)
+        if lost(motion, ship):
+            last = i
+            break
+        follow(out, i + 1, motion, h, sea, words, parameters)
+    memory[0] = kept
+    return last

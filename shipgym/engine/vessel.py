@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cache, cached_property
 from typing import Any
 
 from shipgym.engine.motion import Motion, Ship
@@ -59,6 +59,15 @@ class Vessel:
             "common_ship": Part(read_ship if shared else nothing),
             "ship_at": Part(the_common if shared else ship_of_lane),
         }
+
+
+@cache
+def vessel_of(
+    name: str, state_names: tuple[str, ...], coefficients: Record, functions: tuple[tuple[str, Any], ...],
+    lag: bool, summed: tuple[tuple[str, Any], ...] = (),
+) -> Vessel:  # fmt: skip
+    """The one vessel of these fields, so that what is compiled for one ship serves all that are like her."""
+    return Vessel(name, state_names, coefficients, dict(functions), lag, dict(summed))
 
 
 def read_ship(ships: Any) -> Any:

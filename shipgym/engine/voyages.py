@@ -18,31 +18,15 @@ from shipgym.engine.places import load_envelope, load_scale, load_sea_parameters
 from shipgym.engine.record_code import bounded_storer, chooser, loader, number_storer, storer, summer, zero
 from shipgym.engine.records import LANES, Layout, leaves
 from shipgym.engine.vessel import Vessel, nothing, the_common
-from shipgym.instruments import bridge, perfect
+from shipgym.instruments.sensor_set import SensorSet
 from shipgym.sea import open_sea
 from shipgym.tasks.definition import TaskDefinition
 
-
-@dataclass(frozen=True)
-class Sensors:
-    """A sensor set as it is compiled."""
-
-    module: Any  # with `Settings`, `Memory`, `measure` and `readings`
-    # whether a bridge's instruments are noisy, and whether they filter
-    noise: bool = False
-    filter: bool = False
-
-
 #: Functions of `episodes` that loops call; others become part of them.
-SELDOM = (
+CALLED = (
     "begin_lane", "begin_next", "let_events_come", "observe_lane", "show", "take_commands", "sail_lanes",
+    "conclude_lanes",
 )  # fmt: skip
-PERFECT = Sensors(perfect)
-
-
-def sensors_for(windy: bool, noise: bool, filtered: bool) -> Sensors:
-    """The sensor set for what is asked: without error in calm water, else a bridge's."""
-    return Sensors(bridge, noise, filtered) if windy or noise or filtered else PERFECT
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,7 +35,7 @@ class Voyages:
 
     vessel: Vessel
     task: TaskDefinition
-    sensors: Sensors
+    sensors: SensorSet
     windy: bool  # whether there is current, wind or waves
     shared: bool  # whether all lanes have the same ship and sea
 
@@ -62,7 +46,7 @@ class Voyages:
             motion=(Motion, self.vessel.state_names),
             sea=open_sea.sea_records(self.windy)[0],
             course=episodes.Course,
-            memory=self.sensors.module.Memory,
+            memory=self.sensors.Memory,
             state=self.task.State,
         )
 
@@ -86,7 +70,7 @@ class Voyages:
     @cached_property
     def settings(self) -> Layout:
         """Places of the settings of engine, sensor set and task."""
-        return Layout(rules=episodes.Rules, sensor=self.sensors.module.Settings, task=self.task.Settings)
+        return Layout(rules=episodes.Rules, sensor=self.sensors.Settings, task=self.task.Settings)
 
     def row(self, name: str) -> int:
         """Row of a number of the state by its name: `u`, `course`, `steps`."""
@@ -149,10 +133,9 @@ class Voyages:
         }
 
     def _functions(self) -> dict[str, Any]:
-        task, sensors = self.task, self.sensors.module
-        seldom = {name: Part(getattr(episodes, name), inline=False) for name in SELDOM}
-        return seldom | {
-            "conclude_lanes": Part(episodes.conclude_lanes, inline=False),
+        task, sensors = self.task, self.sensors
+        called = {name: Part(getattr(episodes, name), inline=False) for name in CALLED}
+        return called | {
             "step": Part(episodes.step),
             "reset": Part(episodes.reset),
             "words_at": array_at(np.uint64, 3),
@@ -204,6 +187,6 @@ def view_of_lane(common: Any, ships: Any, lane: int) -> Any:
 
 
 @cache
-def voyages(vessel: Vessel, task: TaskDefinition, sensors: Sensors, windy: bool, shared: bool) -> Voyages:
+def voyages(vessel: Vessel, task: TaskDefinition, sensors: SensorSet, windy: bool, shared: bool) -> Voyages:
     """Episodes, compiled once in a process."""
     return Voyages(vessel, task, sensors, windy, shared)

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import warnings
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from functools import partial
+from itertools import pairwise
 from typing import Any
 
 import gymnasium
@@ -14,22 +17,34 @@ from shipgym.arrays import Floats
 from shipgym.checks import check_whole
 from shipgym.engine import episodes
 from shipgym.engine.addresses import addresses
-from shipgym.engine.records import LANES, flat
-from shipgym.engine.voyages import Sensors, sensors_for, voyages
+from shipgym.engine.records import LANES
+from shipgym.engine.voyages import voyages
 from shipgym.envs.lanes import Lanes
-from shipgym.envs.outputs import STEP_OUTCOME, OutputPool, Outputs
+from shipgym.envs.outputs import STEP_OUTCOME, Outputs
 from shipgym.envs.randomisation import Randomisation
-from shipgym.envs.stability import refuse_unstable
-from shipgym.envs.tiles import Threads, ship_columns, ship_tiles
 from shipgym.errors import InputError
 from shipgym.ships import ShipModel
 from shipgym.tasks.task import Task, course_keeping_task
-from shipgym.trials.sensors import SEA_TRIAL
 
 Observation = NDArray[np.float32]
 N_FIXED = 22  # words of a loop's world before those of its outputs
-#: Settings of a bridge's instruments, and the channel of a sea trial whose noise they take.
-SENSOR_NOISE = {"heading": "psi", "yaw_rate": "r", "speed": "u", "position": "x"}
+
+
+class Threads:
+    """Threads that share the tiles of an engine; the first share is done by the thread that asks."""
+
+    def __init__(self, tiles: int, threads: int) -> None:
+        count = min(threads, tiles)
+        bounds = np.linspace(0, tiles, count + 1).astype(int).tolist()
+        self.shares: list[tuple[int, int]] = list(pairwise(bounds))
+        self._pool = ThreadPoolExecutor(count - 1, "shipgym") if count > 1 else None
+
+    def run(self, loop: Any, worlds: Sequence[NDArray[np.int64]], asked: int) -> list[int]:
+        """What the loop returns for each share."""
+        if self._pool is None:
+            return [loop(worlds[0], asked)]
+        waiting = [self._pool.submit(loop, world, asked) for world in worlds[1:]]
+        return [loop(worlds[0], asked), *(share.result() for share in waiting)]
 
 
 class Engine(Lanes):
@@ -73,60 +88,39 @@ class Engine(Lanes):
             Engine, models, num_envs, randomisation=randomisation, allow_unstable=allow_unstable,
             threads=threads,
         )  # fmt: skip
-        _check_count(num_envs, "num_envs")
-        _check_count(threads, "threads")
+        for name, count in (("num_envs", num_envs), ("threads", threads)):
+            check_whole(count, name, at_least=1)
         fleet = [models] if isinstance(models, ShipModel) else list(models)
         if len(fleet) not in (1, num_envs):
             raise InputError(f"models: {len(fleet)} found, expected 1 or one for each of {num_envs} lanes")
-        self.model = fleet[0]
         refuse_unstable(fleet, allow_unstable)
-        if any(model.vessel is not self.model.vessel for model in fleet):
+        model, task = fleet[0], task or course_keeping_task()
+        if any(other.vessel is not model.vessel for other in fleet):
             raise InputError("models: of several structures, expected one structure in one engine")
-        task = task or course_keeping_task()
-        task.check_fits(self.model)
-        self.num_envs = num_envs
-        self.task = task
-        self.dt = task.interval(self.model)
-        self.pool = (randomisation or Randomisation()).ships(self.model, task.seas)
+        task.check_fits(model)
+        self.pool = (randomisation or Randomisation()).ships(model, task.seas)
         drawn = len(self.pool) > 1
         if drawn and len(fleet) > 1:
             raise InputError("models: several lanes' ships and a pool of ships, expected one of the two")
-        self.windy = any(not sea.calm for _, sea in self.pool)
+        windy = any(not sea.calm for _, sea in self.pool)
         if model_index is not None:
             check_whole(model_index, "model_index", at_least=0, at_most=len(self.pool) - 1)
             self.pool = [self.pool[model_index]] * len(self.pool)
-        sensors = sensors_for(self.windy, task.noise > 0.0, task.measurement == "filtered")
-        if task.sensors is not None:
-            sensors = Sensors(task.sensors)
-        own = self.pool if drawn else [(model, task.seas[0]) for model in fleet]
-        self._voyages = voyages(self.model.vessel, task.definition, sensors, self.windy, len(own) == 1)
-        self._threads = Threads(-(-num_envs // LANES), threads)
-        self._allocate(own, drawn)
-        self._run = self._voyages.run  # compiled last, when nothing is left that may be refused
+        own = self.pool if drawn else [(one, task.seas[0]) for one in fleet]
+        made = voyages(model.vessel, task.definition, task.instruments(windy), windy, len(own) == 1)
+        super().__init__(made, model, task, num_envs, own, drawn)
+        self._threads = Threads(len(self._states), threads)
+        self._connect()
+        self._run = made.run  # compiled last, when nothing is left that may be refused
         self.reset(np.arange(num_envs))
 
-    def _allocate(self, own: Any, drawn: bool) -> None:
-        """Arrays that the loops work on."""
-        tiles = -(-self.num_envs // LANES)
-        columns = ship_columns(own, self.windy, self.task, self.model, drawn)
-        self._pool = columns if drawn else np.zeros((0, columns.shape[1]))
-        self._ships = ship_tiles(columns, tiles, len(own) > 1)
-        plan = int(self.task.definition.plan_length(self.task.settings))
-        self._states = np.zeros((tiles, (self._voyages.state.n_rows + plan) * LANES))
-        self._keys = np.zeros((tiles, 3, LANES), dtype=np.uint64)
-        self._settings = self._numbers_of_settings()
+    def _connect(self) -> None:
+        """Tell the loops where the arrays are: a world for each thread."""
         self._actions = np.zeros((self.task.n_commands, self.num_envs), np.float32)
         self._orders = self._actions.T
         self._which = np.zeros(self.num_envs, dtype=np.bool_)
         self.all_lanes = np.ones(self.num_envs, dtype=np.bool_)
         self.all_lanes.flags.writeable = False
-        observed = [quantity.path for quantity in self.task.observed(self.model)]
-        names = self.task.info_names
-        self.flag_names = [name for name in names if name in self.task.flags]
-        self._rows = self._shown_rows(observed)
-        self._outputs = OutputPool(
-            self.num_envs, len(observed), STEP_OUTCOME + len(names), 2 + len(self.flag_names)
-        )
         words = addresses(
             [self._states, self._keys, self._settings, self._pool, self._ships, self._rows, self._which,
              self._actions]
@@ -138,35 +132,17 @@ class Engine(Lanes):
         ]
         self.show_anew()
 
-    def _numbers_of_settings(self) -> Floats:
-        task = self.task
-        rules = episodes.Rules(
-            self.dt, task.substeps(self.model), task.episode_steps, task.max_envelope_distance,
-            task.least_shaft(self.model),
-        )  # fmt: skip
-        sensor = self._voyages.sensors.module.Settings
-        noise = {field: SEA_TRIAL[channel].noise * task.noise for field, channel in SENSOR_NOISE.items()}
-        own = task.sensor_settings or sensor(
-            **{name: noise[name] for name in sensor._fields if name in noise}
-        )
-        return np.array([*rules, *flat(own), *flat(task.settings)], dtype=float)
-
-    def _shown_rows(self, observed: Sequence[str]) -> NDArray[np.int64]:
-        """How many observations, outcomes and flags there are, and the offsets of their rows."""
-        made = self._voyages
-        outcomes = [
-            LANES * made.result["outcome"].row(name) for name in ("reward", "terminated", "truncated")
-        ]
-        rows = [
-            [LANES * made.result["observation"].row(path) for path in observed],
-            [*outcomes, *(made.info_offset(name) for name in self.task.info_names)],
-            [*outcomes[1:], *(made.info_offset(name) for name in self.flag_names)],
-        ]
-        return np.array([*map(len, rows), *(row for kind in rows for row in kind)], dtype=np.int64)
-
     def show_anew(self) -> None:
-        """See `Lanes.show_anew`."""
+        """Let what comes next be written into new arrays, so that those that were given may be kept."""
         self._write_into(self._outputs.take())
+
+    def set_state(self, state: Mapping[str, Any]) -> None:
+        """Go on from what `get_state` of an engine made alike gave; InputError for another state."""
+        self.check_state(state)
+        self.remember(state)
+        self.show_anew()
+        for name in ("observations", "outcomes", "flags"):
+            getattr(self.shown, name)[:] = state[name]
 
     def _write_into(self, outputs: Outputs) -> None:
         self.shown = outputs
@@ -174,24 +150,11 @@ class Engine(Lanes):
             world[N_FIXED : N_FIXED + len(outputs.words)] = outputs.words
 
     def advance(self, next_ones: bool = False, anew: bool = False) -> int:
-        """One control interval with the commands as they stand.
+        """One control interval with the commands as they stand; returns how many episodes ended.
 
-        Parameters
-        ----------
-        next_ones : bool
-            Whether lanes whose episode was over begin the next one, or stay.
-        anew : bool
-            Whether it is written into new arrays, so that those that were given may be kept.
-
-        Returns
-        -------
-        int
-            Number of episodes that ended.
-
-        Raises
-        ------
-        InputError
-            If a command is not finite; nothing is changed then.
+        With `next_ones` lanes whose episode was over begin the next one, and do not stay. With `anew` it is
+        written into new arrays, so that those that were given may be kept. Raises InputError if a command is
+        not finite; nothing is changed then.
         """
         before = self.shown
         if anew:
@@ -213,33 +176,16 @@ class Engine(Lanes):
     def reset(self, seeds: ArrayLike) -> Observation:
         """Begin in each lane the episode of the single environment's `reset(seed=...)`.
 
-        Parameters
-        ----------
-        seeds : array-like of int, shape (num_envs,)
-            Seed of each lane.
-
-        Returns
-        -------
-        float32 array of shape (num_envs, n_observations)
+        `seeds` are those of the lanes, shape (num_envs,). Returns float32 observations of shape
+        (num_envs, n_observations).
         """
         return self.begin(episode_keys(seeds))
 
     def begin(self, keys: ArrayLike, episodes: ArrayLike = 0, mask: ArrayLike = True) -> Observation:
-        """Begin an episode in each lane.
+        """Begin an episode in the lanes of a mask, the others go on; returns observations as `reset` does.
 
-        Parameters
-        ----------
-        keys : array-like of uint64, shape (num_envs,)
-            Of the random numbers of each lane (`episode_keys`); an episode is a function of its key and
-            number alone.
-        episodes : array-like of int, shape (num_envs,)
-            Number of the episode under that key.
-        mask : array-like of bool, shape (num_envs,)
-            Lanes to begin anew; the others go on.
-
-        Returns
-        -------
-        float32 array of shape (num_envs, n_observations)
+        An episode is a function of its key (`episode_keys`) and number under that key alone; keys, uint64,
+        numbers and mask are of shape (num_envs,).
         """
         which = np.zeros(self.num_envs, dtype=np.bool_)
         which[:] = mask
@@ -251,13 +197,7 @@ class Engine(Lanes):
         return self.observations
 
     def begin_next(self, which: NDArray[np.bool_]) -> None:
-        """Begin the next episode in some lanes; what `step` answers of the last one stays.
-
-        Parameters
-        ----------
-        which : bool array of shape (num_envs,)
-            The lanes.
-        """
+        """Begin the next episode where `which`, shape (num_envs,), says so; `step`'s last answer stays."""
         self._begin(which, next_one=True)
 
     def _begin(self, which: NDArray[np.bool_], next_one: bool) -> None:
@@ -265,17 +205,10 @@ class Engine(Lanes):
         self._run(self._worlds[0], episodes.BEGIN_NEXT if next_one else episodes.BEGIN)
 
     def order(self, actions: ArrayLike) -> None:
-        """Set the commands for the next step, which refuses those that are no numbers.
+        """Set the commands for the next step, which refuses those that are not finite.
 
-        Parameters
-        ----------
-        actions : array-like of shape (num_envs, n_commands)
-            Commanded rudder, and shaft speed, parts of their limits, clipped to [-1, 1].
-
-        Raises
-        ------
-        InputError
-            If their shape is another, or they are texts, objects or complex.
+        `actions`, shape (num_envs, n_commands), are commanded rudder, and shaft speed, parts of their limits,
+        clipped to [-1, 1]. Raises InputError for another shape, texts, objects or complex numbers.
         """
         array = as_numbers(actions, "actions")
         if array.shape != self._orders.shape:
@@ -283,23 +216,10 @@ class Engine(Lanes):
         self._orders[...] = array
 
     def step(self, actions: ArrayLike) -> tuple[Observation, Floats, NDArray[np.bool_], NDArray[np.bool_]]:
-        """One control interval; a lane whose episode is over stays as it is and earns 0.
+        """One control interval by orders (`order`); a lane whose episode is over stays and earns 0.
 
-        Parameters
-        ----------
-        actions : array-like of shape (num_envs, n_commands)
-            See `order`.
-
-        Returns
-        -------
-        observations : float32 array of shape (num_envs, n_observations)
-        rewards : array of shape (num_envs,)
-        terminated, truncated : bool arrays of shape (num_envs,)
-
-        Raises
-        ------
-        InputError
-            If an action is not a number or their shape is another.
+        Returns float32 observations of shape (num_envs, n_observations), rewards, and whether episodes were
+        terminated and truncated, of shape (num_envs,); copies.
         """
         self.order(actions)
         self.advance()
@@ -307,17 +227,10 @@ class Engine(Lanes):
         return self.observations, shown.outcomes[0].copy(), shown.terminated.copy(), shown.truncated.copy()
 
     def refuse_rewards(self) -> None:
-        """Say which part of the last step's rewards is not finite, in which lane.
-
-        Raises
-        ------
-        InputError
-            Always.
-        """
+        """Raise an InputError that says which part of the last rewards is not finite, in which lane."""
         bad = ~np.isfinite(self.reward_parts)
-        lane, part = (
-            np.argwhere(bad)[0] if bad.any() else (int(np.argmax(~np.isfinite(self.shown.outcomes[0]))), 0)
-        )
+        sums = ~np.isfinite(self.shown.outcomes[0])
+        lane, part = np.argwhere(bad)[0] if bad.any() else (int(np.argmax(sums)), 0)
         name = self.task.reward_parts[part]
         raise InputError(
             f"{self.task.definition.reward_source}: {name} is {self.info(name)[lane]} in lane {lane} at step "
@@ -374,6 +287,15 @@ def episode_key(random: np.random.Generator) -> int:
     return int(random.integers(2**63))
 
 
-def _check_count(count: Any, name: str) -> None:
-    if isinstance(count, bool) or not isinstance(count, int | np.integer) or count < 1:
-        raise InputError(f"{name}: {count!r} found, expected a whole number of at least 1")
+def refuse_unstable(models: Iterable[ShipModel], allow_unstable: bool = False) -> None:
+    """InputError for models found unstable when they were identified; a warning if `allow_unstable`."""
+    marked = [model.name for model in models if (model.provenance or {}).get("stable") is False]
+    if not marked:
+        return
+    found = f"model {marked[0]!r} was found unstable when it was identified: it runs away where ships do not"
+    if not allow_unstable:
+        raise InputError(
+            f"{found}, expected a stable one; identify it from more trials or with the guard, or give "
+            "allow_unstable=True to sail it all the same"
+        )
+    warnings.warn(f"{found}, do not trust what is learned or tuned on it", stacklevel=4)

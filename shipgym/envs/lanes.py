@@ -1,9 +1,8 @@
-"""The state of many ships by lane: read, written, copied, taken and put back between two steps."""
+"""The state of many ships by lane: laid out, read, written, copied, taken and put back between two steps."""
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -11,34 +10,71 @@ from numpy.typing import ArrayLike, NDArray
 
 from shipgym.arrays import Floats
 from shipgym.checks import check_keys, check_table, shown
-from shipgym.engine.records import LANES
+from shipgym.engine.envelope import Envelope
+from shipgym.engine.episodes import Rules
+from shipgym.engine.motion import Ship
+from shipgym.engine.records import LANES, flat, leaves
 from shipgym.engine.voyages import Voyages
-from shipgym.envs.outputs import Outputs
-from shipgym.envs.tiles import lanes_of
+from shipgym.envs.outputs import STEP_FLAGS, STEP_OUTCOME, OutputPool, Outputs
+from shipgym.envs.randomisation import Pool
 from shipgym.errors import InputError
+from shipgym.sea.weather_column import weather_column
 from shipgym.ships import ShipModel
 from shipgym.tasks.task import Task
+from shipgym.trials.sensors import SEA_TRIAL
+
+#: Settings of a bridge's instruments, and the channel of a sea trial whose noise they take.
+SENSOR_NOISE = {"heading": "psi", "yaw_rate": "r", "speed": "u", "position": "x"}
 
 
-class Lanes(ABC):
-    """The arrays that loops work on; `Engine`, which steps them, allocates them."""
+class Lanes:
+    """The arrays that loops work on; `Engine` steps them.
 
-    num_envs: int
-    task: Task
-    model: ShipModel
-    windy: bool  # whether there is weather
-    #: what the last step answered
-    shown: Outputs
-    _voyages: Voyages  # says where each number stands
-    _settings: Floats
-    #: tiles of lanes: state, words of the random numbers, and numbers of the ships
-    _states: Floats
-    _keys: NDArray[np.uint64]
-    _ships: Floats
+    `own` are the lanes' ships and seas, one for all or one each; or, if `drawn`, the pool of which each
+    episode draws one.
+    """
 
-    @abstractmethod
-    def show_anew(self) -> None:
-        """Let what comes next be written into new arrays, so that those that were given may be kept."""
+    shown: Outputs  # what the last step answered
+
+    def __init__(
+        self, made: Voyages, model: ShipModel, task: Task, num_envs: int, own: Pool, drawn: bool
+    ) -> None:
+        self.model, self.task, self.num_envs = model, task, num_envs
+        self.windy, self.dt = made.windy, task.interval(model)
+        self._voyages = made  # says where each number stands
+        tiles = -(-num_envs // LANES)
+        columns = ship_columns(own, self.windy, task, model, drawn)
+        self._pool = columns if drawn else np.zeros((0, columns.shape[1]))
+        self._ships = ship_tiles(columns, tiles, len(own) > 1)
+        plan = int(task.definition.plan_length(task.settings))
+        self._states = np.zeros((tiles, (made.state.n_rows + plan) * LANES))
+        self._keys = np.zeros((tiles, 3, LANES), dtype=np.uint64)  # words of the random numbers
+        rules = Rules(
+            self.dt, task.substeps(model), task.episode_steps, task.max_envelope_distance,
+            task.least_shaft(model),
+        )  # fmt: skip
+        noise = {field: SEA_TRIAL[channel].noise * task.noise for field, channel in SENSOR_NOISE.items()}
+        sensor = task.sensor_settings or made.sensors.make_settings(noise if made.sensors.noise else {})
+        self._settings = np.array([*rules, *flat(sensor), *flat(task.settings)], dtype=float)
+        self.flag_names = [name for name in task.info_names if name in task.flags]
+        observed = [quantity.path for quantity in task.observed(model)]
+        self._rows = self._shown_rows(observed)
+        self._outputs = OutputPool(
+            num_envs, len(observed), STEP_OUTCOME + len(task.info_names), STEP_FLAGS + len(self.flag_names)
+        )
+
+    def _shown_rows(self, observed: Sequence[str]) -> NDArray[np.int64]:
+        """How many observations, outcomes and flags there are, and the offsets of their rows."""
+        made = self._voyages
+        outcomes = [
+            LANES * made.result["outcome"].row(name) for name in ("reward", "terminated", "truncated")
+        ]
+        rows = [
+            [LANES * made.result["observation"].row(path) for path in observed],
+            [*outcomes, *(made.info_offset(name) for name in self.task.info_names)],
+            [*outcomes[1:], *(made.info_offset(name) for name in self.flag_names)],
+        ]
+        return np.array([*map(len, rows), *(row for kind in rows for row in kind)], dtype=np.int64)
 
     @property
     def episodes(self) -> NDArray[np.uint64]:
@@ -106,58 +142,6 @@ class Lanes(ABC):
         lengths = getattr(self.task, name, None)
         return None if lengths is None else float(lengths * self.model.particulars["length"])
 
-    def copy_lanes(self, source: Lanes, lanes: ArrayLike) -> None:
-        """Make each lane the copy of one of another engine: same ship, same episode, same future.
-
-        Gusts, noise and what will be asked are functions of the episode's seed and of the step, so copies
-        that are steered alike go on bit for bit like the original.
-
-        Parameters
-        ----------
-        source : Engine
-            Of the same task and ships.
-        lanes : array-like of int, shape (num_envs,)
-            Which lane of `source` each lane becomes.
-
-        Raises
-        ------
-        InputError
-            If the engines differ in more than the number of lanes, or there is no such lane.
-        """
-        which = np.asarray(lanes)
-        if which.shape != (self.num_envs,) or which.dtype.kind not in "iu":
-            raise InputError(
-                f"lanes: {which.dtype} of shape {which.shape} found, expected {self.num_envs} whole numbers"
-            )
-        if which.min() < 0 or which.max() >= source.num_envs:
-            raise InputError(
-                f"lanes: {which.min()} to {which.max()} found, expected 0 to {source.num_envs - 1}"
-            )
-        self._check_alike(source)
-        there, here = divmod(which, LANES), divmod(np.arange(self.num_envs), LANES)
-        pairs: list[tuple[NDArray[Any], NDArray[Any]]] = [
-            (self._states, source._states), (self._keys, source._keys),
-        ]  # fmt: skip
-        if not self._voyages.shared:
-            pairs.append((self._ships, source._ships))
-        for own, other in pairs:
-            lanes_of(own)[here[0], :, here[1]] = lanes_of(other)[there[0] % len(other), :, there[1]]
-        self.shown.observations[:] = source.shown.observations[which]
-        self.shown.outcomes[:] = source.shown.outcomes[:, which]
-        self.shown.flags[:] = source.shown.flags[:, which]
-
-    def _check_alike(self, source: Lanes) -> None:
-        """Refuse an engine whose lanes cannot be taken over."""
-        same_task = (
-            self._voyages is source._voyages
-            and self._states.shape[1] == source._states.shape[1]
-            and np.array_equal(self._settings, source._settings, equal_nan=True)
-        )
-        if not same_task:
-            raise InputError("source: an engine of another task found, expected one of the same")
-        if self._voyages.shared and not np.array_equal(source._ships, self._ships, equal_nan=True):
-            raise InputError("source: an engine with other ships found, expected one with the same")
-
     def get_state(self) -> dict[str, Any]:
         """All that `set_state` needs to go on from here, copies by name."""
         shown, gear = self.shown, self._voyages.state
@@ -166,15 +150,8 @@ class Lanes(ABC):
         outputs = {name: getattr(shown, name).copy() for name in ("observations", "outcomes", "flags")}
         return {"made_for": made_for, **self.memory(), **outputs}
 
-    def set_state(self, state: Mapping[str, Any]) -> None:
-        """Go on from what `get_state` of an engine made alike gave.
-
-        Raises
-        ------
-        InputError
-            For a state of another task, version, ship or number of lanes, or one with a number that is not
-            finite; nothing is changed then.
-        """
+    def check_state(self, state: Mapping[str, Any]) -> None:
+        """Refuse a state that an engine made alike did not give; InputError says what differs."""
         own = self.get_state()
         check_keys(check_table(state, "state"), tuple(own), "state", required=own)
         made_for = check_table(state["made_for"], "state: made_for")
@@ -196,10 +173,6 @@ class Lanes(ABC):
             raise InputError(f"state: {name} in row {lane} is not finite, expected a number")
         if not np.isfinite(state["observations"]).all():
             raise InputError("state: observations are not finite, expected numbers")
-        self.remember(state)
-        self.show_anew()
-        for name in ("observations", "outcomes", "flags"):
-            getattr(self.shown, name)[:] = state[name]
 
     def memory(self) -> dict[str, NDArray[Any]]:
         """All that the steps to come depend on beside their commands, copies by name."""
@@ -209,3 +182,48 @@ class Lanes(ABC):
         """Go on from what `memory` of the same engine, or of one made alike, gave."""
         self._states[:], self._keys[:] = memory["states"], memory["keys"]
         self._ships[:] = memory["ships"]
+
+
+def lanes_of(tiles: NDArray[Any]) -> NDArray[Any]:
+    """Tiles with an axis for their lanes, shape (n_tiles, n_rows, 64), a view."""
+    return tiles.reshape(len(tiles), -1, LANES)
+
+
+def ship_columns(pool: Pool, windy: bool, task: Task, base: ShipModel, drawn: bool) -> Floats:
+    """Numbers of ships and of the seas they meet, a row each; the sea worked out once for each kind of ship.
+
+    Ships that are drawn for an episode are seen in the scales of the environment's model.
+    """
+    known: dict[tuple[int, int], Floats] = {}
+    columns = []
+    for model, sea in pool:
+        kind = (id(model.particulars), id(sea))
+        if windy and kind not in known:
+            known[kind] = weather_column(model, sea, task.substep(base), task.water_depth)
+        numbers = model.ship_numbers(task.water_depth)
+        if drawn and model.particulars["length"] == base.particulars["length"]:
+            numbers[Ship._fields.index("scale_speed")] = base.particulars["speed"]
+        ship = Ship(*numbers[: len(Ship._fields)].tolist())
+        scales = [task.scale(path, ship) for path in task.definition.seen]
+        per_scale = [1.0 / scale if scale else 0.0 for scale in scales]
+        columns.append([*numbers, *envelope_numbers(model), *known.get(kind, ()), *per_scale])
+    return np.stack(columns)
+
+
+def envelope_numbers(model: ShipModel) -> Floats:
+    """The envelope of a model's data in the order of its record; without one everything is inside."""
+    if model.envelope is None:
+        numbers = np.zeros(len(leaves(Envelope)))
+        numbers[:4], numbers[4:8] = -np.inf, np.inf
+        return numbers
+    data = model.envelope
+    return np.concatenate([data.low, data.high, data.centre, data.shape[np.triu_indices(4)]])
+
+
+def ship_tiles(columns: Floats, tiles: int, own: bool) -> Floats:
+    """One vector for all lanes, or a tile for each tile of states."""
+    if len(columns) == 1 and not own:
+        return columns.copy()
+    rest = np.tile(columns[:1], (max(tiles * LANES - len(columns), 0), 1))
+    lanes = np.concatenate([columns[: tiles * LANES], rest])
+    return np.ascontiguousarray(lanes.reshape(tiles, LANES, -1).transpose(0, 2, 1)).reshape(tiles, -1)

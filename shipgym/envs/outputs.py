@@ -13,25 +13,14 @@ STEP_FLAGS = 2  # terminated, truncated come before the flags in `info`
 
 
 class Outputs:
-    """One step's arrays, in one block of memory.
-
-    Attributes
-    ----------
-    observations : float32 array of shape (num_envs, n_observed)
-    outcomes : float64 array of shape (n_outcomes, num_envs)
-        Reward, terminated, truncated, then what is in `info`.
-    flags : bool array of shape (n_flags, num_envs)
-        Terminated, truncated, then the flags in `info`.
-    words : int64 array of shape (9,)
-        Addresses and shapes of the three, by turns.
-    """
+    """One step's arrays, in one block of memory."""
 
     __slots__ = ("flags", "observations", "outcomes", "words")
 
-    observations: NDArray[np.float32]
-    outcomes: NDArray[np.float64]
-    flags: NDArray[np.bool_]
-    words: NDArray[np.int64]
+    observations: NDArray[np.float32]  # (num_envs, n_observed)
+    outcomes: NDArray[np.float64]  # (n_outcomes, num_envs): reward, terminated, truncated, then `info`
+    flags: NDArray[np.bool_]  # (n_flags, num_envs): terminated, truncated, then those of `info`
+    words: NDArray[np.int64]  # (9,): addresses and shapes of the three, by turns
 
     @property
     def terminated(self) -> NDArray[np.bool_]:
@@ -47,11 +36,8 @@ class Outputs:
 
     def take(self, other: Outputs) -> None:
         """Copy what others hold."""
-        self.outcomes[:], self.observations[:], self.flags[:] = (
-            other.outcomes,
-            other.observations,
-            other.flags,
-        )
+        for name in ("outcomes", "observations", "flags"):
+            getattr(self, name)[:] = getattr(other, name)
 
 
 class OutputPool:
@@ -59,11 +45,6 @@ class OutputPool:
 
     To ask the system for memory in each step would take longer than to sail hundreds of ships. What a user
     keeps, an array or a view of one, stays as it is.
-
-    Parameters
-    ----------
-    num_envs, n_observed, n_outcomes, n_flags : int
-        Number of lanes, of quantities that are observed, of outcomes and of flags.
     """
 
     def __init__(self, num_envs: int, n_observed: int, n_outcomes: int, n_flags: int) -> None:

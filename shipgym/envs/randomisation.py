@@ -13,7 +13,7 @@ from shipgym.errors import InputError
 from shipgym.sea.conditions import Weather
 from shipgym.ships import ShipModel, load_model
 from shipgym.ships.particulars import Particulars
-from shipgym.ships.structures import Structure
+from shipgym.ships.term_table import Structure
 
 POOL_SIZE = 256  # ships drawn from what is continuous
 POOL_SEED = 20260101

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Callable, Mapping
 from glob import escape
@@ -122,16 +123,13 @@ class _Recorded:
 
     def __init__(self, env: gymnasium.Env[Any, Any], since_seed: int, info: Mapping[str, Any]) -> None:
         ship: Any = env.unwrapped
-        self.rewards: list[float] = []
         self._ship, self._model = ship, ship.model
-        self._states: list[dict[str, float]] = [ship.physical_state()]
         self._actions: list[Floats] = []
-        self._commands: list[dict[str, float]] = []
-        self._parts: list[dict[str, float]] = []
-        self._info = [_numbers(info)]
-        self._outcome: dict[str, Any] = {}
-        waypoints = getattr(ship, "waypoints", None)
-        spec = env.spec
+        self.rewards: list[float] = []
+        self._states: list[dict[str, float]] = [ship.physical_state()]
+        self._infos = [dict(info)]
+        self._ended = (False, False)
+        waypoints, spec = getattr(ship, "waypoints", None), env.spec
         self._facts: dict[str, Any] = {
             "environment": type(ship).__name__ if spec is None else spec.id,
             "arguments": {} if spec is None else plain(spec.kwargs),
@@ -151,32 +149,28 @@ class _Recorded:
         self, action: Any, reward: float, terminated: bool, truncated: bool, info: Mapping[str, Any]
     ) -> None:
         """One more step and what came of it."""
-        state = self._ship.physical_state()
-        numbers = np.array(action, dtype=float).reshape(-1)
+        self._actions.append(np.array(action, dtype=float).reshape(-1))
         self.rewards.append(reward)
-        self._states.append(state)
-        self._actions.append(numbers)
-        self._commands.append({name: state[f"{name}_command"] for name in self._model.command_names})
-        self._parts.append({key: float(info[key]) for key in info if key.startswith(REWARD)})
-        self._info.append(_numbers(info))
-        success = next((info[key] for key in SUCCESS if key in info), None)
-        self._outcome = {
-            "terminated": bool(terminated),
-            "truncated": bool(truncated),
-            "success": None if success is None else bool(success),
-        }
+        self._states.append(self._ship.physical_state())
+        self._infos.append(dict(info))
+        self._ended = bool(terminated), bool(truncated)
 
     def episode(self) -> Episode:
         """All of it."""
+        orders, infos = self._model.command_names, self._infos
+        success = next((infos[-1][key] for key in SUCCESS if key in infos[-1]), None)
+        terminated, truncated = self._ended
         return Episode(
             states=_columns(self._states),
             actions=np.array(self._actions),
             rewards=np.array(self.rewards),
-            commands=_columns(self._commands),
-            reward_parts=_columns(self._parts),
-            info=_columns(self._info),
+            commands={name: np.array([s[f"{name}_command"] for s in self._states[1:]]) for name in orders},
+            reward_parts=_columns(infos[1:], lambda name: name.startswith(REWARD)),
+            info=_columns([_numbers(info) for info in infos]),
+            terminated=terminated,
+            truncated=truncated,
+            success=None if success is None else bool(success),
             **self._facts,
-            **self._outcome,
         )
 
 
@@ -192,9 +186,11 @@ def _numbers(info: Mapping[str, Any]) -> dict[str, float]:
     }
 
 
-def _columns(rows: list[dict[str, float]]) -> dict[str, Floats]:
+def _columns(
+    rows: list[dict[str, Any]], chosen: Callable[[str], bool] = lambda name: True
+) -> dict[str, Floats]:
     """Values over time by name; a name that some step lacks is left out."""
-    names = [name for name in rows[-1] if all(name in row for row in rows)]
+    names = [name for name in rows[-1] if chosen(name) and all(name in row for row in rows)]
     return {name: np.array([row[name] for row in rows], dtype=float) for name in names}
 
 
@@ -230,20 +226,14 @@ def _folder(folder: Path, prefix: str, overwrite: bool) -> Path:
 
 def plain(value: Any) -> Any:
     """An argument of an environment as JSON can hold it: a model by its name, a weather by its fields."""
+    return json.loads(json.dumps(value, default=_told), parse_constant=lambda text: repr(float(text)))
+
+
+def _told(value: Any) -> Any:
     if isinstance(value, ShipModel):
         return value.name
-    if isinstance(value, np.generic):
-        return plain(value.item())
-    if value is None or isinstance(value, (bool, int, str)):
-        return value
-    if isinstance(value, float):
-        return value if math.isfinite(value) else repr(value)
+    if isinstance(value, np.generic | np.ndarray):
+        return value.tolist()
     if isinstance(value, Mapping):
-        return {str(key): plain(entry) for key, entry in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [plain(entry) for entry in value]
-    if isinstance(value, np.ndarray):
-        return plain(value.tolist())
-    if hasattr(value, "to_dict"):
-        return plain(value.to_dict())
-    return str(value)
+        return dict(value)
+    return value.to_dict() if hasattr(value, "to_dict") else str(value)

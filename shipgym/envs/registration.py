@@ -77,7 +77,7 @@ def register_task(env_id: str, task: str | Path | Any, **options: Any) -> None:
     InputError
         If the task is not what the contract asks, or the id belongs to another; nothing is registered then.
     """
-    from shipgym.envs.ship_env import DEFAULT_MODEL, ENV_OPTIONS, read_options
+    from shipgym.envs.environment import DEFAULT_MODEL, ENV_OPTIONS, read_options
 
     given = {"task": kept_source(task), **options}
     given |= {name: kept_source(options[name]) for name in ("reward", "sensors") if name in options}

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shipgym.arrays import Floats
+from shipgym.checks import check_choice
 from shipgym.errors import InputError
 from shipgym.tasks.guidance import track
 
@@ -68,7 +69,7 @@ class Renderer:
     """
 
     def __init__(self, mode: str) -> None:
-        self.mode = check_render_mode(mode)
+        self.mode = check_choice(mode, RENDER_MODES, "render_mode")
         os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")
         try:
             import pygame
@@ -283,15 +284,6 @@ class _Chart:
         points = np.zeros((len(lines), 2)) + self._centre
         points[:, axis] = lines
         return self.pixels(points)[:, 1 - axis]
-
-
-def check_render_mode(mode: str) -> str:
-    """Return a render mode, which must be one of `RENDER_MODES`."""
-    if mode not in RENDER_MODES:
-        raise InputError(
-            f"render_mode: {mode!r} found, expected one of {', '.join(map(repr, RENDER_MODES))}, or None"
-        )
-    return mode
 
 
 def _round_number(value: float) -> float:

@@ -28,6 +28,7 @@ Vectors = VectorEnv[Any, Any, Any]
 
 #: What all rows have in common, by the names of the single environment.
 SHARED = ("dt", "metadata", "model", "observation_names", "observation_scales", "render_mode", "spec", "task")
+SPACES = ("observation_space", "action_space")  # of one ship
 
 
 class Row:
@@ -38,24 +39,14 @@ class Row:
         self._number = number
 
     def __getattr__(self, name: str) -> Any:
-        if name not in SHARED:
+        if name not in (*SHARED, *SPACES):
             raise AttributeError(f"a row of ShipVecEnv has no attribute {name!r}")
-        return getattr(self._env, name)
+        return getattr(self._env, f"single_{name}" if name in SPACES else name)
 
     @property
     def unwrapped(self) -> Row:
         """The row itself."""
         return self
-
-    @property
-    def observation_space(self) -> gymnasium.Space[Any]:
-        """Of one ship."""
-        return self._env.single_observation_space
-
-    @property
-    def action_space(self) -> gymnasium.Space[Any]:
-        """Of one ship."""
-        return self._env.single_action_space
 
     @property
     def waypoints(self) -> NDArray[np.float64] | None:
@@ -72,7 +63,7 @@ class Row:
         return None if pictures is None else pictures[self._number]
 
 
-FIXED = {*SHARED, *(name for name in vars(Row) if not name.startswith("_"))}
+FIXED = {*SHARED, *SPACES, *(name for name in vars(Row) if not name.startswith("_"))}
 
 
 class ShipVecEnv(VecEnv):  # type: ignore[misc]  # stable-baselines3 is not type-checked here
@@ -167,19 +158,15 @@ class ShipVecEnv(VecEnv):  # type: ignore[misc]  # stable-baselines3 is not type
             self._infos[row] = {}
         dones = terminated | truncated
         self._touched = np.flatnonzero(dones).tolist() if dones.any() else []
-        if self.info_names:
-            self._give_infos(infos)
+        if self.info_names:  # new dictionaries of what is asked for in every step
+            columns = [infos[name].tolist() for name in self.info_names]
+            for row, values in enumerate(zip(*columns, strict=True)):
+                self._infos[row] = dict(zip(self.info_names, values, strict=True))
         for row in self._touched:
             self._infos[row] = self._last_info(row, infos, bool(truncated[row]))
             self.reset_infos[row] = _info_of(infos, row)
             self._returns[row], self._lengths[row] = 0.0, 0
         return observations, rewards.astype(np.float32), dones, self._infos
-
-    def _give_infos(self, infos: Infos) -> None:
-        """New dictionaries of what is asked for in every step."""
-        columns = [infos[name].tolist() for name in self.info_names]
-        for row, values in enumerate(zip(*columns, strict=True)):
-            self._infos[row] = dict(zip(self.info_names, values, strict=True))
 
     def _last_info(self, row: int, infos: Infos, truncated: bool) -> dict[str, Any]:
         """The info of a row whose episode ended."""

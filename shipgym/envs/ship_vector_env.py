@@ -13,24 +13,26 @@ from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
 from shipgym.checks import check_keys, quoted
-from shipgym.envs.engine import Engine, as_array, episode_key, episode_keys
+from shipgym.envs.engine import episode_keys
+from shipgym.envs.environment import (
+    DEFAULT_MODEL,
+    DEFAULT_TASK,
+    VECTOR_OPTIONS,
+    ShipsEnv,
+    refuse_step,
+    rudder_orders,
+)
 from shipgym.envs.outputs import named_rows
-from shipgym.envs.remade import Remade, refuse_step
-from shipgym.envs.ship_env import DEFAULT_MODEL, DEFAULT_TASK, ENV_OPTIONS, read_options, spaces
 from shipgym.errors import InputError
 from shipgym.ships import ShipModel
-from shipgym.tasks.task import RUDDER_ORDERS
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 Observation = NDArray[np.float32]
 Infos = dict[str, Any]
 
-VECTOR_OPTIONS = ("num_envs", *ENV_OPTIONS, "autoreset_mode", "threads", "max_episode_steps")
-ORDERS = np.array(RUDDER_ORDERS, dtype=np.float32)
 
-
-class ShipVectorEnv(Remade, VectorEnv[Observation, Any, Floats]):
+class ShipVectorEnv(ShipsEnv, VectorEnv[Observation, Any, Floats]):
     """Many ships under a task; row i is the single environment reset with `seed + i`, bit for bit.
 
     Parameters
@@ -78,47 +80,25 @@ class ShipVectorEnv(Remade, VectorEnv[Observation, Any, Floats]):
                 raise InputError(
                     f"max_episode_steps: {max_episode_steps!r} found beside episode_steps {steps!r}"
                 )
-        self.model, self.task, randomisation = read_options(task, model, options, VECTOR_OPTIONS)
-        self._engine = Engine(self.model, num_envs, self.task, randomisation, allow_unstable, threads)
-        self.metadata = {"render_modes": ["rgb_array"], "render_fps": 30, "autoreset_mode": mode}
-        self.render_mode = render_mode
-        self._artists = _artists(render_mode, num_envs)
+        seen, commands = self._make(arguments, VECTOR_OPTIONS, ["rgb_array"])
         self.num_envs = int(num_envs)
-        self.single_observation_space, self.single_action_space = spaces(self.task, self.model)
-        self.observation_space = batch_space(self.single_observation_space, self.num_envs)
-        self.action_space = batch_space(self.single_action_space, self.num_envs)
-        observed = self.task.observed(self.model)
-        self.observation_names = tuple(quantity.name for quantity in observed)
-        self.observation_scales = np.array([quantity.scale for quantity in observed])
+        self.metadata = {"render_modes": ["rgb_array"], "render_fps": 30, "autoreset_mode": mode}
+        self.single_observation_space, self.single_action_space = seen, commands
+        self.observation_space = batch_space(seen, self.num_envs)
+        self.action_space = batch_space(commands, self.num_envs)
         self._names, self._flags = self.task.info_names, self._engine.flag_names
         self._masks = {f"_{name}": self._engine.all_lanes for name in self._names}
         self._mode = self.autoreset_mode = mode  # the latter is read by TorchRL
         self._own_reward = not self.task.definition.shipped
-        self._discrete = self.task.action == "rudder-discrete"
-        self._begun = False  # and not closed since
         self._some_over = False  # NEXT_STEP: whether episodes ended in the last step
-        self._keys: NDArray[np.uint64] | None = None
-        self._made(arguments)
-
-    def _use(self, engine: Engine) -> None:
-        self._engine = engine
-
-    def _going(self) -> bool:
-        return self._begun
+        self._made()
 
     def _counters(self) -> dict[str, Any]:
-        return {"row_keys": np.array(self._keys), "some_over": self._some_over}
+        return {**super()._counters(), "some_over": np.array(self._some_over)}
 
-    def _recall(self, engine: Engine, state: Mapping[str, Any]) -> None:
-        self._engine, self._begun = engine, True
-        self._keys, self._some_over = state["row_keys"].copy(), bool(state["some_over"])
-        for artist in self._artists:
-            artist.begin(engine)
-
-    @property
-    def dt(self) -> float:
-        """Control interval, s."""
-        return self._engine.dt
+    def _recall(self, counters: Mapping[str, Any]) -> None:
+        super()._recall(counters)
+        self._some_over = bool(counters["some_over"])
 
     def reset(
         self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
@@ -160,9 +140,7 @@ class ShipVectorEnv(Remade, VectorEnv[Observation, Any, Floats]):
         self._keep_shown()
         self._begun = True
         self._engine.begin(self._keys, episodes, mask)
-        for artist, begun in zip(self._artists, mask, strict=False):
-            if begun:
-                artist.begin(self._engine)
+        self._draw(mask)
         shown, infos = self._engine.shown, self._infos()
         infos.update({name: mask.copy() for name in self._masks})
         return shown.observations, infos
@@ -178,9 +156,6 @@ class ShipVectorEnv(Remade, VectorEnv[Observation, Any, Floats]):
         """Rows of the last step's arrays by name, with their masks."""
         shown = self._engine.shown
         return named_rows(shown.outcomes, shown.flags, self._names, self._flags) | self._masks
-
-    def _drawn_keys(self) -> NDArray[np.uint64]:
-        return np.array([episode_key(self.np_random) for _ in range(self.num_envs)], dtype=np.uint64)
 
     def _mask(self, options: dict[str, Any] | None) -> Flags:
         mask = (options or {}).get("reset_mask", self._engine.all_lanes)
@@ -229,7 +204,7 @@ class ShipVectorEnv(Remade, VectorEnv[Observation, Any, Floats]):
         if not self._begun:
             refuse_step()
         engine = self._engine
-        engine.order(self._commands(actions) if self._discrete else actions)
+        engine.order(rudder_orders(actions, (self.num_envs,), "actions") if self._discrete else actions)
         ended = engine.advance(self._some_over, anew=True)
         shown = engine.shown
         if self._own_reward and not isfinite(shown.outcomes[0].sum()):
@@ -240,20 +215,8 @@ class ShipVectorEnv(Remade, VectorEnv[Observation, Any, Floats]):
         elif ended and self._mode is AutoresetMode.SAME_STEP:
             infos |= self._final()
             engine.begin_next(shown.terminated | shown.truncated)
-        if self._artists:
-            self._note()
+        self._draw()
         return shown.observations, shown.outcomes[0], shown.terminated, shown.truncated, infos
-
-    def _commands(self, actions: Any) -> Any:
-        array = as_array(actions)
-        if array.shape != (self.num_envs,) or array.dtype.kind not in "iu":
-            raise InputError(
-                f"actions: {array.dtype} of shape {array.shape} found, "
-                f"expected int of shape ({self.num_envs},)"
-            )
-        if array.min() < 0 or array.max() >= len(ORDERS):
-            raise InputError(f"actions: {array} found, expected 0 to {len(ORDERS) - 1}: rudder orders")
-        return ORDERS[array][:, None]
 
     def _final(self) -> Infos:
         """What episodes that ended showed last."""
@@ -269,26 +232,18 @@ class ShipVectorEnv(Remade, VectorEnv[Observation, Any, Floats]):
             "final_info": final_info | {f"_{name}": ended for name in final_info}, "_final_info": ended,
         }  # fmt: skip
 
-    def _note(self) -> None:
-        """Let the wakes grow, or begin where an episode did."""
-        for row, artist in enumerate(self._artists):
-            begun = self._engine.steps[row] == 0
-            artist.begin(self._engine) if begun else artist.note(self._engine)
-
     def write(self, name: str, values: Any) -> None:
         """Write one number of the state in all rows (see `Engine.write`)."""
         self._engine.write(name, values)
 
     def memory(self) -> dict[str, NDArray[Any]]:
         """All that the steps to come depend on beside their commands, copies by name; after a `reset`."""
-        assert self._keys is not None
-        own = {"row_keys": self._keys.copy(), "some_over": np.array(self._some_over)}
-        return own | self._engine.memory()
+        return self._counters() | self._engine.memory()
 
     def remember(self, memory: Mapping[str, NDArray[Any]]) -> None:
         """Go on from what `memory` of an environment made alike gave, in place of a `reset`."""
         self._begun = True
-        self._keys, self._some_over = memory["row_keys"].copy(), bool(memory["some_over"])
+        self._recall(memory)
         self._engine.remember(memory)
 
     def physical_state(self) -> dict[str, Floats]:
@@ -319,14 +274,3 @@ def _mode(given: AutoresetMode | str) -> AutoresetMode:
             f"autoreset_mode: {given!r} found, expected one of {quoted(m.value for m in AutoresetMode)}"
         )
     return by_name[given]
-
-
-def _artists(render_mode: str | None, num_envs: int) -> list[Any]:
-    """Who draws each row, if anyone does."""
-    if render_mode is None:
-        return []
-    if render_mode != "rgb_array":
-        raise InputError(f"render_mode: {render_mode!r} found, expected None or 'rgb_array'")
-    from shipgym.envs.artist import Artist
-
-    return [Artist(render_mode, lane) for lane in range(num_envs)]

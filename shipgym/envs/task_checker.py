@@ -16,7 +16,7 @@ from shipgym.engine.compiling import plain as plain_loop
 from shipgym.engine.parts import Part
 from shipgym.engine.records import flat, leaves
 from shipgym.envs.engine import Engine
-from shipgym.envs.ship_env import DEFAULT_MODEL, read_options
+from shipgym.envs.environment import DEFAULT_MODEL, read_options
 from shipgym.errors import InputError
 
 STEPS, PLAIN_STEPS = 400, 40
@@ -52,7 +52,11 @@ def check_task(task: Any, **options: Any) -> TaskCheck:
         problem = _fails_in_python(plain)
         if problem:
             return TaskCheck(name, (problem,))
-        problems = [*_not_finite(many), *_differ_compiled(few, plain), *_differ_alone(many, one)]
+        problems = [
+            *_not_finite(many),
+            *_differ(few, plain, slice(None), PLAIN_STEPS, AGREEMENT, ("compiled", "in plain Python")),
+            *_differ(many, one, slice(-1, None), STEPS // 4, 0.0, ("among many ships", "alone")),
+        ]
     return TaskCheck(name, tuple(problems), tuple(_beyond_bounds(beyond)))
 
 
@@ -138,42 +142,29 @@ def _not_finite(engine: Engine) -> Iterator[str]:
                 )
 
 
-def _differ_compiled(compiled: Engine, plain: Engine) -> Iterator[str]:
-    """Observations and rewards that are not the same compiled and in plain Python."""
-    seeds = np.arange(plain.num_envs)
-    first, second = compiled.reset(seeds), plain.reset(seeds)
-    names = [quantity.path for quantity in compiled.task.observed(compiled.model)]
-    for step in range(PLAIN_STEPS + 1):
-        wrong = np.argwhere(~np.isclose(first, second, rtol=AGREEMENT, atol=AGREEMENT, equal_nan=True))
-        if len(wrong):
-            lane, k = wrong[0]
+def _differ(
+    one: Engine, other: Engine, lanes: slice, steps: int, agreement: float, ways: tuple[str, str]
+) -> Iterator[str]:
+    """Observations and rewards of an engine's lanes that are not those of another, steered alike."""
+    seeds = np.arange(one.num_envs)
+    seen, expected = one.reset(seeds)[lanes], other.reset(seeds[lanes])
+    earned: Floats = np.zeros(other.num_envs)
+    due = earned
+    paths = [f"Observation.{quantity.path}" for quantity in one.task.observed(one.model)]
+    for step in range(min(steps, one.task.episode_steps) + 1):
+        first, second = np.column_stack([earned, seen]), np.column_stack([due, expected])
+        wrong = np.argwhere(~np.isclose(first, second, rtol=agreement, atol=agreement, equal_nan=True))
+        for lane, k in wrong[:1]:
+            name, found, expects = ["reward", *paths][k], first[lane, k], second[lane, k]
             yield (
-                f"Observation.{names[k]} is {first[lane, k]} compiled and {second[lane, k]} in plain Python "
-                f"in lane {lane} at step {step}; look for what differs, such as a global that changes"
+                f"{name} is {found} {ways[0]} and {expects} {ways[1]} in lane {seeds[lanes][lane]} "
+                f"at step {step}; look for what differs, such as a global that changes"
             )
             return
-        orders = _orders(plain, step)
-        first, earned, *_ = compiled.step(orders)
-        second, expected, *_ = plain.step(orders)
-        if not np.allclose(earned, expected, rtol=AGREEMENT, atol=AGREEMENT, equal_nan=True):
-            yield f"rewards are {earned} compiled and {expected} in plain Python at step {step + 1}"
-            return
-
-
-def _differ_alone(many: Engine, one: Engine) -> Iterator[str]:
-    """Results that differ between one ship and the same one among many, which are equal bit for bit."""
-    lane = many.num_envs - 1
-    seen, single = many.reset(np.arange(many.num_envs)), one.reset([lane])
-    for step in range(min(STEPS, many.task.episode_steps) // 4):
-        if not np.array_equal(seen[lane], single[0], equal_nan=True):
-            yield f"observations of one ship alone and among many differ at step {step}, expected the same"
-            return
-        orders = _orders(many, step)
-        seen, earned, *_ = many.step(orders)
-        single, alone, *_ = one.step(orders[lane:])
-        if earned[lane] != alone[0] and np.isfinite(earned[lane]):
-            yield f"rewards of one ship alone and among many differ at step {step + 1}, expected the same"
-            return
+        orders = _orders(one, step)
+        seen, earned, *_ = one.step(orders)
+        seen, earned = seen[lanes], earned[lanes]
+        expected, due, *_ = other.step(orders[lanes])
 
 
 def _beyond_bounds(beyond: _Beyond) -> Iterator[str]:

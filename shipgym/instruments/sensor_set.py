@@ -1,17 +1,15 @@
-"""A sensor set of a user's own: a file of plain functions on named records, as those beside this one."""
+"""Sensor sets: those beside this file, and a user's own, each a file of plain functions on named records."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
-from functools import cached_property
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cache
 from typing import Any
 
-from shipgym.checks import check_keys
 from shipgym.engine.records import Record
-from shipgym.tasks.contract import Setting
-from shipgym.tasks.settings import keywords, make_settings
-from shipgym.tasks.source import check_namespace, check_settings, read_source
+from shipgym.instruments import bridge, perfect
+from shipgym.tasks.source import Configurable, check_namespace, read_source
 
 FUNCTIONS = {
     "measure": ("motion", "sea", "memory", "frequency", "interval", "settings", "random"),
@@ -20,54 +18,28 @@ FUNCTIONS = {
 
 
 @dataclass(frozen=True)
-class SensorSet:
-    """Records and functions of a sensor set (`shipgym/instruments/perfect.py`).
+class SensorSet(Configurable):
+    """Records and functions of a sensor set (`shipgym/instruments/perfect.py`)."""
 
-    Attributes
-    ----------
-    source : str
-        Where it was read from, for messages.
-    Settings, Memory : type
-        Its records.
-    measure, readings : callable
-        Its functions.
-    """
-
-    source: str
-    Settings: Record
     Memory: Record
     measure: Callable[..., Any]
     readings: Callable[..., Any]
-
-    @cached_property
-    def settings(self) -> dict[str, Setting]:
-        """Bounds of each setting by its keyword."""
-        return {name: setting for name, setting, _ in keywords(self.Settings)}
-
-    def make_settings(self, options: Mapping[str, Any]) -> Any:
-        """Settings by keywords, checked.
-
-        Raises
-        ------
-        InputError
-            For an unknown keyword, or a value out of its range.
-        """
-        check_keys(options, self.settings, f"{self.source} options")
-        return make_settings(self.Settings, options)
+    # whether a bridge's instruments are noisy, and whether they filter
+    noise: bool = False
+    filter: bool = False
 
 
 def read_sensors(source: Any) -> SensorSet:
-    """The sensor set of a file or module.
-
-    Raises
-    ------
-    InputError
-        If something is missing or of another form, naming it.
-    """
+    """The sensor set of a file or module; InputError names what is missing or of another form."""
     if isinstance(source, SensorSet):
         return source
     namespace, where = read_source(source)
-    records = ("Settings", "Memory")
-    check_namespace(namespace, where, records, FUNCTIONS)
-    check_settings(namespace.Settings, where)
-    return SensorSet(where, *(getattr(namespace, name) for name in (*records, *FUNCTIONS)))
+    return SensorSet(where, where, **check_namespace(namespace, where, ("Settings", "Memory"), FUNCTIONS))
+
+
+@cache
+def shipped_sensors(windy: bool, noise: bool, filtered: bool) -> SensorSet:
+    """The sensor set for what is asked: without error in calm water, else a bridge's."""
+    if windy or noise or filtered:
+        return replace(read_sensors(bridge), noise=noise, filter=filtered)
+    return read_sensors(perfect)

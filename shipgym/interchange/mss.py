@@ -19,7 +19,7 @@ from shipgym.ships.catalogue import load_model
 from shipgym.ships.particulars import ADDED_MASSES, Particulars
 from shipgym.ships.ship_model import ShipModel
 from shipgym.ships.steering import SteeringGear
-from shipgym.ships.structures import ABKOWITZ
+from shipgym.ships.structures import get_structure
 
 MIRRORED = {"X_vr": "Xrv", "Y_uv": "Yvu", "Y_ur": "Yru", "N_uv": "Nvu", "N_ur": "Nru"}
 RENAMED = {"kappa": "kk", "gamma": "ga"}
@@ -65,7 +65,7 @@ def from_mss(parameters: Mapping[str, Any], name: str = "mss", water_density: fl
             raise InputError(f"{where}: L: {given['L']:g} found, expected {ship.particulars.length:g}")
         values = {own: given[key] for key, own in names.items()}
         return replace(ship, name=name, steering=replace(ship.steering, **gear), coefficients=values)
-    names = {_name(own): own for own in ABKOWITZ.coefficient_names}
+    names = {_name(own): own for own in get_structure("abkowitz").coefficient_names}
     masses = {own.replace("_", ""): own for own in ADDED_MASSES}
     check_keys(given, known := ("L", "U0", *GEAR, "m", "xG", "Iz", *masses, *names), where, known)
     m, L, xg = given["m"], given["L"], given["xG"]

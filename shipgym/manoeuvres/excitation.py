@@ -10,9 +10,8 @@ from shipgym.checks import check_number
 from shipgym.errors import InputError
 from shipgym.manoeuvres.execution import number_of_steps
 from shipgym.sea.conditions import Weather
-from shipgym.ships.conditions import Conditions, Seed
 from shipgym.ships.ship_model import ShipModel
-from shipgym.ships.simulate import simulate
+from shipgym.ships.simulate import Seed, orders, simulate
 from shipgym.trials.trial import Trial
 
 CLOCK = 0.5  # of the binary sequence, L / U0
@@ -72,7 +71,7 @@ def prbs_rudder(
     bits, _ = max_len_seq(REGISTER, state=register)
     tick = np.floor(times / clock * (1.0 + 1e-12)).astype(int)
     rudder = amplitude * (2.0 * bits[tick % len(bits)] - 1.0)
-    return _sail(model, rudder, None, dt, Conditions(water_depth, weather, seed))
+    return simulate(model, orders(model, rudder), dt, None, water_depth, "random", weather, seed)
 
 
 def multi_sine_rudder(
@@ -112,9 +111,8 @@ def multi_sine_rudder(
     waves = np.cos(phases) @ np.cos(angle) - np.sin(phases) @ np.sin(angle)
     crests = np.abs(waves).max(axis=1)
     best = int(np.argmin(crests))
-    return _sail(
-        model, amplitude * waves[best] / crests[best], None, dt, Conditions(water_depth, weather, seed)
-    )
+    rudder = amplitude * waves[best] / crests[best]
+    return simulate(model, orders(model, rudder), dt, None, water_depth, "random", weather, seed)
 
 
 def random_rudder_steps(
@@ -138,7 +136,7 @@ def random_rudder_steps(
     times = _times(duration, dt)
     lengths = _durations(model, (shortest_s, longest_s), RUDDER_STEPS)
     rudder = _steps(times, (-largest, largest), lengths, seed)
-    return _sail(model, rudder, None, dt, Conditions(water_depth, weather, seed))
+    return simulate(model, orders(model, rudder), dt, None, water_depth, "random", weather, seed)
 
 
 def shaft_speed_steps(
@@ -169,8 +167,8 @@ def shaft_speed_steps(
     times = _times(duration, dt)
     lengths = _durations(model, (shortest_s, longest_s), SHAFT_STEPS)
     shaft = service * _steps(times, (lowest_ratio, highest_ratio), lengths, seed)
-    rudder = np.full(len(times), np.radians(rudder_deg))
-    return _sail(model, rudder, shaft, dt, Conditions(water_depth, weather, seed))
+    commands = orders(model, np.full(len(times), np.radians(rudder_deg)), shaft)
+    return simulate(model, commands, dt, None, water_depth, "random", weather, seed)
 
 
 def shaft_of(model: ShipModel) -> float:
@@ -207,20 +205,11 @@ def _durations(
     model: ShipModel, given: tuple[float | None, ...], usual: tuple[float, ...]
 ) -> tuple[float, ...]:
     """The given durations, or the usual ones in times to travel one ship length; s."""
-    travel = float(model.particulars["length"] / model.particulars["speed"])
-    return tuple(count * travel if own is None else own for own, count in zip(given, usual, strict=True))
+    return tuple(
+        count * model.travel_time if own is None else own for own, count in zip(given, usual, strict=True)
+    )
 
 
 def _times(duration: float, dt: float) -> Floats:
     """Start of each step, s."""
     return dt * np.arange(number_of_steps(duration, dt), dtype=float)
-
-
-def _sail(model: ShipModel, rudder: Floats, shaft: Floats | None, dt: float, conditions: Conditions) -> Trial:
-    """The trial with a rudder, rad, and a shaft speed, 1/s, for each step."""
-    commands = np.repeat(model.service_command[None], len(rudder), axis=0)
-    commands[:, 0] = rudder
-    if shaft is not None:
-        commands[:, 1] = shaft
-    depth, weather, seed = conditions.water_depth, conditions.weather, conditions.seed
-    return simulate(model, commands, dt, None, depth, "random", weather, seed)

@@ -12,7 +12,7 @@ from shipgym.manoeuvres.execution import rudder
 from shipgym.manoeuvres.intervals import IndexInterval, attempt, intervals_of, worst
 from shipgym.manoeuvres.registry import Manoeuvre
 from shipgym.manoeuvres.stopping import StoppingIndices, standard_stops
-from shipgym.manoeuvres.turning import TURN_DEG, standard_circles, turning_indices
+from shipgym.manoeuvres.turning import full_rudder_deg, standard_circles, turning_indices
 from shipgym.manoeuvres.zigzags import STANDARD_DEG, standard_zigzags, switch_heading_deg, zigzag_indices
 from shipgym.ships.ship_model import ShipModel
 from shipgym.trials.trial import Trial
@@ -23,6 +23,16 @@ OUTSIDE = 1.15  # distance from the trials' envelope, by its size, from which on
 ANGLE_DEG = 1.0  # by which the rudder and heading of a trial may differ from those of the manoeuvre
 SPEED = 0.1  # likewise its approach speed, by that of service
 STOPPING_LIMIT = 15.0  # ship lengths
+#: Manoeuvre, index, paragraph of the annex and largest value of each criterion; those of the overshoots in
+#: the 10/10 zigzag are smaller for some ships (`overshoot_limits_deg`).
+RULES = {
+    "advance": ("turning circle", "advance_lengths", "5.3.1", 4.5),
+    "tactical_diameter": ("turning circle", "tactical_diameter_lengths", "5.3.1", 5.0),
+    "initial_turning": ("zigzag 10/10", "initial_turning_lengths", "5.3.2", 2.5),
+    "overshoot_1_10_10": ("zigzag 10/10", "overshoot_1_deg", "5.3.3.1", 20.0),
+    "overshoot_2_10_10": ("zigzag 10/10", "overshoot_2_deg", "5.3.3.2", 40.0),
+    "overshoot_1_20_20": ("zigzag 20/20", "overshoot_1_deg", "5.3.3.3", 25.0),
+}
 LARGE_DISPLACEMENT = (
     "where large displacement makes 15 lengths impracticable, the Administration may allow up to 20"
 )
@@ -124,22 +134,14 @@ def imo_criteria(model: ShipModel, found: Mapping[str, Mapping[str, IndexInterva
     """
     needed = imo_manoeuvres(model)
     beyond = {name for name, test in needed.items() if name in found and _outside(model, test)}
-    first, second = overshoot_limits_deg(model.particulars["length"] / model.particulars["speed"])
-
-    def worst_of(manoeuvre: str, index: str, limit: float, paragraph: str) -> Criterion:
+    first, second = overshoot_limits_deg(model.travel_time)
+    limits = {"overshoot_1_10_10": first, "overshoot_2_10_10": second}
+    criteria = {}
+    for criterion, (manoeuvre, index, paragraph, limit) in RULES.items():
         names = [name for name in found if name in needed and name.startswith(manoeuvre)]
-        one = _criterion([found[name] for name in names], index, limit, paragraph)
-        return _decided(one, trial_in_words(model, manoeuvre), bool(beyond & set(names)))
-
-    return {
-        "advance": worst_of("turning circle", "advance_lengths", 4.5, "5.3.1"),
-        "tactical_diameter": worst_of("turning circle", "tactical_diameter_lengths", 5.0, "5.3.1"),
-        "initial_turning": worst_of("zigzag 10/10", "initial_turning_lengths", 2.5, "5.3.2"),
-        "overshoot_1_10_10": worst_of("zigzag 10/10", "overshoot_1_deg", first, "5.3.3.1"),
-        "overshoot_2_10_10": worst_of("zigzag 10/10", "overshoot_2_deg", second, "5.3.3.2"),
-        "overshoot_1_20_20": worst_of("zigzag 20/20", "overshoot_1_deg", 25.0, "5.3.3.3"),
-        "stopping": _stopping(model, found.get("crash stop")),
-    }
+        one = _criterion([found[name] for name in names], index, limits.get(criterion, limit), paragraph)
+        criteria[criterion] = _decided(one, trial_in_words(model, manoeuvre), bool(beyond & set(names)))
+    return {**criteria, "stopping": _stopping(model, found.get("crash stop"))}
 
 
 def with_measured(
@@ -167,32 +169,31 @@ def _measured(model: ShipModel, trial: Trial) -> dict[str, float]:
     start = float(np.hypot(trial["u"][0], trial["v"][0])) if "u" in trial and "v" in trial else 0.0
     if trial.kind not in ("zigzag", "turning-circle") or abs(start - speed) > SPEED * speed:
         return {}
-    values: dict[str, float | None] = {}
+    indices: Any
     try:
         angle = float(np.degrees(np.percentile(np.abs(rudder(trial)), 75)))
         if trial.kind == "zigzag":
             heading, indices = switch_heading_deg(trial) or 0.0, zigzag_indices(trial, length)
-            for usual in STANDARD_DEG:
-                if max(abs(angle - usual), abs(heading - usual)) > ANGLE_DEG:
-                    continue
-                values[f"overshoot_1_{usual:.0f}_{usual:.0f}"] = indices.overshoot_1_deg
-                if usual == STANDARD_DEG[0]:
-                    values["overshoot_2_10_10"] = indices.overshoot_2_deg
-                    values["initial_turning"] = indices.initial_turning_lengths
-        elif abs(angle - min(TURN_DEG, model.steering.rudder_limit_deg)) <= ANGLE_DEG:
-            circle = turning_indices(trial, length)
-            values = {
-                "advance": circle.advance_lengths,
-                "tactical_diameter": circle.tactical_diameter_lengths,
+            off = {
+                f"zigzag {deg:.0f}/{deg:.0f}": max(abs(angle - deg), abs(heading - deg))
+                for deg in STANDARD_DEG
             }
+        else:
+            indices = turning_indices(trial, length)
+            off = {"turning circle": abs(angle - full_rudder_deg(model))}
     except InputError:  # a channel such as the position is missing
         return {}
+    values = {
+        name: getattr(indices, index)
+        for name, (manoeuvre, index, *_) in RULES.items()
+        if off.get(manoeuvre, np.inf) <= ANGLE_DEG
+    }
     return {name: value for name, value in values.items() if value is not None}
 
 
 def trial_in_words(model: ShipModel, manoeuvre: str) -> str:
     """A trial of a standard manoeuvre, of a turn with the rudder's limit where that is less than 35 deg."""
-    full = min(TURN_DEG, model.steering.rudder_limit_deg)
+    full = full_rudder_deg(model)
     return f"{full:g} deg turn" if manoeuvre == "turning circle" else f"{manoeuvre.split()[-1]} zigzag"
 
 

@@ -13,8 +13,8 @@ from shipgym.manoeuvres.execution import require, rudder, turning_rudder
 from shipgym.manoeuvres.registry import SIDES, Manoeuvre
 from shipgym.manoeuvres.settling import Voyage
 from shipgym.sea.conditions import Weather
-from shipgym.ships.conditions import Conditions, Seed
 from shipgym.ships.ship_model import ShipModel
+from shipgym.ships.simulate import Conditions, Seed
 from shipgym.trials.trial import Trial
 
 TURN_DEG = 20.0  # of the standard pull-out, or the rudder's limit where that is less

@@ -1,16 +1,15 @@
 """Legs of a manoeuvre that last until the motion is steady."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from shipgym.arrays import Floats
 from shipgym.checks import check_number
 from shipgym.errors import InputError
-from shipgym.ships.conditions import Conditions, Passage
 from shipgym.ships.ship_model import ShipModel
-from shipgym.ships.simulate import as_trial, unstable
+from shipgym.ships.simulate import Conditions, Passage, as_trial
 from shipgym.trials.trial import Trial
 
 STEPS_PER_LENGTH = 40  # simulation steps in the time to travel one ship length
@@ -20,17 +19,8 @@ HELMSMAN_BANDWIDTH = 2.0  # of the helmsman who holds a yaw rate, U0 / L
 HELMSMAN_RESET = 4.0  # time constant of his integral part, L / U0
 STEADY = 2e-5  # largest change of (u, v, r L) / U0 and rudder from one stretch to the next
 
-#: Sails on: states of shape (n_steps + 1, n_columns) with the start in row 0 and commands (n_steps, 2)
-#: to be filled; returns the last row before the ship ran away.
-Sail = Callable[[Floats, Floats], int]
-
-
-@dataclass(frozen=True, eq=False)
-class Steady:
-    """Means over the last stretch of a leg: rudder ordered, rad, and yaw rate, rad/s."""
-
-    rudder: float
-    yaw_rate: float
+#: Fills states of shape (n_steps + 1, n_columns), which begin with the start, and commands (n_steps, 2).
+Sail = Callable[[Floats, Floats], None]
 
 
 class Voyage:
@@ -43,11 +33,10 @@ class Voyage:
     def __init__(
         self, model: ShipModel, dt: float | None, conditions: Conditions, state: Floats | None = None
     ) -> None:
-        self.model = model
-        self.length_time = model.particulars["length"] / model.particulars["speed"]
+        self.model, self.water_depth = model, conditions.water_depth
+        self.length_time = model.travel_time
         default = self.length_time / STEPS_PER_LENGTH
         self.dt = default if dt is None else check_number(dt, "dt", above=0.0, at_most=self.length_time)
-        self.water_depth = conditions.water_depth
         self.passage = Passage(model, conditions, self.dt)
         start = model.service_state if state is None else state
         self._states = [self.passage.states(start, 0)]
@@ -62,22 +51,20 @@ class Voyage:
     def go(self, sail: Sail, n_steps: int) -> tuple[Floats, Floats]:
         """Sail some steps; states of shape (n_steps, n_columns) and commands of shape (n_steps, 2)."""
         states, commands = self.passage.states(self.state, n_steps), np.empty((n_steps, 2))
-        reached = sail(states, commands)
-        if reached < n_steps:
-            sailed = sum(map(len, self._commands)) + reached
-            raise unstable(self.model, sailed * self.dt, states[reached])
+        sail(states, commands)
         self._states.append(states[1:])
         self._commands.append(commands)
         return states[1:], commands
 
+    def _run(self, loop: str, states: Floats, *arguments: Any) -> None:
+        self.passage.run(loop, states, *arguments, since=self.dt * sum(map(len, self._commands)))
+
     def hold(self, rudder: float, shaft: float) -> Sail:
         """Leg with constant orders: rudder in rad, shaft speed in 1/s."""
-        passage, loop = self.passage, self.passage.loop("simulate")
 
-        def sail(states: Floats, commands: Floats) -> int:
+        def sail(states: Floats, commands: Floats) -> None:
             commands[:] = rudder, shaft
-            reached: int = loop(states, commands, self.dt, *passage.sea, passage.numbers)
-            return reached
+            self._run("simulate", states, commands, self.dt)
 
         return sail
 
@@ -87,27 +74,25 @@ class Voyage:
         The helmsman is designed from the rudder's effect at service speed; the integral part
         carries over from leg to leg.
         """
-        model, memory, passage = self.model, np.zeros(1), self.passage
-        steer, shaft = passage.loop("steer_rate"), model.service_shaft_speed
-        gain = HELMSMAN_BANDWIDTH / self.length_time / _rudder_effect(model, self.water_depth)
+        memory, shaft = np.zeros(1), self.model.service_shaft_speed
+        gain = HELMSMAN_BANDWIDTH / self.length_time / _rudder_effect(self.model, self.water_depth)
         reset_time = HELMSMAN_RESET * self.length_time
 
         def at_rate(rate: float) -> Sail:
-            def sail(states: Floats, commands: Floats) -> int:
+            def sail(states: Floats, commands: Floats) -> None:
                 orders = np.empty(len(commands))
-                reached: int = steer(
-                    states, orders, memory, rate, shaft, self.dt, gain, reset_time,
-                    *passage.sea, passage.numbers,
-                )  # fmt: skip
+                self._run("steer_rate", states, orders, memory, rate, shaft, self.dt, gain, reset_time)
                 commands[:, 0], commands[:, 1] = orders, shaft
-                return reached
 
             return sail
 
         return at_rate
 
-    def settle(self, sail: Sail) -> Steady:
-        """Sail until the motion no longer changes, 300 ship lengths at most."""
+    def settle(self, sail: Sail) -> tuple[float, float]:
+        """Sail until the motion no longer changes, 300 ship lengths at most.
+
+        Returns the means over the last stretch of the rudder ordered, rad, and the yaw rate, rad/s.
+        """
         n_steps = max(round(STRETCH * self.length_time / self.dt), 2)
         speed, length = self.model.particulars["speed"], self.model.particulars["length"]
         columns = [self.model.state_names.index(name) for name in "uvr"]
@@ -120,24 +105,22 @@ class Voyage:
             if before is not None and np.abs(now - before).max() < STEADY:
                 break
             before = now
-        return Steady(float(rudder), float(r))
+        return float(rudder), float(r)
 
     def trial(self, kind: str | None = None, last: int | None = None) -> Trial:
         """What was sailed so far, up to the sample number `last`."""
         states = np.concatenate(self._states)
         commands = np.concatenate([*self._commands, self._commands[-1][-1:]])
         orders = commands[:, : len(self.model.command_names)]
-        times = self.dt * np.arange(len(states), dtype=float)
         kept = slice(None if last is None else last + 1)
-        return as_trial(self.model, times[kept], states[kept], orders[kept], kind)
+        return as_trial(self.model, self.dt, states[kept], orders[kept], kind)
 
 
 def _rudder_effect(model: ShipModel, water_depth: float) -> float:
     """Yaw acceleration per rudder angle at service speed, 1/s^2."""
     angle = float(np.radians(5.0))
-    states = np.repeat(model.service_state[None], 2, axis=0)
-    states[:, model.state_names.index("delta")] = angle, -angle
-    rates = model.derivatives(states, model.service_command, water_depth)[:, model.state_names.index("r")]
+    u, n = np.full(2, model.particulars["speed"]), np.full(2, model.service_shaft_speed)
+    rates = model.rates({"u": u, "delta": np.array([angle, -angle]), "n": n}, water_depth)["r"]
     effect = float(rates[0] - rates[1]) / (2.0 * angle)
     if not effect > 0.0:
         raise InputError(

@@ -18,9 +18,9 @@ from shipgym.manoeuvres.execution import require, rudder
 from shipgym.manoeuvres.registry import Manoeuvre
 from shipgym.manoeuvres.settling import Voyage
 from shipgym.sea.conditions import Weather
-from shipgym.ships.conditions import Conditions, Seed
 from shipgym.ships.linear import is_course_stable
 from shipgym.ships.ship_model import ShipModel
+from shipgym.ships.simulate import Conditions, Seed
 from shipgym.trials.trial import Trial
 
 Method = Literal["direct", "reverse"]
@@ -82,7 +82,7 @@ def direct_spiral(
     voyage = Voyage(model, dt, Conditions(water_depth, weather, seed))
     angles += angles[-2::-1]
     points = [voyage.settle(voyage.hold(np.radians(angle), model.service_shaft_speed)) for angle in angles]
-    rates = np.degrees([point.yaw_rate for point in points])
+    rates = np.degrees([rate for _, rate in points])
     return Spiral(voyage.trial("spiral"), np.array(angles), rates, "direct")
 
 
@@ -110,7 +110,7 @@ def reverse_spiral(
     rates = _one_way(given, "yaw_rate_deg_s", "deg/s", most, "one radian per ship length sailed")
     helmsman = voyage.rate_helmsman()
     points = [voyage.settle(helmsman(np.radians(rate))) for rate in rates]
-    angles = np.degrees([point.rudder for point in points])
+    angles = np.degrees([rudder for rudder, _ in points])
     return Spiral(voyage.trial("spiral"), angles, np.array(rates), "reverse")
 
 

@@ -12,9 +12,9 @@ from shipgym.manoeuvres.execution import distance_sailed, reached, require, ship
 from shipgym.manoeuvres.registry import Manoeuvre
 from shipgym.manoeuvres.settling import Voyage
 from shipgym.sea.conditions import Weather
-from shipgym.ships.conditions import Conditions, Seed
 from shipgym.ships.equations import ShipEquations
 from shipgym.ships.ship_model import ShipModel
+from shipgym.ships.simulate import Conditions, Seed
 from shipgym.trials.trial import Trial
 
 LONGEST = 300.0  # of a stopping trial, L / U0

@@ -172,24 +172,20 @@ def _tow(model: ShipModel, tank: Tank, motion: _Motion, name: str) -> Trial:
     psi = integral(motion.t, motion.velocity[:, 2])
     columns = dict(zip("uvr", motion.velocity.T, strict=True)) | {"psi": psi}
     columns |= {"delta": np.full(len(psi), np.radians(tank.rudder_deg)), "n": np.full(len(psi), shaft)}
-    none = np.zeros(len(psi))
-    states = np.stack([columns.get(state, none) for state in model.state_names], axis=-1)
-    commands = np.stack([columns[command] for command in model.command_names], axis=-1)
-    rates = model.derivatives(states, commands, tank.water_depth)
-    own = np.zeros((len(psi), 4))
-    for i, rate in enumerate("uvrp"):
-        if rate in model.state_names:
-            own[:, i] = rates[:, model.state_names.index(rate)]
+    rates = model.rates(columns, tank.water_depth)
+    own = np.stack([rates.get(axis, np.zeros(len(psi))) for axis in "uvrp"], axis=-1)
     own[:, :3] -= motion.acceleration
     forces = own @ inertia(model, tank.water_depth).T
     if not tank.model_inertia:
         forces += _ship_s_own(model, motion)
+    noise = tank.noise * np.sqrt((forces**2).mean(axis=0))
+    forces += noise * np.random.default_rng(tank.seed).standard_normal(forces.shape)
     channels = {
         "x": integral(motion.t, columns["u"] * np.cos(psi) - columns["v"] * np.sin(psi)),
         "y": integral(motion.t, columns["u"] * np.sin(psi) + columns["v"] * np.cos(psi)),
         **{key: columns[key] for key in ("psi", "u", "v", "r", "delta")},
         **({"n": columns["n"]} if "n" in model.command_names else {}),
-        **dict(zip(FORCES, _noisy(forces, tank).T, strict=True)),
+        **dict(zip(FORCES, forces.T, strict=True)),
     }
     title = f"{model.name}, {name}"
     return Trial(motion.t, channels, name=title, kind="captive", length=model.particulars["length"])
@@ -204,10 +200,3 @@ def _ship_s_own(model: ShipModel, motion: _Motion) -> Floats:
     aside = mass * (vdot + u * r) + static * rdot
     turning = yaw * rdot + static * (vdot + u * r)
     return np.stack([ahead, aside, turning], axis=-1)
-
-
-def _noisy(forces: Floats, tank: Tank) -> Floats:
-    """Forces with their white noise."""
-    size = tank.noise * np.sqrt((forces**2).mean(axis=0))
-    noisy: Floats = forces + size * np.random.default_rng(tank.seed).standard_normal(forces.shape)
-    return noisy

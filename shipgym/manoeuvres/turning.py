@@ -17,9 +17,8 @@ from shipgym.manoeuvres.execution import (
 )
 from shipgym.manoeuvres.registry import SIDES, Manoeuvre, standard_time
 from shipgym.sea.conditions import Weather
-from shipgym.ships.conditions import Seed
 from shipgym.ships.ship_model import ShipModel
-from shipgym.ships.simulate import simulate
+from shipgym.ships.simulate import Seed, orders, simulate
 from shipgym.trials.trial import Trial
 
 TURN_DEG = 35.0  # of the standard circle, or the rudder's limit where that is less
@@ -60,10 +59,8 @@ def turning_circle(
     samples, are in s; the rest as in `zigzag`. Raises InputError for a rudder of 0 or beyond 90 degrees, or a
     duration or step that is not above 0, UnstableModelError if the ship runs away.
     """
-    angle = turning_rudder(rudder_deg, 90.0)
-    commands = np.repeat(model.service_command[None], number_of_steps(duration, dt), axis=0)
-    commands[:, 0] = angle
-    return simulate(model, commands, dt, None, water_depth, "turning-circle", weather, seed)
+    rudder = np.full(number_of_steps(duration, dt), turning_rudder(rudder_deg, 90.0))
+    return simulate(model, orders(model, rudder), dt, None, water_depth, "turning-circle", weather, seed)
 
 
 def turning_indices(trial: Trial, length: float | None = None) -> TurningIndices:
@@ -112,10 +109,15 @@ def _steady(
     return float(speed[steady].mean() / speed[0]), float(drift), float(diameter)
 
 
+def full_rudder_deg(model: ShipModel) -> float:
+    """Rudder of the standard circle, degrees: 35, or the rudder's limit where that is less."""
+    return min(TURN_DEG, model.steering.rudder_limit_deg)
+
+
 def standard_circles(model: ShipModel, water_depth: float = np.inf) -> dict[str, Manoeuvre]:
     """Turning circles with full rudder to both sides."""
     duration, dt = standard_time(model)
-    full = min(TURN_DEG, model.steering.rudder_limit_deg)
+    full = full_rudder_deg(model)
     return {
         f"turning circle {full:.0f} deg to {side}": Manoeuvre(
             partial(

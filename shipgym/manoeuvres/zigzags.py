@@ -13,9 +13,8 @@ from shipgym.errors import ManoeuvreError
 from shipgym.manoeuvres.execution import distance_sailed, number_of_steps, reached, reversals, ship_length
 from shipgym.manoeuvres.registry import SIDES, Manoeuvre, standard_time
 from shipgym.sea.conditions import Weather
-from shipgym.ships.conditions import Conditions, Passage, Seed
 from shipgym.ships.ship_model import ShipModel
-from shipgym.ships.simulate import as_trial, unstable
+from shipgym.ships.simulate import Conditions, Passage, Seed, as_trial, orders
 from shipgym.trials.trial import Trial
 
 STANDARD_DEG = (10.0, 20.0)
@@ -86,9 +85,11 @@ def zigzag(
     threshold = np.radians(check_number(heading_deg, "heading_deg", above=0.0, at_most=180.0))
     n_steps = number_of_steps(duration, dt)
     check_choice(switch, ("inside", "step"), "switch")
-    conditions = Conditions(water_depth, weather, seed)
-    first = -angle if port_first else angle
-    trial, turns = _sail(model, conditions, first, threshold, n_steps, dt, switch == "inside")
+    passage = Passage(model, Conditions(water_depth, weather, seed), dt)
+    states, rudder = passage.states(model.service_state, n_steps), np.empty(n_steps + 1)
+    first = -angle if port_first else angle, threshold, model.service_shaft_speed
+    _, turns = passage.run("zigzag", states, rudder, *first, dt, switch == "inside")
+    trial = as_trial(model, dt, states, orders(model, rudder), kind="zigzag")
     if must_reverse and turns == 0:
         raise _never_reversed(f"zigzag {rudder_deg:g}/{heading_deg:g} of {model.name!r}", trial, heading_deg)
     return trial
@@ -103,31 +104,6 @@ def _never_reversed(what: str, trial: Trial, heading_deg: float) -> ManoeuvreErr
         "order more rudder or less heading",
         trial,
     )
-
-
-def _sail(
-    model: ShipModel,
-    conditions: Conditions,
-    first: float,
-    threshold: float,
-    n_steps: int,
-    dt: float,
-    inside: bool,
-) -> tuple[Trial, int]:
-    """The trial with a first order and a heading to reverse at, rad, and how often it was reversed."""
-    passage = Passage(model, conditions, dt)
-    states = passage.states(model.service_state, n_steps)
-    commands = np.empty(n_steps + 1)
-    reached, turns = passage.loop("zigzag")(
-        states, commands, first, threshold, model.service_shaft_speed, dt, inside,
-        *passage.sea, passage.numbers,
-    )  # fmt: skip
-    times = dt * np.arange(n_steps + 1, dtype=float)
-    if reached < n_steps:
-        raise unstable(model, times[reached], states[reached])
-    orders = np.repeat(model.service_command[None], n_steps + 1, axis=0)
-    orders[:, 0] = commands
-    return as_trial(model, times, states, orders, kind="zigzag"), int(turns)
 
 
 def zigzag_indices(

@@ -12,6 +12,7 @@ from .style import MEASURED as MEASURED
 from .style import MODEL as MODEL
 from .style import MUTED as MUTED
 from .style import PALETTE as PALETTE
+from .style import Panel as Panel
 from .style import axis as axis
 from .style import compact as compact
 from .style import graph_objects as graph_objects
@@ -20,6 +21,7 @@ from .style import layout as layout
 from .style import line as line
 from .style import line_styles as line_styles
 from .style import panels as panels
+from .style import points as points
 from .style import subplots as subplots
 from .style import translucent as translucent
 from .trials import AXES as AXES

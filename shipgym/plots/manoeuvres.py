@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -13,24 +13,9 @@ from shipgym.manoeuvres.pull_outs import pull_out_indices
 from shipgym.manoeuvres.spirals import Spiral, spiral_indices, turning_point
 from shipgym.manoeuvres.turning import track_from_order, turning_indices
 from shipgym.manoeuvres.zigzags import switch_heading_deg
-from shipgym.plots.style import (
-    LIMIT,
-    MEASURED,
-    MODEL,
-    MUTED,
-    PALETTE,
-    axis,
-    graph_objects,
-    label,
-    layout,
-    line,
-    subplots,
-)
+from shipgym.plots.style import LIMIT, MEASURED, MODEL, MUTED, PALETTE, Figure, Panel, axis, line, panels
 from shipgym.plots.trials import AXES, history_figure, quantity, thinned
 from shipgym.trials.trial import Trial
-
-if TYPE_CHECKING:
-    from plotly.graph_objects import Figure
 
 ORDERS = ("delta_command", "delta", "n_command", "n")
 
@@ -40,24 +25,16 @@ def zigzag_figure(trial: Trial, height: int = 320) -> Figure:
 
     Of a trial with psi and delta; height in pixels.
     """
-    figure = graph_objects().Figure()
     heading = np.degrees(trial["psi"] - trial["psi"][0])
-    hover = {"hovertemplate": "%{y:.2f} deg"}
-    figure.add_trace(line(trial.t, heading, "heading change", MODEL, 2.0, **hover))
-    figure.add_trace(line(trial.t, np.degrees(trial["delta"]), "rudder", MUTED, 1.4, **hover))
-    switch = switch_heading_deg(trial)
-    if switch is not None:
-        ends = [trial.t[0], trial.t[-1]]
-        for side in (switch, -switch):
-            figure.add_trace(
-                line(
-                    ends, [side] * 2, "switch heading", LIMIT, 1.1, line_dash="dot", hoverinfo="skip",
-                    showlegend=side > 0,
-                )
-            )  # fmt: skip
-    figure.update_layout(layout(height))
-    label(figure, "time, s", axis("heading change and rudder, deg", zero=True))
-    return figure
+    hover, dotted = {"hovertemplate": "%{y:.2f} deg"}, {"line_dash": "dot", "hoverinfo": "skip"}
+    lines = [
+        line(trial.t, heading, "heading change", MODEL, 2.0, **hover),
+        line(trial.t, np.degrees(trial["delta"]), "rudder", MUTED, 1.4, **hover),
+    ]
+    if (switch := switch_heading_deg(trial)) is not None:
+        ends = trial.t[[0, -1]]
+        lines += [line(ends, [at] * 2, "switch heading", LIMIT, 1.1, **dotted) for at in (switch, -switch)]
+    return panels([Panel(lines, "time, s", axis("heading change and rudder, deg", zero=True))], height)
 
 
 def turning_figure(trial: Trial, length: float | None = None, height: int = 480) -> Figure:
@@ -70,46 +47,43 @@ def turning_figure(trial: Trial, length: float | None = None, height: int = 480)
     indices, lpp = turning_indices(trial, length), ship_length(trial, length)
     ahead, aside, turned = track_from_order(trial, lpp)
     side = 1.0 if turned[-1] >= 0.0 else -1.0
-    figure = graph_objects().Figure()
-    figure.add_trace(line(aside, ahead, "path", MODEL, 2.0))
+    lines = [line(aside, ahead, "path", MODEL, 2.0)]
     advance, transfer, diameter = (
         indices.advance_lengths, indices.transfer_lengths, indices.tactical_diameter_lengths,
     )  # fmt: skip
     if advance is not None and transfer is not None:
         far = side * transfer
-        _dimension(figure, [far, far], [0.0, advance], f"advance {advance:.2f} L", PALETTE[1])
-        _dimension(figure, [0.0, far], [advance, advance], f"transfer {transfer:.2f} L", PALETTE[2])
+        lines += [
+            _dimension([far, far], [0.0, advance], f"advance {advance:.2f} L", PALETTE[1]),
+            _dimension([0.0, far], [advance, advance], f"transfer {transfer:.2f} L", PALETTE[2]),
+        ]
     if diameter is not None:
-        level = float(np.interp(np.pi, side * turned, ahead))
-        wide = [0.0, side * diameter]
-        _dimension(figure, wide, [level] * 2, f"tactical diameter {diameter:.2f} L", PALETTE[3])
-    figure.update_layout(layout(height, hovermode="closest"))
+        level, name = float(np.interp(np.pi, side * turned, ahead)), f"tactical diameter {diameter:.2f} L"
+        lines.append(_dimension([0.0, side * diameter], [level, level], name, PALETTE[3]))
     ahead_axis = axis("ahead, ship lengths", zero=True, scaleanchor="x", scaleratio=1)
-    label(figure, axis("to starboard, ship lengths", zero=True), ahead_axis)
-    return figure
+    seen = Panel(lines, axis("to starboard, ship lengths", zero=True), ahead_axis)
+    return panels([seen], height, hovermode="closest")
 
 
-def _dimension(figure: Figure, x: list[float], y: list[float], name: str, colour: str) -> None:
+def _dimension(x: list[float], y: list[float], name: str, colour: str) -> Any:
     """A measured length as a line with bars at both ends."""
     across = "line-ew" if x[0] == x[1] else "line-ns"
     mark = {"symbol": across, "size": 11, "line": {"width": 1.6, "color": colour}}
-    figure.add_trace(
-        line(x, y, name, colour, 1.5, marker=mark, hoverinfo="name").update(mode="lines+markers")
-    )
+    return line(x, y, name, colour, 1.5, "lines+markers", marker=mark, hoverinfo="name")
 
 
 def spiral_figure(spiral: Spiral, height: int = 420) -> Figure:
     """Yaw rate over rudder angle of a spiral, with the width of its loop; a direct one in two lines."""
-    figure = graph_objects().Figure()
     angles, rates = spiral.rudder_deg, spiral.yaw_rate_deg_s
     points = {"marker": {"size": 5}, "hovertemplate": "%{x:.2f} deg, %{y:.3f} deg/s"}
     ways = {"reverse spiral": (slice(None), MODEL)}
     if spiral.method == "direct":
         turn = turning_point(angles)
         ways = {"there": (slice(0, turn + 1), MODEL), "and back": (slice(turn, None), PALETTE[1])}
-    for name, (part, colour) in ways.items():
-        way = line(angles[part], rates[part], name, colour, 1.6, **points)
-        figure.add_trace(way.update(mode="lines+markers"))
+    lines = [
+        line(angles[part], rates[part], name, colour, 1.6, "lines+markers", **points)
+        for name, (part, colour) in ways.items()
+    ]
     try:
         indices = spiral_indices(spiral)
         width, middle = indices.loop_width_deg, indices.loop_middle_deg
@@ -117,13 +91,10 @@ def spiral_figure(spiral: Spiral, height: int = 420) -> Figure:
         width = middle = 0.0
     step = float(np.abs(np.diff(angles)).min()) if spiral.method == "direct" else 0.0
     if width > step:
-        name = f"loop, {width:.2f} deg wide"
-        figure.add_trace(
-            line([middle - width / 2, middle + width / 2], [0.0, 0.0], name, LIMIT, 2.6, hoverinfo="name")
-        )
-    figure.update_layout(layout(height, hovermode="closest"))
-    label(figure, axis("rudder, deg", zero=True), axis("yaw rate, deg/s", zero=True))
-    return figure
+        ends, name = [middle - width / 2, middle + width / 2], f"loop, {width:.2f} deg wide"
+        lines.append(line(ends, [0.0, 0.0], name, LIMIT, 2.6, hoverinfo="name"))
+    axes = axis("rudder, deg", zero=True), axis("yaw rate, deg/s", zero=True)
+    return panels([Panel(lines, *axes)], height, hovermode="closest")
 
 
 def pull_out_figure(trials: dict[str, Trial], height: int = 340) -> Figure:
@@ -131,18 +102,16 @@ def pull_out_figure(trials: dict[str, Trial], height: int = 340) -> Figure:
 
     The trials, usually one from each side, by the label of their line. InputError if one has no pull-out.
     """
-    figure = graph_objects().Figure()
+    lines = []
     for (name, trial), colour in zip(trials.items(), PALETTE, strict=False):
         left = pull_out_indices(trial).residual_rate_deg_s
         angle = np.abs(rudder(trial))
         release = trial.t[min(int(np.flatnonzero(angle > 0.5 * angle.max())[-1]) + 1, len(trial) - 1)]
         part = thinned(trial)
         residual = f"{name}: {left:.3f} deg/s left"
-        figure.add_trace(line(trial.t[part] - release, np.degrees(trial["r"][part]), residual, colour))
-    figure.update_layout(layout(height))
+        lines.append(line(trial.t[part] - release, np.degrees(trial["r"][part]), residual, colour))
     time_axis = axis("time since the rudder was put amidships, s", zero=True)
-    label(figure, time_axis, axis("yaw rate, deg/s", zero=True))
-    return figure
+    return panels([Panel(lines, time_axis, axis("yaw rate, deg/s", zero=True))], height)
 
 
 def speed_figure(trial: Trial, length: float | None = None, height: int = 380) -> Figure:
@@ -152,21 +121,16 @@ def speed_figure(trial: Trial, length: float | None = None, height: int = 380) -
     """
     sailed = distance_sailed(trial) / ship_length(trial, length)
     part = thinned(trial)
-    shaft = quantity(trial, "n")
-    panels: list[tuple[Any, Any, str, str, str]] = [
-        (sailed, trial["u"], "surge speed", "distance sailed, ship lengths", AXES["u"][0]),
-        (trial.t, trial["u"], "surge speed", "time, s", ""),
+    t, u, shaft = trial.t[part], trial["u"][part], quantity(trial, "n")
+    speed_axis, plain = axis(AXES["u"][0], zero=True), axis(zero=True)
+    shown = [
+        Panel([line(sailed[part], u, "surge speed", MODEL)], "distance sailed, ship lengths", speed_axis),
+        Panel([line(t, u, "surge speed", MODEL)], "time, s", plain),
     ]
     if shaft is not None:
-        panels.append((trial.t, shaft, "shaft", "time, s", AXES["n"][0]))
-    figure = subplots(1, len(panels), horizontal_spacing=0.09)
-    for column, (x, y, name, below, beside) in enumerate(panels, start=1):
-        colour = MODEL if name != "shaft" else MEASURED
-        trace = line(x[part], y[part], name, colour, showlegend=column != 2)
-        figure.add_trace(trace, row=1, col=column)
-        label(figure, below, axis(beside, zero=True), row=1, col=column)
-    figure.update_layout(layout(height, hovermode="closest"))
-    return figure
+        turned = line(t, shaft[part], "shaft", MEASURED)
+        shown.append(Panel([turned], "time, s", axis(AXES["n"][0], zero=True)))
+    return panels(shown, height, len(shown), grid={"horizontal_spacing": 0.09}, hovermode="closest")
 
 
 def excitation_figure(trial: Trial) -> Figure:

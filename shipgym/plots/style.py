@@ -2,21 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from shipgym.errors import InputError
 
-if TYPE_CHECKING:
-    from plotly.graph_objects import Figure
+Figure: TypeAlias = Any  # plotly.graph_objects.Figure
+Axis: TypeAlias = "str | dict[str, Any]"  # a title, or an `axis` with more than that
 
 INK, MUTED, GRID = "#1f2a37", "#64748b", "#e5e9ef"
 MEASURED, MODEL, LIMIT = "#1f2a37", "#1d70b8", "#c2412d"
 PALETTE = (MODEL, "#d9822b", "#0f8a7e", "#a1478f", "#6b7a1e", "#7a5c45")
+UNTITLED = {"title": {"text": ""}}  # of an axis
 FONT = "Inter, 'Segoe UI', 'Helvetica Neue', Arial, 'Liberation Sans', sans-serif"
 
 
@@ -43,11 +44,47 @@ def subplots(rows: int, columns: int, titles: Sequence[str] = (), **settings: An
     return figure
 
 
-def panels(titles: Sequence[str]) -> tuple[Figure, list[dict[str, int]], int]:
-    """A figure of panels beneath their titles, two a row, the place of each, and the number of rows."""
-    rows = max(-(-len(titles) // 2), 1)
-    figure = subplots(rows, min(len(titles), 2) or 1, titles, vertical_spacing=0.36 / max(rows, 2))
-    return figure, [{"row": k // 2 + 1, "col": k % 2 + 1} for k in range(len(titles))], rows
+class Panel(NamedTuple):
+    """A part of a figure."""
+
+    traces: list[Any]  # lines and points of one name are one entry of the legend
+    x: Axis = ""
+    y: Axis = ""
+    title: str = ""
+
+
+def panels(
+    shown: Sequence[Panel],
+    height: int,
+    columns: int = 1,
+    *,
+    outer: bool = False,
+    grid: Mapping[str, Any] | None = None,
+    **changes: Any,
+) -> Figure:
+    """A figure of panels in the shared style, row by row.
+
+    Its height is in pixels; with `outer`, titles of axes stand below the last row and beside the first column
+    only. `grid` has settings of plotly's `make_subplots`, and `changes` those of `layout`.
+    """
+    columns = min(columns, len(shown)) or 1
+    rows = -(-len(shown) // columns) or 1
+    titles = [panel.title for panel in shown] if any(panel.title for panel in shown) else []
+    figure = subplots(rows, columns, titles, **({"vertical_spacing": 0.36 / max(rows, 2)} | dict(grid or {})))
+    names: set[str] = set()
+    for k, panel in enumerate(shown):
+        row, column = k // columns + 1, k % columns + 1
+        for trace in panel.traces:
+            if trace.legendgroup is not None and trace.showlegend is not False:
+                trace.showlegend = trace.legendgroup not in names
+                names.add(trace.legendgroup)
+        figure.add_traces(panel.traces, rows=row, cols=column)
+        x, y = (axis(told) if isinstance(told, str) else told for told in (panel.x, panel.y))
+        x = x | UNTITLED if outer and row < rows else x
+        y = y | UNTITLED if outer and column > 1 else y
+        label(figure, x, y, row, column)
+    figure.update_layout(layout(height, titled=bool(titles), **changes))
+    return figure
 
 
 def layout(height: int, *, titled: bool = False, left: int = 62, **changes: Any) -> dict[str, Any]:
@@ -83,13 +120,7 @@ def axis(title: str = "", zero: bool = False, **changes: Any) -> dict[str, Any]:
     return shared | changes
 
 
-def label(
-    figure: Figure,
-    x: str | dict[str, Any],
-    y: str | dict[str, Any],
-    row: int | None = None,
-    col: int | None = None,
-) -> None:
+def label(figure: Figure, x: Axis, y: Axis, row: int | None = None, col: int | None = None) -> None:
     """Style the axes of a figure or of one panel: each a title, or an `axis` with more than that."""
     figure.update_xaxes(axis(x) if isinstance(x, str) else x, row=row, col=col)
     figure.update_yaxes(axis(y) if isinstance(y, str) else y, row=row, col=col)
@@ -116,9 +147,16 @@ def translucent(colour: str, opacity: float) -> str:
     return f"rgba({red},{green},{blue},{opacity})"
 
 
-def line(x: ArrayLike, y: ArrayLike, name: str, colour: str, width: float = 1.9, **more: Any) -> Any:
-    """A line that appears once in the legend whatever the number of panels."""
+def line(
+    x: ArrayLike, y: ArrayLike, name: str, colour: str, width: float = 1.9, mode: str = "lines", **more: Any
+) -> Any:
+    """A line; `more` are settings of plotly's `Scatter`."""
     return graph_objects().Scatter(
-        x=compact(x), y=compact(y), name=name, legendgroup=name, mode="lines",
+        x=compact(x), y=compact(y), name=name, legendgroup=name, mode=mode,
         line={"color": colour, "width": width}, **more,
     )  # fmt: skip
+
+
+def points(x: ArrayLike, y: ArrayLike, name: str, colour: str, size: float = 7.0, **more: Any) -> Any:
+    """Markers; `more` are settings of plotly's `Scatter`."""
+    return line(x, y, name, colour, mode="markers", marker={"color": colour, "size": size}, **more)

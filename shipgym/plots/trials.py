@@ -3,17 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from shipgym.errors import InputError
-from shipgym.plots.style import axis, graph_objects, label, layout, line, line_styles, subplots
+from shipgym.plots.style import Figure, Panel, axis, line, line_styles, panels
 from shipgym.trials.trial import Trial
-
-if TYPE_CHECKING:
-    from plotly.graph_objects import Figure
 
 #: Axis title and factor from SI of each channel and of what u and v give; m/s and degrees.
 AXES: dict[str, tuple[str, float]] = {
@@ -59,19 +55,14 @@ def history_figure(
     if not shown:
         raise InputError(f"figure: no trial with any of the channels {', '.join(channels)}")
     styles = line_styles(trials)
-    figure = subplots(len(shown), 1, shared_xaxes=True, vertical_spacing=0.16 / len(shown))
-    for row, channel in enumerate(shown, start=1):
-        title, factor = AXES[channel]
+    found = {name: Panel([], "time, s", AXES[name][0]) for name in shown}
+    for channel, panel in found.items():
         for name, trial in trials.items():
-            values, part = quantity(trial, channel), thinned(trial)
-            if values is None:
-                continue
-            style = {"showlegend": row == 1, "hovertemplate": "%{y:.3g}", **styles[name]}
-            trace = line(trial.t[part], factor * values[part], name, **style)
-            figure.add_trace(trace, row=row, col=1)
-        label(figure, "time, s" if row == len(shown) else "", title, row=row, col=1)
-    figure.update_layout(layout(ROW_HEIGHT * len(shown) + 70))
-    return figure
+            if (values := quantity(trial, channel)) is not None:
+                t, drawn = trial.t[thinned(trial)], AXES[channel][1] * values[thinned(trial)]
+                panel.traces.append(line(t, drawn, name, **styles[name], hovertemplate="%{y:.3g}"))
+    grid = {"shared_xaxes": True, "vertical_spacing": 0.16 / len(shown)}
+    return panels([*found.values()], ROW_HEIGHT * len(shown) + 70, outer=True, grid=grid)
 
 
 def path_figure(trials: Mapping[str, Trial], height: int = 460) -> Figure:
@@ -82,10 +73,9 @@ def path_figure(trials: Mapping[str, Trial], height: int = 460) -> Figure:
     located = {name: trial for name, trial in trials.items() if {"x", "y"} <= set(trial.channels)}
     if not located:
         raise InputError("figure: no trial with the channels x and y")
-    figure, styles = graph_objects().Figure(), line_styles(trials)
-    for name, trial in located.items():
-        part = thinned(trial)
-        figure.add_trace(line(trial["y"][part], trial["x"][part], name, **styles[name]))
-    figure.update_layout(layout(height, hovermode="closest"))
-    label(figure, AXES["y"][0], axis(AXES["x"][0], scaleanchor="x", scaleratio=1))
-    return figure
+    styles, north = line_styles(trials), axis(AXES["x"][0], scaleanchor="x", scaleratio=1)
+    tracks = [
+        line(trial["y"][thinned(trial)], trial["x"][thinned(trial)], name, **styles[name])
+        for name, trial in located.items()
+    ]
+    return panels([Panel(tracks, AXES["y"][0], north)], height, hovermode="closest")

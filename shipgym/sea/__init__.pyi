@@ -23,4 +23,4 @@ from .waves import wave_spectrum as wave_spectrum
 from .wind import AIR_DENSITY as AIR_DENSITY
 from .wind import WindCurves as WindCurves
 from .wind import wind_curves as wind_curves
-from .wind_tables import WindTable as WindTable
+from .wind import WindTable as WindTable

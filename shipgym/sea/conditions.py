@@ -18,7 +18,7 @@ from shipgym.checks import (
     quoted,
 )
 from shipgym.errors import InputError
-from shipgym.sea.wind_tables import WindTable, check_coefficients
+from shipgym.sea.wind import WindTable, check_coefficients
 
 GUST_SPECTRA = ("harris", "davenport", "norsok")
 WAVE_SPECTRA = ("jonswap", "pierson-moskowitz")

@@ -55,14 +55,6 @@ def waterplane_coefficient(ship: Particulars) -> float:
     return (1.0 + 2.0 * ship.require("block_coefficient")) / 3.0
 
 
-def _frontal_area(ship: Particulars) -> float:
-    return ship.require("beam") * (freeboard(ship) + _HOUSE_WIDTH * _HOUSE_HEIGHT * ship.length)
-
-
-def _lateral_area(ship: Particulars) -> float:
-    return ship.require("length_overall") * freeboard(ship) + house_area(ship)
-
-
 def _lateral_centroid(ship: Particulars) -> float:
     house_at = -0.42 * ship.length if ship.require("block_coefficient") >= 0.75 else 0.0
     return house_at * house_area(ship) / ship.require("lateral_area")
@@ -84,8 +76,10 @@ def _roll_period(ship: Particulars) -> float:
 
 _ESTIMATES: Estimates = {  # in this order
     "length_overall": lambda ship: 1.03 * ship.length,
-    "frontal_area": _frontal_area,
-    "lateral_area": _lateral_area,
+    "frontal_area": lambda ship: (
+        ship.require("beam") * (freeboard(ship) + _HOUSE_WIDTH * _HOUSE_HEIGHT * ship.length)
+    ),
+    "lateral_area": lambda ship: ship.require("length_overall") * freeboard(ship) + house_area(ship),
     "lateral_centroid": _lateral_centroid,
     "lateral_centroid_height": _centroid_height,
     "metacentric_height": lambda ship: 0.05 * ship.require("beam"),

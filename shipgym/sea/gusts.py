@@ -11,7 +11,7 @@ from shipgym.sea.conditions import Wind
 
 #: Surface drag coefficient of Harris's and Davenport's spectra for a rough sea.
 SURFACE_DRAG = 0.003
-HARRIS_LENGTH, DAVENPORT_LENGTH = 1800.0, 1200.0  # m
+LENGTHS = {"harris": 1800.0, "davenport": 1200.0}  # m
 #: Frequencies for which NORSOK N-003 gives its spectrum, Hz.
 NORSOK_BAND = (1.0 / 2400.0, 0.5)
 
@@ -46,13 +46,9 @@ def gust_spectrum(frequency: ArrayLike, speed: float, spectrum: str = "harris") 
         y = 172.0 * f * (speed / 10.0) ** -0.75
         froya: Floats = 320.0 * (speed / 10.0) ** 2 / (1.0 + y**0.468) ** (5.0 / (3.0 * 0.468))
         return froya
-    if spectrum == "davenport":
-        x = f * DAVENPORT_LENGTH / speed
-        shape = 4.0 * x * DAVENPORT_LENGTH / speed / (1.0 + x * x) ** (4.0 / 3.0)
-    else:
-        x = f * HARRIS_LENGTH / speed
-        shape = 4.0 * HARRIS_LENGTH / speed / (2.0 + x * x) ** (5.0 / 6.0)
-    return SURFACE_DRAG * speed**2 * shape
+    x = f * LENGTHS[spectrum] / speed
+    shape = x / (1.0 + x * x) ** (4.0 / 3.0) if spectrum == "davenport" else (2.0 + x * x) ** (-5.0 / 6.0)
+    return 4.0 * SURFACE_DRAG * speed * LENGTHS[spectrum] * shape
 
 
 def gust_variance(speed: float, spectrum: str = "harris") -> float:
@@ -84,6 +80,5 @@ def gust_filter(wind: Wind) -> GaussMarkov:
         f = np.geomspace(*NORSOK_BAND, 2000)
         peak = float(f[np.argmax(f * gust_spectrum(f, wind.speed, "norsok"))])
     else:
-        length = HARRIS_LENGTH if wind.spectrum == "harris" else DAVENPORT_LENGTH
-        peak = math.sqrt(3.0) * wind.speed / length
+        peak = math.sqrt(3.0) * wind.speed / LENGTHS[wind.spectrum]
     return GaussMarkov(1.0 / (2.0 * math.pi * peak), math.sqrt(gust_variance(wind.speed, wind.spectrum)))

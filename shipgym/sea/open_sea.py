@@ -19,7 +19,7 @@ from shipgym.engine.motion import HAS_ROLL, Motion, Push
 from shipgym.engine.parts import Part
 from shipgym.engine.random import DRAW, S11, TO_UNIT, mix, normal
 from shipgym.engine.record_code import loader, storer
-from shipgym.engine.records import LANES, Rows, leaves
+from shipgym.engine.records import LANES, Layout
 
 SLOWEST_ENCOUNTER = 0.1  # of the wave frequency: in a following sea the filter keeps turning
 LEAST = 1e-12
@@ -350,20 +350,15 @@ def sea_functions(windy: bool) -> dict[str, Any]:
     }
 
 
-def sea_parts(windy: bool, lanes: int = LANES, first: int = 0, shared: bool = True) -> dict[str, Any]:
-    """`sea_functions`, and how state and parameters are loaded.
+def sea_parts(windy: bool, lanes: int = LANES) -> dict[str, Any]:
+    """`sea_functions`, and how state and parameters, one vector for all, are loaded.
 
-    `lanes` are those of a tile of states, 64, or 1 where they are vectors, and `first` is the row of the
-    sea's first number in them. With `shared` all lanes meet the same sea: its parameters are a vector and not
-    a tile.
+    `lanes` are those of a tile of states, 64, or 1 where they are vectors.
     """
-    kinds = (Sea, SeaParameters) if windy else (CalmSea, CalmParameters)
-    state, parameters = (
-        Rows(kind, row, leaves(kind) if windy else ()) for kind, row in zip(kinds, (first, 0), strict=True)
-    )
+    state, parameters = (Layout(sea=kind)["sea"] for kind in sea_records(windy))
     return {
         **sea_functions(windy),
         "load_sea": loader(state, lanes),
         "store_sea": storer(state, lanes),
-        "load_sea_parameters": loader(parameters, 1 if shared else LANES),
+        "load_sea_parameters": loader(parameters, 1),
     }

@@ -1,4 +1,4 @@
-"""The shipped models by name: reference ships, and identified models in `library/`."""
+"""The shipped models by name: reference ships, identified models in `library/`, and grey boxes on them."""
 
 import os
 from collections.abc import Callable, Mapping
@@ -12,12 +12,13 @@ from shipgym.ships import container as container_file
 from shipgym.ships import kvlcc2 as kvlcc2_file
 from shipgym.ships import tanker as tanker_file
 from shipgym.ships.equations import ShipEquations, read_ship_equations
+from shipgym.ships.grey_boxes import GREY_BOX, LINEAR, SOURCE, GreyBox
 from shipgym.ships.mariner import mariner
 from shipgym.ships.particulars import Particulars
-from shipgym.ships.pmm import TABLE_11, XU
 from shipgym.ships.ship_model import ShipModel
 from shipgym.ships.steering import SteeringGear
 from shipgym.ships.structures import EQUATIONS, SHIPPED_EQUATIONS, list_structures
+from shipgym.ships.terms import Term, read_terms
 
 LIBRARY = Path(__file__).parent / "library"
 
@@ -68,15 +69,6 @@ def kvlcc2_l7(form: Form = "published") -> ShipModel:
     """KVLCC2 as a model of 7 m; `form` as in `kvlcc2`."""
     model = model_of(kvlcc2_file.SHIP, {"PACKAGE_FORM": float(form == "shipmmg")})
     return replace(model, name="kvlcc2-l7", provenance={"source": kvlcc2_file.SHIP.source, "form": form})
-
-
-def xu_ship(particulars: Particulars) -> ShipModel:
-    """The ship towed at SINTEF Ocean, of Table 11 in `shipgym.ships.pmm`; the paper prints no particulars.
-
-    She has neither rudder nor propeller.
-    """
-    source = {"source": f"{XU}, Table 11"}
-    return ShipModel("xu-2020", "pmm18", particulars, SteeringGear(), TABLE_11, provenance=source)
 
 
 REFERENCE_SHIPS: dict[str, Callable[[], ShipModel]] = {
@@ -150,3 +142,62 @@ def truth_of(model: str | Path | ShipModel) -> ShipModel:
             "size behind the trials, as 'mariner-tls-svm' names it; evaluate on a ship that you name yourself"
         )
     return ship
+
+
+def grey_box(
+    reference: str | ShipModel,
+    equations: Mapping[str, str | tuple[Term, ...]] | None = None,
+    shaft: bool | None = None,
+    name: str = GREY_BOX,
+) -> GreyBox:
+    """A reference ship plus a table of terms, as a structure of a given name.
+
+    The reference is a shipped model's name, the path of a model file, or a model. The terms, by equation `u`,
+    `v`, `r`, are in units of service speed (`read_terms`), by default Mei's: du (the speed above service
+    speed), v, r, delta and a constant, in all three. `shaft` says whether the target's shaft speed is known,
+    by default if the reference ship knows one. Raises InputError for a reference that does not exist or
+    cannot be one, or a table that cannot be computed.
+    """
+    ship = reference if isinstance(reference, ShipModel) else load_model(reference)
+    table = {
+        q: read_terms(terms) if isinstance(terms, str) else tuple(terms)
+        for q, terms in (equations or dict.fromkeys("uvr", LINEAR)).items()
+    }
+    stripped = replace(ship, covariance=None, envelope=None, provenance=None)
+    known = "n" in ship.command_names if shaft is None else shaft
+    return GreyBox(name, SOURCE, table, "service", "acceleration", stripped, known)
+
+
+def fitted_box(ship: ShipModel) -> GreyBox:
+    """A grey box on a model of the very same ship, whose covariance and provenance it keeps."""
+    named = f"{ship.name}, {ship.structure}"
+    return replace(grey_box(ship), reference=replace(ship, name=named, envelope=None))
+
+
+def converted_model(
+    reference: str | ShipModel | GreyBox,
+    particulars: Particulars,
+    steering: SteeringGear,
+    service_shaft_speed: float = 0.0,
+    name: str | None = None,
+) -> ShipModel:
+    """The bare reference ship as a model of another ship: a grey box whose terms are all zero.
+
+    The reference is as in `grey_box`, or a grey box; particulars (with the service speed), steering gear,
+    shaft speed at service speed (1/s) and name are those of the target. A shaft speed of 0 is not known: the
+    reference ship's is taken as at service speed.
+    """
+    box = reference
+    if not isinstance(box, GreyBox):
+        box = grey_box(box)
+        box = replace(box, shaft=box.shaft and service_shaft_speed > 0.0)
+    return ShipModel(
+        name=particulars.name if name is None else name,
+        structure=box.name,
+        particulars=particulars,
+        steering=steering,
+        coefficients=dict.fromkeys(box.coefficient_names, 0.0),
+        own_table=box,
+        service_shaft_speed=service_shaft_speed,
+        provenance={"source": box.source, "reference": box.ship.name},
+    )

@@ -15,6 +15,7 @@ from shipgym.errors import InputError, UnstableModelError
 from shipgym.ships.catalogue import load_model
 from shipgym.ships.grey_boxes import GreyBox
 from shipgym.ships.ship_model import ShipModel
+from shipgym.ships.simulate import orders
 from shipgym.ships.term_table import ANGULAR, EQUATION_NAMES, Structure
 
 if TYPE_CHECKING:
@@ -22,8 +23,8 @@ if TYPE_CHECKING:
 
 
 SAMPLES = 512
-#: Range of the states looked at, in service speed, service speed by length and rudder limit.
-SURGE, SWAY, YAW_RATE, RUDDER = (0.2, 1.1), 0.3, 0.8, 1.0
+#: Range of the states looked at, in service speed and service speed by length.
+SURGE, SWAY, YAW_RATE = (0.2, 1.1), 0.3, 0.8
 ROLL_RATE, HEEL, MEMORY = 0.5, np.radians(15.0), 0.5  # the memory of yaw by (service speed by length)^2
 CAPSIZED = np.radians(60.0)
 STEP = 0.02  # of the time to sail a ship length
@@ -81,16 +82,19 @@ def _states(model: ShipModel) -> dict[str, Floats]:
     """States and commands over the range of hard manoeuvres, each of shape (n,), always the same."""
     random = np.random.default_rng(0)
     length, speed = model.particulars["length"], model.particulars["speed"]
-    u = speed * random.uniform(*SURGE, SAMPLES)
-    delta = model.steering.limit * RUDDER * random.uniform(-1.0, 1.0, SAMPLES)
+
+    def drawn(low: float = -1.0, high: float = 1.0) -> Floats:
+        return random.uniform(low, high, SAMPLES)
+
+    u = speed * drawn(*SURGE)
     return {
         "u": u,
-        "v": SWAY * u * random.uniform(-1.0, 1.0, SAMPLES),
-        "r": YAW_RATE * u / length * random.uniform(-1.0, 1.0, SAMPLES),
-        "p": ROLL_RATE * u / length * random.uniform(-1.0, 1.0, SAMPLES),
-        "phi": HEEL * random.uniform(-1.0, 1.0, SAMPLES),
-        "q": MEMORY * (speed / length) ** 2 * random.uniform(-1.0, 1.0, SAMPLES),
-        "delta": delta,
+        "delta": model.steering.limit * drawn(),
+        "v": SWAY * u * drawn(),
+        "r": YAW_RATE * u / length * drawn(),
+        "p": ROLL_RATE * u / length * drawn(),
+        "phi": HEEL * drawn(),
+        "q": MEMORY * (speed / length) ** 2 * drawn(),
         "n": np.full(SAMPLES, model.service_shaft_speed),
     }
 
@@ -102,11 +106,8 @@ def _rates(model: ShipModel) -> list[str]:
 
 def _accelerations(model: ShipModel, channels: dict[str, Floats]) -> Floats:
     """Accelerations in the order of `_rates`, shape (n, n_rates)."""
-    zero = np.zeros(SAMPLES)
-    states = np.stack([channels.get(name, zero) for name in model.state_names], axis=-1)
-    commands = np.stack([channels[name] for name in model.command_names], axis=-1)
-    which = [model.state_names.index(name) for name in _rates(model)]
-    return model.derivatives(states, commands)[:, which]
+    rates = model.rates(channels)
+    return np.stack([rates[name] for name in _rates(model)], axis=-1)
 
 
 def _wrong_accelerations(model: ShipModel) -> Iterator[str]:
@@ -134,30 +135,20 @@ def _wrong_accelerations(model: ShipModel) -> Iterator[str]:
 
 def _from_table(model: ShipModel, table: Structure, channels: dict[str, Floats]) -> Floats:
     """Accelerations as sums of the table's terms, shape (n, n_rates)."""
-    length, speed = model.particulars["length"], model.particulars["speed"]
-    shaft = model.service_shaft_speed
-    if table.captive:  # the terms' numbers come last
-        theta = table.numbers(model.coefficients, model.particulars, shaft)
-        theta = theta[-sum(map(len, table.equations.values())) :]
-    else:
-        values = np.array(list(model.coefficients.values()))
-        theta = table.acceleration_matrix(model.particulars, shaft) @ values
-    rates = _rates(model)
-    accelerations = np.zeros((SAMPLES, len(rates)))
-    accelerations[:, 1:3] = -speed / length * np.stack([channels["v"], channels["r"]], axis=-1)
-    row = 0
-    for equation, terms in table.equations.items():
-        features = table.features(equation, channels, model.particulars, shaft)
-        accelerations[:, rates.index(equation)] = features @ theta[row : row + len(terms)]
-        row += len(terms)
+    ship = model.particulars, model.service_shaft_speed
+    found = {name: np.zeros(SAMPLES) for name in _rates(model)}
+    found |= {name: -channels[name] / model.travel_time for name in "vr"}
+    weights = np.split(
+        table.term_numbers(model.coefficients, *ship), np.cumsum([len(t) for t in table.equations.values()])
+    )
+    for equation, theta in zip(table.equations, weights, strict=False):
+        found[equation] = table.features(equation, channels, *ship) @ theta
     if isinstance(table, GreyBox):
-        for equation, known in table.converted_accelerations(channels, model.particulars, shaft).items():
-            axis = rates.index(equation)
-            own = accelerations[:, axis] if equation in table.equations else 0.0
-            accelerations[:, axis] = known + own
-    elif "q" in rates:
-        accelerations[:, rates.index("r")] += channels["q"]
-    return accelerations
+        for equation, known in table.converted_accelerations(channels, *ship).items():
+            found[equation] = known + (found[equation] if equation in table.equations else 0.0)
+    elif "q" in found:
+        found["r"] = found["r"] + channels["q"]
+    return np.stack([*found.values()], axis=-1)
 
 
 def _asymmetry(model: ShipModel) -> float:
@@ -177,10 +168,8 @@ def _asymmetry(model: ShipModel) -> float:
 
 def _run(model: ShipModel, rudder: float, lengths: float) -> Trial:
     """From service with the rudder held, over so many ship lengths at service speed."""
-    step = STEP * model.particulars["length"] / model.particulars["speed"]
-    commands = np.tile(model.service_command, (round(lengths / STEP), 1))
-    commands[:, 0] = rudder
-    return model.simulate(commands, step)
+    commands = orders(model, np.full(round(lengths / STEP), rudder))
+    return model.simulate(commands, STEP * model.travel_time)
 
 
 def _wrong_courses(model: ShipModel) -> Iterator[str]:

@@ -166,25 +166,26 @@ def prime_matrices(A: ArrayLike, B: ArrayLike, length: float, speed: float) -> t
     A of shape (2, 2) and B of shape (2, 1) in SI units, length in m, speed in m/s. Raises InputError for
     matrices of another shape, or a length or speed that is not positive.
     """
-    a, b, unit, time = _checked(A, B, length, speed)
-    return a * time * unit / unit[:, None], b * time / unit[:, None]
+    a, b, unit_a, unit_b = _with_units(A, B, length, speed)
+    return a / unit_a, b / unit_b
 
 
 def si_matrices(A: ArrayLike, B: ArrayLike, length: float, speed: float) -> tuple[Floats, Floats]:
     """Linear steering dynamics of the prime system in SI units, the inverse of `prime_matrices`."""
-    a, b, unit, time = _checked(A, B, length, speed)
-    return a / time / unit * unit[:, None], b / time * unit[:, None]
+    a, b, unit_a, unit_b = _with_units(A, B, length, speed)
+    return a * unit_a, b * unit_b
 
 
-def _checked(A: ArrayLike, B: ArrayLike, length: float, speed: float) -> tuple[Floats, Floats, Floats, float]:
-    """Matrices, units of (v, r) and of time."""
+def _with_units(A: ArrayLike, B: ArrayLike, length: float, speed: float) -> tuple[Floats, ...]:
+    """The matrices, checked, and the unit of each entry."""
     check_number(length, "length", above=0.0, hint="in m")
     check_number(speed, "speed", above=0.0, hint="in m/s")
     a, b = np.asarray(A, dtype=float), np.asarray(B, dtype=float)
     for name, matrix, shape in (("A", a, (2, 2)), ("B", b, (2, 1))):
         if matrix.shape != shape or not np.all(np.isfinite(matrix)):
             raise InputError(f"{name}: shape {matrix.shape} found, expected {shape} finite numbers")
-    return a, b, np.array([speed, speed / length]), length / speed
+    state, time = np.array([speed, speed / length]), length / speed
+    return a, b, state[:, None] / state / time, state[:, None] / time
 
 
 def _need_time_constants(form: Nomoto) -> None:

@@ -6,15 +6,12 @@ ship)`, and `SHIP`, which says the rest. The functions are plain Python; `shipgy
 """
 
 import importlib
-import importlib.util
 import math
-import sys
 import traceback
+from collections import namedtuple
 from collections.abc import Callable, Mapping
 from dataclasses import KW_ONLY, dataclass, field
-from functools import cache
 from pathlib import Path
-from types import ModuleType
 from typing import Any, ClassVar
 
 import numpy as np
@@ -24,13 +21,22 @@ from shipgym.checks import check_number, check_text
 from shipgym.engine.motion import Motion, Ship
 from shipgym.engine.parts import Part
 from shipgym.engine.records import Record, field_types, is_record
-from shipgym.engine.vessel import Vessel
+from shipgym.engine.vessel import Vessel, vessel_of
 from shipgym.errors import InputError
+from shipgym.python_files import load_file
 from shipgym.ships.particulars import Particulars
 from shipgym.ships.steering import SteeringGear
 
 RATES = ("udot", "vdot", "rdot", "pdot", "qdot")
 Accelerations = Callable[[Any, Any, Any], tuple[float, float, float, float, float]]
+
+
+def record_of(values: Mapping[str, float], module: str) -> Any:
+    """A record of coefficients with these values as defaults, for the file of a ship."""
+    names, defaults = [*values], [*values.values()]
+    record = namedtuple("Coefficients", names, defaults=defaults, module=module)  # type: ignore[misc]
+    record.__annotations__ = dict.fromkeys(values, float)
+    return record
 
 
 @dataclass(frozen=True)
@@ -139,9 +145,11 @@ class ShipEquations:
 
     def vessel(self, coefficients: Mapping[str, float], lag: bool) -> Vessel:
         """What is compiled of the ship: the same whatever her coefficients are, but for the switches."""
-        chosen = tuple((name, bool(coefficients[name])) for name in self.switches)
-        functions = (self.accelerations, self.shaft_acceleration)
-        return _vessel(self.name, self.state_names, self.coefficients_record, functions, chosen, lag)
+        parts: dict[str, Any] = {"accelerations": Part(self.accelerations)}
+        parts |= {name: bool(coefficients[name]) for name in self.switches}
+        if self.shaft_acceleration is not None:
+            parts["shaft_acceleration"] = Part(self.shaft_acceleration)
+        return vessel_of(self.name, self.state_names, self.coefficients_record, tuple(parts.items()), lag)
 
     def numbers(
         self, coefficients: Mapping[str, float], particulars: Particulars, shaft_speed: float = 0.0
@@ -154,51 +162,13 @@ class ShipEquations:
         return {"name": self.name, "source": self.source}
 
 
-@cache
-def _vessel(
-    name: str,
-    state_names: tuple[str, ...],
-    record: Record,
-    functions: tuple[Callable[..., Any], Callable[..., Any] | None],
-    switches: tuple[tuple[str, bool], ...],
-    lag: bool,
-) -> Vessel:
-    accelerations, shaft = functions
-    parts: dict[str, Any] = {"accelerations": Part(accelerations), **dict(switches)}
-    if shaft is not None:
-        parts["shaft_acceleration"] = Part(shaft)
-    return Vessel(name, state_names, record, parts, lag)
-
-
 def read_ship_equations(path: str | Path) -> ShipEquations:
     """The ship that a Python file defines as `SHIP`; the file is run.
 
     Raises InputError for a file that is not there, cannot be run, or defines no `SHIP`.
     """
     path = Path(path).resolve()
-    if not path.is_file():
-        raise InputError(
-            f"{path}: no such file, expected a Python file that defines SHIP = ShipEquations(...)"
-        )
-    return _read(path, path.stat().st_mtime_ns)
-
-
-@cache
-def _read(path: Path, changed: int) -> ShipEquations:
-    """Read once as long as the file does not change, so that models of one ship share what is compiled."""
-    name = f"shipgym_ship_{path.stem}_{abs(hash((path, changed))):x}"
-    spec = importlib.util.spec_from_file_location(name, path)
-    assert spec is not None
-    assert spec.loader is not None
-    module: ModuleType = importlib.util.module_from_spec(spec)
-    sys.modules[name] = module
-    try:
-        spec.loader.exec_module(module)
-    except InputError as error:
-        raise InputError(f"{path}: {error}") from None
-    except Exception as error:
-        raise InputError(f"{path}: cannot be run: {type(error).__name__}: {error}") from error
-    ship = getattr(module, "SHIP", None)
+    ship = getattr(load_file(path), "SHIP", None)
     if not isinstance(ship, ShipEquations):
         raise InputError(f"{path}: SHIP = {ship!r} found, expected SHIP = ShipEquations(...)")
     object.__setattr__(ship, "path", path)

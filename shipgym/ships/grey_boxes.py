@@ -16,14 +16,14 @@ from shipgym.arrays import Floats
 from shipgym.engine.motion import Motion, Ship
 from shipgym.engine.parts import Part
 from shipgym.engine.records import Record
-from shipgym.engine.vessel import Vessel
+from shipgym.engine.vessel import Vessel, vessel_of
 from shipgym.errors import InputError
 from shipgym.ships.manoeuvring_model import ManoeuvringModel
 from shipgym.ships.particulars import Particulars
 from shipgym.ships.structures import WITH_REFERENCE
 from shipgym.ships.term_functions import accelerations_function, accelerations_source, coefficients_record
-from shipgym.ships.term_table import Structure
-from shipgym.ships.terms import CHANNEL, read_terms
+from shipgym.ships.term_table import ALWAYS_MEASURED, MEASURED, Structure
+from shipgym.ships.terms import read_terms
 
 GREY_BOX = WITH_REFERENCE
 SOURCE = (
@@ -31,7 +31,6 @@ SOURCE = (
     "minor rudder"
 )
 LINEAR = read_terms("du, v, r, delta, 1")
-CHANNELS = ("u", "v", "r", "p", "phi", "delta", "n")
 
 
 @dataclass(frozen=True)
@@ -89,25 +88,23 @@ class GreyBox(Structure):
         """Whether the reference ship has a rolling motion, and with it the target."""
         return "phi" in self.ship.state_names
 
+    @property
+    def remembers(self) -> bool:
+        """Whether the reference ship has a memory of yaw, and with it the target."""
+        return "q" in self.ship.state_names
+
     @cached_property
     def required_channels(self) -> tuple[str, ...]:
         """Channels a trial needs: those of the terms and those that the reference ship is evaluated at."""
-        needed = {CHANNEL[symbol] for symbol in self.symbols} | {"u", "v", "r", "delta"}
+        needed = self.channels | ALWAYS_MEASURED
         needed |= {"p", "phi"} if self.rolls else set()
         needed |= {"n"} if self.shaft else set()
-        return tuple(name for name in CHANNELS if name in needed)
+        return tuple(name for name in MEASURED if name in needed)
 
     @property
     def has_rudder(self) -> bool:
         """Whether a rudder turns it: that of the reference ship does."""
         return True
-
-    @property
-    def state_names(self) -> tuple[str, ...]:
-        """Names of the state, with roll or memory where the reference ship has it."""
-        roll = ("p", "phi") if self.rolls else ()
-        memory = ("q",) if "q" in self.ship.state_names else ()
-        return ("x", "y", "psi", "u", "v", "r", *roll, *memory, "delta")
 
     @property
     def needs_shaft_speed(self) -> bool:
@@ -121,7 +118,23 @@ class GreyBox(Structure):
 
     def vessel(self, coefficients: Mapping[str, float], lag: bool) -> Vessel:
         """What is compiled of a ship with this grey box: the reference ship's functions and the terms."""
-        return _vessel(self.ship.vessel, self._source, len(self._terms), self.shaft, self.state_names, lag)
+        terms = coefficients_record(len(self._terms), "GreyBoxTerms")
+        return self._vessel(terms, {"term_accelerations": Part(accelerations_function(self._source))}, lag)
+
+    def _vessel(self, terms: Record, functions: dict[str, Any], lag: bool, **summed: Any) -> Vessel:
+        """Functions of the reference ship, of the terms with their record of coefficients, and their sum."""
+        reference = self.ship.vessel
+        parts = {
+            **reference.functions,
+            "accelerations": Part(accelerations),
+            "reference_accelerations": reference.functions["accelerations"],
+            "KNOWS_SHAFT": self.shaft,
+            **functions,
+        }
+        parts.pop("shaft_acceleration", None)  # the shaft turns as commanded
+        record = _coefficients(reference.coefficients, terms)
+        named = tuple(parts.items()), lag, tuple(summed.items())
+        return vessel_of("a grey box", self.state_names, record, *named)
 
     @cached_property
     def _source(self) -> str:
@@ -132,7 +145,7 @@ class GreyBox(Structure):
         self, coefficients: Mapping[str, float], particulars: Particulars, shaft_speed: float = 0.0
     ) -> Floats:
         """Numbers of the vessel's coefficients: the reference ship's, then those of the terms."""
-        terms = super().numbers(coefficients, particulars, shaft_speed)
+        terms = self.term_numbers(coefficients, particulars, shaft_speed)
         return np.concatenate([self.ship.ship_numbers(), terms])
 
     def converted_accelerations(
@@ -148,19 +161,14 @@ class GreyBox(Structure):
         ship = self.ship
         fast = ship.particulars["speed"] / particulars["speed"]
         quick = fast * particulars["length"] / ship.particulars["length"]
-        u = np.asarray(channels["u"], dtype=float)
-        zero = np.zeros_like(u)
-        n = np.full_like(u, ship.service_shaft_speed)
-        if self.shaft:
-            n = np.asarray(channels["n"], dtype=float) * (ship.service_shaft_speed / shaft_speed)
         scale = {"u": fast, "v": fast, "r": quick, "p": quick, "phi": 1.0, "q": quick**2, "delta": 1.0}
-        values = {name: scale[name] * np.asarray(channels.get(name, zero), dtype=float) for name in scale}
-        values["n"] = n
-        states = np.stack([values.get(name, zero) for name in ship.state_names], axis=-1)
-        commands = np.stack([values[name] for name in ship.command_names], axis=-1)
-        rates = ship.derivatives(states, commands)
+        values = {name: scale[name] * np.asarray(channels[name]) for name in scale if name in channels}
+        values["n"] = np.full_like(values["u"], ship.service_shaft_speed)
+        if self.shaft:
+            values["n"] = np.asarray(channels["n"]) * (ship.service_shaft_speed / shaft_speed)
         back = {"u": 1.0 / (fast * quick), "v": 1.0 / (fast * quick), "r": quick**-2, "q": quick**-3}
-        return {q: rates[:, ship.state_names.index(q)] * back[q] for q in back if q in ship.state_names}
+        rates = ship.rates(values)
+        return {q: rates[q] * back[q] for q in back if q in rates}
 
     def to_dict(self) -> dict[str, Any]:
         """The table and the whole reference ship, as they stand in a model file."""
@@ -210,27 +218,7 @@ def accelerations(
 
 
 @cache
-def _vessel(
-    reference: Vessel, source: str, n_terms: int, shaft: bool, state_names: tuple[str, ...], lag: bool
-) -> Vessel:
-    parts = {"term_accelerations": Part(accelerations_function(source))}
-    record = coefficients_record(n_terms, "GreyBoxTerms")
-    return grey_box_vessel(reference, record, parts, shaft, state_names, lag)
-
-
-def grey_box_vessel(
-    reference: Vessel, terms: Record, functions: Mapping[str, Any], shaft: bool,
-    state_names: tuple[str, ...], lag: bool, summed: Mapping[str, Any] | None = None,
-) -> Vessel:  # fmt: skip
-    """Functions of the reference ship, of the terms with their record of coefficients, and their sum."""
-    fields = [("known", Ship), ("reference", reference.coefficients), ("terms", terms)]
-    parts = {
-        **reference.functions,
-        "accelerations": Part(accelerations),
-        "reference_accelerations": reference.functions["accelerations"],
-        "KNOWS_SHAFT": shaft,
-        **functions,
-    }
-    parts.pop("shaft_acceleration", None)  # the shaft turns as commanded
-    record = NamedTuple("GreyBoxCoefficients", fields)  # type: ignore[misc]
-    return Vessel("a grey box", state_names, record, parts, lag, summed or {})
+def _coefficients(reference: Record, terms: Record) -> Record:
+    fields = [("known", Ship), ("reference", reference), ("terms", terms)]
+    record: Record = NamedTuple("GreyBoxCoefficients", fields)  # type: ignore[misc]
+    return record

@@ -45,8 +45,7 @@ def _prime_mass(model: ManoeuvringModel) -> float:
 
 
 def _particulars(model: ManoeuvringModel) -> Floats:
-    p = model.particulars.completed()
-    table = model.dynamics
+    p, table = model.particulars.completed(), model.dynamics
     if isinstance(table, SharedStructure):
         return _prime_mass(model) * _with_arms(table.inertia(model.coefficients, p), p)
     return particulars_inertia(p)
@@ -66,12 +65,13 @@ def _with_arms(prime: Floats, p: Particulars) -> Floats:
 def _container(model: ManoeuvringModel) -> Floats:
     """Son & Nomoto 1981; the added mass in sway acts above the centre, so that roll couples to sway."""
     c, L = model.coefficients, model.particulars["length"]
-    prime = np.zeros((3, 4))
-    prime[0, 0] = c["m"] + c["mx"]
-    prime[1, 1], prime[1, 3] = c["m"] + c["my"], -c["my"] * c["ly"] * L
-    prime[1, 2] = prime[2, 1] = c["my"] * c["alpha_y"] * L
-    prime[2, 2] = (c["Iz"] + c["Jz"]) * L * L
-    return _prime_mass(model) * prime
+    yaw = c["my"] * c["alpha_y"] * L
+    prime = [
+        [c["m"] + c["mx"], 0.0, 0.0, 0.0],
+        [0.0, c["m"] + c["my"], yaw, -c["my"] * c["ly"] * L],
+        [0.0, yaw, (c["Iz"] + c["Jz"]) * L * L, 0.0],
+    ]
+    return _prime_mass(model) * np.array(prime)
 
 
 def _mmg(model: ManoeuvringModel) -> Floats:
@@ -80,19 +80,18 @@ def _mmg(model: ManoeuvringModel) -> Floats:
     length, draught = c.get("L", p.length), c.get("d", p.draught)
     added = 0.5 * p.require("water_density") * length**2 * (draught or p.require("draught"))
     mass, static, yaw = rigid_inertia(model)
-    matrix = np.zeros((3, 4))
-    matrix[0, 0] = mass + c["mx"] * added
-    matrix[1, 1], matrix[1, 2] = mass + c["my"] * added, static
-    matrix[2, 1], matrix[2, 2] = static, yaw + c["Jz"] * added * length**2
-    return matrix
+    rows = [
+        [mass + c["mx"] * added, 0.0, 0.0, 0.0],
+        [0.0, mass + c["my"] * added, static, 0.0],
+        [0.0, static, yaw + c["Jz"] * added * length**2, 0.0],
+    ]
+    return np.array(rows)
 
 
 def _tanker(model: ManoeuvringModel, water_depth: float) -> Floats:
     """Van Berlekom & Goddard 1972, bis system: by the ship's mass, its yaw inertia by mass and length^2."""
     c, p = model.coefficients, model.particulars
     shallow = 0.0 if np.isposinf(water_depth) else p["draught"] / (water_depth - p["draught"])
-    matrix = np.zeros((3, 4))
-    matrix[0, 0] = c["m11"] - c["X_udotz"] * shallow
-    matrix[1, 1] = c["m22"] - c["Y_vdotz"] * shallow
-    matrix[2, 2] = (c["m33"] - c["N_rdotz"] * shallow) * p["length"] ** 2
-    return float(p["mass"]) * matrix
+    masses = [c["m11"] - c["X_udotz"] * shallow, c["m22"] - c["Y_vdotz"] * shallow]
+    yaw = (c["m33"] - c["N_rdotz"] * shallow) * p["length"] ** 2
+    return float(p["mass"]) * np.diag([*masses, yaw, 0.0])[:3]

@@ -20,11 +20,11 @@ from shipgym.engine.mathematics import two_to
 from shipgym.engine.motion import Motion, Ship, accelerations
 from shipgym.engine.parts import Part
 from shipgym.engine.places import row_of
-from shipgym.engine.records import table_of
+from shipgym.engine.records import Record, table_of
 from shipgym.engine.stages import Point, Sums
 from shipgym.engine.vessel import Vessel
 from shipgym.errors import InputError
-from shipgym.ships.grey_boxes import GreyBox, grey_box_vessel
+from shipgym.ships.grey_boxes import GreyBox
 from shipgym.ships.particulars import Particulars
 from shipgym.ships.terms import Term
 
@@ -136,14 +136,16 @@ class KernelBox(GreyBox):
 
     def vessel(self, coefficients: Mapping[str, float], lag: bool) -> Vessel:
         """What is compiled: the reference ship's functions and the sum over centres, read at run time."""
-        return _vessel(self.ship.vessel, self.kernel.size, self.shaft, self.state_names, lag)
+        size = self.kernel.size
+        functions = {"N_CENTRES": size, "term_accelerations": Part(kernel_accelerations)}
+        return self._vessel(_kernel_record(size), functions, lag, **SUMMED, N_ROWS=size)
 
     def numbers(
         self, coefficients: Mapping[str, float], particulars: Particulars, shaft_speed: float = 0.0
     ) -> Floats:
         """Numbers of the vessel's coefficients: the reference ship's, scales, offset and table of centres."""
         kernel = self.kernel
-        weights = self.acceleration_matrix(particulars, shaft_speed) @ np.array(list(coefficients.values()))
+        weights = self.term_numbers(coefficients, particulars, shaft_speed)
         table = np.zeros((kernel.size, ROW))
         rows = table[: len(kernel.centres)]
         rows[:, :4] = PER_ROOT_LN_2 * kernel.centres
@@ -219,17 +221,17 @@ def kernel_accelerations(
     return udot, vdot, rdot, 0.0, 0.0
 
 
+SUMMED = {
+    "sail_lanes": Part(stages.sail_lanes, inline=False),
+    "term_accelerations": Part(accelerations),
+    "point_of": Part(coordinates),
+    "row_sums": Part(add_centre),
+    "sum_accelerations": Part(sum_accelerations),
+}
+
+
 @cache
-def _vessel(reference: Vessel, size: int, shaft: bool, state_names: tuple[str, ...], lag: bool) -> Vessel:
+def _kernel_record(size: int) -> Record:
     fields = [(name, float) for name in KernelCoefficients._fields[:-1]]
-    terms = NamedTuple("KernelCoefficients", [*fields, ("table", table_of(ROW * size))])  # type: ignore[misc]
-    functions = {"N_CENTRES": size, "term_accelerations": Part(kernel_accelerations)}
-    summed = {
-        "sail_lanes": Part(stages.sail_lanes, inline=False),
-        "term_accelerations": Part(accelerations),
-        "point_of": Part(coordinates),
-        "row_sums": Part(add_centre),
-        "sum_accelerations": Part(sum_accelerations),
-        "N_ROWS": size,
-    }
-    return grey_box_vessel(reference, terms, functions, shaft, state_names, lag, summed)
+    record: Record = NamedTuple("KernelCoefficients", [*fields, ("table", table_of(ROW * size))])  # type: ignore[misc]
+    return record

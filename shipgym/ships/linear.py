@@ -2,7 +2,9 @@
 
 Sources: Nomoto, Taguchi, Honda & Hirano 1957, On the steering qualities of ships, International
 Shipbuilding Progress 4; Fossen 2011, Handbook of Marine Craft Hydrodynamics and Motion Control, 7.2
-(second-order transfer function, T = T1 + T2 - T3).
+(second-order transfer function, T = T1 + T2 - T3). Whether a ship holds a straight course by itself:
+Davidson & Schiff 1946, Turning and course-keeping qualities, Trans. SNAME 54; Lewis 1989, Principles of
+Naval Architecture III, chapter IX, section 4 (the criterion C).
 """
 
 from __future__ import annotations
@@ -14,6 +16,7 @@ import numpy as np
 
 from shipgym.arrays import Floats
 from shipgym.errors import InputError
+from shipgym.ships.inertia import inertia
 
 if TYPE_CHECKING:
     from shipgym.ships.ship_model import ShipModel
@@ -24,6 +27,7 @@ SLOWEST, FASTEST = 0.75, 1.25  # speed of straight running over service speed wh
 LARGEST_RUDDER = np.radians(20.0)  # neutral rudder beyond which a model is not that of a ship
 LARGEST_SWAY = 0.5  # over service speed, likewise
 AT_REST = 1e-8  # prime acceleration that counts as zero
+SIDES = {"starboard": 1, "port": -1}
 # rate that each unknown brings to 0
 BALANCED_BY = {"u": "u", "v": "v", "delta": "r", "phi": "p", "q": "q", "n": "n"}
 
@@ -173,14 +177,13 @@ def linearise(model: ShipModel, at: StraightRunning, side: int = 0) -> tuple[Flo
     varied = [model.state_names.index(name) for name in (*names, "delta")]
     n = len(names)
     scales = _scales(model)
+    signs = side * np.array([-1.0] + n * [1.0]) if side else np.ones(n + 1)
     steps = np.zeros((n + 1, len(scales)))
-    steps[range(n + 1), varied] = STEP * scales[varied]
-    if side:
-        steps *= side * np.array([-1.0] + n * [1.0])[:, None]
+    steps[range(n + 1), varied] = STEP * signs * scales[varied]
     state = at.state(model)
-    behind = state - (0.0 if side else 1.0) * steps
+    behind = np.tile(state, (n + 1, 1)) if side else state - steps
     change = (_rates(model, state + steps) - _rates(model, behind))[:, varied[:n]]
-    jacobian = change.T / (STEP * (side * np.array([-1.0] + n * [1.0]) if side else 2.0))
+    jacobian = change.T / (STEP * signs * (1.0 if side else 2.0))
     if n > 2:
         follows = np.linalg.solve(jacobian[2:, 2:n], jacobian[2:][:, [0, 1, n]])
         jacobian = jacobian[:2][:, [0, 1, n]] - jacobian[:2, 2:n] @ follows
@@ -230,3 +233,61 @@ def is_course_stable(model: ShipModel) -> bool:
     """
     A, _ = steering_state_space(model)
     return bool(np.all(np.linalg.eigvals(A).real < 0.0))
+
+
+@dataclass(frozen=True)
+class StraightLineStability:
+    """Straight-line stability with the rudder held."""
+
+    # of sway and yaw for the smallest turns to `starboard` and to `port`, 1/s, the largest real part first.
+    # They are the same for a ship alike to both sides
+    eigenvalues: dict[str, tuple[complex, ...]]
+    # C = Y_v (N_r - m xG) - N_v (Y_r - m) of either side, prime system: positive for a stable ship. None
+    # where the particulars do not tell the mass
+    criterion: dict[str, float] | None
+
+    @property
+    def index(self) -> float:
+        """Largest real part of the eigenvalues of either side, 1/s: negative for a stable ship."""
+        return max(values[0].real for values in self.eigenvalues.values())
+
+    @property
+    def stable(self) -> bool:
+        """Whether a disturbance to either side dies out."""
+        return self.index < 0.0
+
+    @property
+    def unstable_sides(self) -> tuple[str, ...]:
+        """Sides to which the ship leaves her course by herself."""
+        return tuple(side for side, values in self.eigenvalues.items() if not values[0].real < 0.0)
+
+
+def straight_line_stability(model: ShipModel) -> StraightLineStability:
+    """Straight-line stability of a ship about straight running, rudder, speed and shaft fixed, roll at once.
+
+    The criterion is the determinant of the linear derivatives of force, which is that of the inertia times
+    that of the linearised accelerations; the inertia is positive, so both tell the same. Raises InputError if
+    the model has no straight course.
+    """
+    at = straight_running(model)
+    matrices = {name: linearise(model, at, side)[0] for name, side in SIDES.items()}
+    eigenvalues = {
+        name: tuple(sorted(np.linalg.eigvals(A).tolist(), key=lambda value: -complex(value).real))
+        for name, A in matrices.items()
+    }
+    return StraightLineStability(eigenvalues, _criterion(model, matrices))
+
+
+def _criterion(model: ShipModel, matrices: dict[str, Floats]) -> dict[str, float] | None:
+    """Determinant of the force derivatives of sway and yaw, prime system; None without sway or mass."""
+    if "q" in model.state_names:
+        return None
+    try:
+        M = inertia(model)[1:, 1:3]
+        p = model.particulars.completed()
+        unit = 0.5 * p.require("water_density") * p.length**3
+    except InputError:
+        return None
+    length, speed = p.length, model.particulars["speed"]
+    size = unit**2 * length**2 * (speed / length) ** 2
+    return {name: float(np.linalg.det(M) * np.linalg.det(A) / size) for name, A in matrices.items()}

@@ -60,11 +60,7 @@ class ManoeuvringModel:
                 f"coefficients of {self.name!r}: {wrong[0]} is {ordered[wrong[0]]}, expected a number"
             )
         object.__setattr__(self, "coefficients", ordered)
-        if (
-            (isinstance(self.dynamics, Structure) or self.dynamics.scales)
-            and "n" in self.command_names
-            and not self.service_shaft_speed > 0
-        ):
+        if self.dynamics.scales and "n" in self.command_names and not self.service_shaft_speed > 0:
             raise InputError(
                 f"service_shaft_speed of {self.name!r}: {self.service_shaft_speed:g} found, expected that at "
                 f"service speed in 1/s: structure {self.structure!r} has a shaft speed"
@@ -116,13 +112,8 @@ class ManoeuvringModel:
         Raises InputError for water that is too shallow, and for particulars that the structure cannot use.
         """
         self.check_depth(water_depth)
-        p, gear = self.particulars, self.steering
-        ship = Ship(
-            length=p["length"], speed=p["speed"], rudder_limit=gear.limit, rudder_rate=gear.rate,
-            gear_frequency=1.0 / gear.time_constant if gear.time_constant else 0.0,
-            shaft=self.service_shaft_speed, water_depth=water_depth, scale_speed=p["speed"],
-        )  # fmt: skip
-        return np.concatenate([ship, self.dynamics.numbers(self.coefficients, p, self.service_shaft_speed)])
+        own = self.dynamics.numbers(self.coefficients, self.particulars, self.service_shaft_speed)
+        return np.concatenate([ship_of(self, water_depth), own])
 
     @property
     def state_names(self) -> tuple[str, ...]:
@@ -183,6 +174,13 @@ class ManoeuvringModel:
         loop = ship_loop(self.vessel, "derivatives")
         loop(flat, two_commands(flat_commands), depths, self.ship_numbers(), out)
         return out.reshape(*shape, len(self.state_names))
+
+    def rates(self, channels: Mapping[str, Floats], water_depth: float = np.inf) -> dict[str, Floats]:
+        """`derivatives` by name at channels of shape (n_samples,); a state that is absent is 0."""
+        none = np.zeros(len(channels["u"]))
+        states = np.stack([channels.get(name, none) for name in self.state_names], axis=-1)
+        commands = np.stack([channels[name] for name in self.command_names], axis=-1)
+        return dict(zip(self.state_names, self.derivatives(states, commands, water_depth).T, strict=True))
 
     def to_dict(self) -> dict[str, Any]:
         """What a model file holds, ready for JSON (format in `shipgym.ships.model_file`)."""
@@ -274,3 +272,13 @@ def _within(values: Floats, low: float, high: float, what: str, expected: str, w
     if len(wrong):
         row = int(wrong[0])
         raise InputError(f"{where}: row {row}: {what} {values[row]:g} found, expected {expected}")
+
+
+def ship_of(model: ManoeuvringModel, water_depth: float = np.inf) -> Ship:
+    """What every ship has beside her coefficients, as a record."""
+    gear, p = model.steering, model.particulars
+    return Ship(
+        length=p["length"], speed=p["speed"], rudder_limit=gear.limit, rudder_rate=gear.rate,
+        gear_frequency=1.0 / gear.time_constant if gear.time_constant else 0.0,
+        shaft=float(model.service_shaft_speed), water_depth=water_depth, scale_speed=p["speed"],
+    )  # fmt: skip

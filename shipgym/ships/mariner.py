@@ -13,7 +13,7 @@ from math import sqrt
 from shipgym.ships.particulars import Particulars
 from shipgym.ships.ship_model import ShipModel
 from shipgym.ships.steering import SteeringGear
-from shipgym.ships.structures import ABKOWITZ
+from shipgym.ships.structures import get_structure
 
 LENGTH = 160.93
 WATER_DENSITY = 1025.0
@@ -51,6 +51,6 @@ def mariner(service_speed: float = 7.7175) -> ShipModel:
         structure="abkowitz",
         particulars=particulars,
         steering=SteeringGear(rudder_limit_deg=40.0, rudder_rate_deg_s=5.0, time_constant=1.0),
-        coefficients={name: coefficients[name] for name in ABKOWITZ.coefficient_names},
+        coefficients={name: coefficients[name] for name in get_structure("abkowitz").coefficient_names},
         provenance={"source": "Chislett & Strom-Tejsen 1965, in the form of the MSS toolbox (Fossen 1994)"},
     )

@@ -10,7 +10,7 @@ the particulars, and the shaft speed counts by that at service speed: a model ho
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from math import copysign, fabs, pi, sqrt
-from typing import ClassVar, NamedTuple
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -19,7 +19,7 @@ from shipgym.engine.mathematics import arctan2, exponential, small_sin_cos
 from shipgym.engine.motion import Motion, Ship
 from shipgym.errors import InputError
 from shipgym.ships import kvlcc2
-from shipgym.ships.equations import ShipEquations
+from shipgym.ships.equations import ShipEquations, record_of
 from shipgym.ships.particulars import Particulars
 
 MMG = "mmg"
@@ -28,75 +28,66 @@ SLOWEST = 0.02  # of service speed, below which v' and r' lose their meaning
 LEAST_SPEED, MOST_SPEED = 0.01, 4.0  # over service speed, for which the power law of the damping holds
 
 
-class Coefficients(NamedTuple):
-    """Those of KVLCC2; hull by rho L d U^2 / 2 (moments L more), added mass by rho L^2 d / 2 (rho L^4 d / 2).
+#: What the general form has beyond the standard method, with the values that make it the standard one.
+BEYOND = {
+    "thrust": 1.0,  # factor on the open-water thrust coefficient
+    "delta_0": 0.0,  # rad, added to the rudder angle
+    "Y_0": 0.0,
+    "N_0": 0.0,
+    "c_R": 0.0,  # rudder force times 1 + c_R |sin alpha_R|
+    "speed_power": 0.0,  # of U / U0 in Y_r and N_r
+    "N_absr": 0.0,  # by |r'|: damping that differs to the two sides
+    "N_rr": 0.0,
+}
+#: Coefficients that are identified: hull by rho L d U^2 / 2 (moments L more), added mass by rho L^2 d / 2
+#: (rho L^4 d / 2). C_2 is the mean of the sides and C_2_side half of starboard less port; gamma_R is the mean
+#: for beta_R > 0 and < 0, gamma_R_side half the difference.
+IDENTIFIED = (
+    "mx", "my", "Jz", "R_0", "X_vv", "X_vr", "X_rr", "X_vvvv", "Y_v", "Y_r", "Y_vvv", "Y_vvr", "Y_vrr",
+    "Y_rrr", "N_v", "N_r", "N_vvv", "N_vvr", "N_vrr", "N_rrr", "thrust", "w_P0", "C_1", "C_2", "C_2_side",
+    "t_R", "a_H", "x_H", "l_R", "gamma_R", "gamma_R_side", "epsilon", "kappa", "f_alpha", "delta_0", "Y_0",
+    "N_0", "c_R", "speed_power", "N_absr", "N_rr",
+)  # fmt: skip
+#: Those that are known beforehand; nD_U0 is n D_P / U0 at service speed.
+KNOWN = ("t_P", "x_P", "x_R", "k_0", "k_1", "k_2", "nD_U0")
 
-    The first 41 are identified, the rest, from `t_P` on, known beforehand.
+
+def standard_form(model_coefficients: Mapping[str, float], speed: float, shaft: float) -> dict[str, float]:
+    """Coefficients of the general form of a ship given in the standard form, as KVLCC2 is.
+
+    `speed`, m/s, and `shaft`, 1/s, are those at service. Raises InputError for the variant of shipmmg, whose
+    wake has another law.
     """
-
-    mx: float = KVLCC2.mx
-    my: float = KVLCC2.my
-    Jz: float = KVLCC2.Jz
-    R_0: float = KVLCC2.R_0
-    X_vv: float = KVLCC2.X_vv
-    X_vr: float = KVLCC2.X_vr
-    X_rr: float = KVLCC2.X_rr
-    X_vvvv: float = KVLCC2.X_vvvv
-    Y_v: float = KVLCC2.Y_v
-    Y_r: float = KVLCC2.Y_r
-    Y_vvv: float = KVLCC2.Y_vvv
-    Y_vvr: float = KVLCC2.Y_vvr
-    Y_vrr: float = KVLCC2.Y_vrr
-    Y_rrr: float = KVLCC2.Y_rrr
-    N_v: float = KVLCC2.N_v
-    N_r: float = KVLCC2.N_r
-    N_vvv: float = KVLCC2.N_vvv
-    N_vvr: float = KVLCC2.N_vvr
-    N_vrr: float = KVLCC2.N_vrr
-    N_rrr: float = KVLCC2.N_rrr
-    thrust: float = 1.0  # factor on the open-water thrust coefficient
-    w_P0: float = KVLCC2.w_P0
-    C_1: float = KVLCC2.C_1
-    C_2: float = 0.5 * (KVLCC2.C_2_starboard + KVLCC2.C_2_port)  # mean of the sides
-    C_2_side: float = 0.5 * (KVLCC2.C_2_starboard - KVLCC2.C_2_port)  # half of starboard less port
-    t_R: float = KVLCC2.t_R
-    a_H: float = KVLCC2.a_H
-    x_H: float = KVLCC2.x_H
-    l_R: float = KVLCC2.l_R
-    gamma_R: float = 0.5 * (KVLCC2.gamma_plus + KVLCC2.gamma_minus)  # mean for beta_R > 0 and < 0
-    gamma_R_side: float = 0.5 * (KVLCC2.gamma_plus - KVLCC2.gamma_minus)  # half the difference
-    epsilon: float = KVLCC2.epsilon
-    kappa: float = KVLCC2.kappa
-    f_alpha: float = KVLCC2.f_alpha
-    delta_0: float = 0.0  # rad, added to the rudder angle
-    Y_0: float = 0.0
-    N_0: float = 0.0
-    c_R: float = 0.0  # rudder force times 1 + c_R |sin alpha_R|
-    speed_power: float = 0.0  # of U / U0 in Y_r and N_r
-    N_absr: float = 0.0  # by |r'|: damping that differs to the two sides
-    N_rr: float = 0.0
-    # not identified
-    t_P: float = KVLCC2.t_P
-    x_P: float = KVLCC2.x_P
-    x_R: float = KVLCC2.x_R
-    k_0: float = KVLCC2.k_0
-    k_1: float = KVLCC2.k_1
-    k_2: float = KVLCC2.k_2
-    nD_U0: float = 2.171283  # n D_P / U0 at service speed
-    # dimensions, from the particulars
-    d: float = KVLCC2.d  # m
-    volume: float = KVLCC2.volume  # m^3
-    xG: float = KVLCC2.xG  # m forward of midship
-    gyradius: float = 0.25 * KVLCC2.L  # m
-    D_P: float = KVLCC2.D_P  # m
-    A_R: float = KVLCC2.A_R  # m^2, all rudders
-    eta: float = KVLCC2.D_P / KVLCC2.H_R  # diameter of the propeller by span of the rudder in its race
-    propellers: float = 1.0
+    c = BEYOND | dict(model_coefficients)
+    if c["PACKAGE_FORM"]:
+        raise InputError("kvlcc2 in the form 'shipmmg' found, expected the published one: its wake differs")
+    for name, plus, minus in (("C_2", "C_2_starboard", "C_2_port"), ("gamma_R", "gamma_plus", "gamma_minus")):
+        c |= {name: 0.5 * (c[plus] + c[minus]), f"{name}_side": 0.5 * (c[plus] - c[minus])}
+    c["nD_U0"] = shaft * c["D_P"] / speed
+    return {name: c[name] for name in IDENTIFIED + KNOWN}
 
 
-NAMES = Coefficients._fields
-IDENTIFIED = NAMES[: NAMES.index("t_P")]
-KNOWN = NAMES[NAMES.index("t_P") : NAMES.index("d")]
+def dimensions(p: Particulars) -> dict[str, float]:
+    """What the equations take from the particulars, SI units.
+
+    Draught, volume, xG, yaw gyradius, D_P, A_R of all rudders, eta (diameter of the propeller by span of the
+    rudder in its race) and number of propellers. A single rudder between two propellers stands in no race.
+    Raises InputError for what is not known.
+    """
+    rudders, propellers = p.rudders or 1.0, p.propellers or 1.0
+    D_P, A_R = p.require("propeller_diameter"), p.require("rudder_area")
+    span = sqrt(p.require("rudder_aspect_ratio") * A_R / rudders)
+    return {
+        "d": p.require("draught"), "volume": p.require("mass") / p.require("water_density"),
+        "xG": p.require("xg"), "gyradius": p.require("yaw_gyradius"), "D_P": D_P, "A_R": A_R,
+        "eta": min(D_P / span, 1.0) if rudders >= propellers else 0.0, "propellers": propellers,
+    }  # fmt: skip
+
+
+#: KVLCC2 as a model of 7 m.
+STANDARD = standard_form(kvlcc2.SHIP.coefficients, 1.179, 11.85159) | {"nD_U0": 2.171283}
+PARTICULARS = replace(kvlcc2.SHIP.particulars, rudder_aspect_ratio=KVLCC2.H_R**2 / KVLCC2.A_R)
+Coefficients = record_of(STANDARD | dimensions(PARTICULARS), __name__)
 
 
 def power_law(x: float, power: float) -> float:
@@ -110,7 +101,7 @@ def power_law(x: float, power: float) -> float:
     return exponential(power * 16.0 * z * series)
 
 
-def accelerations(motion: Motion, c: Coefficients, ship: Ship) -> tuple[float, float, float, float, float]:
+def accelerations(motion: Motion, c: Any, ship: Ship) -> tuple[float, float, float, float, float]:
     """Accelerations in surge, sway and yaw, body frame, origin midship, from forces per density."""
     u, v, r, L = motion.u, motion.v, motion.r, ship.length
     U = max(sqrt(u * u + v * v), SLOWEST * ship.speed)
@@ -173,50 +164,20 @@ class MMGEquations(ShipEquations):
     @property
     def coefficients(self) -> dict[str, float]:
         """Those of KVLCC2."""
-        return {name: getattr(Coefficients(), name) for name in self.coefficient_names}
+        return dict(STANDARD)
 
     def numbers(
         self, coefficients: Mapping[str, float], particulars: Particulars, shaft_speed: float = 0.0
     ) -> Floats:
         """Coefficients, then dimensions; InputError for particulars that do not suffice."""
         values = [coefficients[name] for name in self.coefficient_names]
-        return np.array([*values, *dimensions(particulars)])
-
-
-def dimensions(p: Particulars) -> tuple[float, ...]:
-    """Draught, volume, xG, yaw gyradius, D_P, A_R, eta and number of propellers, SI units.
-
-    A single rudder between two propellers stands in no race. Raises InputError for what is not known.
-    """
-    rudders, propellers = p.rudders or 1.0, p.propellers or 1.0
-    D_P, A_R = p.require("propeller_diameter"), p.require("rudder_area")
-    span = sqrt(p.require("rudder_aspect_ratio") * A_R / rudders)
-    eta = min(D_P / span, 1.0) if rudders >= propellers else 0.0
-    volume = p.require("mass") / p.require("water_density")
-    return (
-        p.require("draught"), volume, p.require("xg"), p.require("yaw_gyradius"), D_P, A_R, eta, propellers,
-    )  # fmt: skip
-
-
-def standard_form(model_coefficients: Mapping[str, float], speed: float, shaft: float) -> dict[str, float]:
-    """Coefficients of the general form of a ship given in the standard form, as KVLCC2 is.
-
-    `speed`, m/s, and `shaft`, 1/s, are those at service. Raises InputError for the variant of shipmmg, whose
-    wake has another law.
-    """
-    c = dict(model_coefficients)
-    if c["PACKAGE_FORM"]:
-        raise InputError("kvlcc2 in the form 'shipmmg' found, expected the published one: its wake differs")
-    for name, plus, minus in (("C_2", "C_2_starboard", "C_2_port"), ("gamma_R", "gamma_plus", "gamma_minus")):
-        c |= {name: 0.5 * (c[plus] + c[minus]), f"{name}_side": 0.5 * (c[plus] - c[minus])}
-    c["nD_U0"] = shaft * c["D_P"] / speed
-    return {name: c.get(name, default) for name, default in SHIP.coefficients.items()}
+        return np.array([*values, *dimensions(particulars).values()])
 
 
 SHIP = MMGEquations(
     MMG,
     kvlcc2.SHIP.source + "; general form",
     Coefficients, accelerations,
-    replace(kvlcc2.SHIP.particulars, rudder_aspect_ratio=KVLCC2.H_R**2 / KVLCC2.A_R),
+    PARTICULARS,
     kvlcc2.SHIP.steering, service_shaft_speed=kvlcc2.SHIP.service_shaft_speed,
 )  # fmt: skip

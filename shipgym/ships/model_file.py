@@ -55,8 +55,9 @@ from shipgym.ships.manoeuvring_model import FORMAT, ManoeuvringModel
 from shipgym.ships.particulars import Particulars
 from shipgym.ships.shared_structure import ACCELERATIONS, AXES, SharedStructure
 from shipgym.ships.steering import SteeringGear
-from shipgym.ships.structures import EQUATION_NAMES, EQUATIONS, SHIPPED_EQUATIONS, SYMBOLS, Structure
-from shipgym.ships.terms import MOST_TERMS
+from shipgym.ships.structures import EQUATIONS, SHIPPED_EQUATIONS
+from shipgym.ships.term_table import EQUATION_NAMES, Structure
+from shipgym.ships.terms import MOST_TERMS, SYMBOLS
 
 Model = TypeVar("Model", bound=ManoeuvringModel)
 
@@ -135,15 +136,23 @@ def _dynamics(value: Any, where: str, make: Callable[..., ManoeuvringModel]) -> 
         for name in ("source", "name"):
             check_text(table.get(name), f"{where}.{name}")
     if "shares" in table:
-        return _shared(table, where)
-    if "kernel" in table:
-        structure = _structure({**table, "equations": {"u": [{"name": "0", "powers": {}}]}}, where)
-        kernel = _kernel(table["kernel"], f"{where}.kernel")
-        return kernel_box(_grey_box(structure, table, where, make), kernel)
+        shares = {**dict.fromkeys(AXES), **check_table(table["shares"], f"{where}.shares")}
+        _check_lists(shares, AXES, (*SYMBOLS, *ACCELERATIONS), f"{where}.shares", "shares")
+        return SharedStructure.from_dict(table)
+    if "kernel" in table:  # stands in place of the terms
+        table = {**table, "equations": {"u": [{"name": "0", "powers": {}}]}}
     if "equations" in table:
-        structure = _structure(table, where)
-        boxed = {"reference", "shaft"} & table.keys()
-        return _grey_box(structure, table, where, make) if boxed else structure
+        _check_lists(table["equations"], EQUATION_NAMES, SYMBOLS, f"{where}.equations")
+        structure = Structure.from_dict(table)
+        if not {"reference", "shaft", "kernel"} & table.keys():
+            return structure
+        reference = check_table(table.get("reference"), f"{where}.reference")
+        box = GreyBox(
+            structure.name, structure.source, structure.equations, structure.normalisation,
+            structure.quantity, read_model(reference, f"{where}.reference", make),
+            check_flag(table.get("shaft", False), f"{where}.shaft"),
+        )  # fmt: skip
+        return kernel_box(box, _kernel(table["kernel"], f"{where}.kernel")) if "kernel" in table else box
     try:
         return EQUATIONS[check_choice(table.get("name"), EQUATIONS, f"{where}.name")]
     except InputError as error:
@@ -151,18 +160,6 @@ def _dynamics(value: Any, where: str, make: Callable[..., ManoeuvringModel]) -> 
             f"{error} A ship with equations of her own is made known by "
             "shipgym.register_ship_equations(file)."
         ) from None
-
-
-def _grey_box(
-    structure: Structure, table: Mapping[str, Any], where: str, make: Callable[..., ManoeuvringModel]
-) -> GreyBox:
-    """A table of terms that is added to a reference ship, which is held whole."""
-    reference = check_table(table.get("reference"), f"{where}.reference")
-    shaft = check_flag(table.get("shaft", False), f"{where}.shaft")
-    return GreyBox(
-        structure.name, structure.source, structure.equations, structure.normalisation, structure.quantity,
-        read_model(reference, f"{where}.reference", make), shaft,
-    )  # fmt: skip
 
 
 def _kernel(value: Any, where: str) -> Kernel:
@@ -173,19 +170,6 @@ def _kernel(value: Any, where: str) -> Kernel:
     }  # fmt: skip
     check_keys(table, shapes, where)
     return Kernel(*(check_array(table.get(name), shapes[name], f"{where}.{name}") for name in shapes))
-
-
-def _structure(table: Mapping[str, Any], where: str) -> Structure:
-    _check_lists(table.get("equations"), EQUATION_NAMES, SYMBOLS, f"{where}.equations")
-    return Structure.from_dict(table)
-
-
-def _shared(table: Mapping[str, Any], where: str) -> Structure:
-    """A table for the forces of captive tests."""
-    shares = check_table(table["shares"], f"{where}.shares")
-    listed = {axis: shares.get(axis) for axis in AXES} | dict(shares)
-    _check_lists(listed, AXES, (*SYMBOLS, *ACCELERATIONS), f"{where}.shares", "shares")
-    return SharedStructure.from_dict(table)
 
 
 def _check_lists(

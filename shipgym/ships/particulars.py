@@ -4,31 +4,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 from shipgym.checks import check_keys, check_number, check_table, check_text
 from shipgym.errors import InputError
+from shipgym.files import shipped_toml
 
 #: Added masses, in the prime system; in a ship file under ``[ship.added_mass]``.
 ADDED_MASSES = ("X_udot", "Y_vdot", "Y_rdot", "N_vdot", "N_rdot")
 
-_PRIME = "in the prime system (mass by rho L^3 / 2), as a derivative: Y_vdot is minus the added mass"
-
-
-@dataclass(frozen=True)
-class _Bounds:
-    """Open bounds of a value, its largest share of the length or of the length squared, and a hint."""
-
-    above: float | None = None
-    below: float | None = None
-    of_length: float | None = None
-    of_square: float | None = None
-    hint: str = ""
-
-
-def _optional(above: float | None = 0.0, below: float | None = None, **bounds: Any) -> Any:
-    return field(default=None, metadata={"bounds": _Bounds(above, below, **bounds)})
+#: Bounds of each value, hints of its unit, and how it grows with the length.
+BOUNDS: dict[str, dict[str, Any]] = shipped_toml("shipgym.ships", "particulars.toml")
 
 
 @dataclass(frozen=True)
@@ -73,34 +60,34 @@ class Particulars(Mapping[str, Any]):
         For values that no ship has.
     """
 
-    length: float = field(metadata={"bounds": _Bounds(0.01, 2000.0, hint="between perpendiculars, in m")})
+    length: float
     name: str = "ship"
-    beam: float | None = _optional(of_length=1.0)
-    draught: float | None = _optional(of_length=0.5)
-    mass: float | None = _optional()
-    xg: float | None = _optional(None, of_length=0.5)
-    yaw_gyradius: float | None = _optional(of_length=0.7)
-    block_coefficient: float | None = _optional(below=1.0)
-    speed: float | None = _optional(below=50.0, hint="in m/s (a knot is 0.514 m/s)")
-    rudder_area: float | None = _optional()
-    propeller_diameter: float | None = _optional(of_length=0.5)
-    rudder_aspect_ratio: float | None = _optional(below=10.0)
-    propeller_pitch_ratio: float | None = _optional(below=3.0)
-    rudders: float | None = _optional(below=9.0)
-    propellers: float | None = _optional(below=9.0)
-    length_overall: float | None = _optional(of_length=2.0)
-    frontal_area: float | None = _optional(of_square=0.5)
-    lateral_area: float | None = _optional(of_square=0.5)
-    lateral_centroid: float | None = _optional(None, of_length=0.5)
-    lateral_centroid_height: float | None = _optional(of_length=0.5)
-    metacentric_height: float | None = _optional(of_length=0.2)
-    roll_period: float | None = _optional(below=200.0)
-    water_density: float | None = _optional(500.0, 1500.0, hint="in kg/m3 (fresh water 1000, sea water 1025)")
-    X_udot: float | None = _optional(-1.0, 0.0, hint=_PRIME)
-    Y_vdot: float | None = _optional(-1.0, 0.0, hint=_PRIME)
-    Y_rdot: float | None = _optional(-1.0, 1.0, hint=_PRIME)
-    N_vdot: float | None = _optional(-1.0, 1.0, hint=_PRIME)
-    N_rdot: float | None = _optional(-1.0, 0.0, hint=_PRIME)
+    beam: float | None = None
+    draught: float | None = None
+    mass: float | None = None
+    xg: float | None = None
+    yaw_gyradius: float | None = None
+    block_coefficient: float | None = None
+    speed: float | None = None
+    rudder_area: float | None = None
+    propeller_diameter: float | None = None
+    rudder_aspect_ratio: float | None = None
+    propeller_pitch_ratio: float | None = None
+    rudders: float | None = None
+    propellers: float | None = None
+    length_overall: float | None = None
+    frontal_area: float | None = None
+    lateral_area: float | None = None
+    lateral_centroid: float | None = None
+    lateral_centroid_height: float | None = None
+    metacentric_height: float | None = None
+    roll_period: float | None = None
+    water_density: float | None = None
+    X_udot: float | None = None
+    Y_vdot: float | None = None
+    Y_rdot: float | None = None
+    N_vdot: float | None = None
+    N_rdot: float | None = None
     estimated: frozenset[str] = frozenset()
 
     def __post_init__(self) -> None:
@@ -194,11 +181,6 @@ FIELDS: tuple[str, ...] = tuple(item.name for item in fields(Particulars) if ite
 #: Left out of files where not known, so that hashes of models from before them stay.
 LATER = ("rudder_aspect_ratio", "propeller_pitch_ratio", "rudders", "propellers")
 
-_BOUNDS: dict[str, _Bounds] = {
-    item.name: item.metadata["bounds"] for item in fields(Particulars) if "bounds" in item.metadata
-}
-
-
 Estimates = Mapping[str, Callable[[Particulars], float | None]]
 
 
@@ -290,9 +272,9 @@ def _checked(values: Mapping[str, Any], where: str) -> dict[str, Any]:
     for name, value in checked.items():
         if name == "name" or (value is None and name != "length"):
             continue
-        bounds = _BOUNDS[name]
         place = f"{where} added_mass {name}" if name in ADDED_MASSES else f"{where} {name}"
-        checked[name] = check_number(value, place, above=bounds.above, below=bounds.below, hint=bounds.hint)
+        given = {key: bound for key, bound in BOUNDS[name].items() if key in ("above", "below", "hint")}
+        checked[name] = check_number(value, place, **given)
     _check_together({k: v for k, v in checked.items() if k != "name" and v is not None}, where)
     return checked
 
@@ -301,13 +283,12 @@ def _check_together(values: Mapping[str, float], where: str) -> None:
     """Refuse values that do not fit each other: most often a wrong unit."""
     length = values["length"]
     for name, value in values.items():
-        bounds = _BOUNDS[name]
-        for share, power, unit in ((bounds.of_length, 1, "m"), (bounds.of_square, 2, "m2")):
-            if share is not None and abs(value) > share * length**power:
-                raise InputError(
-                    f"{where} {name}: {value:g} found with length {length:g}, expected at most {share:g} of "
-                    f"the length{' squared' * (power - 1)}; check the units ({unit})"
-                )
+        share, power = (BOUNDS[name].get(key, usual) for key, usual in (("share", math.inf), ("growth", 0)))
+        if abs(value) > share * length**power:
+            raise InputError(
+                f"{where} {name}: {value:g} found with length {length:g}, expected at most {share:g} of "
+                f"the length{' squared' * (power - 1)}; check the units (m{'2' * (power - 1)})"
+            )
     if "mass" in values:
         low, high, reason = _mass_range(values)
         if not low <= values["mass"] <= high:

@@ -10,17 +10,10 @@ from shipgym.arrays import Floats
 from shipgym.checks import check_number
 from shipgym.errors import InputError
 from shipgym.ships.envelope import Envelope
-from shipgym.ships.particulars import Particulars
+from shipgym.ships.particulars import BOUNDS, Particulars
 from shipgym.ships.ship_model import ShipModel
 from shipgym.ships.steering import SteeringGear
 from shipgym.ships.term_table import Structure
-
-#: Powers of the length with which the particulars grow; those without unit stay.
-GROWTH = {
-    "beam": 1, "draught": 1, "xg": 1, "yaw_gyradius": 1, "rudder_area": 2, "propeller_diameter": 1,
-    "length_overall": 1, "frontal_area": 2, "lateral_area": 2, "lateral_centroid": 1,
-    "lateral_centroid_height": 1, "metacentric_height": 1, "roll_period": 0.5,
-}  # fmt: skip
 
 
 def scale_model(
@@ -56,30 +49,31 @@ def scale_model(
     which is gravity's, does not follow the speed: keep to the default there.
     """
     table = model.dynamics
-    if not isinstance(table, Structure) and not table.scales:
+    if not table.scales:
         raise InputError(
             f"model {model.name!r}: the equations of reference ship '{table.name}' found, which are written "
             "for one length; expected a model with a table of terms, such as one identified from its trials"
         )
     check_number(length, "length", above=0.0, hint="in m")
     size = length / model.particulars.length
-    if speed is None:
-        speed = model.particulars["speed"] * np.sqrt(size)
+    speed = model.particulars["speed"] * np.sqrt(size) if speed is None else speed
     check_number(speed, "speed", above=0.0, hint="in m/s")
     fast = float(speed) / model.particulars["speed"]
+    quick, gear = fast / size, model.steering
+    gear = SteeringGear(gear.rudder_limit_deg, gear.rudder_rate_deg_s * quick, gear.time_constant / quick)
     factors = dict.fromkeys(model.coefficients, 1.0)  # those without unit
     if isinstance(table, Structure) and table.normalisation == "si":
         factors = _coefficient_factors(table, size, fast)
     scale = np.array(list(factors.values()))
+    origin = {"from_length": model.particulars.length, "from_speed": model.particulars["speed"]}
     return replace(
         model,
         particulars=_particulars(model.particulars, size, float(speed), water_density),
-        steering=_steering(model.steering, fast / size),
+        steering=gear,
         coefficients={name: value * factors[name] for name, value in model.coefficients.items()},
         covariance=None if model.covariance is None else model.covariance * np.outer(scale, scale),
-        envelope=_envelope(model.envelope, np.array([fast, fast, fast / size, 1.0])),
-        provenance=(model.provenance or {})
-        | {"scaled": {"from_length": model.particulars.length, "from_speed": model.particulars["speed"]}},
+        envelope=_envelope(model.envelope, np.array([fast, fast, quick, 1.0])),
+        provenance=(model.provenance or {}) | {"scaled": origin},
         service_shaft_speed=model.service_shaft_speed * fast / size,
     )
 
@@ -95,16 +89,13 @@ def _coefficient_factors(table: Structure, size: float, fast: float) -> dict[str
 
 
 def _particulars(ship: Particulars, size: float, speed: float, water_density: float | None) -> Particulars:
-    changes = {name: ship[name] * size**power for name, power in GROWTH.items() if ship[name] is not None}
+    growth = {name: given["growth"] for name, given in BOUNDS.items() if "growth" in given}
+    changes = {name: ship[name] * size**power for name, power in growth.items() if ship[name] is not None}
     density = ship.water_density if water_density is None else water_density
     if ship.mass is not None:
         denser = 1.0 if water_density is None else water_density / ship.require("water_density")
         changes["mass"] = ship.mass * size**3 * denser
     return replace(ship, length=ship.length * size, speed=speed, water_density=density, **changes)
-
-
-def _steering(gear: SteeringGear, quicker: float) -> SteeringGear:
-    return SteeringGear(gear.rudder_limit_deg, gear.rudder_rate_deg_s * quicker, gear.time_constant / quicker)
 
 
 def _envelope(envelope: Envelope | None, scale: Floats) -> Envelope | None:

@@ -18,8 +18,8 @@ import numpy as np
 from shipgym.arrays import Floats
 from shipgym.errors import InputError
 from shipgym.ships.particulars import Particulars
-from shipgym.ships.term_table import Structure
-from shipgym.ships.terms import Term
+from shipgym.ships.term_table import Structure, total_inertia
+from shipgym.ships.terms import Term, short_terms
 
 AXES = ("u", "v", "r")
 ACCELERATIONS = ("udot", "vdot", "rdot")
@@ -104,33 +104,21 @@ class SharedStructure(Structure):
 
         Raises InputError if it is not positive, or the particulars do not tell the mass.
         """
-        m, static = particulars.mass_prime, particulars.mass_prime * particulars.xg_prime
-        rigid = np.array([[m, 0.0, 0.0], [0.0, m, static], [0.0, static, particulars.inertia_prime]])
-        total: Floats = rigid - self.added_mass(coefficients)
-        if total[0, 0] <= 0.0 or np.linalg.det(total[1:, 1:]) <= 0.0:
-            raise InputError(
-                f"structure '{self.name}': the mass of the ship and the added mass of the coefficients are "
-                "not positive together; expected derivatives X_udot, Y_vdot, N_rdot below 0"
-            )
-        return total
+        return total_inertia(
+            particulars,
+            self.added_mass(coefficients),
+            f"structure '{self.name}': the mass of the ship and the added mass of the coefficients are "
+            "not positive together; expected derivatives X_udot, Y_vdot, N_rdot below 0",
+        )
 
-    def numbers(
+    def term_numbers(
         self, coefficients: Mapping[str, float], particulars: Particulars, shaft_speed: float = 0.0
     ) -> Floats:
         """Coefficients of the SI features: the forces by mass and added mass (see `Structure`)."""
         p = particulars.completed()
-        forces = {axis: self._velocity_forces(axis, coefficients, p) for axis in AXES}
-        mobility = np.linalg.inv(self.inertia(coefficients, p))
-        rows = [
-            mobility[0, 0] * forces["u"],
-            mobility[1, 1] * forces["v"] + mobility[1, 2] * forces["r"],
-            mobility[2, 1] * forces["v"] + mobility[2, 2] * forces["r"],
-        ]
-        scales = [
-            [self.feature_scale(axis, term, p.length, p.require("speed"), 0.0) for term in self.terms(axis)]
-            for axis in AXES
-        ]
-        return np.concatenate([row * scale for row, scale in zip(rows, map(np.array, scales), strict=True)])
+        forces = np.concatenate([self._velocity_forces(axis, coefficients, p) for axis in AXES])
+        numbers: Floats = self.term_scales(p) * (self._from_forces(self.inertia(coefficients, p)) @ forces)
+        return numbers
 
     def _velocity_forces(self, axis: str, coefficients: Mapping[str, float], p: Particulars) -> Floats:
         """Coefficient of each term of an equation in its force, that of the ship's own mass included."""
@@ -200,21 +188,8 @@ def read_shares(text: str) -> tuple[Share, ...]:
     shares = []
     for word in text.split():
         sign, body = (-1.0, word[1:]) if word[0] == "-" else (1.0, word)
-        coefficient, _, term = body.partition(":")
-        shares.append(Share(coefficient, _term(term or coefficient.partition("_")[2]), sign))
+        coefficient, _, name = body.partition(":")
+        name = name or coefficient.partition("_")[2]
+        (term,) = (Term(name, ((name, 1),)),) if name in ACCELERATIONS else short_terms(name, surge="u")
+        shares.append(Share(coefficient, term, sign))
     return tuple(shares)
-
-
-def _term(letters: str) -> Term:
-    """A term from its short name: velocities u, v, r, some between bars, or one acceleration."""
-    if letters in ACCELERATIONS:
-        return Term(letters, ((letters, 1),))
-    powers: dict[str, int] = {}
-    bars = False
-    for letter in letters:
-        if letter == "|":
-            bars = not bars
-        else:
-            symbol = f"|{letter}|" if bars else letter
-            powers[symbol] = powers.get(symbol, 0) + 1
-    return Term(letters, tuple(powers.items()))

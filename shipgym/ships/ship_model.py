@@ -13,12 +13,11 @@ from numpy.typing import ArrayLike
 from shipgym.errors import InputError
 from shipgym.files import write_json
 from shipgym.sea.conditions import Weather
-from shipgym.ships.conditions import Seed
 from shipgym.ships.equations import ShipEquations
 from shipgym.ships.grey_boxes import GreyBox
 from shipgym.ships.manoeuvring_model import ManoeuvringModel
 from shipgym.ships.model_file import load, numbers_hash, read_model
-from shipgym.ships.simulate import simulate
+from shipgym.ships.simulate import Seed, simulate
 from shipgym.ships.term_table import Structure
 from shipgym.trials.trial import Trial
 

@@ -1,16 +1,20 @@
 """Ships through time as Trials: with given commands, or open loop with the rudder of a measured trial."""
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from shipgym.arrays import Floats
+from shipgym.checks import check_whole
 from shipgym.engine.loops import ship_loop
 from shipgym.engine.passages import SEA_CHANNELS
+from shipgym.engine.records import leaves
 from shipgym.errors import InputError, UnstableModelError
 from shipgym.sea.conditions import Weather
-from shipgym.ships.conditions import Conditions, Passage, Seed
+from shipgym.sea.open_sea import Sea
+from shipgym.sea.weather_column import as_weather, weather_column
 from shipgym.ships.manoeuvring_model import ManoeuvringModel, checked_orders, two_commands
 from shipgym.ships.term_table import Structure
 from shipgym.trials.trial import Trial
@@ -18,6 +22,62 @@ from shipgym.trials.units import CHANNELS
 
 LONGEST_STEP = 0.025  # of the time to travel one ship length
 WIND = {"u": "wind_udot", "v": "wind_vdot", "r": "wind_rdot"}  # channels, by equation
+Seed = int | np.random.Generator
+
+
+@dataclass(frozen=True)
+class Conditions:
+    """Depth of the water and weather of a simulation."""
+
+    water_depth: float = np.inf  # m
+    weather: Weather | str | None = None  # A weather, the name of a sea state, or None for calm
+    seed: Seed = 0  # of the random part of the weather
+
+
+class Passage:
+    """One ship on her way through given conditions: the loops for them and the arrays they work on.
+
+    `numbers` are the ship's, `sea` is its state, that of its random numbers and its parameters, as loops take
+    them, `windy` whether there is any weather; its filters are made for steps of `dt` seconds.
+    """
+
+    def __init__(self, model: ManoeuvringModel, conditions: Conditions, dt: float) -> None:
+        self.model, self.vessel, self.dt = model, model.vessel, dt
+        self.numbers = model.ship_numbers(conditions.water_depth)
+        weather = as_weather(conditions.weather, "weather")
+        self.windy = not weather.calm
+        self.sea = np.zeros(0), np.zeros(0, dtype=np.uint64), np.zeros(0)
+        if self.windy:
+            seed, parameters = conditions.seed, weather_column(model, weather, dt, conditions.water_depth)
+            if not isinstance(seed, np.random.Generator):
+                check_whole(seed, "seed", at_least=0)
+            word = np.random.default_rng(seed).integers(2**63)
+            self.sea = np.zeros(len(leaves(Sea))), np.array([word], dtype=np.uint64), parameters
+
+    def loop(self, name: str) -> Any:
+        """A loop of `shipgym.engine.loops`, compiled for the ship and for calm water or weather."""
+        return ship_loop(self.vessel, name, self.windy)
+
+    def run(self, name: str, states: Floats, *arguments: Any, since: float = 0.0) -> Any:
+        """Fill the states after the first by a loop, from its arguments but for the sea and the ship.
+
+        Returns what the loop returns: the last row, or that and more. Raises UnstableModelError where the
+        ship leaves every physical range, `since` s after the manoeuvre began.
+        """
+        found = self.loop(name)(states, *arguments, *self.sea, self.numbers)
+        reached = found[0] if isinstance(found, tuple) else found
+        if reached < len(states) - 1:
+            raise unstable(self.model, since + self.dt * reached, states[reached])
+        return found
+
+    def states(self, first: Floats, n_steps: int) -> Floats:
+        """Rows for `n_steps` + 1 states, shape (n_columns,) each, and their weather; `first` filled in."""
+        width = len(self.vessel.state_names) + (len(SEA_CHANNELS) if self.windy else 0)
+        states = np.empty((n_steps + 1, width))
+        states[0, : len(first)] = first
+        if len(first) < width:
+            self.loop("meet")(states, *self.sea)
+        return states
 
 
 def simulate(
@@ -36,11 +96,17 @@ def simulate(
         raise InputError(f"dt: {dt} found, expected a step in s above 0")
     passage = Passage(model, Conditions(water_depth, weather, seed), dt)
     states = passage.states(initial_state(model, state), len(held))
-    reached = passage.loop("simulate")(states, two_commands(held), dt, *passage.sea, passage.numbers)
-    times = dt * np.arange(len(states), dtype=float)
-    if reached < len(held):
-        raise unstable(model, times[reached], states[reached])
-    return as_trial(model, times, states, np.vstack([held, held[-1:]]), kind)
+    passage.run("simulate", states, two_commands(held), dt)
+    return as_trial(model, dt, states, np.vstack([held, held[-1:]]), kind)
+
+
+def orders(model: ManoeuvringModel, rudder: Floats, shaft: Floats | None = None) -> Floats:
+    """Commands of shape (n_steps, n_command): a rudder, rad, and a shaft, 1/s, by default as in service."""
+    commands = np.repeat(model.service_command[None], len(rudder), axis=0)
+    commands[:, 0] = rudder
+    if shaft is not None:
+        commands[:, 1] = shaft
+    return commands
 
 
 def open_loop(model: ManoeuvringModel, trial: Trial) -> Trial:
@@ -62,7 +128,7 @@ def open_loop(model: ManoeuvringModel, trial: Trial) -> Trial:
     first = [trial[name][0] if name in trial.channels else 0.0 for name in model.state_names]
     n = np.array(trial["n"]) if "n" in trial.channels else np.zeros(len(t))
     states[0] = _settled(model, np.array([first]), n[:1])[0]
-    longest_step = LONGEST_STEP * model.particulars["length"] / model.particulars["speed"]
+    longest_step = LONGEST_STEP * model.travel_time
     wind = wind_accelerations(trial, model.dynamics)
     wind = 0.5 * (wind[1:] + wind[:-1])
     loop = ship_loop(model.vessel, "open_loop", bool(wind.any()))
@@ -94,9 +160,9 @@ def initial_state(model: ManoeuvringModel, state: ArrayLike | None) -> Floats:
 
 
 def as_trial(
-    model: ManoeuvringModel, t: Floats, states: Floats, commands: Floats, kind: str | None = None
+    model: ManoeuvringModel, dt: float, states: Floats, commands: Floats, kind: str | None = None
 ) -> Trial:
-    """States, the weather behind them and the commands held from each sample on as a Trial."""
+    """States dt apart, the weather behind them and the commands held from each sample on as a Trial."""
     channels = _channels(model, states)
     for name, values in zip(SEA_CHANNELS, states[:, len(model.state_names) :].T, strict=False):
         if name not in ("phi_wave", "p_wave") or "phi" in model.state_names:
@@ -105,6 +171,7 @@ def as_trial(
         channels[f"{name}_command"] = command
         if name == "n":  # a shaft without lag turns as ordered, and is part of the record
             channels.setdefault("n", command)
+    t = dt * np.arange(len(states), dtype=float)
     return Trial(t, channels, name=model.name, kind=kind, length=model.particulars["length"])
 
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cache, cached_property
+from functools import cached_property
 from typing import Any, ClassVar
 
 import numpy as np
@@ -16,9 +16,9 @@ import numpy as np
 from shipgym.arrays import Floats
 from shipgym.checks import check_choice, check_text, quoted
 from shipgym.engine.parts import Part
-from shipgym.engine.vessel import Vessel
+from shipgym.engine.vessel import Vessel, vessel_of
 from shipgym.errors import InputError
-from shipgym.ships.particulars import Particulars
+from shipgym.ships.particulars import ADDED_MASSES, Particulars
 from shipgym.ships.term_functions import (
     Sum,
     accelerations_function,
@@ -34,6 +34,7 @@ EQUATION_NAMES = tuple(ACCELERATION_OF_EQUATION)
 ANGULAR = ("r", "p", "q")  # of these the unit holds 1 / length once more
 NORMALISATIONS = ("prime", "service", "si")
 QUANTITIES = ("force", "acceleration")
+MEASURED = ("u", "v", "r", "p", "phi", "delta", "n")  # channels of a trial
 ALWAYS_MEASURED = frozenset(("u", "v", "r", "delta"))
 
 
@@ -67,6 +68,7 @@ class Structure:
     # {"force", "acceleration"}; what the terms make up (those of `q` accelerations per time). Accelerations
     # follow from forces by the inertia of the particulars (mass and added mass, sway and yaw coupled)
     quantity: str = "force"
+    scales: ClassVar[bool] = True  # whether the dimensions are those of the particulars
     captive: ClassVar[bool] = False  # whether it is identified from the forces of captive tests
     shallow_water: ClassVar[bool] = False  # whether it knows the depth of the water
 
@@ -88,19 +90,18 @@ class Structure:
         self._check_inertia(where)
 
     def _check_roll_and_memory(self, where: str) -> None:
-        rolls, remembers = "p" in self.equations, "q" in self.equations
         rolling = [symbol for symbol in self.symbols if symbol in ROLL]
-        if rolling and not rolls:
+        if rolling and "p" not in self.equations:
             raise InputError(
                 f"{where}: symbol '{rolling[0]}' found, expected an equation of roll 'p' beside it; give its "
                 "terms, or leave roll out"
             )
-        if remembers and ("r" not in self.equations or rolls):
+        if "q" in self.equations and ("r" not in self.equations or "p" in self.equations):
             raise InputError(
                 f"{where}: equations {quoted(self.equations)} found, expected the memory 'q' of yaw beside "
                 "an equation 'r' and without one of roll 'p'"
             )
-        if (rolls or remembers) and self.quantity != "acceleration":
+        if {"p", "q"} & self.equations.keys() and self.quantity != "acceleration":
             raise InputError(
                 f"{where}: forces found, expected accelerations in a table with roll 'p' or memory 'q'"
             )
@@ -140,16 +141,30 @@ class Structure:
         return tuple(symbol for symbol in SYMBOLS if symbol in used)
 
     @cached_property
+    def channels(self) -> frozenset[str]:
+        """Channels that stand in its terms, the speed `U` included."""
+        return frozenset(CHANNEL[symbol] for symbol in self.symbols)
+
+    @cached_property
     def required_channels(self) -> tuple[str, ...]:
         """Channels a trial needs so that the model can be identified and its envelope be known."""
-        channels = {CHANNEL[symbol] for symbol in self.symbols} | ALWAYS_MEASURED
-        channels |= {"p"} & self.equations.keys()
-        return tuple(name for name in SYMBOLS if name in channels - {"U"})
+        needed = self.channels | ALWAYS_MEASURED | ({"p"} & self.equations.keys())
+        return tuple(name for name in MEASURED if name in needed)
 
     @property
     def has_rudder(self) -> bool:
         """Whether the rudder stands in a term."""
-        return "delta" in {CHANNEL[symbol] for symbol in self.symbols}
+        return "delta" in self.channels
+
+    @property
+    def rolls(self) -> bool:
+        """Whether it has a rolling motion."""
+        return "p" in self.equations
+
+    @property
+    def remembers(self) -> bool:
+        """Whether it has a memory of yaw."""
+        return "q" in self.equations
 
     @property
     def command_names(self) -> tuple[str, ...]:
@@ -159,8 +174,8 @@ class Structure:
     @property
     def state_names(self) -> tuple[str, ...]:
         """Names of the state."""
-        roll = ("p", "phi") if "p" in self.equations else ()
-        memory = ("q",) if "q" in self.equations else ()
+        roll = ("p", "phi") if self.rolls else ()
+        memory = ("q",) if self.remembers else ()
         return ("x", "y", "psi", "u", "v", "r", *roll, *memory, "delta")
 
     @property
@@ -186,7 +201,9 @@ class Structure:
 
     def vessel(self, coefficients: Mapping[str, float], lag: bool) -> Vessel:
         """What is compiled of a ship with this table; the coefficients are read at run time."""
-        return _vessel(self._source, len(self._terms), self.state_names, lag)
+        parts = (("accelerations", Part(accelerations_function(self._source))),)
+        record = coefficients_record(len(self._terms))
+        return vessel_of("a ship with a table of terms", self.state_names, record, parts, lag)
 
     @cached_property
     def _source(self) -> str:
@@ -208,7 +225,13 @@ class Structure:
     def numbers(
         self, coefficients: Mapping[str, float], particulars: Particulars, shaft_speed: float = 0.0
     ) -> Floats:
-        """Numbers of the vessel's coefficients: those of the SI features of the accelerations, in order."""
+        """Numbers of the vessel's coefficients: those of the terms."""
+        return self.term_numbers(coefficients, particulars, shaft_speed)
+
+    def term_numbers(
+        self, coefficients: Mapping[str, float], particulars: Particulars, shaft_speed: float = 0.0
+    ) -> Floats:
+        """Coefficients of the SI features of the accelerations, in order; shape (n_terms,)."""
         matrix = self.acceleration_matrix(particulars, shaft_speed)
         values: Floats = matrix @ np.array(list(coefficients.values()))
         return values
@@ -241,6 +264,12 @@ class Structure:
             return float(length ** float(lengths + turns))
         speeds = self.unit_speeds(equation) - term.power(*SPEEDS, *TURN_RATES)
         return float(length ** float(lengths) * speed ** float(speeds) / (shaft**turns if turns else 1.0))
+
+    def term_scales(self, particulars: Particulars, shaft_speed: float = 0.0) -> Floats:
+        """`feature_scale` of all terms, one equation after the other, for a ship; shape (n_coefficients,)."""
+        ship = particulars["length"], particulars["speed"], shaft_speed
+        scaled = [self.feature_scale(q, term, *ship) for q, terms in self.equations.items() for term in terms]
+        return np.array(scaled)
 
     def features(
         self, equation: str, channels: Mapping[str, Any], particulars: Particulars, shaft_speed: float = 0.0
@@ -281,15 +310,9 @@ class Structure:
                 f"service_shaft_speed: {shaft_speed:g} found, expected the shaft speed at service speed in "
                 f"1/s: the terms of structure '{self.name}' refer to it"
             )
-        speed = particulars["speed"]
-        scales = [
-            self.feature_scale(equation, term, particulars["length"], speed, shaft_speed)
-            for equation, terms in self.equations.items()
-            for term in terms
-        ]
         if self.quantity == "acceleration":
-            return np.diag(np.array(scales))
-        return np.array(scales)[:, None] * self._mobility_matrix(particulars)
+            return np.diag(self.term_scales(particulars, shaft_speed))
+        return self.term_scales(particulars, shaft_speed)[:, None] * self._from_forces(inertia(particulars))
 
     @property
     def needs_shaft_speed(self) -> bool:
@@ -297,10 +320,10 @@ class Structure:
         scaled = self.normalisation == "service" and "n" in self.command_names
         return scaled or "dn" in self.symbols
 
-    def _mobility_matrix(self, particulars: Particulars) -> Floats:
-        """Inverse inertia, by which the coefficients of forces become those of accelerations."""
+    def _from_forces(self, inertia: Floats) -> Floats:
+        """From the coefficients of forces to those of accelerations, by an inertia of shape (3, 3)."""
         axes = [list(FORCE_OF_EQUATION).index(equation) for equation in self.equations]
-        mobility = np.linalg.inv(inertia(particulars)[np.ix_(axes, axes)])
+        mobility = np.linalg.inv(inertia[np.ix_(axes, axes)])
         counts = [len(terms) for terms in self.equations.values()]
         starts = np.cumsum([0, *counts])
         matrix = np.zeros((starts[-1],) * 2)
@@ -333,32 +356,32 @@ class Structure:
         return cls(table["name"], table["source"], equations, **given)
 
 
-@cache
-def _vessel(source: str, n_terms: int, state_names: tuple[str, ...], lag: bool) -> Vessel:
-    parts = {"accelerations": Part(accelerations_function(source))}
-    return Vessel("a ship with a table of terms", state_names, coefficients_record(n_terms), parts, lag)
-
-
 def inertia(particulars: Particulars) -> Floats:
     """Mass, yaw inertia and added mass of surge, sway and yaw, prime system, shape (3, 3).
 
     Raises InputError if it is not positive.
     """
-    p = particulars
-    m, xg = p.mass_prime, p.xg_prime
-    matrix = np.array(
-        [
-            [m - p.require("X_udot"), 0.0, 0.0],
-            [0.0, m - p.require("Y_vdot"), m * xg - p.require("Y_rdot")],
-            [0.0, m * xg - p.require("N_vdot"), p.inertia_prime - p.require("N_rdot")],
-        ]
-    )
-    if matrix[0, 0] <= 0.0 or np.linalg.det(matrix[1:, 1:]) <= 0.0:
-        raise InputError(
-            "The inertia of the ship is not positive: mass, xg, yaw_gyradius and added masses do not "
-            "belong together. Added masses are in the prime system and negative (X_udot, Y_vdot, N_rdot)."
-        )
-    return matrix
+    added = np.zeros((3, 3))
+    added[[0, 1, 1, 2, 2], [0, 1, 2, 1, 2]] = [particulars.require(name) for name in ADDED_MASSES]
+    return total_inertia(
+        particulars, added,
+        "The inertia of the ship is not positive: mass, xg, yaw_gyradius and added masses do not "
+        "belong together. Added masses are in the prime system and negative (X_udot, Y_vdot, N_rdot).",
+    )  # fmt: skip
+
+
+def total_inertia(particulars: Particulars, derivatives: Floats, problem: str) -> Floats:
+    """Inertia of the ship herself less the derivatives of (X, Y, N) by (udot, vdot, rdot); all (3, 3), prime.
+
+    Raises InputError with the `problem` if it is not positive.
+    """
+    m = particulars.mass_prime
+    static = m * particulars.xg_prime
+    rigid = np.array([[m, 0.0, 0.0], [0.0, m, static], [0.0, static, particulars.inertia_prime]])
+    total: Floats = rigid - derivatives
+    if total[0, 0] <= 0.0 or np.linalg.det(total[1:, 1:]) <= 0.0:
+        raise InputError(problem)
+    return total
 
 
 def _check_terms(terms: tuple[Term, ...], normalisation: str, where: str) -> None:

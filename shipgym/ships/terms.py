@@ -92,15 +92,16 @@ def _read_term(formula: str) -> Term:
     return Term("0" if name == "1" else name, tuple(powers.items()))
 
 
-def prime_terms(words: str) -> tuple[Term, ...]:
-    """Terms from the short names of Abkowitz's polynomials: letters u v r d (delta), 0 for the constant.
+def short_terms(words: str, surge: str = "du") -> tuple[Term, ...]:
+    """Terms from short names separated by spaces: letters u v r d (delta), or such between bars, 0 for one.
 
-    `u` is the perturbation from service speed, so `0u` is the constant's change with it.
+    `u` is Abkowitz's perturbation from service speed, so that `0u` is the constant's change with it, or the
+    symbol that `surge` says.
     """
-    symbol_of = {"u": "du", "v": "v", "r": "r", "d": "delta"}
-    terms = []
-    for word in words.split():
-        letters = word.lstrip("0")
-        powers = {symbol_of[letter]: letters.count(letter) for letter in letters}
-        terms.append(Term(word, tuple(powers.items())))
-    return tuple(terms)
+    return tuple(_short_term(word, {"u": surge, "d": "delta"}) for word in words.split())
+
+
+def _short_term(word: str, symbols: dict[str, str]) -> Term:
+    factors = re.findall(r"\|.\||.", word.lstrip("0"))
+    powers = {symbols.get(factor, factor): factors.count(factor) for factor in factors}
+    return Term(word, tuple(powers.items()))

@@ -99,46 +99,24 @@ class Readings(NamedTuple):
 
 @dataclass(frozen=True)
 class Seen:
-    """How a quantity is observed.
+    """How a quantity is observed."""
 
-    Attributes
-    ----------
-    low, high : float
-        Bounds of the observation.
-    unit : str
-        Of the quantity.
-    scale : float or callable
-        Physical value of an observation of 1, or `(ship, settings) -> float`.
-    option : str
-        Name of the option that shows it: `roll`, or `shaft`; by default it is always shown.
-    """
-
-    low: float
+    low: float  # bounds of the observation
     high: float
-    unit: str = "-"
-    scale: Scale = 1.0
-    option: str = ""
+    unit: str = "-"  # of the quantity
+    scale: Scale = 1.0  # physical value of an observation of 1, or `(ship, settings) -> float`
+    option: str = ""  # which shows it: `roll`, `shaft`, `shaft speed`; by default it is always shown
 
 
 @dataclass(frozen=True)
 class Setting:
-    """Bounds of a setting.
+    """Bounds of a setting."""
 
-    Attributes
-    ----------
-    about : str
-        What it is, a sentence.
-    at_least, at_most, above : float
-        Its bounds.
-    whole : bool
-        Whether it is a whole number.
-    """
-
-    about: str
+    about: str  # what it is, a sentence
     at_least: float | None = None
     at_most: float | None = None
     above: float | None = None
-    whole: bool = False
+    whole: bool = False  # whether it is a whole number
 
 
 def at_service_speed(x: float, y: float, psi: float, ship: Ship) -> Motion:

@@ -13,13 +13,12 @@ from typing import Any
 
 import numpy as np
 
-from shipgym.checks import check_keys, did_you_mean, quoted
+from shipgym.checks import did_you_mean, quoted
 from shipgym.engine.places import reward_of_another, step_of_task
-from shipgym.engine.records import Record, field_types, leaves
+from shipgym.engine.records import Record, field_types, is_record, leaves
 from shipgym.errors import InputError
-from shipgym.tasks.contract import Seen, Setting
-from shipgym.tasks.settings import annotated, keywords, make_settings
-from shipgym.tasks.source import check_namespace, check_settings, read_source
+from shipgym.tasks.contract import Seen
+from shipgym.tasks.source import Configurable, annotated, check_namespace, keywords, read_source
 
 RECORDS = ("Settings", "State", "Reward", "Observation")
 MOMENT = ("motion", "state", "interval", "ship", "settings")
@@ -55,43 +54,15 @@ def no_event(motion: Any, state: Any, interval: Any, ship: Any, settings: Any, r
     return state
 
 
-def no_worst_cost(settings: Any) -> float:
-    """Of a task in which a lost ship costs nothing more."""
+def nothing(settings: Any) -> float:
+    """Of a task in which a lost ship costs nothing more, or that remembers its state alone."""
     return 0.0
 
 
-def no_plan(settings: Any) -> int:
-    """Of a task that remembers its state alone."""
-    return 0
-
-
-def any_settings(settings: Any, model: Any) -> None:
-    """Of a task whose settings fit in any combination."""
-
-
 @dataclass(frozen=True)
-class TaskDefinition:
-    """Records and functions of a task (`shipgym.tasks.contract`).
+class TaskDefinition(Configurable):
+    """Records and functions of a task, by their names in its file (`shipgym.tasks.contract`)."""
 
-    Attributes
-    ----------
-    name : str
-        Of the task.
-    source : str
-        Where it was read from, for messages.
-    Settings, State, Reward, Observation : type
-        Its records.
-    begin, step, observe, due, on_event, worst_cost, plan_length, check, listed : callable
-        Its functions.
-    reported : tuple of str
-        Fields of the state that `info` has.
-    episode_steps : int
-        Control intervals after which an episode is truncated, by default.
-    """
-
-    name: str
-    source: str
-    Settings: Record
     State: Record
     Reward: Record
     Observation: Record
@@ -100,22 +71,17 @@ class TaskDefinition:
     observe: Callable[..., Any]
     due: Callable[..., Any] = never_due
     on_event: Callable[..., Any] = no_event
-    worst_cost: Callable[..., Any] = no_worst_cost
-    plan_length: Callable[[Any], int] = no_plan
-    check: Callable[[Any, Any], None] = any_settings
+    worst_cost: Callable[..., Any] = nothing
+    plan_length: Callable[[Any], float] = nothing
+    check: Callable[[Any, Any], None] | None = None
     listed: Callable[[Any], Any] = np.asarray
-    reported: tuple[str, ...] = ()
-    episode_steps: int = 600
+    reported: tuple[str, ...] = ()  # fields of the state that `info` has
+    episode_steps: int = 600  # control intervals after which an episode is truncated, by default
 
     @cached_property
     def seen(self) -> dict[str, Seen]:
         """How each quantity is observed, by its path in `Observation`."""
-        return dict(annotated(self.Observation, Seen))
-
-    @cached_property
-    def settings(self) -> dict[str, Setting]:
-        """Bounds of each setting by its keyword."""
-        return {name: setting for name, setting, _ in keywords(self.Settings)}
+        return _seen(self.Observation)
 
     @cached_property
     def flags(self) -> tuple[str, ...]:
@@ -139,17 +105,23 @@ class TaskDefinition:
         return str(getattr(sys.modules.get(self.Reward.__module__), "__file__", None) or self.source)
 
     def make_settings(self, options: Mapping[str, Any]) -> Any:
-        """Settings by keywords, checked.
-
-        Raises
-        ------
-        InputError
-            For an unknown keyword, or a value out of its range.
-        """
-        check_keys(options, self.settings, f"{self.name} options")
-        settings = make_settings(self.Settings, options, self.listed)
-        self.check(settings, None)
+        """Settings by keywords; InputError for an unknown one, or a value that does not fit."""
+        settings = super().make_settings(options)
+        self.check_fits(settings)
         return settings
+
+    def check_fits(self, settings: Any, model: Any = None) -> None:
+        """Refuse settings that do not fit together, or the model; InputError names them."""
+        if self.check is not None:
+            self.check(settings, model)
+
+
+def _seen(record: Record, prefix: str = "") -> dict[str, Any]:
+    """How the fields of a record, and of those within it, are observed, by their paths."""
+    paths: dict[str, Any] = {}
+    for name, kind, seen in annotated(record, Seen):
+        paths |= _seen(kind, f"{prefix}{name}.") if is_record(kind) else {prefix + name: seen}
+    return paths
 
 
 #: Definitions by themselves: one that is read again is the same object, so that it is looked at once.
@@ -194,15 +166,13 @@ def _named(source: Any) -> tuple[Any, str]:
 
 
 def _definition(namespace: Any, where: str) -> TaskDefinition:
-    optional = [name for name in FUNCTIONS if name not in NEEDED]
-    check_namespace(namespace, where, RECORDS, FUNCTIONS, optional)
-    check_settings(namespace.Settings, where)
+    found = check_namespace(namespace, where, RECORDS, FUNCTIONS, [*{*FUNCTIONS} - {*NEEDED}])
     definition = TaskDefinition(
         name=getattr(namespace, "NAME", None) or Path(where).stem,
         source=where,
         reported=tuple(getattr(namespace, "REPORTED", ())),
         episode_steps=getattr(namespace, "EPISODE_STEPS", 600),
-        **{name: getattr(namespace, name) for name in (*RECORDS, *FUNCTIONS) if hasattr(namespace, name)},
+        **found,
     )
     for path, seen in definition.seen.items():
         if seen is None or not (np.isfinite(seen.low) and np.isfinite(seen.high) and seen.low < seen.high):
@@ -241,17 +211,11 @@ def _with_reward(definition: TaskDefinition, source: Any) -> TaskDefinition:
     namespace, where = read_source(source)
     name = "step" if hasattr(namespace, "step") and not hasattr(namespace, "reward") else "reward"
     functions = {name: MOMENT, "worst_cost": ("settings",)}
-    check_namespace(namespace, where, ("Reward",), functions, ("worst_cost",))
-    step = getattr(namespace, name)
+    found = check_namespace(namespace, where, ("Reward",), functions, ("worst_cost",))
     if name == "reward":
-        places = {"__name__": __name__, "step_of_task": definition.step, "reward_of_another": step}
-        step = _filled(places)
-    return replace(
-        definition,
-        Reward=namespace.Reward,
-        step=step,
-        worst_cost=getattr(namespace, "worst_cost", definition.worst_cost),
-    )
+        places = {"__name__": __name__, "step_of_task": definition.step, "reward_of_another": found.pop(name)}
+        found["step"] = _filled(places)
+    return replace(definition, **found)
 
 
 _FILLED: dict[Any, FunctionType] = {}
@@ -261,6 +225,3 @@ def _filled(places: dict[str, Any]) -> FunctionType:
     """`rewarded_step` with its places filled, one function for the same ones."""
     key = tuple(places.values())
     return _FILLED.setdefault(key, FunctionType(rewarded_step.__code__, places, "rewarded_step"))
-
-
-__all__ = ["TASKS", "TaskDefinition", "read_definition"]

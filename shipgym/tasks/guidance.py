@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from shipgym.checks import check_number
+from shipgym.checks import check_number, check_whole
 from shipgym.errors import InputError
 
 Floats = NDArray[np.float64]
@@ -25,42 +25,22 @@ FURTHEST = 1e8  # m, of a waypoint from the origin: more than the way round the 
 
 
 class PathPosition(NamedTuple):
-    """Where ships stand on a leg of a path, arrays of one shape.
+    """Where ships stand on a leg of a path, arrays of one shape."""
 
-    Attributes
-    ----------
-    along : array
-        Distance run since the leg's first waypoint, m.
-    cross_track : array
-        Distance from the leg, m, positive to starboard of it.
-    course : array
-        Direction of the leg, rad.
-    to_go : array
-        Distance left to the leg's last waypoint, along the leg, m.
-    """
-
-    along: Floats
-    cross_track: Floats
-    course: Floats
-    to_go: Floats
+    along: Floats  # m, run since the leg's first waypoint
+    cross_track: Floats  # m, from the leg, positive to starboard of it
+    course: Floats  # rad, direction of the leg
+    to_go: Floats  # m, along the leg to its last waypoint
 
 
 @dataclass(frozen=True, eq=False)
 class Path:
     """Straight legs from waypoint to waypoint.
 
-    Attributes
-    ----------
-    waypoints : array of shape (n_waypoints, 2)
-        North and east, m.
-
-    Raises
-    ------
-    InputError
-        For fewer than two waypoints, one that is not finite, or one that repeats the one before it.
+    Raises InputError for fewer than two waypoints, one that is not finite, or repeats the one before it.
     """
 
-    waypoints: Floats
+    waypoints: Floats  # north and east, m, shape (n_waypoints, 2)
 
     def __post_init__(self) -> None:
         points = _waypoints(self.waypoints)
@@ -118,19 +98,7 @@ class Path:
             )
 
     def position(self, x: ArrayLike, y: ArrayLike, leg: ArrayLike) -> PathPosition:
-        """Where ships stand on given legs.
-
-        Parameters
-        ----------
-        x, y : array-like
-            North and east, m.
-        leg : array-like of int
-            Number of the leg of each ship, from 0.
-
-        Returns
-        -------
-        PathPosition
-        """
+        """Where ships at x north and y east, m, stand on legs by their numbers, from 0; arrays alike."""
         legs = np.asarray(leg)
         course = self.courses[legs]
         north, east = np.asarray(x) - self.waypoints[legs, 0], np.asarray(y) - self.waypoints[legs, 1]
@@ -149,20 +117,7 @@ class Path:
 
 
 def line_of_sight(where: PathPosition, lookahead: ArrayLike) -> Floats:
-    """Course towards the point of the leg that lies `lookahead` m ahead (Fossen 2011, 10.3.2).
-
-    Parameters
-    ----------
-    where : PathPosition
-        Of ships on their legs.
-    lookahead : array-like
-        m, above 0.
-
-    Returns
-    -------
-    array
-        rad.
-    """
+    """Course, rad, towards the point of the leg that lies `lookahead` m ahead (Fossen 2011, 10.3.2)."""
     return where.course - np.arctan2(where.cross_track, lookahead)
 
 
@@ -171,25 +126,9 @@ def integral_line_of_sight(
 ) -> tuple[Floats, Floats]:
     """Course that also counters a steady drift, and the integral one interval later (Borhaug 2008, 12).
 
-    Parameters
-    ----------
-    where : PathPosition
-        Of ships on their legs.
-    lookahead : array-like
-        m, above 0.
-    integral : array-like
-        Of the cross-track error, m.
-    gain : float
-        Of the integral, 1/s: sigma of the source over the lookahead.
-    dt : float
-        Interval, s.
-
-    Returns
-    -------
-    course : array
-        rad.
-    integral : array
-        m. It grows slower the further the ship is off, so that it does not wind up.
+    `integral` is that of the cross-track error, m, `lookahead` is above 0 m, `gain`, 1/s, is sigma of the
+    source over the lookahead, and `dt` is the interval, s. The course is in rad; the integral, m, grows
+    slower the further the ship is off, so that it does not wind up.
     """
     offset = where.cross_track + np.asarray(integral)
     rate = gain * np.square(lookahead) * where.cross_track / (np.square(offset) + np.square(lookahead))
@@ -205,25 +144,8 @@ def wrapped(angle: ArrayLike) -> Floats:
 def random_path(
     random: np.random.Generator, n_legs: int, leg_length: tuple[float, float], largest_turn_deg: float
 ) -> Path:
-    """A path from the origin with legs and turns drawn evenly.
-
-    Parameters
-    ----------
-    random : Generator
-        Draws the first course, then for each leg its length and the turn at its end.
-    n_legs : int
-        Number of legs, at least 1.
-    leg_length : tuple of float
-        Least and largest length of a leg, m.
-    largest_turn_deg : float
-        Of course at a waypoint, degrees.
-
-    Returns
-    -------
-    Path
-    """
-    if n_legs < 1:
-        raise InputError(f"n_legs: {n_legs} found, expected at least 1")
+    """A path from the origin, its first course, lengths of legs, m, and turns at waypoints drawn evenly."""
+    check_whole(n_legs, "n_legs", at_least=1)
     check_number(leg_length[0], "leg_length", above=0.0, hint="in m")
     check_number(leg_length[1], "leg_length", at_least=leg_length[0], hint="the least length first")
     lengths = random.uniform(*leg_length, n_legs)

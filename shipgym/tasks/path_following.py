@@ -161,13 +161,7 @@ class Fix(NamedTuple):
 
 
 def check(settings: Settings, model: Any) -> None:
-    """Refuse a path that cannot be sailed, or a corridor that the ship fills.
-
-    Raises
-    ------
-    InputError
-        Naming the argument.
-    """
+    """Refuse a path that cannot be sailed, or a corridor that the ship fills; InputError names it."""
     check_path(settings, model)
     if len(settings.waypoints) == 0:
         turns = min(2.0, settings.n_legs - 1.0)

@@ -1,54 +1,20 @@
-"""Files of a user's own, such as tasks, rewards and sensor sets: read, and checked for what lacks."""
+"""Files such as tasks, rewards and sensor sets: read, checked for what lacks, and their settings made."""
 
 from __future__ import annotations
 
-import hashlib
-import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
-from shipgym.engine.records import field_types, is_list, is_record, leaves
+import numpy as np
+
+from shipgym.checks import check_keys, check_number, check_whole
+from shipgym.engine.records import Record, field_types, is_list, is_record, leaves
 from shipgym.errors import InputError
-
-
-def load_file(path: Path) -> ModuleType:
-    """A Python file as a module, executed once however often it is asked for while it stays the same.
-
-    Raises
-    ------
-    InputError
-        If there is none, or it cannot be executed.
-    """
-    if not path.is_file():
-        raise InputError(f"{path}: no such file, expected a Python file")
-    resolved = path.resolve()
-    content = hashlib.sha256(str(resolved).encode() + b"\0" + resolved.read_bytes())
-    name = f"shipgym_user_{content.hexdigest()[:16]}"
-    if name in sys.modules:
-        return sys.modules[name]
-    module = ModuleType(name)
-    module.__file__ = str(resolved)
-    sys.modules[name] = module
-    try:
-        # compiled here, because Python's own cache takes a file changed within a second for the same
-        exec(compile(resolved.read_bytes(), str(resolved), "exec"), vars(module))
-    except Exception as error:
-        del sys.modules[name]
-        line = _line_in(resolved, error)
-        raise InputError(f"{path}{line}: cannot be executed: {type(error).__name__}: {error}") from error
-    return module
-
-
-def _line_in(path: Path, error: Exception) -> str:
-    """The last line of a file that an error passed through."""
-    traceback, line = error.__traceback__, getattr(error, "lineno", None)
-    while traceback is not None:
-        if traceback.tb_frame.f_code.co_filename == str(path):
-            line = traceback.tb_lineno
-        traceback = traceback.tb_next
-    return f", line {line}" if line else ""
+from shipgym.python_files import load_file
+from shipgym.tasks.contract import Setting
 
 
 def read_source(source: Any) -> tuple[Any, str]:
@@ -70,40 +36,30 @@ def check_namespace(
     records: Sequence[str],
     functions: Mapping[str, Sequence[str]],
     optional: Sequence[str] = (),
-) -> None:
-    """Refuse what lacks a record or a function, or has one of another form.
+) -> dict[str, Any]:
+    """Records and functions of a namespace by name, without optional ones that it lacks.
 
-    Raises
-    ------
-    InputError
-        Naming the file, the name and what is expected.
+    `functions` has the arguments of each. Raises InputError naming the file, the name and what is expected.
     """
+    found = {}
     for name in (*records, *functions):
-        if not hasattr(namespace, name):
-            if name in optional:
-                continue
-            what = _what(name, functions)
-            raise InputError(f"{where}: no {name!r} found, expected {what} (see shipgym.tasks.contract)")
-        found = getattr(namespace, name)
+        if name in optional and not hasattr(namespace, name):
+            continue
+        what = f"a NamedTuple {name!r} of floats"
         if name in functions:
-            _check_function(found, name, where, functions)
-        elif not is_record(found):
-            raise InputError(f"{where}: {name} is no NamedTuple, expected {_what(name, functions)}")
-        else:
-            _check_record(found, name, where)
-
-
-def _what(name: str, functions: Mapping[str, Sequence[str]]) -> str:
-    if name in functions:
-        return f"a function {name}({', '.join(functions[name])})"
-    return f"a NamedTuple {name!r} of floats"
-
-
-def _check_function(function: Any, name: str, where: str, functions: Mapping[str, Sequence[str]]) -> None:
-    code = getattr(function, "__code__", None)
-    if code is None or code.co_argcount != len(functions[name]):
-        found = f"{code.co_argcount} arguments" if code is not None else "no plain function"
-        raise InputError(f"{where}: {name}: {found} found, expected {_what(name, functions)}")
+            what = f"a function {name}({', '.join(functions[name])})"
+        if not hasattr(namespace, name):
+            raise InputError(f"{where}: no {name!r} found, expected {what} (see shipgym.tasks.contract)")
+        found[name] = value = getattr(namespace, name)
+        code = getattr(value, "__code__", None)
+        if name not in functions:
+            if not is_record(value):
+                raise InputError(f"{where}: {name} is no NamedTuple, expected {what}")
+            _check_record(value, name, where)
+        elif code is None or code.co_argcount != len(functions[name]):
+            count = "no plain function" if code is None else f"{code.co_argcount} arguments"
+            raise InputError(f"{where}: {name}: {count} found, expected {what}")
+    return found
 
 
 def _check_record(record: Any, name: str, where: str) -> None:
@@ -115,6 +71,8 @@ def _check_record(record: Any, name: str, where: str) -> None:
         raise InputError(f"{where}: {name}: no fields found, expected one number at least")
     for field, kind in kinds.items():
         default = record._field_defaults.get(field)
+        if name == "Settings" and field not in record._field_defaults:
+            raise InputError(f"{where}: Settings.{field}: no default found, expected one")
         if is_record(kind):
             _check_record(kind, f"{name}.{field}", where)
         elif is_list(kind) and not name.startswith("Settings"):
@@ -125,17 +83,78 @@ def _check_record(record: Any, name: str, where: str) -> None:
             )
 
 
-def check_settings(record: Any, where: str) -> None:
-    """Refuse settings without defaults.
+@dataclass(frozen=True)
+class Configurable:
+    """What a file defines that has settings."""
 
-    Raises
-    ------
-    InputError
-        Naming the field.
-    """
-    for name in record._fields:
-        if name not in record._field_defaults:
-            raise InputError(f"{where}: Settings.{name}: no default found, expected one")
+    name: str
+    source: str  # where it was read from, for messages
+    Settings: Record
+
+    @cached_property
+    def settings(self) -> dict[str, Setting]:
+        """Bounds of each setting by its keyword."""
+        return {name: setting for name, setting, _ in keywords(self.Settings)}
+
+    def make_settings(self, options: Mapping[str, Any]) -> Any:
+        """Settings by keywords; InputError for an unknown keyword, or a value out of its range."""
+        check_keys(options, self.settings, f"{self.name} options")
+        return make_settings(self.Settings, options, getattr(self, "listed", np.asarray))
 
 
-__all__ = ["check_namespace", "check_settings", "kept_source", "load_file", "read_source"]
+def annotated(record: Record, kind: type) -> Iterator[tuple[str, Any, Any]]:
+    """Name and type of each field of a record, and what of a kind it is annotated with, if it is."""
+    for name, hint in field_types(record, notes=True).items():
+        notes = [note for note in getattr(hint, "__metadata__", ()) if isinstance(note, kind)]
+        yield name, getattr(hint, "__origin__", hint) if notes else hint, notes[0] if notes else None
+
+
+def keywords(record: Record) -> Iterator[tuple[str, Setting, Any]]:
+    """Name, bounds and default of each keyword: fields, and those of records within with defaults."""
+    for name, kind, setting in annotated(record, Setting):
+        if is_record(kind) and kind._field_defaults:
+            yield from keywords(kind)
+        else:
+            yield name, setting or Setting(""), record._field_defaults.get(name)  # type: ignore[attr-defined]
+
+
+def make_settings(record: Record, options: Mapping[str, Any], listed: Callable[[Any], Any]) -> Any:
+    """A record of settings, the given ones in place of its defaults; InputError for one out of its range."""
+    values: dict[str, Any] = {}
+    for name, kind, setting in annotated(record, Setting):
+        bounds = setting or Setting("")
+        if is_record(kind) and kind._field_defaults:
+            values[name] = make_settings(kind, options, listed)
+        elif name not in options:
+            values[name] = record._field_defaults[name]  # type: ignore[attr-defined]
+        elif is_list(kind):
+            values[name] = _list_of_numbers(options[name], name, bounds, listed)
+        elif is_record(kind):
+            values[name] = _small_record(kind, options[name], name, bounds)
+        else:
+            values[name] = _number(options[name], name, bounds)
+    return record(**values)
+
+
+def _number(value: Any, name: str, bounds: Setting) -> float:
+    if bounds.whole:
+        check_whole(value, name, at_least=int(bounds.at_least or 0))
+    return check_number(value, name, above=bounds.above, at_least=bounds.at_least, at_most=bounds.at_most)
+
+
+def _small_record(kind: Any, value: Any, name: str, bounds: Setting) -> Any:
+    words = [f"the {word}" for word in kind._fields]
+    if not isinstance(value, Sequence) or isinstance(value, str) or len(value) != len(words):
+        raise InputError(f"{name}: {value!r} found, expected {' and '.join(words)}")
+    return kind(*[_number(one, f"{name}: {word}", bounds) for one, word in zip(value, words, strict=True)])
+
+
+def _list_of_numbers(value: Any, name: str, bounds: Setting, listed: Callable[[Any], Any]) -> Any:
+    if value is None:
+        return np.zeros(0)
+    numbers = np.asarray(listed(value))
+    if numbers.ndim != 1:
+        raise InputError(f"{name}: {value!r} found, expected a list")
+    if len(numbers) == 0:
+        raise InputError(f"{name}: none found, expected one at least, or None")
+    return np.array([_number(one, f"{name}: number {i}", bounds) for i, one in enumerate(numbers.tolist())])

@@ -13,10 +13,11 @@ from numpy.typing import NDArray
 from shipgym.checks import check_choice, check_keys, check_number, check_whole
 from shipgym.engine.motion import Ship
 from shipgym.errors import InputError
-from shipgym.instruments.sensor_set import SensorSet, read_sensors
+from shipgym.instruments.sensor_set import SensorSet, read_sensors, shipped_sensors
 from shipgym.sea.conditions import Weather
 from shipgym.sea.weather_column import as_weather
 from shipgym.ships import ShipModel
+from shipgym.ships.manoeuvring_model import ship_of
 from shipgym.tasks.definition import TaskDefinition, read_definition
 from shipgym.tasks.steering import Helm
 
@@ -36,25 +37,13 @@ OBSERVATION_NAMES: tuple[str, ...] = Helm._fields
 
 
 class Observed(NamedTuple):
-    """One quantity that is observed.
-
-    Attributes
-    ----------
-    name : str
-        Of the quantity.
-    low, high : float
-        Bounds of the observation.
-    scale : float
-        Physical value of 1, SI units.
-    path : str
-        Where it stands in the task's `Observation`.
-    """
+    """One quantity that is observed."""
 
     name: str
-    low: float
+    low: float  # bounds of the observation
     high: float
-    scale: float
-    path: str
+    scale: float  # physical value of 1, SI units
+    path: str  # where it stands in the task's `Observation`
 
 
 @dataclass(frozen=True)
@@ -133,10 +122,7 @@ class Task:
     def of(cls, definition: Any, **options: Any) -> Self:
         """A task by keywords: those of all tasks, and the settings of its own.
 
-        Raises
-        ------
-        InputError
-            For a keyword that it does not have, or a value out of range.
+        Raises InputError for a keyword that it does not have, or a value out of range.
         """
         task = read_definition(definition, options.pop("reward", None))
         sensors = None if options.get("sensors") is None else read_sensors(options["sensors"])
@@ -156,13 +142,7 @@ class Task:
 
     @classmethod
     def option_names(cls, definition: TaskDefinition, sensors: SensorSet | None = None) -> tuple[str, ...]:
-        """Keywords of a task with a sensor set.
-
-        Raises
-        ------
-        InputError
-            If two of them have one name.
-        """
+        """Keywords of a task with a sensor set; InputError if two of them have one name."""
         names = (*definition.settings, *cls.common_names())
         if sensors is not None:
             names = (*names, *sensors.settings)
@@ -210,13 +190,7 @@ class Task:
         return self.interval(model) / self.substeps(model)
 
     def check_fits(self, model: ShipModel) -> None:
-        """Refuse a ship that lacks what the task needs.
-
-        Raises
-        ------
-        InputError
-            Naming the argument.
-        """
+        """Refuse a ship that lacks what the task needs; InputError names the argument."""
         model.check_depth(self.water_depth)
         if self.dt is not None:
             longest = LONGEST_INTERVAL * model.particulars["length"] / model.particulars["speed"]
@@ -229,7 +203,7 @@ class Task:
             )
         if self.action == "rudder-shaft" and not model.service_shaft_speed > 0.0:
             raise InputError(f"action: 'rudder-shaft' found, but {model.name!r} knows no shaft speed")
-        self.definition.check(self.settings, model)
+        self.definition.check_fits(self.settings, model)
 
     def observed(self, model: ShipModel) -> tuple[Observed, ...]:
         """What is observed of a ship, in order."""
@@ -240,6 +214,10 @@ class Task:
             for path, seen in self.definition.seen.items()
             if seen.option in shown
         )
+
+    def instruments(self, windy: bool) -> SensorSet:
+        """What shows the ship, in weather or in calm water."""
+        return self.sensors or shipped_sensors(windy, self.noise > 0.0, self.measurement == "filtered")
 
     def _options(self, model: ShipModel) -> tuple[str, ...]:
         """Options that show a quantity."""
@@ -285,21 +263,6 @@ class Task:
             if name in record._fields:
                 return getattr(record, name)
         raise AttributeError(f"task {self.definition.name!r} has no setting {name!r}")
-
-
-def ship_of(model: ShipModel, water_depth: float = float("inf")) -> Ship:
-    """What every ship has beside her coefficients, as a record."""
-    gear, p = model.steering, model.particulars
-    return Ship(
-        length=p["length"],
-        speed=p["speed"],
-        rudder_limit=gear.limit,
-        rudder_rate=gear.rate,
-        gear_frequency=1.0 / gear.time_constant if gear.time_constant else 0.0,
-        shaft=float(model.service_shaft_speed),
-        water_depth=water_depth,
-        scale_speed=p["speed"],
-    )
 
 
 def control_interval(model: ShipModel) -> float:

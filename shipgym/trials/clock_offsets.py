@@ -14,7 +14,7 @@ import numpy as np
 from shipgym.arrays import Floats, integral
 from shipgym.errors import InputError
 from shipgym.trials.derivatives import time_derivative
-from shipgym.trials.resampling import Series
+from shipgym.trials.resampling import Log, Series
 
 #: Delays that are looked for, s, and the significance, in standard errors, from which one is corrected.
 LONGEST_S, SIGNIFICANT = 10.0, 2.5
@@ -118,14 +118,14 @@ def _turns_against(psi: Floats, delta: Floats) -> bool:
     return one_side and side * float(psi[-1] - psi[0]) < -_TURNED
 
 
-def corrected_clocks(
-    t: Floats, values: Mapping[str, Floats], series: Series, choice: str | None, where: str
-) -> tuple[Series, list[str]]:
+def corrected_clocks(log: Log, series: Series, choice: str | None) -> tuple[Series, list[str]]:
     """The channels with late yaw rate and rudder put right, none where nothing is, and what was found.
 
-    `choice` is that of :class:`shipgym.trials.navigation.Instruments`: without one, channels on one clock are
-    left, and more than `REFUSED_S` between them is an InputError. So is a rudder of the wrong sign.
+    The series are those that the log was made of; `choice` is that of
+    :class:`shipgym.trials.navigation.Instruments`: without one, channels on one clock are left, and more than
+    `REFUSED_S` between them is an InputError. So is a rudder of the wrong sign.
     """
+    t, values, where = log.t, log.channels, log.where
     found: dict[str, ClockOffset | None] = {}
     if {"psi", "r"} <= values.keys() and _reverses(values["r"]):
         found["r"] = clock_offset(t, values["psi"], values["r"], {})

@@ -3,7 +3,7 @@
 import csv
 import re
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -75,6 +75,17 @@ class Table:
                 "expected a number; correct the cell, or leave it empty where the value is missing and "
                 'import with repair = "interpolate"'
             ) from None
+
+
+def column_table(
+    path: Path,
+    columns: Mapping[str, npt.NDArray[Any]],
+    rows: Sequence[int],
+    words: str = "row {line}",
+    **more: Any,
+) -> Table:
+    """A table of whole columns, and the place in the file of each row; `more` are other fields of `Table`."""
+    return Table(path, tuple(columns), columns.__getitem__, rows, words, **more)
 
 
 def read_table(path: str | Path) -> Table:

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from shipgym.checks import shown
 from shipgym.errors import InputError
 from shipgym.trials.clock_texts import DAY, clock_text, read_clock
-
-if TYPE_CHECKING:
-    from shipgym.trials.trial_import import Imported
+from shipgym.trials.resampling import Log
 
 #: A rudder this far, rad, from its usual place is active; quiet for this long, s, it ends a manoeuvre.
 ACTIVE, QUIET_S = float(np.radians(3.0)), 60.0
@@ -31,7 +29,7 @@ def check_cut(cut: Any, where: str) -> None:
         raise InputError(f"{where} cut: {shown(cut)} found, {_EXPECTED}")
 
 
-def cut_log(cut: Any, log: Imported, where: str) -> list[slice]:
+def cut_log(cut: Any, log: Log, where: str) -> list[slice]:
     """The samples of each part, in order of time; all of them where `cut` is None."""
     if cut is None:
         return [slice(0, log.t.size)]
@@ -43,14 +41,14 @@ def cut_log(cut: Any, log: Imported, where: str) -> list[slice]:
             clock = (clock_text((log.start or 0.0) + log.t[k]) for k in (0, -1))
             raise InputError(
                 f"{where} cut: {ends[0]} to {ends[1]} holds no trial, expected stretches of the log, which "
-                "goes "
-                f"from {log.t[0]:g} to {log.t[-1]:g} s" + (f", {' to '.join(clock)}" if log.start else "")
+                f"goes from {log.t[0]:g} to {log.t[-1]:g} s"
+                + (f", {' to '.join(clock)}" if log.start else "")
             )
         found.append(part)
     return found
 
 
-def _seconds(moment: float | str, log: Imported, where: str) -> float:
+def _seconds(moment: float | str, log: Log, where: str) -> float:
     """A moment on the time of the log, s; a time of the day is that next to its beginning."""
     if not isinstance(moment, str):
         return float(moment)
@@ -68,7 +66,7 @@ def _seconds(moment: float | str, log: Imported, where: str) -> float:
     return after if after < log.t[-1] + 0.5 * DAY else after - DAY
 
 
-def _active_stretches(log: Imported, where: str) -> list[tuple[float, float]]:
+def _active_stretches(log: Log, where: str) -> list[tuple[float, float]]:
     """From before the rudder leaves its usual place until it is quiet again."""
     delta = log.channels.get("delta", np.zeros(log.t.size))
     active = log.t[np.abs(delta - np.median(delta)) > ACTIVE]

@@ -2,23 +2,20 @@
 
 import json
 import re
-import tomllib
-from importlib.resources import files
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from shipgym.errors import InputError
+from shipgym.files import packaged_toml
 from shipgym.trials.csv_reader import Table
 from shipgym.trials.tables import read_log
 from shipgym.trials.trial import Trial, read_trials
 from shipgym.trials.trial_import import RUDDER_SIGNS, Conventions
 from shipgym.trials.units import QUANTITIES, UNITS
 
-WORDS: dict[str, dict[str, Any]] = tomllib.loads(
-    files("shipgym.trials").joinpath("guesses.toml").read_text("utf-8")
-)
+WORDS: dict[str, dict[str, Any]] = packaged_toml("shipgym.trials", "guesses.toml")
 
 
 class Guess(NamedTuple):

@@ -14,6 +14,7 @@ from shipgym.arrays import Floats
 from shipgym.checks import check_choice, check_keys, check_number, check_table
 from shipgym.errors import InputError
 from shipgym.trials.derivatives import time_derivative
+from shipgym.trials.resampling import Log
 
 if TYPE_CHECKING:
     from shipgym.ships.particulars import Particulars
@@ -98,29 +99,28 @@ def straight_parts(t: Floats, channels: Mapping[str, Floats]) -> npt.NDArray[np.
     return straight
 
 
-def correct_offsets(t: Floats, channels: dict[str, Floats], tools: Instruments, where: str) -> list[str]:
-    """Take the offsets of heading and rudder out of the channels, in place; what was estimated, in words."""
-    notes = []
+def correct_offsets(log: Log, tools: Instruments) -> None:
+    """Take the offsets of heading and rudder out of the channels."""
+    channels = log.channels
     for (key, name), offset in zip(
         _OFFSETS.items(), (tools.heading_offset, tools.rudder_offset), strict=True
     ):
         if name not in channels:
             continue
         if isinstance(offset, str):
-            straight = straight_parts(t, channels)
+            straight = straight_parts(log.t, channels)
             found = heading_offset(channels, straight) if name == "psi" else None
             if name == "delta" and straight.any():
                 found = float(np.mean(channels["delta"][straight])), 0.0
             if found is None:
                 needed = "with sog and cog on courses over 60 deg apart" if name == "psi" else "and a heading"
                 raise InputError(
-                    f'{where}: {key} = "estimate" found, expected straight parts of {STRAIGHT_S:g} s '
+                    f'{log.where}: {key} = "estimate" found, expected straight parts of {STRAIGHT_S:g} s '
                     f"{needed}; give {key} in degrees, or leave it out"
                 )
             offset = found[0]
-            notes.append(f"{key} {offset / DEGREE:.2f}, estimated from straight parts and taken out")
+            log.notes.append(f"{key} {offset / DEGREE:.2f}, estimated from straight parts and taken out")
         channels[name] = channels[name] - offset if offset else channels[name]
-    return notes
 
 
 def heading_offset(
@@ -143,23 +143,22 @@ def heading_offset(
     return float(np.arctan2(fitted[1], fitted[0])), error
 
 
-def to_midship(
-    t: Floats, channels: dict[str, Floats], derived: set[str], tools: Instruments, where: str
-) -> list[str]:
-    """Move positions and velocities of GNSS to midship and make surge and sway of what was logged, in place.
+def to_midship(log: Log, tools: Instruments) -> None:
+    """Move positions and velocities of GNSS to midship and make surge and sway of what was logged.
 
     Speed and course over ground give u and v, else positions; a speed through the water takes the place of u,
-    and the current that it shows is taken out of v. Returns remarks.
+    and the current that it shows is taken out of v.
     """
+    t, channels = log.t, log.channels
     north, east, water = (channels.pop(name, None) for name in ("ground_north", "ground_east", "stw"))
     moved = bool(tools.forward or tools.starboard)
     if "psi" not in channels:
         if north is not None or moved:
             raise InputError(
-                f"{where}: positions or velocities of GNSS found without a heading, expected a column psi"
+                f"{log.where}: positions or velocities of GNSS found without a heading, expected a column psi"
             )
         channels |= {} if water is None else {"u": water}
-        return []
+        return
     psi, r = channels["psi"], channels["r"]
     if moved and {"x", "y"} <= channels.keys():
         ahead, aside = rotate_to_body(np.full(t.size, tools.forward), np.full(t.size, tools.starboard), -psi)
@@ -171,18 +170,15 @@ def to_midship(
         ground = rotate_to_body(time_derivative(t, channels["x"]), time_derivative(t, channels["y"]), psi)
     else:
         channels |= {} if water is None else {"u": water}
-        return []
-    notes = []
+        return
     if water is not None:
         current, note = set_and_drift(psi, water, ground)
         c, s = np.cos(psi), np.sin(psi)
         channels["u"], ground = water, (water, ground[1] - (c * current[1] - s * current[0]))
-        notes.append(note)
+        log.notes.append(note)
     for name, values in zip(("u", "v"), ground, strict=True):
         if name not in channels:
-            channels[name] = values
-            derived.add(name)
-    return notes
+            log.derive(name, values)
 
 
 def set_and_drift(psi: Floats, water: Floats, ground: tuple[Floats, Floats]) -> tuple[Floats, str]:

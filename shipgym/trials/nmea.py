@@ -4,11 +4,9 @@ pynmea2 parses the sentences; those that hold no channel (AIS, depth, satellites
 """
 
 import re
-import tomllib
 from collections import defaultdict
 from collections.abc import Iterator
 from datetime import UTC, datetime, time
-from importlib.resources import files
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -17,17 +15,15 @@ import numpy as np
 from shipgym.arrays import Floats
 from shipgym.checks import quoted
 from shipgym.errors import InputError
-from shipgym.files import LARGEST_CSV, read_bytes, read_text
+from shipgym.files import LARGEST_CSV, packaged_toml, read_bytes, read_text
 from shipgym.trials.clock_texts import DAY
-from shipgym.trials.csv_reader import MOST_LINES
+from shipgym.trials.csv_reader import MOST_LINES, Table, column_table
 from shipgym.trials.units import si_factor
 
 #: Share of damaged sentences from which a log is refused.
 MOST_DAMAGED = 0.1
 
-SENTENCES: dict[str, dict[str, list[str]]] = tomllib.loads(
-    files("shipgym.trials").joinpath("sentences.toml").read_text("utf-8")
-)
+SENTENCES: dict[str, dict[str, list[str]]] = packaged_toml("shipgym.trials", "sentences.toml")
 _SPEEDS = {"N": "knots", "K": "km/h", "M": "m/s"}
 #: The better sources: of heading true ones, of the speed through the water the log with two axes.
 _BETTER = {"HDT": 3, "THS": 2, "VHW": 1, "VBW": 1}
@@ -43,14 +39,6 @@ class Reading(NamedTuple):
     value: float
 
 
-class Log(NamedTuple):
-    """What a log holds."""
-
-    columns: dict[str, Floats]  # by channel in SI units, positions in degrees; nan where blank; ``t`` too
-    lines: list[int]  # of the file behind each row
-    notes: list[str]  # what was left out
-
-
 Series = tuple[Floats, Floats, Floats]  # time, line and value
 Readings = dict[str, dict[str, list[Reading]]]  # by channel and source, the talker with the sentence
 
@@ -61,8 +49,11 @@ def is_nmea(path: Path) -> bool:
     return len(_ANY.findall(head.replace("\r", "\n"))) >= 2
 
 
-def parse_log(path: Path) -> Log:
-    """Read a log; raises InputError for a damaged one and one without time or channels."""
+def read_nmea(path: Path) -> Table:
+    """The channels of a log in SI units, positions in degrees, nan where a row has none.
+
+    Raises InputError for a damaged log and one without time or channels.
+    """
     import pynmea2
 
     if not hasattr(pynmea2, "THS"):  # which pynmea2 does not know
@@ -99,7 +90,7 @@ def parse_log(path: Path) -> Log:
 
 
 def _values_of(message: Any) -> Iterator[tuple[str, float]]:
-    """The channels of a sentence that is valid."""
+    """The channels of a sentence that is valid; ValueError for an infinite number."""
     kind = message.sentence_type
     fields = dict(SENTENCES[kind])
     flag, valid = fields.pop("valid", ("", ""))
@@ -110,6 +101,8 @@ def _values_of(message: Any) -> Iterator[tuple[str, float]]:
         if told in (None, "") or not getattr(message, field[:3], " "):  # the latitude of an empty lat
             continue
         value = si_factor(channel, unit) * float(told)
+        if np.isinf(value):
+            raise ValueError(told)
         if kind == "HDG":
             for size, side in ((message.deviation, message.dev_dir), (message.variation, message.var_dir)):
                 value += si_factor("psi", "deg") * {"E": 1.0, "W": -1.0}.get(side, 0.0) * float(size or 0.0)
@@ -132,7 +125,7 @@ def _time_of(message: Any) -> float:
     return day + 3600 * clock.hour + 60 * clock.minute + clock.second + 1e-6 * clock.microsecond
 
 
-def _assembled(path: Path, readings: Readings, notes: list[str]) -> Log:
+def _assembled(path: Path, readings: Readings, notes: list[str]) -> Table:
     clocks = readings.pop("t", {})
     if not readings or not clocks:
         found = "sentence of a ship's motion" if clocks else "time that can be read"
@@ -160,7 +153,7 @@ def _assembled(path: Path, readings: Readings, notes: list[str]) -> Log:
         place = np.searchsorted(every, clock)
         columns[channel] = np.full(every.size, np.nan)
         columns[channel][place], lines[place] = value, line
-    return Log(columns, lines.tolist(), notes)
+    return column_table(path, columns, lines.tolist(), "line {line}", time_unit="unix", notes=tuple(notes))
 
 
 def _rank(source: str, readings: list[Reading]) -> tuple[bool, bool, int]:

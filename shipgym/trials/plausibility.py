@@ -1,7 +1,12 @@
-"""Values that no ship can have, and channels that contradict each other: most often a wrong unit."""
+"""Values that no ship can have, and channels that contradict each other.
+
+Most often a unit, a sign, a frame or a clock is wrong. What cannot be right is an InputError with the line to
+write; what may be right is a remark.
+"""
 
 import math
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -10,24 +15,34 @@ import numpy.typing as npt
 from shipgym.arrays import Floats, integral
 from shipgym.errors import InputError
 from shipgym.trials.columns import Source
+from shipgym.trials.derivatives import time_derivative
+from shipgym.trials.navigation import DEGREE, Instruments, heading_offset, straight_parts
+from shipgym.trials.resampling import Log, Series
 from shipgym.trials.units import QUANTITIES, UNITS, si_factor
-
-_DEGREE = math.pi / 180.0
 
 #: Largest magnitude of each channel that can be a ship's, or a small model's; SI units.
 LIMITS: dict[str, float] = {
-    "psi": 100.0, "r": 60.0 * _DEGREE, "p": 360.0 * _DEGREE, "phi": 180.0 * _DEGREE, "delta": 90.0 * _DEGREE,
-    "delta_command": 90.0 * _DEGREE, "u": 50.0, "v": 50.0, "n": 200.0, "n_command": 200.0,
+    "psi": 100.0, "r": 60.0 * DEGREE, "p": 360.0 * DEGREE, "phi": 180.0 * DEGREE, "delta": 90.0 * DEGREE,
+    "delta_command": 90.0 * DEGREE, "u": 50.0, "v": 50.0, "n": 200.0, "n_command": 200.0,
     "t": 1e10, "x": 1e8, "y": 1e8, "X": 1e10, "Y": 1e10, "N": 1e13, "psi_wave": 100.0,
-    "r_wave": 60.0 * _DEGREE, "phi_wave": 180.0 * _DEGREE, "p_wave": 360.0 * _DEGREE,
+    "r_wave": 60.0 * DEGREE, "phi_wave": 180.0 * DEGREE, "p_wave": 360.0 * DEGREE,
     "current_north": 50.0, "current_east": 50.0, "wind_speed": 200.0, "wind_from": 100.0,
     "lat": 90.0, "lon": 360.0, "sog": 50.0, "cog": 100.0, "stw": 50.0,
-    "wind_udot": 10.0, "wind_vdot": 10.0, "wind_rdot": 60.0 * _DEGREE,
+    "wind_udot": 10.0, "wind_vdot": 10.0, "wind_rdot": 60.0 * DEGREE,
 }  # fmt: skip
 
-_FASTEST_TURN = 60.0 * _DEGREE
-_LARGEST_JUMP = 30.0 * _DEGREE
+_FASTEST_TURN = 60.0 * DEGREE
+_LARGEST_JUMP = 30.0 * DEGREE
 _WINDOWS = 30
+#: Faster than any ship, and slower than any manoeuvre, over ground, m/s.
+FASTEST, SLOWEST = 50.0, 0.3
+_MOST_OUTLIERS = 0.1  # share of the steps; more are two ships in turn
+_SAME, _COMPASS, _CONTRADICTION, _TURNED = 0.3 * DEGREE, 2.0 * DEGREE, 25.0 * DEGREE, 20.0 * DEGREE
+_HALF_HOUR, _LONGEST_ZONE = 1800.0, 14.0 * 3600.0
+NO_RUDDER = (
+    "no rudder angle in this log: without rudder nothing can be identified from it, it can only be looked "
+    "at; log the rudder too (in NMEA 0183 the sentence RSA)"
+)
 
 
 def check_ranges(channels: Mapping[str, Floats], source: Source) -> None:
@@ -81,22 +96,23 @@ def check_heading(t: Floats, psi: Floats, raw_psi: Floats, source: Source) -> No
     )
 
 
-def check_consistency(t: Floats, channels: Mapping[str, Floats], frame: str, source: Source) -> None:
+def check_consistency(log: Log, frame: str, source: Source) -> None:
     """Refuse channels that contradict each other so plainly that a unit, sign or frame must be wrong.
 
     Compared over windows in time, so that noise and offsets do not matter: yaw rate with the change of
     heading, and velocities with the change of position. The channels are as recorded, in SI units, the
     heading without jumps; `frame`, "body" or "earth", is the declared one of u and v.
     """
-    if "psi" in channels and "r" in channels:
-        _check_yaw_rate(t, channels["psi"], channels["r"], source)
-    if all(name in channels for name in ("x", "y", "psi", "u", "v")):
-        _check_velocity(t, channels, frame, source)
+    if {"psi", "r"} <= log.channels.keys():
+        _check_yaw_rate(log, source)
+    if {"x", "y", "psi", "u", "v"} <= log.channels.keys():
+        _check_velocity(log, frame, source)
 
 
-def _check_yaw_rate(t: Floats, psi: Floats, r: Floats, source: Source) -> None:
-    turned, expected = (_detrended(t, part) for part in (psi, integral(t, r)))
-    if max(np.ptp(turned), np.ptp(expected)) < 2.0 * _DEGREE:
+def _check_yaw_rate(log: Log, source: Source) -> None:
+    parts = log.channels["psi"], integral(log.t, log.channels["r"])
+    turned, expected = (_detrended(log.t, part) for part in parts)
+    if max(np.ptp(turned), np.ptp(expected)) < 2.0 * DEGREE:
         return
     gain, misfit = _fit(np.diff(expected), np.diff(turned))
     if misfit > 0.5 or 0.2 < gain.real < 5.0:
@@ -114,7 +130,8 @@ def _check_yaw_rate(t: Floats, psi: Floats, r: Floats, source: Source) -> None:
     )
 
 
-def _check_velocity(t: Floats, channels: Mapping[str, Floats], frame: str, source: Source) -> None:
+def _check_velocity(log: Log, frame: str, source: Source) -> None:
+    t, channels = log.t, log.channels
     moved = np.diff(_at_windows(channels["x"] + 1j * channels["y"]))
     velocity = channels["u"] + 1j * channels["v"]
     velocities = {"body": velocity * np.exp(1j * channels["psi"]), "earth": velocity}
@@ -186,3 +203,108 @@ def _angle_remedy(gain: float, source: Source) -> str:
     }
     nearest = min(options.values())
     return "declare " + " or ".join(text for text, distance in options.items() if distance < nearest + 0.01)
+
+
+def find_outliers(
+    t: Floats, local: Floats, source: Source, rows: npt.NDArray[np.intp]
+) -> npt.NDArray[np.intp]:
+    """Rows whose positions no ship reaches from those beside; time in s, `local` in m, shape (2, n_rows).
+
+    Raises InputError where there are so many that two ships must be in the log.
+    """
+    if t.size < 3:
+        return rows[:0]
+    steps = np.hypot(*np.diff(local))
+    fast = steps > FASTEST * np.maximum(np.diff(t), 0.1)
+    if np.mean(fast) > _MOST_OUTLIERS:
+        k = int(np.argmax(fast))
+        raise InputError(
+            f"{source.at(int(rows[k + 1]), 'lat')}: the position jumps {steps[k] / 1000.0:.4g} km within "
+            f"{t[k + 1] - t[k]:g} s, as in {int(fast.sum())} of {fast.size} steps, expected the track of one "
+            "ship; likely two ships are in one log: keep the rows of one, or declare the unit of lat and lon"
+        )
+    return np.asarray(rows[np.r_[fast, True] & np.r_[True, fast]])
+
+
+def check_overlap(series: Series, other: Series, path: Path, column: str) -> None:
+    """Refuse a file of one log that was not written at the time of the others, all on one clock, s."""
+    (first, last), (begin, end) = (
+        (min(clock[0] for clock, _ in one.values()), max(clock[-1] for clock, _ in one.values()))
+        for one in (series, other)
+    )
+    if begin < last and end > first:
+        return
+    shift = _HALF_HOUR * round((begin + end - first - last) / 2.0 / _HALF_HOUR)
+    zone = f"{'-' if shift < 0.0 else '+'}{int(abs(shift) // 3600):02d}:{int(abs(shift) % 3600 // 60):02d}"
+    remedy = (
+        f'likely its clock is in another time zone: write t = {{ column = "{column}", zone = "{zone}" }}'
+        if begin - shift < last and end - shift > first and abs(shift) <= _LONGEST_ZONE
+        else "name files that were written at the same time"
+    )
+    raise InputError(
+        f"{path}: begins {begin - first:.6g} s after the other file of this log and does not overlap with "
+        f"it, expected one time; {remedy}"
+    )
+
+
+def check_log(log: Log, tools: Instruments, source: Source, gnss: bool) -> list[str]:
+    """Compare heading with course over ground, and look for a ship at berth; remarks on what may be wrong.
+
+    The channels are as logged, in SI units, the heading without jumps. Looked at are speed and course over
+    ground and, where they are of `gnss`, positions.
+    """
+    t, values = log.t, log.channels
+    notes = [NO_RUDDER] if gnss and "delta" not in values else []
+    if "ground_north" in values:
+        velocity = values["ground_north"] + 1j * values["ground_east"]
+    elif gnss and "x" in values:
+        velocity = time_derivative(t, values["x"]) + 1j * time_derivative(t, values["y"])
+    else:
+        return notes
+    fastest = float(np.quantile(np.abs(velocity), 0.95))
+    if fastest < SLOWEST:
+        raise InputError(
+            f"{source.table.path}: the ship makes at most {fastest:.2g} m/s over ground, she lies at berth "
+            "or at anchor, expected a manoeuvre; read another log"
+        )
+    moving = np.abs(velocity) > 0.3 * fastest
+    if "psi" not in values or np.count_nonzero(moving) < 3:
+        return notes
+    _check_course(values["psi"][moving], np.angle(velocity[moving]), tools, source)
+    offset = heading_offset(values, straight_parts(t, values)) if not tools.heading_offset else None
+    magnetic = "mag" in source.columns.get("psi", source.columns["t"]).name.lower()
+    if offset is not None and abs(offset[0]) > max(_COMPASS, 4.0 * offset[1]):
+        told = f"{offset[0] / DEGREE:.1f}"
+        notes.append(
+            f"the heading shows {told} deg too much on every course, as a magnetic compass or a gyro that is "
+            f"not aligned does; to take it out write heading_offset_deg = {told} in [sensors]"
+        )
+    elif magnetic and not tools.heading_offset:
+        notes.append(
+            "the heading is magnetic by its name; write what it shows too much as heading_offset_deg"
+        )
+    return notes
+
+
+def _check_course(psi: Floats, course: Floats, tools: Instruments, source: Source) -> None:
+    """Refuse a heading that is none beside the course over ground."""
+    apart, mirrored = np.exp(1j * (course - psi)), np.exp(1j * (course + psi))
+    mean, turned = float(np.angle(apart.mean())), float(np.ptp(psi))
+    head = f"{source.table.path}: the heading "
+    if turned > _TURNED and np.sqrt(np.mean(np.angle(apart) ** 2)) < _SAME:
+        raise InputError(
+            f"{head}is the course over ground, from which it differs by less than 0.3 deg in a turn of "
+            f"{turned / DEGREE:.0f} deg, where a ship drifts; name the gyro's column: psi = "
+            f'{{ column = "..." }}'
+        )
+    if turned > _TURNED and abs(mirrored.mean()) > max(0.95, abs(apart.mean()) + 0.02):
+        raise InputError(
+            f"{head}contradicts the course over ground: it turns the other way, expected it clockwise from "
+            "north; change the sign of its column"
+        )
+    if abs(mean) > _CONTRADICTION and abs(apart.mean()) > 0.7 and not tools.heading_offset:
+        raise InputError(
+            f"{head}contradicts the course over ground by {-mean / DEGREE:.0f} deg, expected it clockwise "
+            "from "
+            f"north; name the right column, or write heading_offset_deg = {-mean / DEGREE:.0f} in [sensors]"
+        )

@@ -1,5 +1,7 @@
 """Channels that were logged at different rates, each on a clock of its own, and one clock for all of them."""
 
+from dataclasses import dataclass, field
+
 import numpy as np
 import numpy.typing as npt
 
@@ -14,6 +16,25 @@ MOTION = ("x", "ground_north", "u", "psi", "r", "delta")
 #: A step this many times the usual one of a channel is a hole, not a slow clock.
 HOLE_STEPS = 6.0
 _FEWEST = 3
+
+
+@dataclass
+class Log:
+    """The channels of one log on one clock, in SI units; corrections change it in place."""
+
+    t: Floats
+    channels: dict[str, Floats]  # by name, shape (n_samples,)
+    where: str  # start of messages: the file
+    notes: list[str]  # remarks of the readers and corrections
+    derived: set[str] = field(default_factory=set)
+    repaired: dict[str, int] = field(default_factory=dict)  # how many values of a channel were filled in
+    over_ground: bool | None = None  # whether surge and sway are; None: where they are derived
+    start: float | None = None  # clock at t = 0 as the file has it, s since 1970 or of the day
+
+    def derive(self, channel: str, values: Floats) -> None:
+        """Add a channel that follows from others."""
+        self.channels[channel] = values
+        self.derived.add(channel)
 
 
 def have_own_clocks(present: npt.NDArray[np.bool_]) -> bool:
@@ -47,15 +68,15 @@ def own_clock(channel: str, t: Floats, values: Floats, source: Source) -> tuple[
     return clock, values[rows]
 
 
-def on_one_clock(series: Series, where: str) -> tuple[Floats, dict[str, Floats], list[str]]:
-    """Time, the channels on it, and remarks, of channels on clocks of their own.
+def on_one_clock(series: Series, where: str) -> Log:
+    """Channels on clocks of their own on one.
 
     The clock is that of the slowest channel of the motion, where all of these have values; the others are
     interpolated linearly onto it. A hole in one of the motion's channels stays a hole.
     """
     clocks = [clock for clock, _ in series.values()]
     if all(clock is clocks[0] for clock in clocks):
-        return clocks[0], {name: values for name, (_, values) in series.items()}, []
+        return Log(clocks[0], {name: values for name, (_, values) in series.items()}, where, [])
     motion = {name: series[name][0] for name in series if name in MOTION} or dict(
         zip(series, clocks, strict=True)
     )
@@ -80,4 +101,4 @@ def on_one_clock(series: Series, where: str) -> tuple[Floats, dict[str, Floats],
             f"{where}: {', '.join(motion)} have {t.size} moments in common, expected channels of one time; "
             "check their clocks"
         )
-    return t, {name: np.interp(t, *pair) for name, pair in series.items()}, notes
+    return Log(t, {name: np.interp(t, *pair) for name, pair in series.items()}, where, notes)

@@ -32,7 +32,15 @@ def check_scale(trial: Trial, ship: Particulars, where: str) -> None:
         )
     speeds = np.hypot(trial["u"], trial.channels.get("v", np.zeros(1))) if "u" in trial else None
     if speeds is not None and "r" in trial:
-        _check_turning(trial, float(speeds.max()), ship.length, where)
+        speed, fastest = float(speeds.max()), float(np.quantile(np.abs(trial["r"]), _MOST))
+        limit = _FASTEST_TURN_PRIME * speed / ship.length
+        if fastest > limit:
+            raise InputError(
+                f"{where}: yaw rate up to {math.degrees(fastest):.4g} deg/s at up to {speed:.4g} m/s found, "
+                f"expected at most {math.degrees(limit):.4g} deg/s for a length of {ship.length:g} m; likely "
+                "the trial of another ship or scale, or a wrong unit of r, psi, u or v in [columns], or of "
+                "[ship] length"
+            )
     if speeds is not None and ship.speed is not None and "speed" not in ship.estimated:
         fastest = float(np.quantile(speeds, _MOST))
         low, high = (share * ship.speed for share in _SPEEDS)
@@ -57,14 +65,3 @@ def check_scale(trial: Trial, ship: Particulars, where: str) -> None:
                 f"propeller of {ship.propeller_diameter:g} m; likely a wrong unit: "
                 'declare n = { column = "...", unit = "rpm" } in [columns]'
             )
-
-
-def _check_turning(trial: Trial, speed: float, length: float, where: str) -> None:
-    fastest, limit = float(np.quantile(np.abs(trial["r"]), _MOST)), _FASTEST_TURN_PRIME * speed / length
-    if fastest > limit:
-        raise InputError(
-            f"{where}: yaw rate up to {math.degrees(fastest):.4g} deg/s at up to {speed:.4g} m/s found, "
-            f"expected at most {math.degrees(limit):.4g} deg/s for a length of {length:g} m; likely the "
-            "trial of another ship or scale, or a wrong unit of r, psi, u or v in [columns], or of [ship] "
-            "length"
-        )

@@ -23,38 +23,17 @@ class Sensor:
     """One sensor, in the SI unit of its channel. The default is a perfect one.
 
     The reading at time t is the signal at t - latency_s, plus drift and white noise, now and then an outlier,
-    rounded to the resolution.
-
-    Attributes
-    ----------
-    noise : float
-        Standard deviation of the white noise.
-    resolution : float
-        Step of the readings; 0 for none.
-    drift : float
-        Standard deviation of a first-order Gauss-Markov process.
-    drift_time_s : float
-        Its correlation time, s.
-    outlier_probability : float
-        Of each reading.
-    outlier_size : float
-        Standard deviation of what an outlier adds.
-    latency_s : float
-        Age of the signal at the time its reading is logged, s.
-
-    Raises
-    ------
-    InputError
-        For a negative or infinite number, a probability above 1, or a drift without correlation time.
+    rounded to the resolution. Raises InputError for a negative or infinite number, a probability above 1, or
+    a drift without correlation time.
     """
 
-    noise: float = 0.0
-    resolution: float = 0.0
-    drift: float = 0.0
-    drift_time_s: float = 300.0
-    outlier_probability: float = 0.0
-    outlier_size: float = 0.0
-    latency_s: float = 0.0
+    noise: float = 0.0  # standard deviation of the white noise
+    resolution: float = 0.0  # step of the readings; 0 for none
+    drift: float = 0.0  # standard deviation of a first-order Gauss-Markov process
+    drift_time_s: float = 300.0  # its correlation time
+    outlier_probability: float = 0.0  # of each reading
+    outlier_size: float = 0.0  # standard deviation of what an outlier adds
+    latency_s: float = 0.0  # age of the signal at the time its reading is logged
 
     def __post_init__(self) -> None:
         for item in fields(self):
@@ -104,30 +83,14 @@ SEA_TRIAL: Mapping[str, Sensor] = MappingProxyType(
 
 @dataclass(frozen=True)
 class Sensors:
-    """The sensors of a ship and her logger.
+    """The sensors of a ship and her logger; InputError for an unknown channel or a number out of range."""
 
-    Attributes
-    ----------
-    by_channel : mapping of str to Sensor
-        Channels without a sensor are logged as they are. By default those of a sea trial (`SEA_TRIAL`).
-    sampling_s : float or None
-        Time between logged samples, s, which lie on straight lines between those of the trial; None: as in
-        the trial.
-    dropout_probability : float
-        Of each sample to begin a gap in the log.
-    dropout_samples : float
-        Mean length of a gap, samples. A gap leaves the samples out of the measured trial.
-
-    Raises
-    ------
-    InputError
-        For an unknown channel, or a number out of range.
-    """
-
+    #: channels without a sensor are logged as they are
     by_channel: Mapping[str, Sensor] = field(default_factory=lambda: SEA_TRIAL)
+    #: time between logged samples, which lie on straight lines between those of the trial; None: as there
     sampling_s: float | None = None
-    dropout_probability: float = 0.0
-    dropout_samples: float = 3.0
+    dropout_probability: float = 0.0  # of each sample to begin a gap in the log
+    dropout_samples: float = 3.0  # mean length of a gap, whose samples are left out
 
     def __post_init__(self) -> None:
         for channel, sensor in self.by_channel.items():
@@ -164,16 +127,9 @@ class Sensors:
                 f"trial {trial.name!r}: {kept.sum()} of {len(t)} samples outside the gaps, expected at least "
                 f"{FEWEST_SAMPLES}; give a smaller dropout_probability"
             )
-        return Trial(
-            t[kept],
-            {name: values[kept] for name, values in readings.items()},
-            name=trial.name,
-            kind=trial.kind,
-            use=trial.use,
-            derived=trial.derived,
-            length=trial.length,
-            over_ground=trial.over_ground,
-        )
+        facts = ("name", "kind", "use", "derived", "length", "over_ground")
+        logged = {name: values[kept] for name, values in readings.items()}
+        return Trial(t[kept], logged, **{fact: getattr(trial, fact) for fact in facts})
 
     def _sampled(self, trial: Trial) -> Floats:
         """Times of the logger, s."""
@@ -185,8 +141,7 @@ class Sensors:
                 f"sensors sampling_s: {self.sampling_s:g} s found, expected at most half of the "
                 f"{trial.duration:g} s of trial {trial.name!r}"
             )
-        times: Floats = trial.t[0] + self.sampling_s * np.arange(count)
-        return times
+        return np.asarray(trial.t[0] + self.sampling_s * np.arange(count))
 
     def _logged(self, count: int, rng: np.random.Generator) -> NDArray[np.bool_]:
         """Which samples are not in a gap."""
@@ -215,5 +170,4 @@ def on_board(trial: Trial) -> dict[str, Floats]:
 
 def orders_at(times: Floats, t: Floats, orders: Floats) -> Floats:
     """Orders, each given at a time t and held until the next, at other times; all in s."""
-    given: Floats = orders[np.searchsorted(t, times + 1e-9, side="right") - 1]
-    return given
+    return np.asarray(orders[np.searchsorted(t, times + 1e-9, side="right") - 1])

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from shipgym.checks import check_choice, check_keys, check_table, check_text, data_only, placed
 from shipgym.errors import InputError
@@ -28,6 +28,7 @@ _SECTIONS = (
     "ship", "steering", "columns", "conventions", "sensors", "structure", "identify", "wind", "trials",
 )  # fmt: skip
 _CONVENTIONS = ("rudder_positive", "velocity_frame", "origin", "repair")
+Read = TypeVar("Read")
 _TRIAL = ("file", "kind", "use", "columns", "cut", "sensors", *_CONVENTIONS)
 
 
@@ -75,15 +76,17 @@ class ShipFile:
         ship = check_table(data["ship"], f"{path}: [ship]")
         if "estimated" in ship:
             raise InputError(f"{path}: [ship]: unknown key 'estimated'; leave out what is not known")
+
+        def section(name: str, read: Callable[[Any, str], Read]) -> Read | None:
+            return read(data[name], f"{path}: [{name}]") if name in data else None
+
         particulars = Particulars.from_mapping(ship, f"{path}: [ship]")
-        steering = (
-            SteeringGear.from_mapping(data["steering"], f"{path}: [steering]") if "steering" in data else None
-        )
+        steering = section("steering", SteeringGear.from_mapping)
         given = check_table(data.get("identify", {}), f"{path}: [identify]")
         given = {**given, "wind": data["wind"]} if "wind" in data else given
         identify = check_options(given, f"{path}: [identify]")
         data_only(identify, f"{path}: [identify]")
-        structure = own_structure(data["structure"], f"{path}: [structure]") if "structure" in data else None
+        structure = section("structure", own_structure)
         return cls(path, particulars, steering, identify, _entries(path, data, particulars), structure)
 
     def completed_particulars(self) -> Particulars:
@@ -126,17 +129,16 @@ def _entries(path: Path, data: Mapping[str, Any], particulars: Particulars) -> t
         raise InputError(
             f'{path}: no trials found, expected at least one [[trials]] table with file = "run.csv"'
         )
-    conventions = check_table(data.get("conventions", {}), f"{path}: [conventions]")
-    check_keys(conventions, _CONVENTIONS, f"{path}: [conventions]")
-    _conventions(conventions, particulars, f"{path}: [conventions]")
-    columns = check_table(data.get("columns", {}), f"{path}: [columns]")
-    parse_columns(columns, f"{path}: [columns]")
-    sensors = check_table(data.get("sensors", {}), f"{path}: [sensors]")
-    Instruments.from_mapping(sensors, f"{path}: [sensors]", particulars)
+    shared = {
+        name: check_table(data.get(name, {}), f"{path}: [{name}]")
+        for name in ("conventions", "columns", "sensors")
+    }
+    check_keys(shared["conventions"], _CONVENTIONS, f"{path}: [conventions]")
+    _conventions(shared["conventions"], {}, particulars, f"{path}: [conventions]")
+    parse_columns(shared["columns"], f"{path}: [columns]")
+    Instruments.from_mapping(shared["sensors"], f"{path}: [sensors]", particulars)
     entries = [
-        _entry(
-            path, f"{path}: [[trials]] {k}", table, columns, {**conventions, "sensors": sensors}, particulars
-        )
+        _entry(path, f"{path}: [[trials]] {k}", table, shared, particulars)
         for k, table in enumerate(tables, start=1)
     ]
     by_path = {_place(entry): entry for entry in reversed(entries)}
@@ -156,13 +158,9 @@ def _place(entry: TrialEntry) -> tuple[str, ...]:
 
 
 def _entry(
-    path: Path,
-    where: str,
-    table: Any,
-    columns: Mapping[str, Any],
-    conventions: Mapping[str, Any],
-    particulars: Particulars,
+    path: Path, where: str, table: Any, shared: Mapping[str, Mapping[str, Any]], particulars: Particulars
 ) -> TrialEntry:
+    """One table, where nothing else stands with what the file has for all."""
     check_keys(check_table(table, where), _TRIAL, where)
     if "file" not in table:
         raise InputError(f'{where}: no file found, expected file = "run.csv"')
@@ -171,29 +169,23 @@ def _entry(
     check_cut(table.get("cut"), where)
     kind = check_choice(table["kind"], KINDS, f"{where} kind") if "kind" in table else None
     use = check_choice(table.get("use", "fit"), USES, f"{where} use")
-    own_columns = check_table(table.get("columns", {}), f"{where} columns")
-    parse_columns(own_columns, f"{where} columns")
-    own_conventions = {key: table[key] for key in _CONVENTIONS if key in table}
-    if "sensors" in table:
-        own = check_table(table["sensors"], f"{where} sensors")
-        own_conventions["sensors"] = {**conventions["sensors"], **own}
+    columns = check_table(table.get("columns", {}), f"{where} columns")
+    parse_columns(columns, f"{where} columns")
+    sensors = {**shared["sensors"], **check_table(table.get("sensors", {}), f"{where} sensors")}
+    words = {**shared["conventions"], **{key: table[key] for key in _CONVENTIONS if key in table}}
     if use != "skip":
         with placed(f"{where} file"):
             for one in paths:
                 check_readable(one, "CSV file")
+    conventions = _conventions(words, sensors, particulars, where)
+    columns = {**shared["columns"], **columns}
     return TrialEntry(
-        file=" + ".join(files),
-        paths=paths,
-        cut=table.get("cut"),
-        kind=kind,
-        use=use,
-        columns={**columns, **own_columns} or None,
-        conventions=_conventions({**conventions, **own_conventions}, particulars, where),
-        where=where,
+        " + ".join(files), paths, table.get("cut"), kind, use, columns or None, conventions, where
     )
 
 
-def _conventions(words: Mapping[str, Any], particulars: Particulars, where: str) -> Conventions:
-    tools = Instruments.from_mapping(words.get("sensors", {}), f"{where} sensors", particulars)
-    own = {key: word for key, word in words.items() if key != "sensors"}
-    return Conventions(**own, xg=particulars.xg, where=where, instruments=tools)
+def _conventions(
+    words: Mapping[str, Any], sensors: Mapping[str, Any], particulars: Particulars, where: str
+) -> Conventions:
+    tools = Instruments.from_mapping(sensors, f"{where} sensors", particulars)
+    return Conventions(**words, xg=particulars.xg, where=where, instruments=tools)

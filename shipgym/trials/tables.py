@@ -4,7 +4,7 @@ import io
 import struct
 import zipfile
 import zlib
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from importlib import import_module
@@ -12,13 +12,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from shipgym.checks import quoted
 from shipgym.errors import InputError
 from shipgym.files import LARGEST_CSV, MIB, read_bytes
-from shipgym.trials.csv_reader import Table, read_table
-from shipgym.trials.nmea import is_nmea, parse_log
+from shipgym.trials.csv_reader import Table, column_table, read_table
+from shipgym.trials.nmea import is_nmea, read_nmea
 
 #: Most bytes of an Excel or MATLAB file, most of what any is unpacked, and most values.
 LARGEST_PACKED, LARGEST_UNPACKED, MOST_CELLS = 32 * MIB, 256 * MIB, 5_000_000
@@ -37,23 +36,8 @@ def read_log(path: str | Path | Table) -> Table:
     if isinstance(path, Table):
         return path
     path = Path(path)
-    read = _READERS.get(path.suffix.lower())
-    if read is not None:
-        return read(path)
-    if not is_nmea(path):
-        return read_table(path)
-    log = parse_log(path)
-    return _table(path, log.columns, log.lines, "line {line}", time_unit="unix", notes=tuple(log.notes))
-
-
-def _table(
-    path: Path,
-    columns: Mapping[str, npt.NDArray[Any]],
-    rows: Sequence[int],
-    words: str = "row {line}",
-    **more: Any,
-) -> Table:
-    return Table(path, tuple(columns), columns.__getitem__, rows, words, **more)
+    read = _READERS.get(path.suffix.lower()) or (read_nmea if is_nmea(path) else read_table)
+    return read(path)
 
 
 def from_frame(frame: Any, name: str | Path = "frame", first: int = 0) -> Table:
@@ -71,7 +55,7 @@ def from_frame(frame: Any, name: str | Path = "frame", first: int = 0) -> Table:
         str(label).strip(): column.to_numpy() if column.dtype.kind in "fiub" else column.to_numpy(object)
         for label, column in frame.items()
     }
-    return _table(Path(name), columns, range(first, first + len(frame)))
+    return column_table(Path(name), columns, range(first, first + len(frame)))
 
 
 @contextmanager
@@ -167,7 +151,7 @@ def _read_matlab(path: Path) -> Table:
                 "save('run.mat', '-struct', 'data', '-v7')"
             )
     columns = {name: values for name, values in found.items() if values.size == length}
-    return _table(path, columns, range(1, length + 1))
+    return column_table(path, columns, range(1, length + 1))
 
 
 def _elements(data: bytes, order: str) -> Iterator[tuple[int, bytes]]:

@@ -1,6 +1,6 @@
 """From the columns of a file to channels in SI units with the project's signs, frame and origin."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
@@ -10,16 +10,15 @@ import numpy.typing as npt
 from shipgym.arrays import Floats
 from shipgym.checks import check_choice, check_number, quoted
 from shipgym.errors import InputError
+from shipgym.trials import plausibility
 from shipgym.trials.clock_offsets import corrected_clocks
 from shipgym.trials.clock_texts import read_angles, read_clock, zone_seconds
 from shipgym.trials.columns import Column, Source, choose_columns
 from shipgym.trials.csv_reader import Table, is_number
 from shipgym.trials.derivatives import time_derivative
-from shipgym.trials.mistakes import check_log, check_overlap, find_outliers
 from shipgym.trials.navigation import NO_OFFSETS, Instruments, correct_offsets, local_metres, to_midship
 from shipgym.trials.navigation import rotate_to_body as rotate_to_body
-from shipgym.trials.plausibility import check_consistency, check_heading, check_ranges
-from shipgym.trials.resampling import Series, have_own_clocks, on_one_clock, own_clock
+from shipgym.trials.resampling import Log, Series, have_own_clocks, on_one_clock, own_clock
 from shipgym.trials.units import QUANTITIES, si_factor
 
 RUDDER_SIGNS = ("starboard", "port")
@@ -65,61 +64,46 @@ class Conventions:
             )
 
 
-class Imported(NamedTuple):
-    """What is read from the files of one log, in SI units, with the project's signs, at midship."""
-
-    t: Floats
-    channels: dict[str, Floats]  # by name, shape (n_samples,)
-    derived: frozenset[str]
-    repaired: dict[str, int]  # how many values of a channel were filled in
-    over_ground: bool | None  # whether surge and sway are; None: where they are derived
-    notes: list[str]  # remarks of the readers
-    start: float | None  # clock at t = 0 as the file has it, s since 1970 or of the day
-
-
 class _Recorded(NamedTuple):
     """The chosen columns of one table, in SI units, on their own clocks."""
 
     series: Series
     source: Source
     filled: dict[str, int]
-    start: float | None  # as in `Imported`, but in UTC
+    start: float | None  # as in `Log`, but in UTC
 
 
 def import_tables(
     tables: Sequence[Table], columns: Mapping[str, Any] | None, conventions: Conventions
-) -> Imported:
+) -> Log:
     """Read channels from the tables of one log, as a rule one.
 
-    The columns are given as :func:`shipgym.trials.columns.choose_columns` takes them. The channels are in SI
-    units, with the project's signs, in the body frame, at midship; each has shape (n_samples,). Anything
-    wrong with a file is an InputError that names line, column, value and remedy.
+    The columns are given as :func:`shipgym.trials.columns.choose_columns` takes them. The channels have the
+    project's signs and are in the body frame, at midship. Anything wrong with a file is an InputError that
+    names line, column, value and remedy.
     """
+    tools = conventions.instruments
     chosen = [choose_columns(table, columns, len(tables) > 1) for table in tables]
     gnss = any("lat" in one for one in chosen)
     recorded = [_recorded(*pair, conventions.repair) for pair in zip(tables, chosen, strict=True)]
     series, source, where = _joined(recorded), recorded[0].source, str(tables[0].path)
-    signed = {
-        name: (
-            clock,
-            0.0 - values if conventions.rudder_positive == "port" and name.startswith("delta") else values,
-        )
-        for name, (clock, values) in series.items()
-    }
-    t, values, gaps = on_one_clock(signed, where)
-    told = check_log(t, values, conventions.instruments, source, gnss)
-    late, notes = corrected_clocks(t, values, signed, conventions.instruments.clock_offsets, where)
+    if conventions.rudder_positive == "port":
+        for name in {"delta", "delta_command"} & series.keys():
+            series[name] = series[name][0], 0.0 - series[name][1]
+    log = on_one_clock(series, where)
+    told = plausibility.check_log(log, tools, source, gnss)
+    late, found = corrected_clocks(log, series, tools.clock_offsets)
     if late:
-        t, values, gaps = on_one_clock(late, where)
-    notes = [*(note for table in tables for note in table.notes), *gaps, *told, *notes]
-    check_consistency(t, values, conventions.velocity_frame, source)
-    channels, derived, over_ground, more = to_project_conventions(t, values, conventions, where)
-    filled = {name: n for one in recorded for name, n in one.filled.items() if n and name in channels}
-    start = recorded[0].start
-    if start is not None:
-        start += zone_seconds(chosen[0]["t"].zone, where)
-    ordered = {name: channels[name] for name in QUANTITIES if name in channels}
-    return Imported(t, ordered, derived, filled, over_ground, notes + more, start)
+        log = on_one_clock(late, where)
+    log.notes = [*(note for table in tables for note in table.notes), *log.notes, *told, *found]
+    plausibility.check_consistency(log, conventions.velocity_frame, source)
+    to_project_conventions(log, conventions)
+    log.channels = {name: log.channels[name] for name in QUANTITIES if name in log.channels}
+    filled = {name: n for one in recorded for name, n in one.filled.items()}
+    log.repaired = {name: n for name, n in filled.items() if n and name in log.channels}
+    if (start := recorded[0].start) is not None:
+        log.start = start + zone_seconds(chosen[0]["t"].zone, where)
+    return log
 
 
 def _recorded(table: Table, chosen: dict[str, Column], repair: str | None) -> _Recorded:
@@ -145,7 +129,7 @@ def _recorded(table: Table, chosen: dict[str, Column], repair: str | None) -> _R
         channel: values[:, k] * si_factor(channel, column.unit)
         for k, (channel, column) in enumerate(source.columns.items())
     }
-    check_ranges(recorded, source)
+    plausibility.check_ranges(recorded, source)
     t = recorded.pop("t")
     series = {
         channel: own_clock(channel, t, column, source) if own_clocks else (t, column)
@@ -156,7 +140,7 @@ def _recorded(table: Table, chosen: dict[str, Column], repair: str | None) -> _R
         series[name] = clock, np.unwrap(raw)
         if name == "psi":
             rows = source.rows[np.isfinite(recorded["psi"])]
-            check_heading(clock, series["psi"][1], raw, replace(source, rows=rows))
+            plausibility.check_heading(clock, series["psi"][1], raw, replace(source, rows=rows))
     if "sog" in series:
         (clock, speed), (_, course) = series.pop("sog"), series.pop("cog")
         if speed.size != course.size:
@@ -223,9 +207,11 @@ def _local_positions(
     here = np.flatnonzero(np.isfinite(lat) & np.isfinite(lon) & np.isfinite(t))
     local = np.full((2, t.size), np.nan)
     if here.size:
-        check_ranges({"lat": lat, "lon": lon}, source)
+        plausibility.check_ranges({"lat": lat, "lon": lon}, source)
         local[:, here] = local_metres(lat[here], lon[here], (lat[here[0]], lon[here[0]]))
-        far = find_outliers(t[here] * si_factor("t", chosen["t"].unit), local[:, here], source, here)
+        far = plausibility.find_outliers(
+            t[here] * si_factor("t", chosen["t"].unit), local[:, here], source, here
+        )
         if far.size and repair is None:
             k = int(far[0])
             raise InputError(
@@ -254,69 +240,65 @@ def _joined(recorded: Sequence[_Recorded]) -> Series:
             )
         shift = (other.start or 0.0) - (base.start or 0.0)
         moved = {name: (clock + shift, values) for name, (clock, values) in other.series.items()}
-        check_overlap(series, moved, path, other.source.columns["t"].name)
+        plausibility.check_overlap(series, moved, path, other.source.columns["t"].name)
         series |= moved
     return series
 
 
-def to_project_conventions(
-    t: Floats, recorded: Mapping[str, Floats], conventions: Conventions, where: str
-) -> tuple[dict[str, Floats], frozenset[str], bool | None, list[str]]:
+def to_project_conventions(log: Log, conventions: Conventions) -> None:
     """Convert frame and origin, and derive the channels that follow from others.
 
-    The recorded channels are in SI units in the file's frame, the heading without jumps, the rudder positive
-    to starboard, of shape (n_samples,); time is in s. The yaw rate is derived from the heading, surge and
-    sway from velocity over ground or position, the heading (relative to the start) from the yaw rate where no
-    position is recorded. Returns the channels, the names of the derived ones, whether surge and sway are over
-    ground, and remarks.
+    The channels are in the file's frame, the heading without jumps, the rudder positive to starboard. The yaw
+    rate is derived from the heading, surge and sway from velocity over ground or position, the heading
+    (relative to the start) from the yaw rate where no position is recorded.
     """
-    channels = dict(recorded)
-    derived: set[str] = set()
-    notes = correct_offsets(t, channels, conventions.instruments, where)
+    channels, earth = log.channels, conventions.velocity_frame == "earth"
+    log.over_ground = False if "stw" in channels else (earth and "u" in channels) or None
+    correct_offsets(log, conventions.instruments)
     if "psi" in channels and "r" not in channels:
-        channels["r"] = time_derivative(t, channels["psi"])
-        derived.add("r")
+        log.derive("r", time_derivative(log.t, channels["psi"]))
     if "r" in channels and not {"psi", "x", "y"} & channels.keys():
-        channels["psi"] = _antiderivative(t, channels["r"])
-        derived.add("psi")
-    if conventions.velocity_frame == "earth":
-        _earth_to_body(channels, derived, where)
+        log.derive("psi", _antiderivative(log.t, channels["r"]))
+    if earth:
+        _earth_to_body(log)
     if conventions.origin == "cg":
-        _cg_to_midship(channels, conventions.xg or 0.0, where)
-    water = "stw" in channels
-    notes += to_midship(t, channels, derived, conventions.instruments, where)
-    over_ground = False if water else (conventions.velocity_frame == "earth" and "u" in recorded) or None
-    return channels, frozenset(derived), over_ground, notes
+        _cg_to_midship(log, conventions.xg or 0.0)
+    to_midship(log, conventions.instruments)
 
 
-def _earth_to_body(channels: dict[str, Floats], derived: set[str], where: str) -> None:
+def _earth_to_body(log: Log) -> None:
+    channels = log.channels
     if not {"u", "v"} & channels.keys():
         return
-    absent = [name for name in ("u", "v", "psi") if name not in channels or name in derived]
+    absent = [name for name in ("u", "v", "psi") if name not in channels or name in log.derived]
     if absent:
         raise InputError(
-            f'{where}: velocity_frame = "earth" found without a recorded {absent[0]}, expected u (north), '
-            "v (east) and the heading psi; name their columns, or leave u and v out"
+            f'{log.where}: velocity_frame = "earth" found without a recorded {absent[0]}, expected u '
+            "(north), v (east) and the heading psi; name their columns, or leave u and v out"
         )
     channels["u"], channels["v"] = rotate_to_body(channels["u"], channels["v"], channels["psi"])
 
 
-def _cg_to_midship(channels: dict[str, Floats], xg: float, where: str) -> None:
+#: What moves from the centre of gravity, `xg` forward of midship, to midship: by xg times a function of
+#: another channel.
+_LEVERS: dict[str, tuple[str, Callable[[Floats], Floats]]] = {
+    "v": ("r", np.negative),
+    "x": ("psi", lambda psi: -np.cos(psi)),
+    "y": ("psi", lambda psi: -np.sin(psi)),
+    "N": ("Y", np.positive),
+}
+
+
+def _cg_to_midship(log: Log, xg: float) -> None:
     """Move position, sway and yaw moment from the centre of gravity to midship: v = v_cg - xg r."""
-    needed = {"v": "r", "x": "psi", "y": "psi", "N": "Y"}
-    for name, other in needed.items():
-        if name in channels and other not in channels:
+    for name, (other, lever) in _LEVERS.items():
+        if name not in log.channels:
+            continue
+        if other not in log.channels:
             raise InputError(
-                f'{where}: origin = "cg" needs {other} to move {name} to midship; name its column'
+                f'{log.where}: origin = "cg" needs {other} to move {name} to midship; name its column'
             )
-    if "v" in channels:
-        channels["v"] = channels["v"] - xg * channels["r"]
-    if "x" in channels:
-        channels["x"] = channels["x"] - xg * np.cos(channels["psi"])
-    if "y" in channels:
-        channels["y"] = channels["y"] - xg * np.sin(channels["psi"])
-    if "N" in channels:
-        channels["N"] = channels["N"] + xg * channels["Y"]
+        log.channels[name] = log.channels[name] + xg * lever(log.channels[other])
 
 
 def _antiderivative(t: Floats, values: Floats) -> Floats:

@@ -3,19 +3,20 @@
 import json
 from dataclasses import replace
 
+import control
 import numpy as np
 import pytest
 
 from agents import LQ, AdaptiveLQ, check_controller, load_agent, sail
-from agents.controllers.adaptive_lq import GAINS
-from agents.controllers.batched_lq import lq_rows
 from agents.controllers.linear_loop import SIGNALS, length_time, rate_weight, sample_ship, sampled_ships
-from agents.controllers.lq import lq_gain
+from agents.controllers.lq import lq_rows
+from agents.controllers.memory import records
 from shipgym.envs.engine import Engine
 from shipgym.errors import InputError
 from shipgym.ships import load_model
 from shipgym.ships.conversions import nomoto, nomoto2_ship
 from shipgym.ships.linear import linearise, straight_running
+from shipgym.tasks.steering import RUDDER_WEIGHT
 from shipgym.tasks.task import control_interval, course_keeping_task
 
 MARINER = load_model("mariner")
@@ -23,7 +24,7 @@ GENTLE = course_keeping_task(course_change_deg=10.0, episode_steps=2000)
 
 
 @pytest.mark.parametrize("name", ["mariner", "container", "tanker", "kvlcc2", "kvlcc2-l7"])
-def test_many_designs_at_once_are_those_made_one_by_one(name):
+def test_many_designs_at_once_are_those_of_python_control(name):
     model = load_model(name)
     dt, time = control_interval(model), 20.0 * length_time(model)
     ship = sample_ship(model, dt)
@@ -31,9 +32,13 @@ def test_many_designs_at_once_are_those_made_one_by_one(name):
     A, B = sampled_ships(np.stack([linear, 0.5 * linear]), model.steering.time_constant, dt)
     np.testing.assert_allclose(A[0], ship.A, atol=1e-12)
     np.testing.assert_allclose(B[0], ship.B[:, 0], atol=1e-12)
-    for weights in ((rate_weight(model), time), (2.0 * rate_weight(model), time, 0.3)):
-        wanted = -lq_gain(ship, *weights)
-        np.testing.assert_allclose(lq_rows(A, B, dt, *weights)[0], wanted, rtol=1e-9)
+    for rate, rudder in ((rate_weight(model), RUDDER_WEIGHT), (2.0 * rate_weight(model), 0.3)):
+        weights = np.sqrt([1.0, rudder, rate / dt**2, 1.0 / time**2])  # of error, rudder, its rate, integral
+        cost, effect = (weights[:, None] * matrix[[2, 3, 3, 4]] for matrix in (A[1], B[1][:, None]))
+        cost[2, 3] -= weights[2]
+        plant = control.ss(A[1], B[1][:, None], np.eye(5), 0.0, dt)
+        wanted, _, _ = control.lqr(plant, cost.T @ cost, effect.T @ effect, cost.T @ effect)
+        np.testing.assert_allclose(lq_rows(A, B, dt, rate, time, rudder)[1], -wanted[0], rtol=1e-9)
 
 
 def changed(**factors):
@@ -62,7 +67,7 @@ def test_it_converges_to_the_design_of_the_true_ship(believed, true):
     adaptive = AdaptiveLQ.from_model(believed, noise=0.0)
     wanted = np.array([LQ.from_model(true).gains[signal] for signal in SIGNALS])
     begun = np.array([adaptive.gains[signal] for signal in SIGNALS])
-    reached = state_after(adaptive, true, 1500)[:, GAINS]
+    reached = records(state_after(adaptive, true, 1500), adaptive.record)["gains"]
     size = np.abs(wanted)
     assert np.all(np.abs(reached - wanted) < 0.12 * size)
     before, after = (np.linalg.norm((gains - wanted) / size, axis=-1) for gains in (begun, reached))
@@ -109,7 +114,7 @@ def test_designed_anew_for_the_same_ship_it_is_the_lq_of_the_same_weights(weight
     settings = {"integral_lengths": 15.0, **weights}
     adaptive, lq = (kind.from_model(MARINER, **settings) for kind in (AdaptiveLQ, LQ))
     assert adaptive.gains == lq.gains
-    (anew,) = adaptive._redesigned(adaptive._fresh()[None])[:, GAINS]
+    (anew,) = adaptive._redesigned(adaptive._fresh())["gains"]
     np.testing.assert_allclose(anew, [lq.gains[signal] for signal in SIGNALS], rtol=1e-8)
 
 

@@ -1,18 +1,21 @@
 import json
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from typer.testing import CliRunner
 
 from agents import LQ, PID, benchmark, load_results
-from agents.benchmarking.contestants import contestants
+from agents.benchmarking.contestants import Contestant, contestants, pretrained
 from agents.benchmarking.replays import EpisodeId, rerun
+from agents.benchmarking.results import check_new
+from agents.benchmarking.run import _chosen, _run, checked_part, results_of
 from agents.benchmarking.verification import verify
 from agents.cli import app
 from agents.cli.benchmark_tables import ranking_table
 from agents.controllers.designs import design
-from agents.suites.reference import reference_costs
+from agents.suites.reference import best_costs, best_known, reference_costs
 from agents.suites.suite import load_suite
 from shipgym import load_model
 from shipgym.errors import InputError
@@ -224,6 +227,13 @@ def test_wrong_contestants(given, said):
         contestants(given)
 
 
+def test_agents_in_the_box_are_found_by_task_and_algorithm():
+    assert [path.name for path in pretrained("container-path", "ppo")] == ["container-path-ppo.json"]
+    runs = [path.name for path in pretrained("course-unstable", "ppo")]
+    assert runs == [f"course-unstable-ppo-s{run}.json" for run in range(5)]
+    assert pretrained("container", "ppo") == []
+
+
 def test_wrong_task_and_suite():
     with pytest.raises(InputError, match="Did you mean 'mariner-calm'"):
         benchmark("pid", tasks=["mariner-clam"])
@@ -336,6 +346,101 @@ def test_broken_results(copy, name, damage, said):
     path.write_bytes(damage(path.read_bytes()))
     with pytest.raises(InputError, match=said):
         load_results(copy)
+
+
+def test_results_that_do_not_agree_with_their_episodes_are_refused(copy):
+    def one_more(columns):
+        columns["contestant"][np.flatnonzero(columns["contestant"] == "lq")[0]] = "pid"
+
+    summary = json.loads((copy / "results.json").read_text())
+    _rewritten(copy, one_more)
+    with pytest.raises(InputError, match="5 episodes of 'pid' on 'mariner-calm' found, expected 1 runs of 4"):
+        load_results(copy)
+    (copy / "results.json").write_text(json.dumps({k: v for k, v in summary.items() if k != "seeds"}))
+    with pytest.raises(
+        InputError, match=r"results.json: field 'seeds' is missing; run `shipgym benchmark` again"
+    ):
+        load_results(copy)
+    (copy / "results.json").write_text(json.dumps(summary | {"kind": "model"}))
+    with pytest.raises(InputError, match=r"kind 'model' found, expected .*: not benchmark results"):
+        load_results(copy / "results.json")
+
+
+def test_contestants_of_the_file_and_of_the_table_are_the_same(copy):
+    def exchange(columns):
+        columns["contestant"][columns["contestant"] == "lq"] = "los"
+
+    _rewritten(copy, exchange)
+    with pytest.raises(InputError, match=r"contestants and tasks differ from those of episodes.parquet"):
+        load_results(copy)
+
+
+def test_a_folder_takes_the_results_of_one_suite_only(copy, tmp_path):
+    assert check_new(tmp_path / "new", False, "shipgym-v1") == tmp_path / "new"
+    assert check_new(copy, True, "shipgym-v1") == copy
+    with pytest.raises(InputError, match="holds results already; go on there with --resume"):
+        check_new(copy, False, "shipgym-v1")
+    with pytest.raises(InputError, match="holds results of another suite than 'shipgym-v2'"):
+        check_new(copy, True, "shipgym-v2")
+    with pytest.raises(
+        InputError, match=r"results.json: is not a folder, expected one to write the results to"
+    ):
+        check_new(copy / "results.json", False, "shipgym-v1")
+    other = tmp_path / "other"
+    other.mkdir()
+    assert check_new(other, False, "shipgym-v1") == other
+    (other / "letter.txt").write_text("")
+    with pytest.raises(InputError, match=r"holds 'letter.txt', not a result of a benchmark"):
+        check_new(other, True, "shipgym-v1")
+
+
+def test_a_part_that_was_kept_is_of_its_job():
+    job = {"contestant": "pid", "task": "mariner-calm", "episodes": 2}
+
+    def part(**figures):
+        return {"refused": "", "runs": [_run(figures, "", 0.1, None)]}
+
+    whole = part(cost=np.zeros(2), overshoot=np.zeros(2))
+    assert checked_part(whole, job) is whole
+    for wrong in (part(cost=np.zeros(3)), part(overshoot=np.zeros(2)), part(cost=np.zeros((2, 1)))):
+        with pytest.raises(
+            InputError, match="part of 'pid' on 'mariner-calm': expected cost and other figures"
+        ):
+            checked_part(wrong, job)
+
+
+def test_tasks_are_chosen_by_name_each_once():
+    whole = load_suite("shipgym-v1").tasks
+    assert _chosen("shipgym-v1", None) == whole
+    both = _chosen("shipgym-v1", f"{whole[1].name}, {whole[0].name}, {whole[1].name}")
+    assert both == (whole[1], whole[0])
+    with pytest.raises(InputError, match="tasks: none found, expected at least one"):
+        _chosen("shipgym-v1", [])
+
+
+def test_a_factory_may_raise_anything_and_best_known_costs_are_kept_by_task(monkeypatch):
+    task = load_suite("shipgym-v1").task("mariner-calm")
+
+    def fails(one, task, suite):
+        raise KeyError("gain")
+
+    monkeypatch.setattr(Contestant, "policies", fails)
+    for source in ("mine:make", fails):
+        done = results_of(Contestant("mine", source), task, "shipgym-v1", 2)
+        assert done == {"refused": "KeyError: 'gain'", "runs": []}
+    with pytest.raises(KeyError):  # of ours it is a fault
+        results_of(Contestant("pid", "pid"), task, "shipgym-v1", 2)
+    known = results_of(Contestant("best-known", "best-known"), task, "shipgym-v1", 3)["runs"][0]
+    np.testing.assert_array_equal(known["episodes"]["cost"], best_costs(task, "shipgym-v1")[:3])
+    zero, one = reference_costs("shipgym-v1")["mariner-calm"]
+    assert (zero, one) == (
+        best_known("shipgym-v1")["mariner-calm"]["zero"],
+        best_costs(task, "shipgym-v1").mean(),
+    )
+    with pytest.raises(
+        InputError, match="no best known costs are kept for task 'mine' of suite 'shipgym-v1'"
+    ):
+        best_costs(replace(task, name="mine"), "shipgym-v1")
 
 
 def test_the_command_ranks_and_writes(tmp_path):

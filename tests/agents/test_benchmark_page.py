@@ -5,6 +5,7 @@ import gzip
 import json
 import re
 import sys
+from functools import partial
 from types import SimpleNamespace
 
 import gymnasium
@@ -436,3 +437,41 @@ def test_the_hardest_episode_has_tracks_where_there_is_a_path(result):
         again = SimpleNamespace(episodes={one: episodes[0]})
         assert benchmark_page._hardest(result, again, task).keys() == names
         assert benchmark_page._hardest(result, SimpleNamespace(episodes={}), task) == {}
+
+
+def test_worst_hardest_and_best_by_hand(monkeypatch):
+    """Two training runs of `a` and one of `b` in three episodes; a cost that is no number is the worst."""
+    costs = {"a": np.array([[1.0, 3.0, 2.0], [0.0, 9.0, np.nan]]), "b": np.array([[1.0, 1.0, 4.0]])}
+    means = {
+        "a": {"cost": {"value": 2.0}},
+        "b": {"cost": {"value": 1.0}},
+        "best-known": {"cost": {"value": 0.5}},
+    }
+    result = SimpleNamespace(
+        ranking=["best-known", "b", "a", "c"],
+        tasks=["calm"],
+        summary={"tasks": {"calm": means}, "seeds": {"first": 100}},
+        figures=lambda name, task: costs[name],
+    )
+    assert page_replays.contestants_of(result, "calm") == ["b", "a"]
+    assert page_replays.bests_of(result, "calm") == ["b"]
+    means["a"]["cost"]["value"] = 1.0 + 1e-13
+    assert page_replays.bests_of(result, "calm") == ["b", "a"]
+    means["a"]["cost"]["value"] = None
+    assert page_replays.bests_of(result, "calm") == ["b"]
+    worst = page_replays.worst_of(result, "a", "calm", 3)
+    assert [(one.run, one.seed) for one in worst] == [(1, 102), (1, 101), (0, 101)]
+    assert page_replays.hardest_of(result, "calm") == 102
+    costs["a"][1, 2] = 2.0
+    assert page_replays.hardest_of(result, "calm") == 101  # medians of 0.75, 3.5 and 3
+    of = partial(EpisodeId, task="calm")
+    entries = page_replays.entries_of(result, "calm", 1)
+    assert entries == [
+        ("", [of("b", run=0, seed=101), of("a", run=0, seed=101)]),
+        ("b", [of("b", run=0, seed=102)]),
+        ("a", [of("a", run=1, seed=101), of("b", run=0, seed=101)]),
+    ]
+    for most, count, shown in ((20, 3, 6), (5, 2, 5), (4, 1, 4), (1, 1, 4)):
+        monkeypatch.setattr(page_replays, "MOST_RUNS", most)
+        found, episodes = page_replays.replayable(result, 3)
+        assert (found, len(episodes)) == (count, shown)

@@ -12,7 +12,7 @@ from safetensors import safe_open
 from agents.training import checkpoints
 from agents.training.algorithms import make_agent
 from agents.training.plan import Given, make_plan
-from agents.training.safe_file import CONTENT, SHA256, read_values, write_values
+from agents.training.safe_file import CONTENT, SHA256, _unpacked, read_values, write_values
 from shipgym.errors import InputError
 
 SHORT = {"episode_steps": 20, "change_interval_steps": 10}
@@ -271,3 +271,21 @@ def test_a_file_that_is_not_there_or_has_no_content(file, tmp_path):
     rewritten(file, lambda header: header.pop("__metadata__"))
     with pytest.raises(InputError, match="not a thing"):
         read_values(file, "thing")
+
+
+def test_values_within_values_are_read_twenty_deep():
+    def nested(depth):
+        return {"list": [nested(depth - 1)]} if depth else 3
+
+    found = _unpacked(nested(20), {})
+    for _ in range(20):
+        (found,) = found
+    assert found == 3
+    with pytest.raises(ValueError, match="'list' found among its values, 20 deep"):
+        _unpacked(nested(21), {})
+    with pytest.raises(ValueError, match="'code' found among its values, 1 deep"):
+        _unpacked({"tuple": [{"code": "x"}]}, {})
+    assert _unpacked({"dict": [["a", {"tuple": [1, 2]}], ["b", {"array": "x"}]]}, {"x": 5}) == {
+        "a": (1, 2),
+        "b": 5,
+    }

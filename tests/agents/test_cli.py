@@ -1,5 +1,8 @@
+import errno
+import importlib.metadata
 import json
 import os
+import re
 import resource
 import shlex
 import subprocess
@@ -10,8 +13,10 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
-from agents.cli import app
-from shipgym import load_model
+from agents.cli import app, doctor
+from agents.cli.command import LONGEST_NAME, told_failure
+from agents.cli.warm import _jobs, _names
+from shipgym import InputError, load_model
 
 ROOT = Path(__file__).parents[2]
 
@@ -290,6 +295,80 @@ def test_warm_compiles_into_the_cache_and_writes_nothing_else(tmp_path):
 
 
 @pytest.mark.skipif(os.name == "nt", reason="Windows has other permissions")
+def test_warm_takes_what_is_named_or_all_there_is():
+    everything = _names(None, True)
+    assert {"shipgym/CourseKeeping-v0", "shipgym/PathFollowingRoll-v1", "mariner", "kvlcc2-mmg"} <= set(
+        everything
+    )
+    assert _names(["tanker"], True) == everything
+    assert _names(["tanker"], False) == ["tanker"]
+    assert _names(None, False) == [
+        "shipgym/CourseKeeping-v0", "shipgym/PathFollowing-v0", "shipgym/PathFollowing-v1", "mariner"
+    ]  # fmt: skip
+    assert [what for what, _ in _jobs("shipgym/CourseKeeping-v0")] == [
+        "shipgym/CourseKeeping-v0 in calm water", "shipgym/CourseKeeping-v0 in a sea"
+    ]  # fmt: skip
+    assert {what for what, _ in _jobs("tanker")} >= {"tanker: zigzag", "tanker: open_loop"}
+    with pytest.raises(InputError, match="'titanic' found, expected an environment's id or a model: "):
+        list(_jobs("titanic"))
+
+
+def test_warm_says_what_cannot_be_and_goes_on_only_where_all_was_asked_for(monkeypatch):
+    def refuses():
+        raise InputError("no beam")
+
+    jobs = {"one": [("first", refuses)], "other": [("second", int)]}
+    monkeypatch.setattr("agents.cli.warm._names", lambda wanted, everything: list(jobs))
+    monkeypatch.setattr("agents.cli.warm._jobs", lambda name: iter(jobs[name]))
+    answer = shipgym("warm", "--all", "--json")
+    assert answer.exit_code == 0
+    ready = json.loads(answer.stdout)["ready"]
+    assert [(one["what"], one["refused"]) for one in ready] == [("first", "no beam"), ("second", "")]
+    answer = shipgym("warm", "one", "other")
+    assert (answer.exit_code, answer.stderr) == (2, "error: no beam\n")
+    assert "2/2  second: 0.0 s" in shipgym("warm", "--all").stdout
+
+
+@pytest.mark.parametrize(
+    ("error", "code", "said"),
+    [
+        (OSError(errno.ENOENT, "No such file", "a.toml"), 2, "a.toml: No such file"),
+        (OSError(errno.ENOENT, "No such file", "a" * 5000), 2, "a" * LONGEST_NAME + ": No such file"),
+        (OSError(errno.EIO, "Input/output error"), 2, "Input/output error"),
+        (OSError("odd"), 2, "odd"),
+        (OSError(errno.ENOSPC, "No space left"), 1, "the output cannot be written (No space left)"),
+        (OSError(errno.EPIPE, "Broken pipe"), 1, ""),
+    ],
+)
+def test_what_cannot_be_read_or_written_is_one_line(error, code, said, monkeypatch, capsys):
+    closed = []
+    monkeypatch.setattr(os, "dup2", lambda *ends: closed.append(ends[1]))
+    assert told_failure(error) == code
+    assert closed == ([1] if code == 1 else [])
+    told = capsys.readouterr().err.replace("\n", "")
+    assert told == (f"error: {said}" if said else "")
+
+
+def test_doctor_names_what_is_missing_and_packages_of_one_name(monkeypatch):
+    found = doctor._installed("numpy", ["numpy", "scipy"], "wrong", "shipgym")
+    assert (found.what, found.state) == ("numpy", "fine")
+    assert re.fullmatch(r"[0-9.]+, scipy [0-9.]+", found.detail)
+    found = doctor._installed("extra", ["numpy", "nowhere-1", "nowhere-2"], "left", "'shipgym[x]'")
+    assert (found.state, found.detail) == (
+        "left",
+        "nowhere-1, nowhere-2 not installed: pip install 'shipgym[x]'",
+    )
+    monkeypatch.setattr(
+        importlib.metadata, "packages_distributions", lambda: {"agents": ["shipgym", "other", "alike"]}
+    )
+    found = doctor.name_finding("agents")
+    assert found.state == "wrong"
+    assert found.detail.startswith("also a package of alike, other, they overwrite each other")
+    assert doctor.name_finding("identification").state == "fine"
+    assert doctor.name_finding("json").detail.startswith("leads to ")
+    assert doctor.name_finding("nowhere_1").detail.startswith("leads to None, expected ")
+
+
 def test_warm_fills_no_cache_that_would_not_be_used(tmp_path):
     tmp_path.chmod(0o777)
     answer = subprocess.run(

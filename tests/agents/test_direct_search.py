@@ -10,11 +10,10 @@ import pytest
 from direct_search import FIRST_SEED, LAWS, REFUSED, Setting, is_sane, search, search_spaces, tunable, tune
 
 from agents import PID
-from agents.controllers.designs import CLASSICAL, design, tuned
+from agents.controllers.designs import CLASSICAL, design, design_base, tuned
 from agents.rollouts.rollout import episode_costs
 from agents.suites.reference import load_tuned
 from agents.suites.suite import BenchmarkTask, load_suite
-from agents.training.bases import design_base
 from shipgym.errors import InputError
 from shipgym.files import write_json
 from shipgym.ships import load_model
@@ -127,7 +126,7 @@ def test_policies_are_not_added_to_slow_controllers_unless_asked_for(
 ) -> None:
     path = tmp_path / "tuned.json"
     monkeypatch.setattr("agents.suites.reference.suite_file", lambda suite, what: path)
-    monkeypatch.setattr("agents.training.bases.suite_of", lambda name: "shipgym-v1")
+    monkeypatch.setattr("agents.controllers.designs.suite_of", lambda name: "shipgym-v1")
     costs = {"mpc": 1.0, "lq-adaptive": 2.0, "lq": 3.0, "pid": 4.0}
     found = {kind: {"settings": {}, "cost": cost} for kind, cost in costs.items()}
     write_json({"tasks": {"calm": found}}, path)

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from agents import PID, FilteredPID, check_controller, load_agent, sail, step_response
-from agents.controllers.filtered_pid import LEAD, TURN, notch_band
+from agents.controllers.filtered_pid import notch_band
+from agents.controllers.memory import records
 from shipgym.errors import InputError
 from shipgym.ships import load_model
 from shipgym.tasks.task import course_keeping_task, observation_scales
@@ -35,7 +36,7 @@ def test_the_reference_is_the_step_response_of_three_equal_poles():
         error = np.radians(20.0) if k else 0.0
         seen = np.array([np.sin(error), np.cos(error), 0.0, 0.0, 7.0, 0.0, 0.0, 0.0]) / scales
         _, state = pid.predict(seen, state)
-        reference.append(np.radians(20.0) + state[LEAD])
+        reference.append(np.radians(20.0) + records(state, pid.record)["lead"])
     t = 0.02 * np.arange(399)
     expected = np.radians(20.0) * (1.0 - (1.0 + t + 0.5 * t**2) * np.exp(-t))
     assert np.abs(np.array(reference[1:]) - expected).max() < np.radians(0.5)
@@ -110,7 +111,7 @@ def test_it_is_a_controller_and_a_file(period, tmp_path):
     _, state = pid.predict(shown)
     assert np.array_equal(again.predict(shown, state)[0], pid.predict(shown, state)[0])
     assert state.shape == (4, pid.memory_size)
-    assert np.all(state[:, TURN] != 0.0)
+    assert np.all(records(state, pid.record)["turn"] != 0.0)
 
 
 def test_the_least_integral_that_a_number_can_be_leaves_commands_finite(filtered):

@@ -180,7 +180,7 @@ def test_options_of_the_command_line_reach_the_settings(ship, demo, tmp_path):
 def test_the_whole_chain_takes_the_same_options(demo, tmp_path):
     held = "zigzag_10_10.csv"
     answer = shipgym(
-        "autopilot", demo, "--out", tmp_path / "out", "--draws", "3", "--structure", "linear-steering",
+        "autopilot", demo, "--out", tmp_path / "out", "--draws", "3", "--structure", "abkowitz",
         "--method", "abc-lssvr", "--objective", "training", "--hold-out", held, "--set", "seed=3",
         "--set", "bounds=[1, 1e6]", "--json",
     )  # fmt: skip

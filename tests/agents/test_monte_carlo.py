@@ -1,6 +1,7 @@
 """Monte Carlo over the covariance gives the same in this process, in others, resumed, and draw by draw."""
 
 from dataclasses import fields
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -72,3 +73,24 @@ def test_wrong_arguments(ship, pilots):
         monte_carlo(pilots, ship, 1)
     with pytest.raises(InputError, match="Did you mean 'local'"):
         JobEngine("lokal").check()
+
+
+def test_draws_that_run_away_in_any_manoeuvre_count_once_and_have_no_paths(ship, monkeypatch):
+    """Of seven draws the second runs away in one criterion, the fifth loses the runs that are kept."""
+    module = "agents.verification.index_uncertainty"
+    away = np.arange(7) == 1
+    criteria = {
+        "overshoot": SimpleNamespace(drawn=SimpleNamespace(ran_away=away)),
+        "advance": SimpleNamespace(drawn=SimpleNamespace(ran_away=np.zeros(7, dtype=bool))),
+        "stop": SimpleNamespace(drawn=None),
+    }
+    monkeypatch.setattr(f"{module}.imo_manoeuvres", lambda model: {})
+    monkeypatch.setattr(f"{module}.imo_criteria", lambda model, found: criteria)
+    parts = []
+    for part in (np.arange(3), np.arange(3, 7)):
+        parts.append({"values": {}, "ran_away": {}, "lost": part == 4, "headings": part, "paths": part})
+    found = uncertainty_of(ship, ("zigzag", "circle"), parts)
+    assert found.criteria.keys() == {"overshoot", "advance"}
+    assert found.unstable.tolist() == [False, True, False, False, True, False, False]
+    assert found.zigzag_headings.tolist() == list(found.circle_paths) == [0, 2, 3, 5, 6]
+    assert (found.zigzag, found.circle) == ("zigzag", "circle")

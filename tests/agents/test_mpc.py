@@ -59,7 +59,10 @@ def test_rudder_and_its_rate_keep_to_their_limits(model):
 def test_the_plan_is_the_cheapest_within_the_limits():
     """Against scipy's solver on the plan's own numbers, LQ's cost of a plan being a square of corrections."""
     mpc = MPC.from_model(SLOW, horizon_lengths=0.6)
-    lowest, highest = mpc._bounds(SLOW.steering.limit)
+    limit, change = SLOW.steering.limit, mpc.design["rudder_rate_rad_s"] * mpc.design["dt"]
+    steps, neutral = int(mpc.design["horizon_steps"]), mpc.neutral_rudder
+    lowest = np.repeat((-limit - neutral, -change), steps)
+    highest = np.repeat((limit - neutral, change), steps)
     error, rate, rudder = hard_questions(SLOW, 6)
     order = mpc.predict(seen(error, rate, rudder, SLOW))[0][:, 0] * SLOW.steering.limit
     row = np.array([mpc.gains[signal] for signal in SIGNALS])

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from lane_copies import copy_lanes
 from oracle import OracleSettings, run_oracle
 
 from agents import LQ, PID
@@ -34,7 +35,7 @@ def test_copies_of_lanes_have_the_future_of_their_originals_bit_for_bit(
     for action in rudder[:25]:
         ships.step(action)
     lanes = np.arange(70) % 3
-    copies.copy_lanes(ships, lanes)
+    copy_lanes(copies, ships, lanes)
     assert np.array_equal(copies.observations, ships.observations[lanes])
     for action in rudder[25:]:
         seen, rewards, *_ = ships.step(action)
@@ -46,11 +47,16 @@ def test_copies_of_lanes_have_the_future_of_their_originals_bit_for_bit(
 def test_lanes_of_another_task_or_that_are_not_there_are_refused() -> None:
     ships = Engine(MARINER, 2, course_keeping_task())
     with pytest.raises(InputError, match="another task"):
-        ships.copy_lanes(Engine(MARINER, 2, course_keeping_task(episode_steps=10)), [0, 1])
+        copy_lanes(ships, Engine(MARINER, 2, course_keeping_task(episode_steps=10)), [0, 1])
     with pytest.raises(InputError, match="0 to 2 found, expected 0 to 1"):
-        ships.copy_lanes(Engine(MARINER, 2, course_keeping_task()), [0, 2])
-    with pytest.raises(InputError, match="expected 2 whole numbers"):
-        ships.copy_lanes(Engine(MARINER, 2, course_keeping_task()), [0])
+        copy_lanes(ships, Engine(MARINER, 2, course_keeping_task()), [0, 2])
+    for lanes, message in (
+        ([0.0, 1.0], "lanes: float64 of shape"),
+        ([0], r"lanes: int64 of shape \(1,\) found, expected 2 whole numbers"),
+        ([-1, 0], "lanes: -1 to 0 found"),
+    ):
+        with pytest.raises(InputError, match=message):
+            copy_lanes(ships, ships, lanes)
 
 
 def test_it_prepares_a_turn_of_the_path_and_saves_more_than_a_quarter() -> None:

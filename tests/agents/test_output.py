@@ -1,12 +1,15 @@
 import errno
+import os
+import re
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
 
+from agents import output
 from agents.cli.doctor import left_findings
-from agents.output import check_folder, in_use, whole_folder
+from agents.output import check_file, check_folder, check_page, in_use, whole_folder
 from shipgym import InputError
 from shipgym.files import remove_drafts
 
@@ -162,3 +165,34 @@ def test_of_a_folder_that_stands_alone_nothing_is_beside(tmp_path, monkeypatch):
             assert {path.parts[0] for path in map(Path, everything(tmp_path))} == {"ship"}
             assert draft.parent == tmp_path / "ship"
         assert everything(tmp_path) == ["ship", "ship/model.json"]
+
+
+def test_a_page_is_a_file_that_can_be_written(tmp_path):
+    for name in ("page.html", "page.HTM"):
+        check_page(tmp_path / name)
+    check_file(tmp_path / "page.txt")
+    (tmp_path / "folder.html").mkdir()
+    (tmp_path / "file").write_text("")
+    for name, message in (
+        ("page.txt", r"page.txt: ending '.txt' found, expected a file that ends in .html"),
+        ("folder.html", r"folder.html: is a folder, expected a file to write to"),
+        ("absent/page.html", "its folder does not exist or cannot be written; choose another"),
+        ("file/page.html", "its folder does not exist or cannot be written; choose another"),
+    ):
+        with pytest.raises(InputError, match=message):
+            check_page(tmp_path / name)
+
+
+def test_a_lock_without_words_is_another_process(tmp_path):
+    (tmp_path / "empty").write_text("")
+    (tmp_path / "named").write_text("process 7 on ship")
+    found = [output.holder(tmp_path / name) for name in ("empty", "absent", "named")]
+    assert found == ["another process", "another process", "process 7 on ship"]
+    command = ["shipgym", "identify", "a b", *["x"] * 500]
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(output.sys, "argv", command)
+        told = output._this_process()
+    assert re.fullmatch(
+        rf"process {os.getpid()} on \S+ since [-0-9]+ [0-9:+-]+ \(shipgym identify 'a b' x .*\)", told
+    )
+    assert len(told.partition(" (")[2]) == output.LONGEST_COMMAND + 1

@@ -170,6 +170,7 @@ def test_a_wrong_field_is_named(field, value, message, tmp_path):
         ("limits__back_deg", 20.0, "limits.back_deg: 20 found, expected a number > 0 and < 12; less than"),
         ("limits__calm", 1.0, "limits: unknown key 'calm'"),
         ("policy__network__sizes", [8, 9], "policy: network: .*shape"),
+        ("policy", {}, "policy: field 'format' is missing"),
     ],
 )
 def test_a_wrong_field_of_a_shield_is_named(field, value, message, tmp_path):

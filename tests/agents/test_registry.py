@@ -12,8 +12,9 @@ from agents import LQ, benchmark, check_controller, load_agent, register_control
 from agents.cli import app
 from agents.controllers import registry
 from agents.controllers.controller import Controller
+from agents.controllers.designs import design_base
+from agents.controllers.memory import records
 from agents.suites.suite import load_suite
-from agents.training.bases import design_base
 from shipgym import load_model
 from shipgym.errors import InputError
 
@@ -48,6 +49,31 @@ def mine(tmp_path, monkeypatch):
     yield "my_controllers"
     sys.modules.pop("my_controllers", None)
     sys.path[:] = path
+
+
+def test_what_a_controller_of_ones_own_remembers_is_a_record_with_names():
+    """Its last order, half of which goes into the next one; another controller's memory is refused."""
+    lq, ship = LQ.from_model(load_model("mariner")), load_model("mariner")
+
+    class Sluggish(LQ):
+        record = np.dtype([("order", "f8")])
+
+        def steer(self, seen, memory, begins):
+            order, _ = super().steer(seen, memory, begins)
+            order = 0.5 * (order + records(memory, self.record)["order"])
+            return order, order[:, None]
+
+    sluggish = Sluggish(**vars(lq))
+    check_controller(sluggish, ship, n_steps=4)
+    seen = np.zeros((2, 8), np.float32)
+    seen[:, 0], seen[:, 1] = np.sin(0.1), np.cos(0.1)
+    first, state = sluggish.predict(seen)
+    second, state = sluggish.predict(seen, state)
+    plain, _ = lq.predict(seen)
+    assert state.shape == (2, sluggish.memory_size) == (2, 1)
+    np.testing.assert_allclose([first, second], [0.5 * plain, 0.75 * plain], rtol=1e-6)
+    with pytest.raises(InputError, match=r"state: shape \(2, 3\) found, expected \(2, 1\)"):
+        sluggish.predict(seen, np.zeros((2, 3)))
 
 
 def test_a_controller_of_ones_own_is_one_file(mine, tmp_path, monkeypatch):

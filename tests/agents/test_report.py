@@ -224,7 +224,7 @@ def test_a_probability_is_certain_only_if_it_is(share, shown):
 
 def test_a_band_is_the_95_per_cent_interval():
     t, values = np.arange(3.0), np.linspace(0.0, 1.0, 101)[:, None] * np.ones(3)
-    (drawn,) = band(t, values, "draws", "#1d70b8")
+    drawn = band(t, values, "draws", "#1d70b8")
     assert np.asarray(drawn.y, dtype=float) == pytest.approx([0.975] * 3 + [0.025] * 3)
 
 

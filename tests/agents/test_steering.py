@@ -1,9 +1,12 @@
 """An autopilot on NMEA 0183: what it understands, when it hands over, and a ship that it steers over TCP."""
 
 import asyncio
+import math
 import os
+import re
 import selectors
 import socket
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,7 +17,7 @@ from agents.cli import app
 from agents.deployment.nmea import Link, Reading, readings, sentences
 from agents.deployment.route import Route
 from agents.deployment.simulated import SimulatedShip, simulate_ship
-from agents.deployment.steering import MANUAL, STANDBY, STEERING, Helm, Limits, steer
+from agents.deployment.steering import MANUAL, STANDBY, STEERING, Helm, Limits, Sensors, steer
 from shipgym.errors import InputError
 from shipgym.tasks.task import Task
 from tests.agents.policies import MARINER
@@ -377,3 +380,40 @@ def test_an_address_that_cannot_be_opened_is_refused_by_the_command(address, mes
     found = CliRunner().invoke(app, ["steer", str(tmp_path / "pid.json"), "--nmea", address])
     assert found.exit_code == 2, found.output
     assert message in " ".join(found.output.split())
+
+
+def test_limits_are_those_of_the_page():
+    page = (Path(__file__).parents[2] / "docs" / "deployment.md").read_text(encoding="utf-8")
+    told = {"persistence_s": 2.0, "order_deg": 90.0}  # in words beside the tables
+    for limit, names in re.findall(r"^\| .* \| (.*\d.*) \| (.*`.*) \|$", page, re.MULTILINE):
+        numbers = map(float, re.findall(r"\d+(?:\.\d+)?", limit))
+        told |= dict(zip(re.findall(r"`(\w+)`", names), numbers, strict=False))
+    limits = Limits()
+    assert vars(limits) == {name: told[name] for name in vars(limits)} | {"disagreement_deg": 5.0}
+    assert limits.between("heading") == pytest.approx(math.radians(5.0))
+    assert limits.between("yaw_rate") == pytest.approx(math.radians(0.5))
+    assert limits.between("speed") == pytest.approx(4.0 * 1852.0 / 3600.0)
+    assert limits.between("latitude") == pytest.approx(100.0 / 6.371e6)
+    assert limits.between("cross_track") == math.inf
+    with pytest.raises(InputError, match="late_s: 0"):
+        Limits(late_s=0.0)
+
+
+def test_instruments_disagree_when_it_lasts_and_while_both_speak():
+    sensors = Sensors(Limits())
+
+    def fault(seconds, second):
+        sensors.take(Reading("heading", math.radians(179.0), "HE"), seconds)
+        sensors.take(Reading("heading", math.radians(second), "HC"), seconds)
+        return sensors.fault(0.0, 1.0, seconds)
+
+    assert fault(0.0, -177.1) is None  # 3.9 degrees over south
+    assert fault(5.0, -175.9) is None
+    assert fault(7.0, -175.9) is None  # not longer than two seconds
+    assert fault(7.1, -175.9) == "heading of HE and HC disagree"
+    assert fault(8.0, -177.0) is None
+    assert fault(9.0, -175.9) is None  # counted anew
+    sensors.take(Reading("heading", math.radians(179.0), "HE"), 12.1)
+    assert sensors.fault(0.0, 1.0, 12.1) is None  # the second one is silent
+    assert sensors.value("heading", 15.1) == pytest.approx(math.radians(179.0))
+    assert sensors.value("heading", 15.2) is None

@@ -74,7 +74,7 @@ def test_shipped_suites_are_known_by_name():
     for call in (load_suite, suite_hash):
         with pytest.raises(InputError, match="suite: 'shipgym-v3' found"):
             call("shipgym-v3")
-    with pytest.raises(InputError, match=r"of suite 'shipgym-v1': .*Did you mean 'mariner-calm'"):
+    with pytest.raises(InputError, match=r"suite 'shipgym-v1': task: .*Did you mean 'mariner-calm'"):
         load_suite().task("mariner-clam")
 
 

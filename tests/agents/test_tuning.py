@@ -9,9 +9,17 @@ from typer.testing import CliRunner
 from agents.cli import app
 from agents.engines.jobs import JobEngine
 from agents.training.plan import Given, make_plan
-from agents.training.search_space import SPACES, Choice, Wholes, with_parameters
 from agents.training.settings import ALGORITHMS, load_settings
-from agents.training.tuning import Trial, allowed, evaluated_evenly, limits, train_trial, tune
+from agents.training.tuning import (
+    Trial,
+    allowed,
+    evaluated_evenly,
+    limits,
+    search_space,
+    train_trial,
+    tune,
+    with_parameters,
+)
 from shipgym.errors import InputError
 
 optuna = pytest.importorskip("optuna", reason="optuna is not installed")
@@ -105,10 +113,10 @@ def test_whatever_is_proposed_are_valid_settings(algorithm):
     draw = random.Random(1)
     for _ in range(100):
         parameters = {}
-        for name, dimension in SPACES[algorithm].items():
-            if isinstance(dimension, Choice):
+        for name, dimension in search_space(algorithm).items():
+            if isinstance(dimension, optuna.distributions.CategoricalDistribution):
                 parameters[name] = draw.choice(dimension.choices)
-            elif isinstance(dimension, Wholes):
+            elif isinstance(dimension, optuna.distributions.IntDistribution):
                 parameters[name] = draw.randint(dimension.low, dimension.high)
             else:
                 parameters[name] = draw.uniform(dimension.low, dimension.high)

@@ -6,14 +6,13 @@ from functools import cache
 
 import numpy as np
 import pytest
+from papers.xu2020_tank import PMM18, PMM38, TABLE_11, xu_ship
 
 import shipgym
 from identification import identify
-from identification.regression.forces import force_regression, identify_forces
+from identification.regression.forces import force_regression, force_variances, identify_forces
 from shipgym import InputError, Particulars, ShipModel, Trial
 from shipgym.manoeuvres.towing_tank import Tank, pure_surge, pure_sway, pure_yaw, static_drift, yaw_with_drift
-from shipgym.ships.catalogue import xu_ship
-from shipgym.ships.pmm import PMM18, PMM38, TABLE_11
 from shipgym.ships.shared_structure import read_shares, shared_structure
 from shipgym.ships.structures import get_structure
 
@@ -181,3 +180,12 @@ def test_tests_that_tell_nothing_are_refused() -> None:
         identify_forces([run], "pmm18", PARTICULARS, method="ls", rank=3)
     with pytest.raises(InputError, match="particulars: None found, expected at least length"):
         identify_forces([run], "pmm18", None)
+
+
+def test_the_variance_of_a_force_is_that_of_its_own_residuals_with_one_degree_of_freedom_at_least():
+    equation = np.array([0, 0, 0, 1, 1, 2])
+    residuals = np.array([[1.0, 2.0], [1.0, 2.0], [2.0, 0.0], [3.0, 1.0], [4.0, 1.0], [5.0, 6.0]])
+    leverages = np.array([0.5, 0.25, 0.25, 0.9, 0.9, 1.0])
+    np.testing.assert_allclose(
+        force_variances(equation, residuals, leverages), [[3.0, 4.0], [25.0, 2.0], [25.0, 36.0]]
+    )

@@ -10,7 +10,7 @@ from sklearn.utils.estimator_checks import check_estimator
 
 import shipgym
 from identification import IdentificationResult, identify
-from identification.estimators.rm_svm import ERROR_TOLERANCE, RMSVM
+from identification.estimators.rm_svm import ERROR_TOLERANCE, RMSVM, heading_error
 from identification.report.figures import search_figure
 from identification.search.pattern_search import pattern_search
 from identification.simulation_error.similarity import correlations, select_reference, similarity_vector
@@ -275,3 +275,24 @@ def test_a_feature_that_never_moves_is_left_out_of_the_bands() -> None:
     still = RMSVM(**settings).fit(np.column_stack([X, np.zeros(60)]), y)
     np.testing.assert_allclose(still.coef_, [*alone.coef_, 0.0], atol=1e-3)
     np.testing.assert_allclose(alone.coef_, [1.0, -2.0], atol=0.05)
+
+
+@pytest.mark.parametrize(
+    ("predicted", "rmse", "correlation"),
+    [
+        ([0.0, 1.0, 2.0, 5.0], 0.0, 0.0),
+        ([0.5, 1.5, 2.5, 5.5], 0.5, 0.0),
+        ([0.0, 2.0, 4.0, 10.0], np.sqrt(30.0 / 4.0), 0.0),
+        ([0.0, -1.0, -2.0, -5.0], np.sqrt(120.0 / 4.0), 2.0),
+        ([1.0, 1.0, 1.0, 1.0], np.sqrt(18.0 / 4.0), 1.0),  # a straight course tells nothing of a zigzag
+        (None, np.inf, np.inf),  # she ran away
+    ],
+)
+def test_the_error_of_a_heading(
+    target: ShipModel, monkeypatch: pytest.MonkeyPatch, predicted: Any, rmse: float, correlation: float
+) -> None:
+    trial = Trial(np.arange(4.0), {"psi": np.array([0.0, 1.0, 2.0, 5.0])})
+    run = None if predicted is None else {"psi": np.array(predicted)}
+    monkeypatch.setattr("identification.estimators.rm_svm.predict", lambda model, trial: run)
+    assert heading_error(target, trial, "rmse") == pytest.approx(rmse)
+    assert heading_error(target, trial, "correlation") == pytest.approx(correlation)

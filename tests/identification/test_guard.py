@@ -9,7 +9,7 @@ import pytest
 
 from identification import IdentificationResult, Samples, identify
 from identification.estimators.methods import fit_held
-from identification.validation import guarded_fit
+from identification.validation import guard
 from identification.validation.guard import hard_turn_features, reasons_unstable
 from shipgym import ShipModel, Trial
 from shipgym.manoeuvres import zigzag
@@ -87,7 +87,7 @@ def test_least_squares_is_never_penalised_but_marked(mariner: ShipModel, weak_tr
 def test_a_fit_that_nothing_holds_is_marked(
     mariner: ShipModel, weak_trials: list[Trial], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(guarded_fit, "STRENGTHS", (1e-9,))
+    monkeypatch.setattr(guard, "STRENGTHS", (1e-9,))
     fit = identify(weak_trials, particulars=mariner.particulars)
     assert not fit.stable
     assert fit.model.provenance is not None

@@ -12,12 +12,13 @@ import numpy as np
 import pytest
 
 from identification import LSSVM, IdentificationResult, identify
+from identification.estimators.kernel_residual import stabilised
 from identification.report.page import report_page
 from shipgym import ShipModel, Trial
 from shipgym.errors import InputError
 from shipgym.manoeuvres import zigzag
+from shipgym.ships.catalogue import fitted_box
 from shipgym.ships.checker import check_ship_model
-from shipgym.ships.grey_box_model import fitted_box
 from shipgym.ships.kernel_boxes import Kernel, KernelBox, kernel_box
 from shipgym.ships.linear import nomoto
 from shipgym.ships.particulars import Particulars
@@ -221,3 +222,31 @@ def test_what_cannot_be(trials: list[Trial], reference: ShipModel, truth: ShipMo
         identify(trials, structure="linear", particulars=SHIP, method=LSSVM(kernel="rbf"))
     with pytest.raises(InputError, match="no kernel found"):
         replace(truth.table, kernel=None)
+
+
+def linear_ship(**changes: float) -> ShipModel:
+    """A linear ship in the prime system, of which some coefficients are given."""
+    return ShipModel("linear ship", "linear", SHIP, GEAR, LINEAR | changes)
+
+
+def test_the_linear_ship_beneath_a_kernel_is_damped_as_little_as_steadies_her() -> None:
+    steady = linear_ship(a_du=-0.06)
+    assert stabilised(steady).coefficients == steady.coefficients
+    assert stabilised(linear_ship(a_du=0.3, a_0=0.01)).coefficients["a_du"] == pytest.approx(-0.07)
+    for given in ({"b_v": 0.4, "c_r": 0.2}, {"c_d": 9.0}, {"b_d": -3.0, "c_d": 0.0}):
+        ship = linear_ship(**given)
+        found = stabilised(ship).coefficients
+        shift = ship.coefficients["b_v"] - found["b_v"]
+        assert shift == pytest.approx(ship.coefficients["c_r"] - found["c_r"])
+        steady_at = [worst_of(ship, damping) < 1.0 for damping in (shift, shift - 0.05)]
+        assert steady_at == [True, False]
+    with pytest.raises(InputError, match="no damping steadies the linear ship beneath it"):
+        stabilised(linear_ship(c_d=1e4))
+
+
+def worst_of(ship: ShipModel, damping: float) -> float:
+    """Most of what a linear ship may do by it: roots at -0.2, a drift of 0.5, a turn of 1.2."""
+    c = ship.coefficients
+    A = np.array([[c["b_v"], c["b_r"]], [c["c_v"], c["c_r"]]]) - damping * np.eye(2)
+    drift, turn = np.linalg.inv(A) @ [c["b_d"], c["c_d"]] * GEAR.limit
+    return max(1.2 + np.linalg.eigvals(A).real.max(), abs(drift) / 0.5, abs(turn) / 1.2)

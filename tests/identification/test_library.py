@@ -11,8 +11,8 @@ import shipgym
 from agents import LQ, PID
 from identification import identify
 from shipgym import manoeuvres
+from shipgym.envs.environment import DEFAULT_MODEL
 from shipgym.envs.registration import IDENTIFIED
-from shipgym.envs.ship_env import DEFAULT_MODEL
 
 ROOT = Path(__file__).parents[2]
 MARINER_TRIALS = ROOT / "examples" / "mariner" / "ship.toml"

@@ -9,8 +9,9 @@ from sklearn.linear_model import Ridge
 from sklearn.neighbors import KNeighborsRegressor
 
 from identification import LSSVM, ArtificialBeeColony, cross_validate, identify
-from identification.estimators.free_running import free_running_error
-from identification.estimators.methods import METHODS
+from identification.estimators.l_curve import LCurve, corner_rank, gcv_rank
+from identification.estimators.methods import METHODS, get_method
+from identification.estimators.tuned import free_running_error
 from shipgym import InputError, ShipModel, Trial
 from shipgym.manoeuvres import zigzag
 
@@ -200,3 +201,46 @@ def test_an_object_that_is_no_linear_estimator_is_refused(
 ) -> None:
     with pytest.raises(InputError, match=told):
         identify([cao_zigzag], method=method, particulars=mariner.particulars, **settings)
+
+
+def test_the_free_running_error_is_relative_to_the_motion_of_each_trial(
+    monkeypatch: pytest.MonkeyPatch, mariner: ShipModel
+) -> None:
+    ramp = np.arange(4.0)
+    moving = Trial(ramp, {"u": 1.0 + ramp, "v": 2.0 * ramp, "r": np.zeros(4)})
+    mean = {name: np.full(4, moving[name].mean()) for name in "uvr"}
+    answers = iter([{name: moving[name] for name in "uvr"}, mean, None, {"u": 1e9 * ramp, "v": ramp}])
+    monkeypatch.setattr("identification.estimators.free_running.predict", lambda model, trial: next(answers))
+    found = [free_running_error(mariner, [moving]) for _ in range(4)]
+    assert found == [0.0, pytest.approx(1.0), 1e3, 1e3]  # the last is as if it had run away
+    answers = iter([mean, None])
+    assert free_running_error(mariner, [moving, moving]) == pytest.approx(500.5)
+
+
+def test_the_rank_of_few_samples_is_the_corner_and_of_many_what_they_determine() -> None:
+    """The corner has the smallest product of both norms; a drop by more than chance goes beyond it."""
+    curve = LCurve(np.array([10.0, 1.0, 0.8, 0.79]), np.array([1.0, 2.0, 9.0, 90.0]))
+    assert [corner_rank(curve, n) for n in (4, 5, 100, 400)] == [2, 2, 3, 4]
+    flat = LCurve(np.array([10.0, 1.0, 1.0, 1.0]), np.array([1.0, 2.0, 9.0, 90.0]))
+    assert corner_rank(flat, 400) == 2
+    exact = LCurve(np.array([1.0, 1e-3, 1e-14]), np.ones(3))
+    assert corner_rank(exact, 100) == 3
+    # (residual / (n - rank))^2: 10 / 9, 1 / 8, 0.8 / 7 and 0.79 / 6 of ten samples
+    assert gcv_rank(curve, 10) == 3
+    assert gcv_rank(curve, 6) == 2  # 1 / 4 against 0.8 / 3
+    assert gcv_rank(curve, 4) == 2  # never as many as samples
+
+
+def test_a_method_knows_its_settings_and_an_object_without_fit_is_none() -> None:
+    svm = get_method("ls-svm")
+    assert [svm.knows(name) for name in ("C", "scale", "rank", "epsilon")] == [True, True, False, False]
+    assert get_method("tls-svm").knows("selection")  # which 1 is none of: the name is known all the same
+    with pytest.raises(
+        InputError, match=r"method: 3 found, expected one of .*an estimator with scikit-learn"
+    ):
+        get_method(3)
+    with pytest.raises(InputError, match="LSSVM with kernel 'rbf' found, which has no coefficient"):
+        get_method(LSSVM(kernel="rbf"))
+    assert get_method(LSSVM()).name == "LSSVM"
+    with pytest.raises(InputError, match="method: 'lsq' found"):
+        get_method("lsq")

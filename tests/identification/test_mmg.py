@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from copy import copy
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -13,14 +15,21 @@ import pytest
 
 import shipgym
 from identification import IdentificationResult, identify
-from identification.simulation_error.mmg_prior import formula_coefficients, mmg_prior
+from identification.simulation_error.maximum_a_posteriori import LARGEST, _groups, _Problem
+from identification.simulation_error.mmg_prior import (
+    HULL_FORMULAS,
+    formula_coefficients,
+    mmg_prior,
+    reference_coefficients,
+)
 from identification.validation.warnings import model_warnings
 from shipgym import InputError, Particulars, ShipModel, Trial
 from shipgym.engine.motion import Motion, Ship
 from shipgym.manoeuvres import turning_circle, turning_indices
-from shipgym.ships import kvlcc2, mmg
+from shipgym.ships import container, kvlcc2, load_model, mmg
 from shipgym.ships.particulars import ADDED_MASSES
 from shipgym.ships.scaling import scale_model
+from tests.ships.mmg import MMG_SHIPS, mmg_ship
 
 L7 = mmg.SHIP.particulars
 
@@ -86,12 +95,12 @@ def test_terms_beyond_the_standard_form_act_as_they_are_named() -> None:
 
 def test_twin_screws_and_rudders_count() -> None:
     one, two = (
-        dict(zip(("d", "V", "xG", "k", "D", "A", "eta", "N"), mmg.dimensions(p), strict=True))
+        dict(zip(("d", "V", "xG", "k", "D", "A", "eta", "N"), mmg.dimensions(p).values(), strict=True))
         for p in (L7, replace(L7, propellers=2.0, rudders=2.0, rudder_area=2 * L7.require("rudder_area")))
     )
     assert (one["eta"], two["eta"]) == pytest.approx((0.216 / 0.345,) * 2)  # each in a race of its own
     assert (one["N"], two["N"]) == (1.0, 2.0)
-    assert mmg.dimensions(replace(L7, propellers=2.0))[6] == 0.0  # one rudder between the races
+    assert mmg.dimensions(replace(L7, propellers=2.0))["eta"] == 0.0  # one rudder between the races
     ahead = Motion(0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 11.85)
     surge = [at(ship_of({}, replace(L7, propellers=n)), ahead)[0] for n in (1.0, 2.0, 3.0)]
     assert surge[1] - surge[0] == pytest.approx(surge[2] - surge[1])
@@ -154,6 +163,27 @@ def test_formulas_give_about_what_was_measured_of_kvlcc2() -> None:
     for source in ("yoshimura", "kijima", "kvlcc2-l7"):  # at service speed thrust balances resistance
         found = mmg_prior(source, L7)
         assert at(ship_of(found.mean, found.ship), ahead)[0] == pytest.approx(0.0, abs=1e-12)
+
+
+@pytest.mark.parametrize("hull", HULL_FORMULAS)
+def test_formulas_claim_no_more_than_published_ships_bear_out(hull: str) -> None:
+    """The prior's deviation is at least the root mean square of published coefficients less the formula's."""
+    ships = [load_model("kvlcc2-l7"), *map(mmg_ship, MMG_SHIPS)]
+    forms = [(ship.particulars, reference_coefficients(ship)) for ship in ships]
+    s175 = load_model("container")  # by rho L^2 / 2; her rudder straightens the flow by another law
+    own, by_draught = s175.coefficients, s175.particulars.length / s175.particulars.require("draught")
+    hull_terms = {name for name in own if name in mmg.IDENTIFIED and (name[1] == "_" or name[0] in "mJ")}
+    rudder_terms = {"a_H", "x_H", "epsilon", "kappa"}
+    form = {name: by_draught * own[name] for name in hull_terms - rudder_terms}
+    form |= {name: own[name] for name in rudder_terms}
+    form |= {"R_0": -by_draught * own["X_uu"], "w_P0": own["wp"], "t_R": 1.0 - own["c_RX"]}
+    form["f_alpha"] = 6.13 * container.ASPECT_RATIO / (2.25 + container.ASPECT_RATIO)
+    forms.append((s175.particulars, form))
+    priors = [mmg_prior(hull, replace(ship, **dict.fromkeys(ADDED_MASSES))) for ship, _ in forms]
+    for k, name in enumerate(mmg.IDENTIFIED):
+        apart = [form[name] - prior.mean[name]
+                 for (_, form), prior in zip(forms, priors, strict=True) if name in form]  # fmt: skip
+        assert np.sqrt(np.mean(np.square(apart))) <= priors[0].deviation[k], name
 
 
 def test_main_dimensions_outside_the_range_are_said_and_an_unlike_reference_refused() -> None:
@@ -293,3 +323,67 @@ def test_a_trial_without_shaft_speed_or_with_a_still_rudder_is_refused() -> None
     without = Trial(trial.t, {c: v for c, v in trial.channels.items() if c != "n"}, name="still")
     with pytest.raises(InputError, match="'still': channel 'n' is missing, structure 'mmg' needs"):
         identify([without], "mmg", particulars=L7)
+
+
+@pytest.fixture(scope="module")
+def exact() -> _Problem:
+    """A zigzag without noise of the ship that the prior takes for the likeliest."""
+    prior = mmg_prior("kvlcc2-l7", L7)
+    ship = replace(ship_of({}, prior.ship), coefficients=dict(prior.mean))
+    steps = np.arange(1000)
+    order = np.radians(20.0) * np.where(steps // 90 % 2 == 0, 1.0, -1.0)
+    run = ship.simulate(np.column_stack([order, np.full(1000, ship.service_shaft_speed)]), 0.1)
+    channels = {name: run[name] for name in ("u", "v", "r", "psi", "delta", "n")}
+    return _Problem(ship, [Trial(run.t, channels)], prior)
+
+
+def test_errors_are_those_of_the_segments_and_their_slopes_are_derivatives(exact: _Problem) -> None:
+    """Segments of 1.7 ship lengths, samples 0.067 ship lengths apart at least: here 3 steps."""
+    everything, zero = np.arange(len(exact.segments)), np.zeros(len(mmg.IDENTIFIED))
+    travel = 7.0 / 1.179
+    assert len(exact.segments) == round(100.0 / (1.7 * travel))
+    samples = [s.inputs[s.samples >= 0, 0] for s in exact.segments]
+    assert np.concatenate([np.diff(t) for t in samples]) == pytest.approx(0.3)
+    errors, slopes = exact.simulated(zero, everything)
+    assert np.abs(errors).max() < 0.01 * exact.floors.min()
+    size = 0.05
+    for name in ("N_v", "Y_r", "thrust"):
+        k = mmg.IDENTIFIED.index(name)
+        ahead, behind = (
+            exact.simulated(zero + h * (np.arange(41) == k), everything)[0] for h in (size, -size)
+        )
+        scale = np.abs(slopes[:, :, k]).max()
+        np.testing.assert_allclose(slopes[:, :, k], (ahead - behind) / (2 * size), atol=0.02 * scale)
+
+
+def test_errors_over_one_ship_length_are_one_error_and_no_scale_is_below_its_floor(exact: _Problem) -> None:
+    everything, zero = np.arange(len(exact.segments)), np.zeros(len(mmg.IDENTIFIED))
+    speed, length = 1.179, 7.0
+    floors = [0.0017 * speed, 0.0017 * speed, 0.0021 * speed / length, np.radians(0.1)]
+    assert exact.floors == pytest.approx(floors)
+    off = np.array([3.0, 2.0, 0.5, 4.0]) * exact.floors
+    shifted, segments = copy(exact), exact.segments
+    shifted.segments = [replace(s, measured=s.measured + off) for s in segments]
+    errors, _ = shifted.simulated(zero, everything)
+    weights = [(s.inputs[-1, 0] - s.inputs[0, 0]) * speed / length for s in segments]
+    np.testing.assert_allclose(np.sum(errors**2, axis=0), off**2 * sum(weights), rtol=1e-2)
+    np.testing.assert_allclose(shifted.scales(errors, everything), np.maximum(off, exact.floors), rtol=1e-2)
+    z = 0.1 * np.arange(41.0)
+    shifted.kept = {}
+    rows, slopes = shifted.rows(z, everything, 1e-9 * exact.floors, 2.0)
+    np.testing.assert_array_equal(rows[-41:], 2.0 * z)
+    np.testing.assert_array_equal(slopes[-41:], 2.0 * np.eye(41))
+    assert np.abs(rows[:-41]).max() == LARGEST
+
+
+@pytest.mark.parametrize(
+    ("trials", "groups"),
+    [
+        ([0, 0, 0, 0, 0, 0, 0], [0, 0, 0, 1, 1, 2, 2]),  # a single trial in thirds
+        ([0, 0, 1, 2, 2], [0, 0, 1, 2, 2]),
+        ([0, 1, 2, 3, 4, 5, 6], [0, 1, 2, 3, 4, 0, 1]),  # every fifth trial together
+    ],
+)
+def test_segments_are_held_out_by_trials(trials: list[int], groups: list[int]) -> None:
+    segments: Any = [SimpleNamespace(trial=trial) for trial in trials]
+    assert _groups(segments).tolist() == groups

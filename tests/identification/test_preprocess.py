@@ -16,8 +16,8 @@ from identification.regression.preprocess import (
     smooth_kinematics,
     smoothed_channels,
 )
+from identification.regression.preprocess.filters import Reinsch
 from identification.regression.preprocess.noise import is_noisy, noise_ratio
-from identification.regression.preprocess.spline import Reinsch
 from shipgym import InputError, ShipModel, Trial
 from shipgym.manoeuvres import zigzag
 

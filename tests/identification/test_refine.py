@@ -11,8 +11,16 @@ from identification import IdentificationResult, build_samples, identify
 from identification.estimators.estimator import FitTask
 from identification.estimators.methods import get_method
 from identification.simulation_error.refine import Refinement, refine
-from identification.simulation_error.segments import Shooter, compared_channels, cut
-from identification.validation.guarded_fit import guarded_fit
+from identification.simulation_error.segments import (
+    Shooter,
+    _edges,
+    _without_start,
+    about_mean,
+    averaged,
+    compared_channels,
+    cut,
+)
+from identification.validation.guard import guarded_fit
 from shipgym import InputError, ShipModel, Trial
 from shipgym.manoeuvres import turning_circle, turning_indices, zigzag
 
@@ -49,6 +57,43 @@ def test_segments_cover_a_trial_and_the_second_set_begins_half_a_segment_later(
     assert min(starts[1:]) == pytest.approx(2.0 * travel, abs=0.5)
     assert all(segment.inputs[-1, 0] == cao_zigzag.t[-1] for segment in (segments[half - 1], segments[-1]))
     assert sum(len(s.measured) for s in segments[:half]) == len(cao_zigzag) + half - 1
+
+
+def test_edges_divide_a_trial_alike() -> None:
+    """As many as come nearest to the duration; the second set begins half of it later."""
+    t = np.arange(100.0)
+    assert _edges(t, 33.0, 0.0).tolist() == [0, 33, 66, 99]
+    assert _edges(t, 38.0, 0.0).tolist() == [0, 33, 66, 99]  # 2.6 of them
+    assert _edges(t, 33.0, 0.5).tolist() == [17, 58, 99]  # 2.5 of them: the last are longer
+    assert _edges(t, 500.0, 0.0).tolist() == [0, 99]
+    assert _edges(t, 500.0, 0.5).tolist() == []
+    assert _edges(t, 4.0, 0.0).tolist() == [0, 99]  # none of fewer than five samples
+    assert _edges(t, 99.0 / 19.0, 0.0).tolist()[:3] == [0, 6, 11]
+    assert _edges(t[:5], 2.0, 0.0).tolist() == [0, 4]
+
+
+def test_blocks_are_averaged_and_offsets_compared_with_their_mean() -> None:
+    values = np.arange(14.0).reshape(7, 2)
+    means = averaged(values, np.array([0, 3, 6]), np.array([3, 3, 1]))
+    np.testing.assert_allclose(means, [[2.0, 3.0], [8.0, 9.0], [12.0, 13.0]])
+    np.testing.assert_allclose(about_mean(np.array([1.0, 2.0, 6.0])), [-2.0, -1.0, 3.0])
+    assert about_mean(np.zeros(0)).size == 0
+
+
+def test_what_a_start_may_explain_is_projected_out() -> None:
+    """The rest is that of least squares over the start, and the move its solution."""
+    rng = np.random.default_rng(0)
+    value, slope = rng.standard_normal(12), rng.standard_normal((12, 5))
+    rest, slopes, move = _without_start(value, slope, 2)
+    best = -np.linalg.lstsq(slope[:, 3:], value)[0]
+    np.testing.assert_allclose(move, best, atol=1e-12)
+    np.testing.assert_allclose(rest, value + slope[:, 3:] @ best, atol=1e-12)
+    np.testing.assert_allclose(slope[:, 3:].T @ slopes, np.zeros((2, 3)), atol=1e-12)
+    value[3] = np.nan  # a ship that ran away
+    rest, slopes, move = _without_start(value, slope, 2)
+    np.testing.assert_array_equal(rest, value)
+    np.testing.assert_array_equal(move, [0.0, 0.0])
+    assert _without_start(value, slope, 0)[1].shape == (12, 5)
 
 
 def test_jacobian_is_that_of_central_differences(

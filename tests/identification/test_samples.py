@@ -153,3 +153,18 @@ def test_a_gap_is_a_step_of_more_than_five_usual_ones() -> None:
     assert pieces(0.1, 1.6) == [30, 30]
     assert pieces(0.5, 9.0, first=9) == [51]  # too short a piece is left out
     assert pieces(0.5, 9.0, first=10) == [10, 50]
+
+
+def test_six_long_steps_on_end_are_another_rate_and_five_are_gaps() -> None:
+    """The usual step is the median of the eleven around, where that is longer than the trial's."""
+    ship = Particulars(length=50.0, speed=5.0)
+
+    def pieces(*long: int) -> list[int]:
+        steps = np.full(99, 0.5)
+        steps[list(long)] = 3.0
+        t = np.concatenate([[0.0], np.cumsum(steps)])
+        return [len(piece) for piece in between_gaps(Trial(t, {"u": np.ones(100)}), ship)]
+
+    assert pieces(*range(40, 46)) == [100]
+    assert pieces(*range(40, 45)) == [41, 55]
+    assert pieces(34, *range(40, 45)) == [35, 55]  # the sixth is not among the eleven around the fifth

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import pytest
 
@@ -93,3 +94,13 @@ def test_the_fewest_coefficients_among_errors_that_differ_by_chance() -> None:
     usual = standing("abkowitz", 40, 0.10, 0.12, 0.112)
     other = standing("abkowitz", 40, 0.10, 0.12, 0.11, method="ls")
     assert _simplest([other, usual]) is usual
+
+
+def test_ships_that_run_away_come_last_then_unstable_ones_then_by_error() -> None:
+    good, worse = standing("abkowitz", 40, 0.1), standing("cubic", 27, 0.2)
+    unstable, lost = replace(good, stable=False), replace(good, ran_away=1, error=None)
+    often = replace(lost, ran_away=2)
+    unknown = replace(good, error=None)
+    in_order = [good, worse, unknown, unstable, lost, often]
+    shuffled = [often, unknown, good, lost, unstable, worse]
+    assert sorted(shuffled, key=lambda one: one.rank) == in_order

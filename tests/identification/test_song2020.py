@@ -5,7 +5,7 @@ from papers.song2020_container import HULL, PROPULSION, inertia_matrix, recorded
 
 from shipgym.ships import container as own
 from shipgym.ships import load_model
-from shipgym.ships.structures import MMG_4DOF
+from shipgym.ships.structures import get_structure
 
 
 @pytest.fixture(scope="module")
@@ -77,7 +77,7 @@ def test_the_regressors_are_those_of_the_structure_of_the_package():
         theirs = {term.powers for term in song2020_container.read_terms(text)}
         ours = {
             term.powers
-            for term in MMG_4DOF.terms(equation)
+            for term in get_structure("mmg4dof").terms(equation)
             if not {"n", "delta"} & {symbol for symbol, _ in term.powers} and term.name not in known[equation]
         }
         assert theirs == ours, equation

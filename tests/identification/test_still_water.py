@@ -15,10 +15,11 @@ from shipgym import ShipModel, Trial
 from shipgym.errors import InputError
 from shipgym.manoeuvres import turning_circle, zigzag
 from shipgym.sea.conditions import Current, Weather, Wind
-from shipgym.sea.mobility import mobility_matrix
+from shipgym.sea.weather_column import mobility_matrix
 from shipgym.sea.wind import AIR_DENSITY, wind_curves
 from shipgym.ships.simulate import open_loop
 from shipgym.trials.identify_table import Options
+from shipgym.trials.resampling import Log
 from shipgym.trials.trial_import import Conventions, to_project_conventions
 
 NORTH, EAST = 0.3, -0.4  # m/s
@@ -32,8 +33,10 @@ def log(run: Trial, seed: int = 0) -> Trial:
     channels = {
         name: run[name][every] + size * rng.standard_normal(len(run.t[every])) for name, size in noise.items()
     }
-    made, derived, *_ = to_project_conventions(run.t[every], channels, Conventions(), "log")
-    return Trial(run.t[every], made, name=run.name, kind=run.kind, use=run.use, derived=derived)
+    recorded = Log(run.t[every], channels, "log", [])
+    to_project_conventions(recorded, Conventions())
+    facts = {"kind": run.kind, "use": run.use, "derived": recorded.derived}
+    return Trial(recorded.t, recorded.channels, name=run.name, **facts)
 
 
 @pytest.fixture(scope="module")
@@ -112,8 +115,9 @@ def test_a_given_current_and_a_logged_speed(mariner: ShipModel) -> None:
     """Of a trial with a speed log and positions only the sway that was derived changes."""
     run = zigzag(mariner, 20, 20, duration=300.0, dt=0.5, weather=CURRENT)
     channels = {name: run[name] for name in ("x", "y", "psi", "r", "delta", "u")}
-    made, derived, *_ = to_project_conventions(run.t, channels, Conventions(), "log")
-    mixed = Trial(run.t, made, derived=derived)
+    recorded = Log(run.t, channels, "log", [])
+    to_project_conventions(recorded, Conventions())
+    mixed = Trial(run.t, recorded.channels, derived=recorded.derived)
     assert mixed.over_ground
     found = through_water(mixed, NORTH, EAST)
     np.testing.assert_array_equal(found["u"], run["u"])

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from identification.search.bee_colony import _chances, _moved, _settle
 from sklearn.linear_model import Ridge
 
 from identification import (
@@ -17,6 +18,7 @@ from identification import (
     TunedLSSVM,
     minimise,
 )
+from identification.search import get_optimiser
 from identification.search.objectives import held_out_error, time_blocks, training_error
 from identification.search.pattern_search import pattern_search
 from identification.search.search import Optimiser
@@ -243,3 +245,47 @@ def test_searches_may_be_as_small_as_they_say(optimiser: Any, least: dict[str, i
 def test_a_seed_is_a_whole_number_from_0(seed: Any) -> None:
     with pytest.raises(InputError, match=f"seed: {seed} found"):
         TunedLSSVM(seed=seed).fit(*regression(40))
+
+
+def test_bees_choose_good_sources_more_often() -> None:
+    """Fitness 1 / (1 + f), or 1 - f below zero (Karaboga 2005); of costs without a sum all alike, in turn."""
+    np.testing.assert_allclose(
+        _chances(np.array([0.0, 1.0, 3.0, -1.0])), np.array([1.0, 1.5, 1.75, 3.75]) / 3.75
+    )
+    np.testing.assert_allclose(_chances(np.full(4, np.inf)), [0.25, 0.5, 0.75, 1.0])
+
+
+def test_a_bee_moves_in_one_dimension_by_a_share_of_the_way_between_two_sources() -> None:
+    rng = np.random.default_rng(0)
+    sources = rng.random((5, 3))
+    chosen = rng.integers(0, 5, 4000)
+    step = _moved(sources, chosen, rng) - sources[chosen]
+    moved = np.abs(step) > 0.0
+    assert set(moved.sum(axis=1)) <= {0, 1}
+    np.testing.assert_allclose(moved.mean(axis=0), 1.0 / 3.0, atol=0.05)
+    apart = np.abs(sources[:, None] - sources[None]).max(axis=1)
+    share = step[moved] / apart[chosen][moved]
+    assert np.abs(share).max() <= 1.0
+    assert np.abs(share).max() > 0.9
+    assert abs(np.mean(share)) < 0.05
+
+
+def test_a_source_keeps_its_best_move_and_counts_tries_in_vain() -> None:
+    sources, values, idle = np.zeros((3, 1)), np.array([5.0, 5.0, 5.0]), np.array([2, 2, 2])
+    chosen, found = np.array([0, 0, 0, 1, 1]), np.array([4.0, 3.0, 6.0, 5.0, 7.0])
+    _settle(sources, values, idle, chosen, np.arange(1.0, 6.0)[:, None], found)
+    assert (sources.ravel().tolist(), values.tolist()) == ([2.0, 0.0, 0.0], [3.0, 5.0, 5.0])
+    assert idle.tolist() == [0, 4, 2]
+
+
+def test_an_optimiser_is_a_name_a_table_or_an_object() -> None:
+    swarm = get_optimiser({"name": "pso", "rounds": 7})
+    assert swarm.rounds == 7  # type: ignore[attr-defined]
+    assert get_optimiser(swarm) is swarm
+    for wrong, message in (
+        ("ant", "optimiser: 'ant' found"),
+        ({"rounds": 7}, "optimiser: None found"),
+        ({"name": "abc", "legs": 6}, "optimiser: legs found for 'abc'"),
+    ):
+        with pytest.raises(InputError, match=message):
+            get_optimiser(wrong)  # type: ignore[arg-type]

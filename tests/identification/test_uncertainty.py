@@ -7,7 +7,12 @@ import pytest
 
 from identification import Samples, build_samples
 from identification.estimators.methods import fit_all, get_method
-from identification.uncertainty.covariance import coefficient_covariance, joint_covariance
+from identification.uncertainty.covariance import (
+    coefficient_covariance,
+    effective_freedom,
+    joint_covariance,
+    newey_west,
+)
 from shipgym import ShipModel, Trial
 
 
@@ -90,3 +95,32 @@ def test_covariance_of_a_real_fit_is_positive_and_of_all_coefficients(noisy_fit)
     assert covariance.shape == (40, 40)
     deviation = np.sqrt(np.diag(covariance))
     assert np.linalg.eigvalsh(covariance / np.outer(deviation, deviation)).min() > -1e-9
+
+
+@pytest.mark.parametrize("lags", [0, 2, 7, 30])
+def test_bartletts_weights_fall_linearly_to_zero_beyond_the_last_lag(lags: int) -> None:
+    """Every pair of rows by 1 - |i - j| / (L + 1), Newey & West 1987; of eight rows at most seven lags."""
+    scores = np.random.default_rng(0).standard_normal((8, 3))
+    apart = np.abs(np.subtract.outer(np.arange(8), np.arange(8)))
+    weight = np.maximum(1.0 - apart / (min(lags, 7) + 1.0), 0.0)
+    np.testing.assert_allclose(newey_west(scores, lags), scores.T @ weight @ scores, rtol=1e-12)
+
+
+def test_without_memory_the_covariance_is_that_of_the_textbook() -> None:
+    """s2 (X'X)^-1 with n - p degrees of freedom; a step of memory of no length changes its factor alone."""
+    rng = np.random.default_rng(1)
+    X = rng.standard_normal((40, 3))
+    y = X @ [1.0, 2.0, 3.0] + rng.standard_normal(40)
+    time = np.arange(40.0)
+    samples = Samples({"v": X}, {"v": y}, time, np.ones(40), np.repeat([0, 1], [30, 10]), 1)
+    fitted = fit_all(get_method("ls").estimator, samples)
+    errors, inverse = y - X @ np.linalg.lstsq(X, y)[0], np.linalg.inv(X.T @ X)
+    assert effective_freedom(fitted["v"], X) == pytest.approx(37.0)
+    np.testing.assert_allclose(joint_covariance(fitted, samples), errors @ errors / 37.0 * inverse, rtol=1e-6)
+    # correlated over two rows within each of two trials
+    scores = X * errors[:, None] * np.sqrt(40.0 / 37.0)
+    meat = newey_west(scores[:30], 2) + newey_west(scores[30:], 2)
+    np.testing.assert_allclose(joint_covariance(fitted, samples, 2.0), inverse @ meat @ inverse, rtol=1e-6)
+    matrix = np.triu(rng.standard_normal((3, 3))) + 3.0 * np.eye(3)
+    back = np.linalg.inv(matrix)
+    np.testing.assert_allclose(coefficient_covariance(inverse, matrix), back @ inverse @ back.T, rtol=1e-9)

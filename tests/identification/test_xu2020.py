@@ -1,8 +1,7 @@
 import pytest
 from papers import xu2020, xu2020_rank, xu2020_tank
 from papers.xu2020 import TABLE_12
-
-from shipgym.ships.pmm import PMM18, PMM38, TABLE_11
+from papers.xu2020_tank import PMM18, PMM38, TABLE_11
 
 
 @pytest.fixture(scope="module")

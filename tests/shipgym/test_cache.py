@@ -19,7 +19,8 @@ from filelock import FileLock
 import shipgym
 from shipgym.engine import cache_folder, compiling
 from shipgym.engine.disk_cache import DiskCache
-from shipgym.engine.voyages import Voyages, sensors_for
+from shipgym.engine.voyages import Voyages
+from shipgym.instruments.sensor_set import shipped_sensors
 from shipgym.tasks.definition import read_definition
 
 VECTOR = r"<\d+ x double>"  # as LLVM writes it
@@ -302,7 +303,7 @@ def test_who_waits_at_a_terminal_sees_one_line(tmp_path, monkeypatch, capsys):
 def test_loops_over_ships_are_vectorised(monkeypatch):
     monkeypatch.setattr(compiling, "usable_folder", lambda: None)  # what comes from the cache tells no code
     vessel = shipgym.load_model("mariner-tls-svm").vessel
-    sensors = sensors_for(False, False, False)
+    sensors = shipped_sensors(False, False, False)
     (code,) = (
         Voyages(vessel, read_definition("CourseKeeping"), sensors, False, True).run.inspect_llvm().values()
     )

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import shipgym
-from shipgym.engine import mathematics
+from shipgym.engine import mathematics, specialise
 from shipgym.engine.compiling import explanation
 from shipgym.engine.loops import LOOPS, ship_loop
 from shipgym.engine.parts import Part
@@ -59,7 +59,7 @@ def test_without_compiling_the_numbers_are_the_same():
     np.testing.assert_allclose(plain_run, compiled_run, rtol=1e-9, atol=1e-12)
 
 
-def test_another_ship_or_an_edited_function_has_a_file_of_its_own():
+def test_another_ship_or_an_edited_function_has_a_file_of_its_own(monkeypatch):
     loop = LOOPS["simulate"].function
     ships = [shipgym.load_model(name).vessel for name in ("mariner", "container")]
     parts, other = ({**sea_parts(False, lanes=1), **vessel.parts(1)} for vessel in ships)
@@ -75,6 +75,10 @@ def test_another_ship_or_an_edited_function_has_a_file_of_its_own():
     }
     assert len(tags) == 4
     assert fingerprint(loop, dict(parts)) in tags
+    monkeypatch.setattr(specialise, "GENERATORS", specialise.GENERATORS[1:])
+    specialise._machine.cache_clear()
+    assert fingerprint(loop, parts) not in tags  # nor what another generator wrote
+    specialise._machine.cache_clear()
 
 
 def test_each_coefficient_is_read_once_and_what_terms_share_is_taken_out():

@@ -293,14 +293,6 @@ def test_wrong_batches(mariner):
         Engine([mariner, mariner], 2, randomisation=pool)
     with pytest.raises(InputError, match="models: of several structures"):
         Engine([mariner, shipgym.load_model("kvlcc2")], 2)
-    for lanes, message in (
-        ([0.0, 1.0], "lanes: float64 of shape"),
-        ([0], r"lanes: int64 of shape \(1,\) found, expected 2 whole"),
-        ([0, 2], "lanes: 0 to 2 found, expected 0 to 1"),
-        ([-1, 0], "lanes: -1 to 0 found"),
-    ):
-        with pytest.raises(InputError, match=message):
-            engine.copy_lanes(engine, lanes)
     with pytest.raises(InputError, match="num_envs: 0"):
         Engine(mariner, 0)
     with pytest.raises(InputError, match="3 found, expected 1 or one for each of 2"):

@@ -255,3 +255,13 @@ def test_every_id_conforms_as_a_vector(name):
         shipgym.check_vector_env(
             lambda: gymnasium.make_vec(name, 3, episode_steps=6), lambda: gymnasium.make(name, **options), 20
         )
+
+
+def test_every_id_makes_both():
+    for name in environments():
+        many, one = gymnasium.make_vec(name, num_envs=2), gymnasium.make(name)
+        assert many.single_observation_space == one.observation_space
+        assert many.single_action_space == one.action_space
+        assert many.observation_names == one.unwrapped.observation_names
+        seen, _ = many.reset(seed=5)
+        np.testing.assert_array_equal(seen[1], one.reset(seed=6)[0])

@@ -47,6 +47,7 @@ def misreadings(env, seen):
     return wrong
 
 
+@pytest.mark.compiled
 @pytest.mark.parametrize("noise", [1.0, 3.0])
 def test_noise_has_the_deviation_of_a_sea_trials_sensors(noise):
     """Within 5 standard errors of a deviation, sigma / sqrt(2 n)."""
@@ -63,6 +64,7 @@ def test_noise_has_the_deviation_of_a_sea_trials_sensors(noise):
     assert abs(np.corrcoef(second["sway"], second["surge"])[0, 1]) < 5.0 / np.sqrt(count)
 
 
+@pytest.mark.compiled
 def test_noise_of_the_position_shows_in_the_cross_track_error():
     count, env = 4000, many(4000, PATH, **SHAFT, noise=2.0, waypoints=[[0.0, 0.0], [5000.0, 1000.0]])
     env.reset(seed=0)
@@ -72,6 +74,7 @@ def test_noise_of_the_position_shows_in_the_cross_track_error():
     assert np.std(wrong) == pytest.approx(2.0 * SEA_TRIAL["x"].noise, rel=5.0 / np.sqrt(2 * count))
 
 
+@pytest.mark.compiled
 def test_the_course_to_steer_is_that_of_the_position_shown():
     """So satellite noise reaches it: what remains of the heading error's noise is the compass's alone."""
     count, lookahead, length = 4000, 0.2, 160.93
@@ -115,6 +118,7 @@ def waves_shown(measurement, **options):
     return np.median(shown / first_order, axis=-1)
 
 
+@pytest.mark.compiled
 def test_a_filter_takes_most_of_the_waves_out_of_what_is_shown():
     """Four fifths of its variance; raw shows it all."""
     rate, heading = waves_shown("filtered", noise=1e-6)
@@ -123,6 +127,7 @@ def test_a_filter_takes_most_of_the_waves_out_of_what_is_shown():
     assert waves_shown("raw") == pytest.approx([1.0, 1.0], rel=1e-6)
 
 
+@pytest.mark.compiled
 def test_a_filter_keeps_slow_motion():
     """Rudder to and fro in 120 s, in waves too low to matter: the yaw rate comes through, a little late."""
     env = many(64, sea=Weather(waves=Waves(0.01, 9.0)), measurement="filtered", noise=1e-6, **UNBOUND)
@@ -285,6 +290,7 @@ def turned(count=600, steps=30, **options):
     return env.physical_state()["r"]
 
 
+@pytest.mark.compiled
 def test_an_ensemble_gives_each_episode_one_of_its_ships():
     mariner = shipgym.load_model("mariner")
     weak = replace(mariner, name="weak", coefficients={**mariner.coefficients, "N_d": 0.0011})
@@ -293,6 +299,7 @@ def test_an_ensemble_gives_each_episode_one_of_its_ships():
     assert rates.max() == pytest.approx(turned(2)[0], abs=1e-8)
 
 
+@pytest.mark.compiled
 def test_a_posterior_gives_each_episode_a_draw():
     rates = turned(model="mariner-tls-svm", model_uncertainty="posterior")
     nominal = turned(1, model="mariner-tls-svm")[0]

@@ -273,6 +273,10 @@ def test_a_log_with_wrong_checksums_or_without_time_is_refused(tmp_path):
     )
     with pytest.raises(InputError, match=r"sentences have a wrong checksum.*the first in line 2\)"):
         read_log(tmp_path / "bad.nmea")
+    lines[3:4] = [sentence("GPVTG,inf,T,,M,5.0,N,,K"), lines[3]]
+    (tmp_path / "infinite.nmea").write_text("\n".join(lines))
+    notes = read_log(tmp_path / "infinite.nmea").notes
+    assert [note.partition(" of ")[0] for note in notes if "checksum" in note] == ["1"]
     (tmp_path / "dark.nmea").write_text("\n".join(one for one in lines if "HETHS" in one))
     with pytest.raises(InputError, match="no time that can be read in this log, expected some of RMC"):
         read_log(tmp_path / "dark.nmea")

@@ -31,7 +31,16 @@ def ours(name, num_envs=3, **options):
         (COURSE, {"episode_steps": 23, **LOST}),
         (PATH, {"episode_steps": 39, "corridor": 0.4, "ground": 0.5}),
         (PATH, {"episode_steps": 33, "n_legs": 1, "leg_lengths": (1.0, 2.0), "corridor": 3.0}),
-        (COURSE, {"episode_steps": 23, "action": "rudder-discrete", "sea": "rough", "noise": 1.0}),
+        (
+            COURSE,
+            {
+                "episode_steps": 23,
+                "action": "rudder-discrete",
+                "sea": "rough",
+                "noise": 1.0,
+                "measurement": "filtered",
+            },
+        ),
     ],
     ids=["course", "ground", "arrival", "discrete"],
 )

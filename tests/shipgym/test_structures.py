@@ -12,7 +12,11 @@ import shipgym
 from shipgym import InputError, Particulars, ShipModel, SteeringGear
 from shipgym.engine.motion import Motion, Ship
 from shipgym.ships.linear import nomoto
-from shipgym.ships.structures import ABKOWITZ, STRUCTURES, Structure, get_structure, read_terms
+from shipgym.ships.structures import STRUCTURES, get_structure
+from shipgym.ships.term_table import Structure
+from shipgym.ships.terms import read_terms
+
+ABKOWITZ = get_structure("abkowitz")
 
 speeds = st.floats(2.0, 10.0)
 FREE = [name for name, table in STRUCTURES.items() if not table.captive]

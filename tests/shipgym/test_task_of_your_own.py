@@ -13,6 +13,7 @@ from stable_baselines3 import PPO
 import shipgym
 from shipgym import InputError, ShipVecEnv, check_task, check_vector_env, register_task
 from shipgym.envs.engine import Engine
+from shipgym.tasks.source import check_namespace, read_source
 from shipgym.tasks.task import Task
 
 ROOT = Path(__file__).parents[2]
@@ -193,6 +194,48 @@ def test_what_is_wrong_is_named_and_nothing_is_registered(tmp_path, old, new, me
         with pytest.raises(InputError, match=message):
             register_task("harbour/Wrong-v0", path, **SHIP)
         assert "harbour/Wrong-v0" not in gymnasium.registry
+
+
+RECORD = "from typing import NamedTuple\n\n\nclass Settings(NamedTuple):\n    weight: float = 1.0\n\n\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", r"own.py: no 'Settings' found, expected a NamedTuple 'Settings' of floats"),
+        ("Settings = 3\n", "Settings is no NamedTuple, expected a NamedTuple 'Settings' of floats"),
+        (RECORD.replace("float", "flaot"), "Settings: an annotation cannot be read: name 'flaot'"),
+        ("from collections import namedtuple\nSettings = namedtuple('Settings', '')\n", "no fields found"),
+        (RECORD.replace(" = 1.0", ""), None),
+        (
+            RECORD.replace("1.0", "'1'"),
+            "Settings.weight: '1' found, expected a number, or a list as the last",
+        ),
+        (RECORD + "begin = 3\n", "begin: no plain function found, expected a function begin\\(ship\\)"),
+        (RECORD + "def begin(ship, more): ...\n", "begin: 2 arguments found, expected a function begin"),
+        (RECORD + "def begin(ship): ...\n", None),
+        (RECORD, "no 'begin' found, expected a function begin"),
+        ("1 / 0", r"own.py, line 1: cannot be executed: ZeroDivisionError"),
+    ],
+)
+def test_a_file_lacks_nothing_that_is_asked_of_it(text, message, tmp_path):
+    path = written(tmp_path, "own.py", text)
+    functions = {"begin": ("ship",)} if "1.0" in text else {}
+
+    def check():
+        check_namespace(*read_source(path), ("Settings",), functions)
+
+    if message is None:
+        check()
+        assert read_source(path)[0] is read_source(str(path))[0]  # executed once
+    else:
+        with pytest.raises(InputError, match=message):
+            check()
+
+
+def test_a_file_that_is_not_there_is_named(tmp_path):
+    with pytest.raises(InputError, match=r"none.py: no such file, expected a Python file"):
+        read_source(tmp_path / "none.py")
 
 
 def test_a_reward_that_is_not_finite_is_named(tmp_path):

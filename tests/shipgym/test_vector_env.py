@@ -12,7 +12,6 @@ from gymnasium.wrappers.vector import NormalizeObservation, RecordEpisodeStatist
 import shipgym
 from shipgym import InputError
 from shipgym.envs.checker import check_vector_env
-from shipgym.envs.registration import environments
 
 COURSE, PATH = "shipgym/CourseKeeping-v0", "shipgym/PathFollowing-v0"
 SHORT = {"episode_steps": 23}
@@ -56,16 +55,6 @@ def test_rows_are_single_environments_with_every_option(name, options):
         lambda: gymnasium.make(name, **options),
         n_steps=30,
     )
-
-
-def test_every_id_makes_both():
-    for name in environments():
-        many, one = gymnasium.make_vec(name, num_envs=2), gymnasium.make(name)
-        assert many.single_observation_space == one.observation_space
-        assert many.single_action_space == one.action_space
-        assert many.observation_names == one.unwrapped.observation_names
-        seen, _ = many.reset(seed=5)
-        np.testing.assert_array_equal(seen[1], one.reset(seed=6)[0])
 
 
 @pytest.mark.parametrize("threads", [2, 5])

@@ -11,8 +11,8 @@ from shipgym import InputError, Particulars, Waves, load_model, sea_states
 from shipgym.sea import slow_drift, wave_drift, wave_motion, wave_spectrum
 from shipgym.sea.drift import added_resistance, end_angle, reflection_coefficients
 from shipgym.sea.estimates import GRAVITY, weather_particulars
-from shipgym.sea.mobility import mobility_matrix, roll_inertia
 from shipgym.sea.waves import draught_attenuation
+from shipgym.sea.weather_column import mobility_matrix, roll_inertia
 from shipgym.ships import get_structure
 from shipgym.ships.inertia import inertia
 from tests.shipgym.harmonics import evaluate_cosines, evaluate_sines

@@ -32,12 +32,16 @@ def test_winds_of_the_sea_states_raise_seas_of_their_height():
         assert state.significant_height == pytest.approx(0.21 * at_19_5_m**2 / 9.81, rel=0.16)
 
 
-def test_moderate_is_that_of_bales_1983():
-    weather = Weather.from_sea_state("moderate")
-    assert (weather.waves.significant_height, weather.waves.peak_period) == (1.88, 8.8)
-    assert weather.wind.speed == pytest.approx(19 * 0.514444 * (10 / 19.5) ** (1 / 7), rel=1e-5)
+@pytest.mark.parametrize(
+    ("name", "code", "height", "period", "knots"),
+    [("slight", 3, 0.88, 7.5, 13.5), ("moderate", 4, 1.88, 8.8, 19.0), ("rough", 5, 3.25, 9.7, 24.5)],
+)
+def test_sea_states_are_those_of_bales_1983(name, code, height, period, knots):
+    weather = Weather.from_sea_state(name)
+    assert (weather.waves.significant_height, weather.waves.peak_period) == (height, period)
+    assert weather.wind.speed == pytest.approx(knots * 0.514444 * (10 / 19.5) ** (1 / 7), rel=1e-5)
     assert weather.wind.from_deg == weather.waves.from_deg == 45.0
-    assert weather == Weather.from_sea_state(4)
+    assert weather == Weather.from_sea_state(code)
 
 
 def test_calm_is_calm_unless_there_is_a_current():

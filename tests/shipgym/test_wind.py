@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from shipgym import InputError, Particulars, Wind, load_model
-from shipgym.sea import WindTable, gust_filter, gust_spectrum, gust_variance, wind_curves, wind_tables
+from shipgym.sea import WindTable, gust_filter, gust_spectrum, gust_variance, wind_curves
 from shipgym.sea.estimates import weather_particulars
 from shipgym.sea.gusts import GaussMarkov
-from shipgym.sea.wind_tables import BLENDERMANN, coefficient_names, isherwood_coefficients
+from shipgym.sea.wind import BLENDERMANN, ISHERWOOD, coefficient_names, isherwood_coefficients
 from tests.shipgym.harmonics import evaluate_cosines, evaluate_sines
 
 AREAS = {
@@ -80,9 +80,7 @@ def test_isherwoods_superstructure_is_felt_on_the_quarter_only():
 
 def test_published_tables_keep_their_numbers():
     """Sums of the columns of Isherwood's three tables and of Blendermann's."""
-    found = [
-        table.sum(axis=0).round(6).tolist() for table in (wind_tables._CX, wind_tables._CY, wind_tables._CN)
-    ]
+    found = [table.sum(axis=0).round(6).tolist() for table in ISHERWOOD.values()]
     assert found == [
         [6.664, -13.63, 0.929, -0.633, -2.477, 4.63, 0.115],
         [11.104, 7.43, 1.686, 0.003, -1.283, -7.54, 1.43],

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from identification.regression.preprocess.filters import median, savitzky_golay
+from identification.regression.preprocess.filters import median, savitzky_golay, smooth
 from identification.regression.preprocess.kinematics import smooth_kinematics
 from identification.regression.preprocess.noise import NOISY, is_noisy, noise_level, noise_ratio
 from identification.regression.preprocess.repair import outliers, repaired
-from identification.regression.preprocess.spline import smooth
 from shipgym.arrays import Floats
 from shipgym.checks import check_choice
 from shipgym.trials.trial import Trial
@@ -24,14 +23,16 @@ FILTERS: dict[str, Callable[[Floats, Floats], Floats]] = {
 PREPROCESSING = (*FILTERS, "rts", "none")
 
 
-def smoothed_channels(trial: Trial, names: Sequence[str], preprocessing: str) -> dict[str, Floats]:
+def smoothed_channels(
+    trial: Trial, names: Sequence[str], preprocessing: str | bool = True
+) -> dict[str, Floats]:
     """Some channels of a trial, smoothed; the rudder, which has corners, is left as it is.
 
-    `trial`: the record; `names`: channels wanted; `preprocessing`: smoothing spline, Savitzky-Golay filter,
-    running median, Kalman smoother of the kinematics (the shaft speed by a spline), or nothing, one of
-    `spline`, `savgol`, `median`, `rts`, `none`. Returns an array of shape (n_samples,). Raises InputError for
-    another name.
+    By one of `PREPROCESSING`: smoothing spline, also for True, Savitzky-Golay filter, running median, Kalman
+    smoother of the kinematics (the shaft speed by a spline), or nothing, also for False.
     """
+    if isinstance(preprocessing, bool):
+        preprocessing = "spline" if preprocessing else "none"
     check_choice(preprocessing, PREPROCESSING, "preprocessing")
     if preprocessing == "none":
         return {name: trial[name] for name in names}

@@ -8,8 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import minimize_scalar
 
-from identification.regression.preprocess.kalman import smooth_linear
-from identification.regression.preprocess.noise import NOISY, noise_level, noise_ratio
+from identification.regression.preprocess.noise import is_noisy, noise_level
 from shipgym.arrays import Floats
 from shipgym.errors import InputError
 from shipgym.trials.trial import Trial
@@ -22,13 +21,11 @@ LEAST_NOISE = 1e-4  # of the range of a channel: resolution, and channels withou
 
 
 def smooth_kinematics(trial: Trial) -> Trial:
-    """Smooth heading and yaw rate, then positions and velocities at that heading.
+    """Smooth heading and yaw rate, then positions and velocities at that heading, as far as recorded.
 
     Accelerations are random walks whose roughness is that of greatest likelihood; with the heading known,
-    positions and velocities are linear in each other, so that two linear smoothers do. `trial`: with at least
-    r or psi; u and v, or x, y and psi, are smoothed together as far as recorded. Channels that are not
-    recorded are not added. `raw` is the trial as it was. Raises InputError for a trial with neither psi nor
-    r.
+    positions and velocities are linear in each other, so that two linear smoothers do. Raises InputError for
+    a trial with neither psi nor r.
     """
     if not {"psi", "r"} & trial.channels.keys():
         raise InputError(
@@ -45,7 +42,7 @@ def smooth_kinematics(trial: Trial) -> Trial:
 def _smooth_heading(trial: Trial) -> dict[str, Floats]:
     """Heading (from 0 where it is not recorded) and yaw rate."""
     names = [name for name in HEADING if name in trial]
-    if not _noisy(trial, names) and "psi" in names:
+    if "psi" in names and not is_noisy(trial.t, (trial[name] for name in names)):
         return {name: trial[name] for name in names}
     h = np.diff(trial.t)
     motion = _Motion((*HEADING, "rdot"), _integrators(h), _random_walk(h), (1.0, 1e-2, 1.0))
@@ -56,7 +53,7 @@ def _smooth_heading(trial: Trial) -> dict[str, Floats]:
 def _smooth_plane(trial: Trial, psi: Floats) -> dict[str, Floats]:
     """Position, surge and sway at a known heading."""
     names = [name for name in PLANE if name in trial]
-    if not _noisy(trial, names):
+    if not is_noisy(trial.t, (trial[name] for name in names)):
         return {name: trial[name] for name in names}
     h = np.diff(trial.t)
     walk, process = _random_walk(h), np.zeros((len(h), 6, 6))
@@ -82,7 +79,9 @@ class _Motion:
         observation = np.eye(len(self.columns))[[self.columns.index(name) for name in names]]
         start = np.array([trial[name][0] if name in names else 0.0 for name in self.columns])
         measured, variances = np.column_stack([trial[name] for name in names]), _variances(trial, names)
-        guess = _first_guess(trial, guessed_by)
+        # variance by time of the acceleration's random walk, from how much a velocity changes
+        size = float(np.ptp(trial[guessed_by])) or 1.0
+        guess = size**2 / max(trial.duration / 20.0, 1e-9) ** 3
 
         def run(decade: float, rows: int, quick: bool) -> tuple[Floats, float]:
             process = guess * 10.0**decade * self.process[: rows - 1]
@@ -98,22 +97,10 @@ class _Motion:
         return dict(zip(self.columns, run(float(best.x), len(trial), False)[0].T, strict=True))
 
 
-def _first_guess(trial: Trial, channel: str) -> float:
-    """Variance by time of the acceleration's random walk, from how much a velocity changes."""
-    size = float(np.ptp(trial[channel])) or 1.0
-    return size**2 / max(trial.duration / 20.0, 1e-9) ** 3
-
-
-def _noisy(trial: Trial, names: Sequence[str]) -> bool:
-    return any(noise_ratio(trial.t, trial[name]) > NOISY for name in names)
-
-
 def _variances(trial: Trial, names: Sequence[str]) -> Floats:
-    levels = [
-        max(noise_level(trial.t, trial[name]), LEAST_NOISE * float(np.ptp(trial[name])), 1e-9)
-        for name in names
-    ]
-    return np.array(levels) ** 2
+    levels = [[noise_level(trial.t, trial[c]), LEAST_NOISE * np.ptp(trial[c]), 1e-9] for c in names]
+    largest: Floats = np.max(levels, axis=1)
+    return largest**2
 
 
 def _integrators(h: Floats) -> Floats:
@@ -143,3 +130,48 @@ def _plane_transitions(h: Floats, psi: Floats) -> Floats:
             found[:, axis, 4 + k] = 0.5 * h**2 * part
     found[:, 2, 4] = found[:, 3, 5] = h
     return found
+
+
+def smooth_linear(
+    transitions: Floats,
+    process: Floats,
+    observation: Floats,
+    variances: Floats,
+    measured: Floats,
+    start: Floats,
+    start_variances: Floats,
+    only_likelihood: bool = False,
+) -> tuple[Floats, float]:
+    """Smooth x_k+1 = F_k x_k + w_k, y_k = H x_k + e_k (Rauch, Tung & Striebel 1965, AIAA Journal 3(8)).
+
+    Measurements are taken in one at a time, in Joseph's form, so that nothing is inverted. `transitions` and
+    `process`, the covariance of w, have shape (n_samples - 1, n_states, n_states), `observation` (n_channels,
+    n_states) and `measured` (n_samples, n_channels); what is not finite is missing. Returns the states, the
+    filtered ones with `only_likelihood`, and the measurements' log-likelihood but for a constant.
+    """
+    n, size = len(measured), len(start)
+    ahead, filtered = np.empty((2, n, size)), np.empty((2, n, size, size))
+    x, p, likelihood, identity = start.copy(), np.diag(start_variances), 0.0, np.eye(size)
+    for k in range(n):
+        if k:
+            x = transitions[k - 1] @ x
+            p = transitions[k - 1] @ p @ transitions[k - 1].T + process[k - 1]
+        ahead[0, k], filtered[0, k] = x, p
+        for h, variance, y in zip(observation, variances, measured[k], strict=True):
+            if not np.isfinite(y):
+                continue
+            ph = p @ h
+            innovation_variance = float(h @ ph) + variance
+            error = y - float(h @ x)
+            gain = ph / innovation_variance
+            x = x + gain * error
+            left = identity - np.outer(gain, h)
+            p = left @ p @ left.T + variance * np.outer(gain, gain)
+            likelihood -= 0.5 * (np.log(innovation_variance) + error * error / innovation_variance)
+        ahead[1, k], filtered[1, k] = x, p
+    states = ahead[1]
+    if not only_likelihood:
+        for k in range(n - 2, -1, -1):
+            gain = np.linalg.solve(filtered[0, k + 1], transitions[k] @ filtered[1, k]).T
+            states[k] += gain @ (states[k + 1] - ahead[0, k + 1])
+    return states, likelihood

@@ -15,8 +15,7 @@ def noise_level(t: ArrayLike, values: ArrayLike) -> float:
     """Standard deviation of the sample-to-sample noise of a channel, in its unit.
 
     Each sample is compared with the cubic through its two neighbours on either side; the median of the
-    differences is not moved by corners of the signal. Times in s, of shape (n_samples,) as the values; 0 with
-    fewer than five samples.
+    differences is not moved by corners of the signal. 0 with fewer than five samples.
     """
     t, values = np.asarray(t, dtype=float), np.asarray(values, dtype=float)
     if len(t) < 5:

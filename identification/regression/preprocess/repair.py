@@ -40,14 +40,12 @@ def outliers(t: ArrayLike, values: ArrayLike, threshold: float = OUTLYING) -> Fl
 
 
 def repaired(trial: Trial, threshold: float = OUTLYING) -> Trial:
-    """Replace outliers and fill short dropouts of a trial from their neighbours.
+    """Replace outliers and fill short dropouts of a trial from their neighbours, by PCHIP.
 
     A dropout is a step in time of more than 1.5 usual ones; those of up to 10 are filled, at the usual step;
-    longer ones stay, and no method smooths or integrates across them. Shape-preserving cubics (PCHIP) fill.
-    `trial`: the record; `threshold`: beyond so many standard deviations of the noise from the running median
-    a sample is an outlier. Returns the trial itself where nothing is wrong; else with `repaired`, the number
-    of values that were filled by channel, and `raw`, the trial as it was. Raises InputError where more than a
-    tenth of a channel would be outliers: that is no record with outliers.
+    longer ones stay, and no method smooths or integrates across them. Returns the trial itself where nothing
+    is wrong; else with `repaired`, the number of values that were filled by channel, and `raw`, the trial as
+    it was. Raises InputError where more than a tenth of a channel would be outliers.
     """
     check_number(threshold, "threshold", above=0.0, hint="in standard deviations of the noise")
     times = _filled_times(trial.t)
@@ -61,25 +59,19 @@ def repaired(trial: Trial, threshold: float = OUTLYING) -> Trial:
                 f"expected at most a tenth; check the channel, or give a threshold above {threshold:g}"
             )
         filled = int(wrong.sum() + (~kept).sum())
-        channels[name] = _refilled(trial.t[~wrong], values[~wrong], times, values, kept & ~_at(wrong, kept))
+        sound = kept.copy()
+        sound[kept] = ~wrong
+        channels[name] = _refilled(trial.t[~wrong], values[~wrong], times, values, sound)
         if filled:
             counts[name] = filled
     return trial.with_channels(channels, t=times, repaired=counts) if counts else trial
-
-
-def _at(wrong: Flags, kept: Flags) -> Flags:
-    """Flags of the record's samples on the filled times."""
-    found = np.zeros(len(kept), dtype=bool)
-    found[kept] = wrong
-    return found
 
 
 def _refilled(known: Floats, good: Floats, times: Floats, values: Floats, sound: Flags) -> Floats:
     """Values at the filled times; sound ones to the bit as they were."""
     if sound.all():
         return values
-    found: Floats = np.asarray(PchipInterpolator(known, good, extrapolate=False)(times), dtype=float)
-    found = np.where(times < known[0], good[0], np.where(times > known[-1], good[-1], found))
+    found: Floats = PchipInterpolator(known, good)(np.clip(times, known[0], known[-1]))
     found[sound] = good
     return found
 

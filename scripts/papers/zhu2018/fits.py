@@ -18,7 +18,7 @@ from identification.estimators.lssvm import LSSVM
 from identification.estimators.tuned import TunedLSSVM
 from identification.regression.samples import Samples, build_samples
 from shipgym.ships import ShipModel, get_structure
-from shipgym.ships.structures import ZHU, accelerations
+from shipgym.ships.structures import own_structure
 from shipgym.trials.trial import Trial
 
 Floats = NDArray[np.float64]
@@ -36,12 +36,13 @@ SEARCHES = {"CV": ("grid", "k-fold"), "PSO": ("pso", "training"), "ABC": ("abc",
 #: The seven terms with the speed of the moment in them, so that they follow the loss of speed in a turn, two
 #: cubic ones, and surge to know that speed: resistance, and a thrust that falls with the advance ratio.
 STEERING_WITH_SPEED = "U v, |v| v, |r| v, U r, |v| r, |r| r, U^2 delta, v^2 r/U, v^3/U"
-WITH_SPEED = accelerations(
-    "zhu-with-speed",
-    f"{ZHU}, equation 7.1, with the instantaneous speed, and surge",
-    u="u^2, v r, n^2, n u",
-    v=STEERING_WITH_SPEED,
-    r=STEERING_WITH_SPEED,
+WITH_SPEED = own_structure(
+    {
+        "name": "zhu-with-speed",
+        "source": f"{get_structure(STEERING).source}, with the instantaneous speed, and surge",
+        "equations": {"u": "u^2, v r, n^2, n u", "v": STEERING_WITH_SPEED, "r": STEERING_WITH_SPEED},
+    },
+    "zhu2018",
 )
 
 

@@ -1,0 +1,50 @@
+"""Python files of a user's own, such as tasks and ships: read as modules, at the user's own word only."""
+
+from __future__ import annotations
+
+import hashlib
+import sys
+from pathlib import Path
+from types import ModuleType
+
+from shipgym.errors import InputError
+
+
+def load_file(path: Path) -> ModuleType:
+    """A Python file as a module, executed once however often it is asked for while it stays the same.
+
+    Raises
+    ------
+    InputError
+        If there is none, or it cannot be executed.
+    """
+    if not path.is_file():
+        raise InputError(f"{path}: no such file, expected a Python file")
+    resolved = path.resolve()
+    content = hashlib.sha256(str(resolved).encode() + b"\0" + resolved.read_bytes())
+    name = f"shipgym_user_{content.hexdigest()[:16]}"
+    if name in sys.modules:
+        return sys.modules[name]
+    module = ModuleType(name)
+    module.__file__ = str(resolved)
+    sys.modules[name] = module
+    try:
+        # compiled here, because Python's own cache takes a file changed within a second for the same
+        exec(compile(resolved.read_bytes(), str(resolved), "exec"), vars(module))
+    except Exception as error:
+        del sys.modules[name]
+        if isinstance(error, InputError):
+            raise InputError(f"{path}: {error}") from None
+        line = _line_in(resolved, error)
+        raise InputError(f"{path}{line}: cannot be executed: {type(error).__name__}: {error}") from error
+    return module
+
+
+def _line_in(path: Path, error: Exception) -> str:
+    """The last line of a file that an error passed through."""
+    traceback, line = error.__traceback__, getattr(error, "lineno", None)
+    while traceback is not None:
+        if traceback.tb_frame.f_code.co_filename == str(path):
+            line = traceback.tb_lineno
+        traceback = traceback.tb_next
+    return f", line {line}" if line else ""

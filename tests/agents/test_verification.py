@@ -1,0 +1,98 @@
+"""What is said of a verified autopilot, from numbers made up."""
+
+from dataclasses import asdict
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from agents import PID
+from agents.verification.page import headline
+from agents.verification.result import pilot_metrics, track_metrics
+from shipgym import load_model
+
+
+def track(largest, rms, arrived):
+    controller = SimpleNamespace(gains={"heading": np.float64(1.5)})
+    return SimpleNamespace(
+        controller=controller, largest=np.array(largest), rms=np.array(rms), arrived=np.array(arrived)
+    )
+
+
+def test_the_first_ship_of_a_track_is_the_identified_one_and_the_others_are_drawn():
+    found = track_metrics(track([40.0, *range(101)], [9.0, *range(101)], [True, *[False] * 3, *[True] * 98]))
+    assert found == {
+        "gains": {"heading": 1.5}, "cross_track_largest_m": 40.0, "cross_track_rmse_m": 9.0,
+        "cross_track_largest_m_quantile_95": 95.0, "arrived": True, "not_arrived": 3,
+    }  # fmt: skip
+    alone = track_metrics(track([40.0], [9.0], [False]))
+    assert (alone["cross_track_largest_m_quantile_95"], alone["arrived"], alone["not_arrived"]) == (
+        40.0,
+        False,
+        0,
+    )
+
+
+def episodes(count=101):
+    numbers = np.arange(float(count))
+    return SimpleNamespace(
+        cost=numbers, heading_rmse_deg=2.0 * numbers, rudder_travel_deg_min=3.0 * numbers,
+        extrapolating=numbers / 100.0, terminated=numbers > 97.0,
+    )  # fmt: skip
+
+
+def test_a_pilots_figures_are_means_and_the_95th_of_a_hundred():
+    design = PID.from_model(load_model("mariner"))
+    found = pilot_metrics(SimpleNamespace(episodes=episodes(), design=design))
+    assert found["gains"] == pytest.approx(design.gains)
+    margins = {name: value for name, value in asdict(design.margins).items() if np.isfinite(value)}
+    assert {name: value for name, value in found["margins"].items() if value is not None} == pytest.approx(
+        margins
+    )
+    figures = {name: value for name, value in found.items() if name not in ("gains", "margins")}
+    assert figures == pytest.approx({
+        "cost_mean": 50.0, "cost_quantile_95": 95.0, "heading_rmse_deg_mean": 100.0,
+        "heading_rmse_deg_quantile_95": 190.0, "rudder_travel_deg_min_mean": 150.0,
+        "extrapolating_mean": 0.5, "lost_control": 3,
+    })  # fmt: skip
+    learned = pilot_metrics(SimpleNamespace(episodes=episodes(), design=None))
+    assert (learned["gains"], learned["margins"]) == (None, None)
+
+
+def criterion(passed, decided=True):
+    return SimpleNamespace(passed=passed, decided=decided, manoeuvre="", run="")
+
+
+@pytest.mark.parametrize(
+    ("criteria", "runaway", "lost", "said"),
+    [
+        (
+            {"advance": True},
+            0,
+            0,
+            "is stable and meets all IMO criteria. LQ steers best and keeps control of all 9",
+        ),
+        (
+            {"advance": True, "tactical_diameter": False},
+            0,
+            0,
+            "is stable but misses the IMO criterion of tactical",
+        ),
+        (
+            {"advance": True, "tactical_diameter": None},
+            0,
+            0,
+            "misses no IMO criterion that these trials decide. Not",
+        ),
+        ({"advance": None}, 0, 0, "Not decided by these trials: advance. LQ steers best"),
+        ({"advance": True}, 2, 0, "all IMO criteria. 2 of 9 models drawn run away in a manoeuvre. LQ steers"),
+        ({"advance": True}, 0, 4, "LQ steers best and loses control of 4 of 9 models drawn."),
+    ],
+)
+def test_the_verdict_says_what_is_met_missed_and_not_decided(criteria, runaway, lost, said):
+    best = SimpleNamespace(name="LQ", episodes=SimpleNamespace(terminated=np.arange(9) < lost))
+    made = {name: criterion(passed, passed is not None) for name, passed in criteria.items()}
+    manoeuvres = SimpleNamespace(criteria=made, unstable=np.arange(9) < runaway)
+    told = headline(SimpleNamespace(draws=9, pilots=[best], manoeuvres=manoeuvres))
+    assert told.startswith("The model ")
+    assert said in told

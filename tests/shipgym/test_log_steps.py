@@ -1,0 +1,346 @@
+"""The steps from a log to a trial, each by itself: what it makes of numbers, and what it refuses."""
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from scipy.io import savemat
+
+from shipgym.errors import InputError
+from shipgym.trials import csv_reader, nmea, tables
+from shipgym.trials.clock_offsets import clock_offset
+from shipgym.trials.clock_texts import clock_text, read_angles, zone_seconds
+from shipgym.trials.columns import Column, Source
+from shipgym.trials.csv_reader import Table, read_table
+from shipgym.trials.cuts import check_cut, cut_log
+from shipgym.trials.navigation import Instruments, correct_offsets, heading_offset, straight_parts, to_midship
+from shipgym.trials.plausibility import _fit, check_log, check_overlap, find_outliers
+from shipgym.trials.resampling import Log, have_own_clocks, on_one_clock, own_clock
+from shipgym.trials.tables import from_frame, read_log
+from shipgym.trials.trial_import import _cg_to_midship, _earth_to_body
+
+NAN, DEGREE = math.nan, math.pi / 180.0
+
+
+def source(lines, **names):
+    """A table of no cells, whose rows stand on some lines of log.csv, with columns by channel."""
+    table = Table(Path("log.csv"), tuple(names.values()), {}.__getitem__, lines)
+    return Source(table, {key: Column(name, "") for key, name in names.items()}, np.arange(len(lines)))
+
+
+# --- clocks
+
+
+def test_channels_at_different_rates_have_clocks_of_their_own():
+    fast, slow = [1.0] * 6, [1.0, NAN, 1.0, NAN, 1.0, NAN]
+    assert have_own_clocks(np.isfinite([fast, slow]).T)
+    assert not have_own_clocks(np.isfinite([fast, fast]).T)
+    assert not have_own_clocks(np.isfinite([fast[:4], slow[:4]]).T)  # two values are no clock
+    assert not have_own_clocks(np.isfinite([[*fast[:5], NAN], slow]).T)  # a row without a value is a hole
+
+
+def test_a_channel_has_its_values_and_time_that_goes_on():
+    t, here = np.array([0.0, 1.0, 2.0, 1.5, 4.0]), source([2, 3, 4, 5, 7], t="time", psi="gyro")
+    clock, values = own_clock("psi", t, np.array([1.0, NAN, 2.0, NAN, 3.0]), here)
+    assert (clock.tolist(), values.tolist()) == ([0.0, 2.0, 4.0], [1.0, 2.0, 3.0])
+    with pytest.raises(InputError, match=r"log.csv: column 'gyro' has 2 values, expected 3 or more"):
+        own_clock("psi", t, np.array([1.0, NAN, NAN, NAN, 3.0]), here)
+    with pytest.raises(InputError, match=r"line 5 \(data row 4\), column 'time': time goes from 2 to 1.5 s"):
+        own_clock("psi", t, np.arange(5.0), here)
+
+
+def test_the_slowest_channel_of_the_motion_gives_the_clock_and_holes_stay():
+    fine, coarse = np.arange(0.0, 30.5, 0.5), np.r_[np.arange(1.0, 11.0), np.arange(18.0, 40.0)]
+    series = {
+        "delta": (fine, 2.0 * fine),
+        "psi": (coarse, 3.0 * coarse),
+        "wind_speed": (fine[::9], fine[::9]),
+    }
+    log = on_one_clock(series, "log.csv")
+    assert log.t.tolist() == [*range(1, 11), *range(18, 31)]  # where all of the motion is known
+    for name, factor in (("delta", 2.0), ("psi", 3.0)):
+        np.testing.assert_allclose(log.channels[name], factor * log.t)
+    np.testing.assert_allclose(log.channels["wind_speed"], np.minimum(log.t, 27.0))
+    assert log.notes == ["psi has 1 holes, of up to 8 s; nothing is put there"]
+    six = np.delete(np.arange(40.0), np.arange(11, 16))
+    assert on_one_clock(series | {"psi": (six, six)}, "").notes == []  # six usual steps are none
+    holed = np.delete(np.arange(0.0, 40.0, 1.0), np.arange(11, 18))
+    found = on_one_clock({"r": (np.arange(40.0), np.arange(40.0)), "psi": (holed, holed)}, "")
+    assert found.t.tolist() == holed.tolist()
+    with pytest.raises(
+        InputError, match=r"log.csv: psi, r have 0 moments in common, expected channels of one"
+    ):
+        on_one_clock({"psi": (fine, fine), "r": (fine + 50.0, fine)}, "log.csv")
+
+
+def test_a_clock_is_ahead_of_utc_by_what_its_text_says():
+    assert [zone_seconds(text, "log") for text in ("UTC", "Z", "+02:00", "-03:30")] == [0, 0, 7200, -12600]
+    for text in ("+2", "CET", "25:00"):
+        with pytest.raises(InputError, match=r"log: .* found, expected how far the clock is ahead of UTC"):
+            zone_seconds(text, "log")
+    assert clock_text(34200.0) == "09:30:00"
+    assert clock_text(1717148999.96) == "2024-05-31 09:50:00"
+    with pytest.raises(ValueError, match="57 north"):
+        read_angles(["57.5", "57 north"])
+
+
+def test_too_short_a_record_says_nothing_of_a_clock():
+    t = np.arange(0.0, 20.0)
+    assert clock_offset(t, np.sin(t), np.cos(t), {}) is None
+
+
+# --- cuts
+
+
+def log(start=None, **channels):
+    return Log(np.arange(0.0, 601.0), channels, "log.csv", [], start=start)
+
+
+@pytest.mark.parametrize(
+    "cut", ["psi", [], 3, [[1, 2, 3]], [[1]], [1, 2], [[1, None]], [[True, 2]], [[1, 2], 3]]
+)
+def test_what_is_no_cut_is_refused(cut):
+    with pytest.raises(InputError, match=r'trials 1 cut: .* found, expected cut = "rudder", or stretches'):
+        check_cut(cut, "trials 1")
+    for right in (None, "rudder", [[1, 2.5]], [["09:30", "2024-05-31 09:31"], [1, 2]]):
+        check_cut(right, "trials 1")
+
+
+def test_stretches_are_those_asked_for():
+    morning = 9.5 * 3600.0
+    assert cut_log(None, log(), "") == [slice(0, 601)]
+    assert cut_log([[10, 20], [30, 32]], log(), "") == [slice(10, 21), slice(30, 33)]
+    assert cut_log([["09:31", "09:32"]], log(morning), "") == [slice(60, 121)]
+    late = log(86400.0 - 120.0)
+    assert cut_log([["23:59", "00:01"]], late, "") == [slice(60, 181)]  # over midnight
+    assert cut_log([["1970-01-05 00:01", "1970-01-05 00:02"]], log(4 * 86400.0), "") == [slice(60, 121)]
+    for cut, start, message in (
+        ([[10, 11]], None, r"cut: 10 to 11 holds no trial, .* goes from 0 to 600 s$"),
+        ([[700, 800]], morning, "goes from 0 to 600 s, 09:30:00 to 09:40:00$"),
+        ([["09:31", "09:32"]], None, "'09:31' found, but the log has no clock; write seconds"),
+        ([["noon", "09:32"]], morning, "'noon' found, expected cut"),
+        ("rudder", None, 'cut: "rudder" found, but no rudder that is more than 3 deg from its usual place'),
+    ):
+        with pytest.raises(InputError, match=message):
+            cut_log(cut, log(start), "trials 1")
+
+
+def test_a_manoeuvre_lasts_from_before_the_rudder_moves_until_it_is_quiet():
+    delta = np.zeros(601)
+    delta[100:140] = delta[190:200] = 3.1 * DEGREE  # quiet for less than a minute between
+    delta[300:310] = 20.0 * DEGREE  # too short for a manoeuvre
+    delta[400:432] = -10.0 * DEGREE
+    (first, last) = cut_log("rudder", log(delta=delta + 5.0 * DEGREE), "")
+    assert (first, last) == (slice(70, 230), slice(370, 462))
+
+
+# --- what a log is checked for
+
+
+def test_positions_that_no_ship_reaches_are_outliers():
+    t, track = np.arange(100.0), np.stack([5.0 * np.arange(100.0), np.zeros(100)])
+    here, rows = source(range(2, 102), t="time", lat="lat"), np.arange(100)
+    assert find_outliers(t, track, here, rows).size == 0
+    track[0, 4] += 500.0
+    assert find_outliers(t, track, here, rows).tolist() == [4]
+    assert find_outliers(t[:2], track[:, 3:5], here, rows[:2]).size == 0
+    track[0, 1::2] += 1e5
+    with pytest.raises(InputError, match=r"line 3 .*jumps 100 km within 1 s, as in 99 of 99 steps"):
+        find_outliers(t, track, here, rows)
+
+
+def test_files_of_one_log_overlap_in_time():
+    hour = 3600.0
+    mine = {"psi": (np.array([0.0, 600.0]), np.zeros(2))}
+
+    def other(begin):
+        return {"u": (np.array([begin, begin + 600.0]), np.zeros(2))}
+
+    check_overlap(mine, other(599.0), Path("b.csv"), "time")
+    check_overlap(mine, other(-599.0), Path("b.csv"), "time")
+    for begin, remedy in (
+        (2 * hour + 10.0, r'zone = "\+02:00"'),
+        (-1.5 * hour, r'zone = "-01:30"'),
+        (900.0, "name files that were written at the same time"),
+        (20 * hour, "name files that were written at the same time"),
+    ):
+        with pytest.raises(InputError, match=rf"b.csv: begins {begin:g} s after the other file .*{remedy}"):
+            check_overlap(mine, other(begin), Path("b.csv"), "time")
+
+
+def test_a_heading_that_is_magnetic_by_its_name_is_told():
+    n = 400
+    values = {"psi": np.full(n, 0.5), "delta": np.zeros(n)}
+    values |= {"ground_north": np.full(n, 5.0 * np.cos(0.5)), "ground_east": np.full(n, 5.0 * np.sin(0.5))}
+    t = np.arange(float(n))
+    for name, offset, told in (("HDG mag", 0.0, 1), ("HDG mag", 0.1, 0), ("HDG true", 0.0, 0)):
+        tools = Instruments(heading_offset=offset)
+        notes = check_log(Log(t, values, "", []), tools, source(range(n), t="time", psi=name), gnss=True)
+        assert [note.startswith("the heading is magnetic by its name") for note in notes] == [True] * told
+    here = source(range(n), t="time")
+    alone = check_log(Log(t, {"psi": values["psi"]}, "", []), Instruments(), here, True)
+    assert alone == [check_log(Log(t, {}, "", []), Instruments(), here, True)[0]]
+
+
+def test_a_fit_of_one_channel_by_another_has_its_gain_and_what_is_left():
+    x = np.array([1.0, -1.0, 1.0, -1.0])
+    y = np.array([1.0, 1.0, -1.0, -1.0])
+    assert _fit(x, 2.0 * x) == (2.0, 0.0)
+    assert _fit(x, 3.0 * x + 4.0 * y) == pytest.approx((3.0, 0.8))
+    assert _fit(0.0 * x, y) == _fit(x, 0.0 * y) == (1.0, 1.0)
+
+
+# --- to midship
+
+
+def test_forces_and_motion_are_moved_from_the_centre_of_gravity_to_midship():
+    """Of a body that turns about a point xg ahead of midship."""
+    ahead = 2.0
+    channels = {"v": 1.0, "r": 0.1, "x": 10.0, "y": 20.0, "psi": np.pi / 6, "Y": 3.0, "N": 4.0}
+    channels = {name: np.array([value]) for name, value in channels.items()}
+    _cg_to_midship(Log(np.zeros(1), channels, "log", []), ahead)
+    found = {name: float(values[0]) for name, values in channels.items()}
+    assert found["v"] == pytest.approx(0.8)
+    assert (found["x"], found["y"]) == pytest.approx((10.0 - np.sqrt(3.0), 19.0))
+    assert found["N"] == pytest.approx(4.0 + 2.0 * 3.0)
+    for name, other in (("v", "r"), ("x", "psi"), ("y", "psi"), ("N", "Y")):
+        with pytest.raises(InputError, match=f'origin = "cg" needs {other} to move {name} to midship'):
+            _cg_to_midship(Log(np.zeros(1), {name: np.zeros(1)}, "log", []), ahead)
+
+
+def test_velocities_of_the_earth_need_each_other_and_a_recorded_heading():
+    channels = {"u": np.array([0.0]), "v": np.array([2.0]), "psi": np.array([np.pi / 2])}
+    for absent in channels:
+        others = {name: values for name, values in channels.items() if name != absent}
+        with pytest.raises(InputError, match=f'"earth" found without a recorded {absent}, expected u'):
+            _earth_to_body(Log(np.zeros(1), others, "log", []))
+    with pytest.raises(InputError, match="without a recorded psi"):
+        _earth_to_body(Log(np.zeros(1), dict(channels), "log", [], {"psi"}))
+    _earth_to_body(Log(np.zeros(1), channels, "log", []))
+    assert (channels["u"][0], channels["v"][0]) == pytest.approx((2.0, 0.0))
+
+
+def test_offsets_are_estimated_from_straight_parts_on_several_courses_only():
+    t = np.arange(0.0, 400.0)
+    psi = np.where(t < 200.0, 0.2, 0.2 + 90.0 * DEGREE)
+    ground = 5.0 * np.exp(1j * psi) + 0.4 - 0.3j
+    channels = {"psi": psi + 3.0 * DEGREE, "delta": np.full(400, 0.02)}
+    channels |= {"ground_north": ground.real, "ground_east": ground.imag}
+    straight = straight_parts(t, channels)
+    assert straight[[0, 185, 215, 399]].all()
+    assert not straight[[195, 200, 205]].any()
+    assert heading_offset(channels, straight)[0] == pytest.approx(3.0 * DEGREE, abs=1e-6)
+    tools = Instruments(heading_offset="estimate", rudder_offset="estimate")
+    log = Log(t, dict(channels), "log", [])
+    correct_offsets(log, tools)
+    np.testing.assert_allclose(log.channels["psi"], psi, atol=1e-6)
+    np.testing.assert_allclose(log.channels["delta"], 0.0, atol=1e-12)
+    told = [note.partition(",")[0] for note in log.notes]
+    assert told == ["heading_offset_deg 3.00", "rudder_offset_deg 1.15"]
+    one_course = {name: values[:200] for name, values in channels.items()}
+    with pytest.raises(
+        InputError, match="straight parts of 20 s with sog and cog on courses over 60 deg apart"
+    ):
+        correct_offsets(Log(t[:200], one_course, "log", []), tools)
+    turning = {"psi": 0.1 * t, "delta": np.full(400, 0.1)}
+    with pytest.raises(InputError, match=r'rudder_offset_deg = "estimate" found.*and a heading; give rudder'):
+        correct_offsets(Log(t, turning, "log", []), Instruments(rudder_offset="estimate"))
+
+
+def test_without_a_heading_velocities_over_ground_tell_no_drift():
+    t = np.arange(3.0)
+    with pytest.raises(InputError, match="found without a heading, expected a column psi"):
+        to_midship(Log(t, {"ground_north": t, "ground_east": t}, "log", []), Instruments())
+    log = Log(t, {"stw": t}, "log", [])
+    to_midship(log, Instruments())
+    assert log.notes == []
+    np.testing.assert_array_equal(log.channels["u"], t)
+
+
+def test_a_wind_told_as_the_true_one_is_turned_by_the_heading_and_preferred():
+    """By MWV "theoretical": its angle counts from the bow; the apparent one needs the speed over ground."""
+    clock, line = np.array([0.0, 1.0]), np.array([1.0, 2.0])
+    series = {"psi": (clock, line, np.array([0.1, 0.3]))}
+    apparent = {
+        "wind_from_relative": (clock, line, np.zeros(2)),
+        "wind_speed_relative": (clock, line, 9.0 + clock),
+    }
+    told = {
+        "wind_from": (clock, line, np.array([1.0, 1.0])),
+        "wind_speed": (clock, line, np.array([7.0, 8.0])),
+    }
+    chosen = series | apparent | told
+    nmea._absolute_wind(chosen)
+    np.testing.assert_allclose(chosen["wind_from"][2], [1.1, 1.3])
+    np.testing.assert_allclose(chosen["wind_speed"][2], [7.0, 8.0])
+    motion = {"sog": (clock, line, np.full(2, 4.0)), "cog": (clock, line, np.array([0.1, 0.3]))}
+    chosen = series | apparent | motion
+    nmea._absolute_wind(chosen)  # from ahead: the ship's own 4 m/s are no wind
+    np.testing.assert_allclose(chosen["wind_from"][2], [0.1, 0.3])
+    np.testing.assert_allclose(chosen["wind_speed"][2], [5.0, 6.0])
+    for chosen in (apparent | told | motion, series | apparent):
+        nmea._absolute_wind(chosen)
+        assert not {"wind_from", "wind_speed"} & chosen.keys()
+
+
+# --- files
+
+
+def test_a_frame_has_columns_and_values(monkeypatch):
+    frame = pd.DataFrame({" u ": [1.0, 2.0], "v": ["3", None]})
+    table = from_frame(frame, "mine", 5)
+    assert (table.header, table.place(1)) == (("u", "v"), "row 6")
+    assert table.numbers("u").tolist() == [1.0, 2.0]
+    np.testing.assert_array_equal(table.numbers("v"), [3.0, NAN])
+    assert from_frame(frame.set_index(pd.Index([0.0, 0.5], name="t"))).header == ("t", "u", "v")
+    assert table.column("u").dtype == float
+    assert from_frame(pd.DataFrame({"n": [1, 2]})).numbers("n").dtype == float
+    with pytest.raises(InputError, match="mine: a dict found, expected a pandas DataFrame"):
+        from_frame({"u": [1.0]}, "mine")
+    with pytest.raises(InputError, match="frame: 2 columns of 0 rows found, expected a table of at most"):
+        from_frame(frame[:0])
+    monkeypatch.setattr(tables, "MOST_CELLS", 4)
+    assert len(from_frame(frame).lines) == 2
+    monkeypatch.setattr(tables, "MOST_CELLS", 3)
+    with pytest.raises(InputError, match="2 columns of 2 rows found, expected a table of at most 3 values"):
+        from_frame(frame)
+
+
+def test_a_compressed_matlab_file_is_unpacked_within_bounds(tmp_path, monkeypatch):
+    path = tmp_path / "log.mat"
+    savemat(path, {"u": np.arange(50.0), "v": 2.0 * np.arange(50.0)}, do_compression=True)
+    table = read_log(path)
+    np.testing.assert_array_equal(table.numbers("v"), 2.0 * np.arange(50.0))
+    monkeypatch.setattr(tables, "LARGEST_UNPACKED", 600)  # each vector has 400 bytes
+    with pytest.raises(InputError, match=r"log.mat: over 600 bytes unpacked, expected less; split the file"):
+        read_log(path)
+    for head in (b"MATLAB 7.3 MAT-file" + bytes(200), b"\x89HDF\r\n\x1a\n" + bytes(200)):
+        path.write_bytes(head)
+        with pytest.raises(InputError, match=r"MATLAB 7.3 \(HDF5\) found, expected an older format"):
+            read_log(path)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("t,u\n0,1\n1,1\n2,1\n3,1\n", "run.csv: 6 lines found, expected at most 5; split the file"),
+        ("t,u\n0," + "1" * 28 + "\n", "run.csv: line 2 30 characters found, expected at most 29"),
+        ("t,u,v,w\n0,1,2,3\n", "run.csv: line 1 names 4 columns, expected at most 3"),
+        ("\nt,\x07\n0,1\n", r"run.csv: line 2 holds '\\x07', expected column names"),
+        ("t,u\0\n0,1\n", r"run.csv: binary content \(a zero byte at byte 3\), expected CSV text"),
+    ],
+)
+def test_a_file_beyond_the_limits_is_refused(text, message, tmp_path, monkeypatch):
+    for name, most in (("MOST_LINES", 5), ("LONGEST_LINE", 29), ("MOST_COLUMNS", 3)):
+        monkeypatch.setattr(csv_reader, name, most)
+    path = tmp_path / "run.csv"
+    path.write_text("t,u,v\n0," + "1" * 25 + ",2\n\n\n")  # at all limits
+    assert len(read_table(path).lines) == 1
+    path.write_text(text)
+    with pytest.raises(InputError, match=message):
+        read_table(path)
+    monkeypatch.setattr(nmea, "MOST_LINES", 1)
+    with pytest.raises(InputError, match="lines found, expected at most 1; split the file"):
+        nmea.read_nmea(path)

@@ -1,0 +1,52 @@
+"""Units of a file are those of the international system, by their definitions."""
+
+import pytest
+from scipy import constants
+
+from shipgym.errors import InputError
+from shipgym.trials.units import CHANNELS, INPUTS, QUANTITIES, UNITS, check_channel, si_factor, si_unit
+
+
+@pytest.mark.parametrize(
+    ("channel", "units"),
+    [
+        ("t", {"s": 1, "ms": constants.milli, "min": constants.minute, "h": constants.hour, "unix": 1}),
+        ("x", {"m": 1, "km": constants.kilo, "ft": constants.foot, "nm": constants.nautical_mile}),
+        ("psi", {"rad": 1, "deg": constants.degree}),
+        ("r", {"rad/s": 1, "deg/s": constants.degree, "deg/min": constants.degree / constants.minute}),
+        ("u", {"m/s": 1, "knots": constants.knot, "kn": constants.knot, "km/h": constants.kmh}),
+        ("n", {"rps": 1, "rpm": 1 / constants.minute}),
+        ("X", {"N": 1, "kN": constants.kilo}),
+        ("N", {"N m": 1, "kN m": constants.kilo}),
+        ("lat", {"deg": 1, "ddmm.mm": 1}),
+        ("wind_udot", {"m/s^2": 1}),
+        ("wind_rdot", {"rad/s^2": 1, "deg/s^2": constants.degree}),
+    ],
+)
+def test_units_are_what_they_are_by_definition(channel, units):
+    known = UNITS[QUANTITIES[channel]]
+    assert {unit: si_factor(channel, unit) for unit in units} == pytest.approx(units)
+    assert known.keys() - units.keys() <= {"unix ms"}
+    assert si_unit(channel) == next(iter(units))
+    with pytest.raises(
+        InputError, match=f"columns: unit 'furlong' found, expected a unit of {QUANTITIES[channel]}"
+    ):
+        si_factor(channel, "furlong", "columns")
+
+
+def test_a_unit_of_another_quantity_is_told():
+    with pytest.raises(InputError, match=r"unit 'deg/s' found, .*'deg/s' is a unit of angular rate"):
+        si_factor("psi", "deg/s")
+    with pytest.raises(InputError, match=r"unit 'knot' found, .*Did you mean 'knots'\?"):
+        si_factor("u", "knot")
+
+
+def test_a_trial_has_no_time_among_its_channels_and_nothing_that_only_files_have():
+    assert set(QUANTITIES) - set(CHANNELS) == {"t", *INPUTS}
+    assert check_channel("t", "columns") == "t"
+    assert check_channel("sog", "columns") == "sog"
+    for name in ("t", "sog"):
+        with pytest.raises(InputError, match=f"trial: unknown channel '{name}'"):
+            check_channel(name, "trial", time=False)
+    with pytest.raises(InputError, match=r"unknown channel 'deltta'. Did you mean 'delta'\?"):
+        check_channel("deltta", "columns")
