@@ -50,20 +50,20 @@ def sail_draws(model: ShipModel, draws: Sequence[ShipModel]) -> dict[str, Any]:
 
     Returns `values` by manoeuvre and index, shape (n_draws,), NaN where there is none; `ran_away` by
     manoeuvre, shape (n_draws,); `lost`, draws that run away in the two runs that are kept, shape (n_draws,);
-    `headings` in the zigzag, rad, shape (n_draws, n_samples), and `paths`, north and east in the circle, m,
-    shape (n_draws, n_samples, 2), both 0 for lost draws.
+    `headings` in the zigzag, rad, shape (n_samples,), and `paths`, north and east in the circle, m, shape
+    (n_samples, 2), of each draw that is not lost.
     """
     needed = imo_manoeuvres(model)
     empty = {name: test.no_indices for name, test in needed.items()}
     found = intervals_of(empty, draws, {name: test.evaluate for name, test in needed.items()})
     runs = [_kept_runs(draw) for draw in draws]
-    headings, paths = zip(*(run or _no_runs() for run in runs), strict=True)
+    kept = [run for run in runs if run is not None]
     return {
         "values": {name: {k: one.values for k, one in indices.items()} for name, indices in found.items()},
         "ran_away": {name: next(iter(indices.values())).ran_away for name, indices in found.items()},
         "lost": np.array([run is None for run in runs]),
-        "headings": np.array(headings),
-        "paths": np.array(paths),
+        "headings": [heading for heading, _ in kept],
+        "paths": [path for _, path in kept],
     }
 
 
@@ -84,15 +84,16 @@ def uncertainty_of(
     }
     criteria = {name: one for name, one in imo_criteria(model, found).items() if one.drawn is not None}
     unstable = np.any([c.drawn.ran_away for c in criteria.values() if c.drawn is not None], axis=0)
-    unstable |= np.concatenate([part["lost"] for part in parts])
-    headings, paths = (np.concatenate([part[name] for part in parts]) for name in ("headings", "paths"))
+    unstable |= (lost := np.concatenate([part["lost"] for part in parts]))
+    headings, paths = ([one for part in parts for one in part[name]] for name in ("headings", "paths"))
+    stable = ~unstable[~lost]  # of those that were kept
     return ManoeuvreUncertainty(
         criteria=criteria,
         unstable=unstable,
         zigzag=nominal[0],
-        zigzag_headings=headings[~unstable],
+        zigzag_headings=np.array(headings)[stable],
         circle=nominal[1],
-        circle_paths=tuple(paths[~unstable][:PATHS_KEPT]),
+        circle_paths=tuple(np.array(paths)[stable][:PATHS_KEPT]),
     )
 
 
@@ -103,14 +104,6 @@ def _kept_runs(model: ShipModel) -> tuple[Floats, Floats] | None:
     except UnstableModelError:
         return None
     return heading, np.column_stack([circle["x"], circle["y"]])
-
-
-def _no_runs() -> tuple[Floats, Floats]:
-    """In the place of the runs of a draw that runs away."""
-    zigzag_samples, circle_samples = (
-        round(lengths * SAMPLES_PER_LENGTH) + 1 for lengths in (ZIGZAG_LENGTHS, TURN_LENGTHS)
-    )
-    return np.zeros(zigzag_samples), np.zeros((circle_samples, 2))
 
 
 def _sampling(model: ShipModel) -> float:

@@ -27,6 +27,7 @@ from agents.benchmarking.page_replays import (
     worst_of,
 )
 from agents.benchmarking.replays import EpisodeId, rerun
+from agents.benchmarking.results import BenchmarkResult
 from agents.cli import app
 from agents.rollouts.episodes import recorded
 from agents.suites.suite import load_suite
@@ -420,8 +421,8 @@ def test_who_failed_or_did_not_take_part_is_told_with_the_task():
         "rough": {"pid": {"failed": 0, "failure": ""}},
     }
     contestants = {"pid": {"refused": {}}, "mine": {"refused": {"rough": "other observations"}}}
-    result = SimpleNamespace(summary={"tasks": tasks, "contestants": contestants})
-    assert benchmark_page._failures(result) == [
+    result = BenchmarkResult({"tasks": tasks, "contestants": contestants}, {})
+    assert result.failures == [
         "mine did not take part in rough: other observations",
         "mine failed in 3 episodes of calm: no number",
     ]
