@@ -1,6 +1,7 @@
 """The exported C does what the library does, and what cannot be written as C is refused by name."""
 
 import ctypes
+import math
 import subprocess
 from dataclasses import replace
 
@@ -27,7 +28,7 @@ from agents.controllers.adaptive_lq import AdaptiveLQ
 from agents.controllers.los_autopilot import AdaptiveLineOfSight
 from agents.deployment.autopilot import Autopilot
 from agents.deployment.c99 import ShipInput, advance, autopilot_source, ship_source
-from agents.deployment.translator import Translator
+from agents.deployment.translator import Translator, c_name, literal
 from shipgym.engine import mathematics
 from shipgym.engine.motion import Motion
 from shipgym.engine.specialise import Specialisation
@@ -254,6 +255,43 @@ def unwritable(x):
 def test_python_that_is_not_arithmetic_is_refused_with_its_line():
     with pytest.raises(InputError, match=r"unwritable, line 3: '\[x, x\]' found, which cannot be"):
         Translator({}, "it").function(unwritable, float)
+
+
+def of_a_sequence(x):
+    total = 0.0
+    for one in x:
+        total = total + one
+    return total
+
+
+def of_too_few(x):
+    return unwritable()
+
+
+def of_itself(x):
+    return of_itself(x - 1.0)
+
+
+def of_a_text(x):
+    return "x"
+
+
+@pytest.mark.parametrize("function", [of_a_sequence, of_too_few, of_itself, of_a_text])
+def test_what_c_has_no_words_for_is_refused(function):
+    with pytest.raises(
+        InputError, match=rf"test_c99.{function.__name__}, line [2-5]: .* cannot be written as C"
+    ):
+        Translator({}, "it").function(function, float)
+
+
+def test_numbers_and_names_are_those_of_c():
+    numbers = {0.1: "0.1", -2.0: "(-2.0)", 3: "3", True: "1", 1e300: "1e+300"}
+    numbers |= {math.inf: "HUGE_VAL", -math.inf: "(-HUGE_VAL)"}
+    assert {number: literal(number) for number in numbers} == numbers
+    assert literal(math.nan) == "NAN"
+    assert [c_name(name) for name in ("double", "heading")] == ["double_", "heading"]
+    with pytest.raises(InputError, match="name 'é' found, expected letters of ASCII"):
+        c_name("é")
 
 
 def test_a_lambda_is_refused():

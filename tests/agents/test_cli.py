@@ -8,14 +8,16 @@ import shlex
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 import typer
 from typer.testing import CliRunner
 
-from agents.cli import app, doctor
+from agents.cli import app, doctor, training
 from agents.cli.command import LONGEST_NAME, told_failure
 from agents.cli.warm import _jobs, _names
+from agents.training.plan import Given
 from shipgym import InputError, load_model
 
 ROOT = Path(__file__).parents[2]
@@ -417,3 +419,36 @@ def test_trials_in_shallow_water():
         answer = shipgym("trials", name, "--depth", depth)
         assert answer.exit_code == 2
         assert said in answer.stderr
+
+
+def test_what_a_training_found_is_told(capsys):
+    result = SimpleNamespace(
+        to_dict=dict, resumed_from=None, lq_cost=None, best_cost=1.234, best_steps=2000, steps=3000,
+        lq_reached=None, finished=True, plan=SimpleNamespace(settings=SimpleNamespace(total_steps=9000)),
+    )  # fmt: skip
+    training._print_result(result, Path("run"))
+    assert capsys.readouterr().out == (
+        "cost of a held-out episode: 1.23 (step 2,000 of 3,000)\nwritten: run/agent.json\n"
+    )
+    vars(result).update(
+        resumed_from=1500, lq_cost=2.5, lq_reached={"steps": 1200, "seconds": 7.6}, finished=False
+    )
+    training._print_result(result, Path("run"))
+    assert capsys.readouterr().out.splitlines() == [
+        "resumed at step 1,500",
+        "cost of a held-out episode: 1.23; LQ's: 2.50 (step 2,000 of 3,000)",
+        "LQ's cost reached at step 1,200, after 8 s",
+        "stopped at step 3,000 of 9,000: go on with --resume --out run",
+        "written: run/agent.json",
+    ]
+
+
+def test_a_training_that_is_interrupted_says_whether_it_can_go_on(tmp_path, monkeypatch, capsys):
+    def interrupted(*arguments, **settings):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("agents.training.training.train", interrupted)
+    given, run = Given("ppo", None, None, None, None, {}, None, {}, None, False, None), tmp_path / "run"
+    with pytest.raises(typer.Exit) as left:
+        training._train(given, run, False, None)
+    assert (left.value.exit_code, capsys.readouterr().err) == (130, "error: interrupted\n")
