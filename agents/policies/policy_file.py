@@ -35,6 +35,7 @@ and of kind "one-for-all" (`agents.policies.one_for_all`):
     format, kind         1, "one-for-all"
     context              of each of `CONTEXT` mean, standard deviation, least and largest in the fleet
     decision             how long an output is repeated, times to travel a ship length
+    rule                 of its base's settings (`agents.policies.one_for_all.base_for`); older files lack it
     observation_names, network, authority, training, weights as above
 """
 
@@ -75,9 +76,14 @@ LEARNED = (
     "format", "kind", "observation_names", "observation_scales", "action", "network", "frame_stack", "base",
     "authority", "action_repeat", "rate_limit", "environment", "model", "training",
 )  # fmt: skip
-LATER = {"action_repeat": 1, "rate_limit": NO_LIMIT}  # what older files lack, and what it means
+#: What older files of a kind lack, and what it means.
+LATER: Mapping[str, Mapping[str, Any]] = {
+    "learned": {"action_repeat": 1, "rate_limit": NO_LIMIT}, ONE_FOR_ALL: {"rule": {}}
+}  # fmt: skip
 RENAMED = {"history": "frame_stack", "hold": "action_repeat"}  # fields of older files
-FOR_ALL = ("format", "kind", "observation_names", "context", "network", "decision", "authority", "training")
+FOR_ALL = (
+    "format", "kind", "observation_names", "context", "network", "decision", "authority", "training", "rule",
+)  # fmt: skip
 SHIELDED = ("format", "kind", "policy", "fallback", "dt", "envelope", "limits")
 
 
@@ -107,9 +113,8 @@ def read_policy(content: Mapping[str, Any], path: Path) -> LearnedPolicy | Shiel
 
 def _current(content: Mapping[str, Any]) -> dict[str, Any]:
     """The fields by their present names."""
-    return (LATER if content["kind"] == "learned" else {}) | {
-        RENAMED.get(name, name): value for name, value in content.items()
-    }
+    later = LATER.get(content["kind"], {})
+    return {**later, **{RENAMED.get(name, name): value for name, value in content.items()}}
 
 
 def _check_fields(content: Mapping[str, Any], expected: tuple[str, ...], where: str) -> None:
@@ -179,6 +184,7 @@ def _for_all(content: Mapping[str, Any], tensors: Tensors, prefix: str, where: s
             decision=content["decision"],
             authority=content["authority"],
             training=dict(check_table(content["training"], f"{where}: training")),
+            rule=check_table(content["rule"], f"{where}: rule"),
         )
 
 
