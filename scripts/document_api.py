@@ -64,7 +64,7 @@ def pages() -> dict[str, str]:
 
 
 def imported() -> list[tuple[str, str]]:
-    """Functions and classes that are imported in the pages, the README and the examples, with their modules."""
+    """Functions and classes that are imported in pages, README and examples, with their modules."""
     pages = [path for path in (ROOT / "docs").rglob("*.md") if path.parent != PAGES]
     found = set[tuple[str, str]]()
     for path in (ROOT / "README.md", *pages, *(ROOT / "examples").rglob("*.py")):
