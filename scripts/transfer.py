@@ -1,6 +1,6 @@
 """Transfer: autopilots made on an identified model, run on the ship behind it, beside the same made on her.
 
-    python scripts/transfer.py [TASK ...] --out transfer/    # 5 training runs each; resumes where it stopped
+    python scripts/transfer.py [TASK ...] --out transfer/    # resumes where it stopped
 
 Tasks are those of `shipgym-v2`: contestants know the identified model and are evaluated, in the same 100
 episodes, on the ship behind her trials. Each is made twice, alike but for what is known:
@@ -8,8 +8,9 @@ episodes, on the ship behind her trials. Each is made twice, alike but for what 
     wheel-over     designed on the model, or on the ship
     tuned          the classical controller that cost least on the model, its settings by direct search there,
                    or, with the same budget, on the ship
-    ppo            the agents of `agents/pretrained`, learned over models drawn from the covariance and added
-                   to `tuned`; or learned on the ship, with the same settings, and added to that tuned on her
+    ppo            the five agents of `agents/pretrained`, learned over models drawn from the covariance and
+                   added to `tuned`; or three learned on the ship, with the same settings, and added to that
+                   tuned on her
 
 What one costs on the ship over what its twin costs that knew her is the loss by the model's error. How large
 that error is stands beside it: turning circles at 35 deg and zigzags 15/15 and 25/25, which are in no
@@ -41,17 +42,18 @@ from agents.training import run_folder
 from agents.training.plan import Plan
 from agents.training.settings import load_settings
 from agents.training.training import train
-from shipgym.files import write_json
+from shipgym.files import read_json, write_json
 
 Floats = NDArray[np.float64]
 
-SUITE, RUNS = "shipgym-v2", 5
+SUITE, RUNS = "shipgym-v2", 3
 #: One for each kind of model: the ship's own form, with roll, with shaft; another ship's form with a kernel;
 #: two trials only; and the control, Nomoto's form for an MMG ship.
 TASKS = (
     "sharp-turns", "tight-corridor", "roll-limit", "speed-loss", "course-unstable", "two-zigzags",
     "nomoto-to-mmg",
 )  # fmt: skip
+KINDS = ("on_model", "on_ship", "knowing")
 HEAD = (
     "task", "model", "off: turns, %; overshoots, deg", "factor", "contestant",
     "made on the model: on the model",
@@ -68,12 +70,12 @@ class Contestant:
     on_ship: Floats
     knowing: Floats  # on the ship, made on the ship
 
-    def lost(self, number: int) -> Interval:
+    @property
+    def lost(self) -> Interval:
         """What part more it costs on the ship than its twin that knew her, over runs and paired episodes."""
-        draws = Draws(number + 1, self.on_ship.shape[1])
+        draws = Draws(1, self.on_ship.shape[1])
         here, there = (
-            draws.means(costs, number, who).mean(axis=1)
-            for who, costs in enumerate((self.on_ship, self.knowing))
+            draws.means(costs, 0, who).mean(axis=1) for who, costs in enumerate((self.on_ship, self.knowing))
         )
         return interval(float(self.on_ship.mean() / self.knowing.mean() - 1.0), here / there - 1.0)
 
@@ -89,7 +91,7 @@ def contestants(task: BenchmarkTask, out: Path, runs: int) -> Iterator[Contestan
     base = out / f"{task.name}-tuned.json"
     known.save(base)
     agents = [load_agent(path) for path in pretrained(task.name, "ppo")]
-    pairs["ppo"] = (agents[:runs], [learned_on(ship, base, seed, out) for seed in range(runs)])
+    pairs["ppo"] = (agents, [learned_on(ship, base, seed, out) for seed in range(runs)])
     on_model = load_suite(SUITE).task(task.name + SETS["model"])
     for name, (ours, theirs) in pairs.items():
         yield Contestant(name, costs(ours, on_model), costs(ours, task), costs(theirs, task))
@@ -121,14 +123,25 @@ def costs(policies: Sequence[Policy], task: BenchmarkTask) -> Floats:
     return np.stack([evaluate(policy, task).figures["cost"] for policy in policies])
 
 
-def rows(task: BenchmarkTask, found: Sequence[Contestant], number: int) -> Iterator[str]:
+def kept(task: BenchmarkTask, out: Path, runs: int) -> list[Contestant]:
+    """All of one task, read from the folder where they are there already."""
+    file = out / f"{task.name}.json"
+    if not file.is_file():
+        found = {one.name: one for one in contestants(task, out, runs)}
+        parts = {name: {kind: getattr(one, kind).tolist() for kind in KINDS} for name, one in found.items()}
+        write_json({"task": task.name, "costs": parts}, file)
+    costs = read_json(file, "costs of a task", "delete it")["costs"]
+    return [Contestant(name, *(np.array(one[kind]) for kind in KINDS)) for name, one in costs.items()]
+
+
+def rows(task: BenchmarkTask, found: Sequence[Contestant]) -> Iterator[str]:
     """A line of Markdown for each contestant; what is said of the model stands in the first."""
     model = shipgym.load_model(task.model)
     turn, held_out, _ = errors(model, *COMPARED_DEG)
     factor = (model.provenance or {})["model_error"]["factor"]
     about = (task.name, f"`{task.model}`", f"{turn:.1f}; {held_out:.1f}", f"{factor:.1f}")
     for one in found:
-        lost = one.lost(number)
+        lost = one.lost
         figures = [f"{costs.mean():.1f}" for costs in (one.on_model, one.on_ship, one.knowing)]
         figures.append(f"{100 * lost.value:.1f} ({100 * lost.low:.1f} to {100 * lost.high:.1f})")
         yield f"| {' | '.join((*about, one.name, *figures))} |"
@@ -140,20 +153,14 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("tasks", nargs="*", help=f"by default {', '.join(TASKS)}")
     parser.add_argument("--out", type=Path, default=Path("transfer"))
-    parser.add_argument("--runs", type=int, default=RUNS)
+    parser.add_argument("--runs", type=int, default=RUNS, help="of training on the ship")
     asked = parser.parse_args()
     asked.out.mkdir(parents=True, exist_ok=True)
     suite = load_suite(SUITE)
     print(f"| {' | '.join(HEAD)} |\n|{' --- |' * len(HEAD)}")
-    for number, name in enumerate(asked.tasks or TASKS):
+    for name in asked.tasks or TASKS:
         task = suite.task(name)
-        found = list(contestants(task, asked.out, asked.runs))
-        kept = {
-            one.name: {kind: getattr(one, kind).tolist() for kind in ("on_model", "on_ship", "knowing")}
-            for one in found
-        }
-        write_json({"task": name, "costs": kept}, asked.out / f"{name}.json")
-        print("\n".join(rows(task, found, number)), flush=True)
+        print("\n".join(rows(task, kept(task, asked.out, asked.runs))), flush=True)
 
 
 if __name__ == "__main__":
