@@ -1,12 +1,14 @@
 """Write `docs/api`: a page for each public package, with the names of its `__init__.pyi`.
 
 `python scripts/document_api.py`; a test compares the pages with what this writes. mkdocstrings puts the
-docstrings in.
+docstrings in. One page more has what the other pages, the README and the examples import from modules.
 """
 
 from __future__ import annotations
 
 import ast
+import re
+from importlib import import_module
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
@@ -19,9 +21,15 @@ PACKAGES = {
     "shipgym.sea": "Current, wind and waves.",
     "shipgym.tasks": "What an environment asks of an autopilot.",
     "shipgym.plots": "Figures, made with plotly.",
+    "shipgym.interchange": "To and from pandas, xarray, Minari, python-control, MSS and shipmmg.",
     "identification": "From trials to a ship model.",
     "agents": "Autopilots, and how they are run and compared.",
 }
+MODULES = "modules.md"
+#: `from MODULE import NAMES`, in brackets or on one line.
+IMPORT = re.compile(
+    r"^\s*from ((?:shipgym|identification|agents)[\w.]*) import (?:\(([^)]*)\)|([^\n#(]+))", re.MULTILINE
+)
 
 
 def names(package: str) -> list[str]:
@@ -49,7 +57,25 @@ def pages() -> dict[str, str]:
                 said[name] = package
                 blocks.append(f"::: {package}.{name}")
         written[f"{package}.md"] = "\n\n".join(blocks) + "\n"
+    further = [f"::: {module}.{name}" for module, name in imported() if module not in PACKAGES]
+    purpose = "What pages and examples import from modules, beside the names of the packages."
+    written[MODULES] = "\n\n".join(["# Modules", purpose, *further]) + "\n"
     return written
+
+
+def imported() -> list[tuple[str, str]]:
+    """Functions and classes that are imported in pages, README and examples, with their modules."""
+    pages = [path for path in (ROOT / "docs").rglob("*.md") if path.parent != PAGES]
+    found = set[tuple[str, str]]()
+    for path in (ROOT / "README.md", *pages, *(ROOT / "examples").rglob("*.py")):
+        for module, inside, line in IMPORT.findall(path.read_text(encoding="utf-8")):
+            given = [one.split(" as ")[0].strip() for one in re.split(r"[,\n]", inside or line)]
+            found |= {(module, name) for name in given if name}
+    return sorted(
+        (module, name)
+        for module, name in found
+        if not name.isupper() and callable(getattr(import_module(module), name))
+    )
 
 
 if __name__ == "__main__":

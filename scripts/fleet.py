@@ -17,9 +17,7 @@ from stable_baselines3.common.vec_env import VecEnv, VecEnvWrapper
 
 from agents.controllers.controller import Controller
 from agents.controllers.controller_file import read_controller
-from agents.controllers.lq import LQ
-from agents.controllers.wheel_over import WheelOver
-from agents.policies.one_for_all import CONTEXT, OneForAll, context
+from agents.policies.one_for_all import CONTEXT, OneForAll, base_for, context
 from agents.policies.weights_file import as_json
 from agents.rollouts.rollout import episode_costs, rollout
 from agents.training.residual import ResidualVecEnv
@@ -36,6 +34,7 @@ Floats = NDArray[np.float64]
 #: Standard deviations of logarithms: of all coefficients of an equation together, of each by itself, and of
 #: each of the ship against her model.
 EQUATION, COEFFICIENT, ERROR = 0.2, 0.1, 0.05
+GEAR = np.log([0.25, 1.8])  # logarithms of what the rudder rate is multiplied by
 LEAST_STABILITY = -1.0  # prime determinant; the tanker, unstable on her course, has -0.1 to -0.2
 TRIES = 20
 MEAN_COST = 100.0  # of an episode under wheel-over, whatever the path: rewards are scaled to it
@@ -92,6 +91,12 @@ class Fleet:
         """Each designed on its lane's model."""
         return [lane.pilot for lane in self.lanes]
 
+    def ruled(self, rule: Mapping[str, float]) -> Fleet:
+        """The same with pilots whose settings are by a rule."""
+        task = self.task
+        lanes = (replace(lane, pilot=base_for(lane.model, task, rule)) for lane in self.lanes)
+        return replace(self, lanes=tuple(lanes))
+
     def times(self, number: int) -> Fleet:
         """Each ship so many times."""
         return replace(self, lanes=self.lanes * number)
@@ -100,9 +105,9 @@ class Fleet:
         """A lane for each ship."""
         return Engine([lane.ship for lane in self.lanes], len(self.lanes), self.task, allow_unstable=True)
 
-    def cost_of(self, policy: Any) -> Floats:
-        """What an episode of each ship costs, of those that nobody learns from."""
-        return episode_costs(policy, self.engine(), FIRST_SEED + np.arange(len(self.lanes)))
+    def cost_of(self, policy: Any, seed: int = FIRST_SEED) -> Floats:
+        """What an episode of each ship costs, by default of those that nobody learns from."""
+        return episode_costs(policy, self.engine(), seed + np.arange(len(self.lanes)))
 
     def to_dict(self) -> dict[str, Any]:
         """As JSON has it."""
@@ -119,9 +124,9 @@ class Fleet:
 
 def path_like(random: np.random.Generator, speed: float, length: float) -> dict[str, Any]:
     """Options of a path and of its current at random; all weathers have one, be it next to none."""
-    radius, turn = float(random.uniform(2.5, 5.0)), float(random.choice([60.0, 90.0, 120.0]))
+    radius, turn = float(random.uniform(2.5, 5.0)), float(random.choice([45.0, 60.0, 90.0, 120.0]))
     least = max(8.0, 2.0 * radius * np.tan(np.radians(0.5 * turn)) + 1.0)
-    corridor = float(np.exp(random.uniform(np.log(0.25), 0.0)))
+    corridor = float(np.exp(random.uniform(np.log(0.2), np.log(1.2))))
     share = float(random.choice([0.01, random.uniform(0.05, 0.3)]))
     current = Current(
         share * speed,
@@ -130,7 +135,7 @@ def path_like(random: np.random.Generator, speed: float, length: float) -> dict[
     )
     return {
         "turn_radius": radius, "max_turn_deg": turn, "leg_lengths": [least, least + 6.0],
-        "corridor": corridor, "ground": max(6.0 * corridor, 2.0), "sea": Weather(current=current),
+        "corridor": corridor, "ground": max(4.0 * corridor, 1.0), "sea": Weather(current=current),
     }  # fmt: skip
 
 
@@ -144,7 +149,7 @@ def around(model: ShipModel, random: np.random.Generator) -> ShipModel:
         factors |= {name: common * factors[name] for name in table.names(equation) if name in factors}
     gear = replace(
         model.steering,
-        rudder_rate_deg_s=model.steering.rudder_rate_deg_s * float(random.uniform(0.6, 1.8)),
+        rudder_rate_deg_s=model.steering.rudder_rate_deg_s * float(np.exp(random.uniform(*GEAR))),
         rudder_limit_deg=float(random.uniform(30.0, 40.0)),
     )
     return replace(scaled(drawn, factors), steering=gear)
@@ -190,7 +195,7 @@ def draw_lane(base: ShipModel, task: Task, random: np.random.Generator) -> Lane 
         told = context(model, task)
         if told[CONTEXT.index("stability")] < LEAST_STABILITY:
             return None
-        pilot = WheelOver.from_model(model, autopilot=LQ.from_model(model), task=task)
+        pilot = base_for(model, task, {})
     except (InputError, UnstableModelError):
         return None
     return Lane(model, scaled(model, wrong), pilot, told)

@@ -1,318 +1,166 @@
-"""Transfer: autopilots learned and tuned on an identified model, run on the ship behind its trials.
+"""Transfer: autopilots made on an identified model, run on the ship behind it, beside the same made on her.
 
-    python scripts/transfer.py [TASK ...] --out transfer/    # 5 training runs each; resumes where it stopped
+    python scripts/transfer.py [TASK ...] --out transfer/    # resumes where it stopped
 
-A task of the suite is taken as it is but for the ship. Contestants know what can be known of her:
+Tasks are those of `shipgym-v2`: contestants know the identified model and are evaluated, in the same 100
+episodes, on the ship behind her trials. Each is made twice, alike but for what is known:
 
-    tuned          the best classical controller, settings found by direct search on the identified model
-    identified     learned in the identified model, added to the controller tuned there
-    covariance     the same, learned in models drawn from its estimated covariance, a new one each episode
-    reference      tuned and learned on the ship behind the trials: what knowing her would have brought
+    wheel-over     designed on the model, or on the ship
+    tuned          the classical controller that cost least on the model, its settings by direct search there,
+                   or, with the same budget, on the ship
+    ppo            the five agents of `agents/pretrained`, learned over models drawn from the covariance and
+                   added to `tuned`; or three learned on the ship, with the same settings, and added to that
+                   tuned on her
 
-and all sail, in the same episodes, the identified model, the ship behind its trials and, where there is one,
-a model of the same ship identified from measurements. The measurements of KVLCC2 lie beside the checkout;
-without them there is no such model.
+What one costs on the ship over what its twin costs that knew her is the loss by the model's error. How large
+that error is stands beside it: turning circles at 35 deg and zigzags 15/15 and 25/25, which are in no
+model's trials, and the factor by which trials left out widen its standard errors.
 """
 
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
-from functools import cache, partial
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
+from build_models import COMPARED_DEG, errors
 from direct_search import tune
 from numpy.typing import NDArray
-from real_ships.data import Data
-from real_ships.recipe import fitted
 
+import shipgym
 from agents.agent_file import load_agent
-from agents.benchmarking.statistics import Draws, Interval, interval, mean_cost
-from agents.cli.terminal import progress_bars
+from agents.benchmarking.contestants import pretrained
+from agents.benchmarking.statistics import Draws, Interval, interval
 from agents.controllers.controller import Controller, Policy
-from agents.controllers.designs import design
-from agents.engines.jobs import run_jobs
+from agents.controllers.designs import NO_BASES, design, tuned
 from agents.rollouts.metrics import evaluate
-from agents.suites.suite import BenchmarkTask, load_suite
+from agents.suites.reference import load_tuned
+from agents.suites.suite import SETS, BenchmarkTask, load_suite
+from agents.training import run_folder
 from agents.training.plan import Plan
 from agents.training.settings import load_settings
 from agents.training.training import train
-from shipgym import InputError, ShipModel, load_model
-from shipgym.checks import check_whole
-from shipgym.files import write_json
-from shipgym.ships.scaling import scale_model
+from shipgym.files import read_json, write_json
 
-ROOT = Path(__file__).parents[1]
 Floats = NDArray[np.float64]
 
-IDENTIFIED, COVARIANCE, REFERENCE, TUNED = "identified", "covariance", "reference", "tuned"
-LEARNERS = (IDENTIFIED, COVARIANCE, REFERENCE)
-N_RUNS = 5
-CLASSICAL = ("pid", "lq", "lqg", "ilos")
-#: Task whose settings of PPO all cases are learned with.
-SETTINGS_OF = "container-path"
-#: Tasks of the suite, and the identified model of their ship.
-CASES = {
-    "mariner-sharp-turns": "mariner-tls-svm",
-    "mariner-current": "mariner-tls-svm",
-    "container-path": "container-abc-lssvr",
-    "kvlcc2-sharp-turns": "kvlcc2-rm-svm",
-}
+SUITE, RUNS = "shipgym-v2", 3
+#: One for each kind of model: the ship's own form, with roll, with shaft; another ship's form with a kernel;
+#: two trials only; and the control, Nomoto's form for an MMG ship.
+TASKS = (
+    "sharp-turns", "tight-corridor", "roll-limit", "speed-loss", "course-unstable", "two-zigzags",
+    "nomoto-to-mmg",
+)  # fmt: skip
+KINDS = ("on_model", "on_ship", "knowing")
+HEAD = (
+    "task", "model", "off: turns, %; overshoots, deg", "factor", "contestant",
+    "made on the model: on the model",
+    "on the ship", "made on the ship: on the ship", "lost, %",
+)  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
-class TransferCase:
-    """One task and the ships that sail it.
+class Contestant:
+    """What one cost, shape (n_runs, n_episodes)."""
 
-    Attributes
-    ----------
-    task : BenchmarkTask
-        With the ship behind the trials.
-    identified : str
-        Name of the model identified from her trials.
-    others : dict of str to ShipModel
-        Further ships, such as one identified from measurements.
-    """
-
-    task: BenchmarkTask
-    identified: str
-    others: Mapping[str, ShipModel] = field(default_factory=dict)
-
-    def learned_in(self, learner: str) -> BenchmarkTask:
-        """The task in which a learner learns."""
-        if learner == REFERENCE:
-            return self.task
-        uncertain = {"model_uncertainty": "covariance"} if learner == COVARIANCE else {}
-        options = {**self.task.options, **uncertain}
-        name = f"{self.task.name}-{learner}"
-        return BenchmarkTask(name, self.task.environment, self.identified, self.task.why, options)
+    name: str
+    on_model: Floats
+    on_ship: Floats
+    knowing: Floats  # on the ship, made on the ship
 
     @property
-    def ships(self) -> dict[str, ShipModel]:
-        """All of them, by what they are."""
-        return {IDENTIFIED: load_model(self.identified), REFERENCE: self.task.ship, **self.others}
+    def lost(self) -> Interval:
+        """What part more it costs on the ship than its twin that knew her, over runs and paired episodes."""
+        draws = Draws(1, self.on_ship.shape[1])
+        here, there = (
+            draws.means(costs, 0, who).mean(axis=1) for who, costs in enumerate((self.on_ship, self.knowing))
+        )
+        return interval(float(self.on_ship.mean() / self.knowing.mean() - 1.0), here / there - 1.0)
 
 
-@dataclass(frozen=True, eq=False)
-class Transfer:
-    """What the contestants cost in one case.
-
-    Attributes
-    ----------
-    case : TransferCase
-    costs : dict of str to dict of str to array of shape (n_runs, n_episodes)
-        By contestant and ship.
-    """
-
-    case: TransferCase
-    costs: Mapping[str, Mapping[str, Floats]]
-
-    def cost(self, contestant: str, ship: str) -> Interval:
-        """Mean cost with its interval over training runs and episodes."""
-        costs = self.costs[contestant][ship]
-        return mean_cost(costs, Draws(1, costs.shape[1]), 0)
-
-    def gain(self, contestant: str, ship: str) -> Interval:
-        """How much less a contestant costs than the tuned classical one on the same ship, a part of that."""
-        return self._paired(ship, contestant, lambda own, tuned: 1.0 - own / tuned, TUNED)
-
-    def gain_kept(self, contestant: str, ship: str = REFERENCE) -> float:
-        """Gain on a ship over that on the identified model, where it was learned."""
-        there = self.gain(contestant, IDENTIFIED).value
-        return self.gain(contestant, ship).value / there if there > 0.0 else np.nan
-
-    def _paired(self, ship: str, contestant: str, compare: Callable[[Any, Any], Any], other: str) -> Interval:
-        """A comparison of mean costs of two contestants in the same episodes."""
-        own, against = self.costs[contestant][ship], self.costs[other][ship]
-        draws = Draws(1, own.shape[1])
-        drawn = [draws.means(costs, 0, who).mean(axis=1) for who, costs in enumerate((own, against))]
-        return interval(float(compare(own.mean(), against.mean())), compare(*drawn))
-
-
-def transfer_case(name: str, others: Mapping[str, ShipModel] | None = None) -> TransferCase:
-    """One of `CASES` by the name of its task."""
-    return TransferCase(load_suite().task(name), CASES[name], others or {})
-
-
-def transfer(
-    case: TransferCase,
-    out: str | Path,
-    *,
-    n_runs: int = N_RUNS,
-    learners: Sequence[str] = LEARNERS,
-    settings: Mapping[str, Any] | None = None,
-    engine: str = "local",
-    workers: int = 1,
-    progress: Callable[[int, int], None] | None = None,
-) -> Transfer:
-    """Learn, tune and run one case.
-
-    Parameters
-    ----------
-    case : TransferCase
-    out : str or Path
-        Folder of the training runs; what is there already is not learned again.
-    n_runs : int
-        Training runs of each learner, with seeds from 0 on.
-    learners : sequence of str
-        Of `LEARNERS`.
-    settings : mapping, optional
-        Of PPO, in place of those of `SETTINGS_OF`.
-    engine, workers
-        See `agents.engines.jobs.run_jobs`.
-    progress : callable, optional
-        Told the number of training runs done and their total.
-
-    Returns
-    -------
-    Transfer
-        The same for the same arguments, whatever was done at once.
-    """
-    check_whole(n_runs, "n_runs", at_least=1)
-    folder = Path(out)
-    tuned = _tuned(case, folder, engine, workers)
-    file = folder / f"{case.task.name}-tuned.json"
-    tuned.save(file)
-    own = {learner: {"base": str(file), **(settings or {})} for learner in learners}
-    if REFERENCE in own:  # who knows the ship tunes on her
-        own[REFERENCE] |= {"base": "tuned"}
-    jobs = [
-        {
-            **_identity(case), "learner": learner, "seed": seed, "settings": own[learner],
-            "out": str(folder / f"{case.task.name}-{learner}-{seed}"),
-        }
-        for learner in learners
-        for seed in range(n_runs)
-    ]  # fmt: skip
-    files = run_jobs(learn, jobs, engine=engine, workers=workers, keep=folder / "jobs", progress=progress)
-    found: dict[str, dict[str, Floats]] = {TUNED: _costs([tuned], case)}
-    for k, learner in enumerate(learners):
-        runs = files[k * n_runs : (k + 1) * n_runs]
-        found[learner] = _costs([load_agent(file) for file in runs], case)
-    return Transfer(case, found)
-
-
-def learn(job: dict[str, Any]) -> str:
-    """One training run, begun or gone on with; returns the file of its agent."""
-    case = _case(job)
-    task = case.learned_in(job["learner"])
-    settings = load_settings("ppo", task.environment, SETTINGS_OF, job["settings"])
-    folder = Path(job["out"])
-    train(Plan("ppo", task, settings, seed=job["seed"]), folder, resume=folder.exists())
-    return str(folder / "agent.json")
-
-
-def _tuned(case: TransferCase, folder: Path, engine: str, workers: int) -> Controller:
-    """The best classical controller on the identified model."""
-    searches = [{**_identity(case), "kind": kind} for kind in CLASSICAL]
-    found = run_jobs(tune_one, searches, engine=engine, workers=workers, keep=folder / "searches")
-    best = min(found, key=lambda result: float(result["cost"]))
-    return design(best["kind"], case.learned_in(IDENTIFIED), best["settings"])
-
-
-def tune_one(job: dict[str, Any]) -> dict[str, Any]:
-    """Direct search of one classical controller on the identified model."""
-    found = tune(job["kind"], _case(job).learned_in(IDENTIFIED))
-    return {"kind": job["kind"], "settings": found.settings, "cost": found.cost}
-
-
-def _identity(case: TransferCase) -> dict[str, str]:
-    return {"case": case.task.name, "identified": case.identified}
-
-
-def _case(job: Mapping[str, Any]) -> TransferCase:
-    return TransferCase(load_suite().task(job["case"]), job["identified"])
-
-
-def _costs(policies: Sequence[Policy], case: TransferCase) -> dict[str, Floats]:
-    """Costs of the scored episodes on every ship, each of shape (n_runs, n_episodes)."""
-    return {
-        ship: np.stack([evaluate(policy, case.task, model=model).figures["cost"] for policy in policies])
-        for ship, model in case.ships.items()
+def contestants(task: BenchmarkTask, out: Path, runs: int) -> Iterator[Contestant]:
+    """All of one task, each made on the model and on the ship."""
+    model, ship = task.handed_out, replace(task.handed_out, model=task.behind)
+    pairs: dict[str, tuple[Sequence[Policy], Sequence[Policy]]] = {
+        "wheel-over": ([design("wheel-over", model)], [design("wheel-over", ship)])
     }
+    known = tuned_on(ship, base_of(task))
+    pairs[f"tuned {base_of(task)}"] = ([tuned("base", model, SUITE)], [known])
+    base = out / f"{task.name}-tuned.json"
+    known.save(base)
+    agents = [load_agent(path) for path in pretrained(task.name, "ppo")]
+    pairs["ppo"] = (agents, [learned_on(ship, base, seed, out) for seed in range(runs)])
+    on_model = load_suite(SUITE).task(task.name + SETS["model"])
+    for name, (ours, theirs) in pairs.items():
+        yield Contestant(name, costs(ours, on_model), costs(ours, task), costs(theirs, task))
 
 
-def save_transfer(result: Transfer, path: str | Path) -> None:
-    """Write costs of all episodes, and what follows from them, as JSON."""
-    ships = list(result.case.ships)
-    write_json(
-        {
-            "format": 1,
-            "task": result.case.task.name,
-            "identified": result.case.identified,
-            "ships": ships,
-            "contestants": {
-                who: {
-                    ship: {
-                        "cost": result.cost(who, ship).to_dict(),
-                        "gain": result.gain(who, ship).to_dict(),
-                        "runs": result.costs[who][ship].mean(axis=1).tolist(),
-                        "episodes": result.costs[who][ship].tolist(),
-                    }
-                    for ship in ships
-                }
-                for who in result.costs
-            },
-        },
-        Path(path),
-    )
+def base_of(task: BenchmarkTask) -> str:
+    """The kind of controller that cost least on the model, which the agents add to."""
+    found = load_tuned(SUITE)[task.name]
+    return min((kind for kind in found if kind not in NO_BASES), key=lambda kind: float(found[kind]["cost"]))
 
 
-@cache
-def measured(data: Path) -> dict[str, ShipModel]:
-    """KVLCC2 as identified from HSVA's measured zigzags, at full scale; nothing without the measurements."""
-    try:
-        ship = Data(ROOT / "tests" / "ships", data).ship("kvlcc2_hsva", 20)
-    except InputError:
-        return {}
-    model = fitted(ship, tuple(sorted(ship.runs)))
-    return {"measured": scale_model(model, load_model("kvlcc2").particulars["length"])}
+def tuned_on(task: BenchmarkTask, kind: str) -> Controller:
+    """A controller with the suite's search budget on a task; guidance leads the LQ found first."""
+    lq = tune("lq", task).settings
+    return design(kind, task, tune(kind, task, {"lq": lq}).settings)
 
 
-def table(result: Transfer) -> str:
-    """Costs of one case as Markdown: contestants down, ships across."""
-    ships = list(result.case.ships)
-    head = [
-        "learned or tuned in",
-        *(f"cost, {ship}" for ship in ships),
-        "gain, identified",
-        "gain, reference",
-        "kept",
-    ]
-    rows = [head, ["---"] * len(head)]
-    for who in result.costs:
-        costs = [result.cost(who, ship) for ship in ships]
-        gains = [result.gain(who, ship) for ship in ("identified", "reference")]
-        cells = [f"{cost.value:.1f} ({cost.low:.1f} to {cost.high:.1f})" for cost in costs]
-        cells += [f"{100 * gain.value:.1f} %" for gain in gains]
-        kept = result.gain_kept(who)
-        rows.append([who, *cells, f"{100 * kept:.0f} %" if np.isfinite(kept) else ""])
-    return "\n".join("| " + " | ".join(row) + " |" for row in rows)
+def learned_on(task: BenchmarkTask, base: Path, seed: int, out: Path) -> Policy:
+    """One training run, begun, gone on with, or read where it has ended."""
+    folder, settings = out / f"{task.name}-{seed}", {"base": str(base)}
+    plan = Plan("ppo", task, load_settings("ppo", task.environment, task.name, settings), seed=seed)
+    train(plan, folder, resume=(folder / run_folder.RUN).is_file())
+    agent: Policy = load_agent(folder / run_folder.AGENT)
+    return agent
+
+
+def costs(policies: Sequence[Policy], task: BenchmarkTask) -> Floats:
+    """Costs of the scored episodes, shape (n_runs, n_episodes)."""
+    return np.stack([evaluate(policy, task).figures["cost"] for policy in policies])
+
+
+def kept(task: BenchmarkTask, out: Path, runs: int) -> list[Contestant]:
+    """All of one task, read from the folder where they are there already."""
+    file = out / f"{task.name}.json"
+    if not file.is_file():
+        found = {one.name: one for one in contestants(task, out, runs)}
+        parts = {name: {kind: getattr(one, kind).tolist() for kind in KINDS} for name, one in found.items()}
+        write_json({"task": task.name, "costs": parts}, file)
+    costs = read_json(file, "costs of a task", "delete it")["costs"]
+    return [Contestant(name, *(np.array(one[kind]) for kind in KINDS)) for name, one in costs.items()]
+
+
+def rows(task: BenchmarkTask, found: Sequence[Contestant]) -> Iterator[str]:
+    """A line of Markdown for each contestant; what is said of the model stands in the first."""
+    model = shipgym.load_model(task.model)
+    turn, held_out, _ = errors(model, *COMPARED_DEG)
+    factor = (model.provenance or {})["model_error"]["factor"]
+    about = (task.name, f"`{task.model}`", f"{turn:.1f}; {held_out:.1f}", f"{factor:.1f}")
+    for one in found:
+        lost = one.lost
+        figures = [f"{costs.mean():.1f}" for costs in (one.on_model, one.on_ship, one.knowing)]
+        figures.append(f"{100 * lost.value:.1f} ({100 * lost.low:.1f} to {100 * lost.high:.1f})")
+        yield f"| {' | '.join((*about, one.name, *figures))} |"
+        about = ("",) * len(about)
 
 
 def main() -> None:
-    """Run the cases asked for."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("tasks", nargs="*", help=f"some of {', '.join(CASES)}; by default all")
-    parser.add_argument("--out", type=Path, default=ROOT / "transfer")
-    parser.add_argument("--data", type=Path, default=ROOT.parent / "shared" / "data")
-    parser.add_argument("--runs", type=int, default=N_RUNS)
-    parser.add_argument("--total-steps", type=int, default=400_000, help="of each training run")
-    parser.add_argument("--workers", type=int, default=1)
-    options = parser.parse_args()
-    for task in options.tasks or CASES:
-        with progress_bars(True) as bars:
-            tell = None if bars is None else partial(bars, task)
-            case = transfer_case(task, measured(options.data) if task.startswith("kvlcc2") else {})
-            result = transfer(
-                case, options.out, n_runs=options.runs, settings={"total_steps": options.total_steps},
-                workers=options.workers, progress=tell,
-            )  # fmt: skip
-        save_transfer(result, options.out / f"{task}.json")
-        print(f"## {task}\n\n{table(result)}\n", flush=True)
+    """Run the tasks asked for, and print the table."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    parser.add_argument("tasks", nargs="*", help=f"by default {', '.join(TASKS)}")
+    parser.add_argument("--out", type=Path, default=Path("transfer"))
+    parser.add_argument("--runs", type=int, default=RUNS, help="of training on the ship")
+    asked = parser.parse_args()
+    asked.out.mkdir(parents=True, exist_ok=True)
+    suite = load_suite(SUITE)
+    print(f"| {' | '.join(HEAD)} |\n|{' --- |' * len(HEAD)}")
+    for name in asked.tasks or TASKS:
+        task = suite.task(name)
+        print("\n".join(rows(task, kept(task, asked.out, asked.runs))), flush=True)
 
 
 if __name__ == "__main__":

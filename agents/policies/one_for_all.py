@@ -4,7 +4,7 @@ Beside what every policy observes the network has inputs that stay the same thro
 ship answers her rudder, and how narrow and how winding the path is, all without units (lengths in ship
 lengths, times in those to travel one at service speed). Constant inputs are a part of the first layer's
 bias; so what is made for a ship is a `LearnedPolicy` like any other, which adds to the wheel-over autopilot
-designed on her model.
+designed on her model, with settings that a rule found on the fleet gives for her path (`base_for`).
 
 Sources: Yu, Tan, Liu & Turk 2017, Preparing for the unknown: learning a universal policy with online system
 identification, RSS (a policy that is told the dynamics); Nomoto, Taguchi, Honda & Hirano 1957 (the linear
@@ -21,15 +21,18 @@ from typing import Any
 import numpy as np
 
 from agents.controllers.controller import FORMAT, check_names, model_hash
-from agents.controllers.wheel_over import WheelOver, own_turn
+from agents.controllers.linear_loop import rate_weight
+from agents.controllers.lq import LQ
+from agents.controllers.wheel_over import WheelOver, own_lead, own_turn
 from agents.policies.network import Network
 from agents.policies.policy import LARGEST_AUTHORITY, LearnedPolicy, network_fields
 from agents.policies.weights_file import as_json, write_policy
 from shipgym.arrays import Floats
-from shipgym.checks import check_number
+from shipgym.checks import check_keys, check_number
 from shipgym.errors import InputError
 from shipgym.ships import ShipModel
 from shipgym.ships.linear import steering_state_space
+from shipgym.tasks.steering import RUDDER_WEIGHT
 from shipgym.tasks.task import Task
 
 ONE_FOR_ALL = "one-for-all"  # its name, and the kind of its file
@@ -39,6 +42,10 @@ CONTEXT = (
     "damping", "stability", "rudder_gain", "rudder_effect", "drift", "gear_rate", "gear_lag", "rudder_limit",
     "turn_radius", "turn_reach", "path_radius", "corridor",
 )  # fmt: skip
+#: Settings of its base for which the fleet has a rule: a factor on the design's own where the corridor is one
+#: ship length, and NAME_power, the power of the corridor that it changes with.
+RULED = ("lookahead", "reach", "crab_share", "rudder_weight", "rate_weight", "integral")
+RULES = (*RULED, *(f"{name}_power" for name in RULED))
 LARGEST = 3.0  # deviation from the fleet's mean, in its standard deviations, that the network is shown
 FAR = 0.2  # of the range that the fleet covers: beyond it by so much nothing is added, and a ship is refused
 
@@ -71,6 +78,32 @@ def context(model: ShipModel, task: Task) -> Floats:
     )  # fmt: skip
 
 
+def base_for(model: ShipModel, task: Task, rule: Mapping[str, float]) -> WheelOver:
+    """The wheel-over autopilot of a ship and path, its settings by a rule (`RULES`; none: the design's own).
+
+    Raises InputError if it cannot be designed.
+    """
+
+    def factor(name: str) -> float:
+        return float(rule.get(name, 1.0) * task.corridor ** rule.get(f"{name}_power", 0.0))
+
+    pilot = LQ.from_model(
+        model,
+        dt=task.interval(model),
+        integral_lengths=20.0 * factor("integral"),
+        rudder_weight=RUDDER_WEIGHT * factor("rudder_weight"),
+        rate_weight_s2=rate_weight(model) * factor("rate_weight"),
+    )
+    return WheelOver.from_model(
+        model,
+        autopilot=pilot,
+        task=task,
+        lookahead_lengths=task.lookahead * factor("lookahead"),
+        reach_lengths=own_lead(model, pilot) * factor("reach"),
+        crab_share=min(factor("crab_share"), 2.0),
+    )
+
+
 @dataclass(frozen=True, eq=False)
 class OneForAll:
     """A policy for a fleet, from which `for_ship` makes that of one ship and path.
@@ -85,6 +118,7 @@ class OneForAll:
     decision: float  # how long an output is repeated, times to travel a ship length at service speed
     authority: float  # share of the rudder limit by which it may differ from the base
     training: Mapping[str, Any] = field(default_factory=dict)  # how it was made, as JSON has it
+    rule: Mapping[str, float] = field(default_factory=dict)  # of its base's settings, see `base_for`
 
     def __post_init__(self) -> None:
         check_number(self.decision, "decision", above=0.0)
@@ -92,6 +126,11 @@ class OneForAll:
         for name, (_, deviation, low, high) in zip(CONTEXT, self.fleet, strict=True):
             check_number(deviation, f"context.{name}[1]", above=0.0)
             check_number(high, f"context.{name}[3]", above=low)
+        check_keys(self.rule, RULES, "rule")
+        for name, value in self.rule.items():
+            check_number(
+                value, f"rule.{name}", at_least=-4.0 if name.endswith("_power") else 1e-3, at_most=1e3
+            )
         sizes, n_in = self.network.sizes, len(self.observation_names) + 1 + len(CONTEXT)
         if (sizes[0], sizes[-1]) != (n_in, 1):
             raise InputError(f"network: sizes {sizes} found, expected {n_in} inputs and 1 output")
@@ -112,7 +151,7 @@ class OneForAll:
         observed = asked.observed(model)[: len(self.observation_names)]
         where = f"{ONE_FOR_ALL} on '{asked.name}'"
         check_names([one.name for one in observed], self.observation_names, where)
-        base, told = WheelOver.from_model(model, task=asked), context(model, asked)
+        base, told = base_for(model, asked, self.rule), context(model, asked)
         outside = self.outside(told, model.name)
         ((weight, bias), *rest), n_in = self.network.layers, len(observed) + 1
         first = weight[:, :n_in].copy(), (bias + weight[:, n_in:] @ self.inputs(told)).astype(np.float32)
@@ -156,5 +195,6 @@ class OneForAll:
             "decision": self.decision,
             "authority": self.authority,
             "training": as_json(self.training),
+            "rule": dict(self.rule),
         }
         write_policy(content, tensors, Path(path))

@@ -33,7 +33,10 @@ from shipgym.errors import InputError
 from shipgym.ships.model_file import read_envelope
 from shipgym.tasks.task import OBSERVATION_NAMES
 
-LATER = {"action_repeat": 1, "rate_limit": NO_LIMIT}  # what older files lack, and what it means
+#: What older files of a kind lack, and what it means.
+LATER: Mapping[str, Mapping[str, Any]] = {
+    "learned": {"action_repeat": 1, "rate_limit": NO_LIMIT}, ONE_FOR_ALL: {"rule": {}}
+}  # fmt: skip
 RENAMED = {"history": "frame_stack", "hold": "action_repeat"}  # fields of older files
 #: Fields of each kind, beside `weights`.
 FIELDS: Mapping[str, tuple[str, ...]] = {
@@ -44,6 +47,7 @@ FIELDS: Mapping[str, tuple[str, ...]] = {
     "shielded": ("format", "kind", "policy", "fallback", "dt", "envelope", "limits"),
     ONE_FOR_ALL: (
         "format", "kind", "observation_names", "context", "network", "decision", "authority", "training",
+        "rule",
     ),
 }  # fmt: skip
 
@@ -72,7 +76,7 @@ def read_policy(content: Mapping[str, Any], path: Path) -> LearnedPolicy | Shiel
 def _checked(content: Mapping[str, Any], where: str, more: tuple[str, ...] = ()) -> dict[str, Any]:
     """The fields by their present names: all there, none besides, and of this format."""
     current = {RENAMED.get(name, name): value for name, value in content.items()}
-    current = (LATER if content["kind"] == "learned" else {}) | current
+    current = {**LATER.get(content["kind"], {}), **current}
     expected = (*FIELDS[content["kind"]], *more)
     check_format(current, FORMAT, where)
     check_keys(current, expected, where, expected)
@@ -87,7 +91,7 @@ def _learned(content: Mapping[str, Any], tensors: Tensors, prefix: str) -> Learn
         network=_network(content["network"], tensors, prefix),
         observation_names=names,
         observation_scales=read_scales(content["observation_scales"], names),
-        **{name: content[name] for name in ("action", "frame_stack", "authority", *LATER)},
+        **{name: content[name] for name in ("action", "frame_stack", "authority", *LATER["learned"])},
         base=None if content["base"] is None else _controller(content, "base"),
         env_id=check_text(place.get("id"), "environment.id"),
         env_options=dict(check_table(place.get("options"), "environment.options")),
@@ -126,6 +130,7 @@ def _for_all(content: Mapping[str, Any], tensors: Tensors, prefix: str) -> OneFo
         decision=content["decision"],
         authority=content["authority"],
         training=dict(check_table(content["training"], "training")),
+        rule=check_table(content["rule"], "rule"),
     )
 
 
