@@ -28,7 +28,6 @@ from agents.controllers.linear_loop import (
 )
 from shipgym.arrays import Floats
 from shipgym.checks import check_number
-from shipgym.errors import InputError
 from shipgym.ships import ShipModel
 from shipgym.tasks.steering import RUDDER_WEIGHT
 from shipgym.tasks.task import control_interval
@@ -134,13 +133,32 @@ def lq_gain(
 ) -> Floats:
     """Gain G of order = -G x that minimises the environment's cost on the sampled linear ship, shape (5,).
 
-    `rate_weight`: of the rudder rate, s^2; `integral_time`: for an offset to decay, s. Raises InputError
-    where no feedback makes the loop stable.
+    `rate_weight`: of the rudder rate, s^2; `integral_time`: for an offset to decay, s.
     """
-    row: Floats = -lq_rows(ship.A[None], ship.B.T, ship.dt, rate_weight, integral_time, rudder_weight)[0]
-    if not np.isfinite(row).all():
-        raise InputError("LQ: no gains found with which the loop is stable; choose other weights or dt")
+    import control  # here, because it takes a second to import
+
+    C, D = (
+        one[0] for one in _outputs(ship.A[None], ship.B.T, ship.dt, rate_weight, integral_time, rudder_weight)
+    )
+    plant = control.ss(ship.A, ship.B, np.eye(len(SIGNALS)), 0.0, ship.dt)
+    gain, _, _ = control.lqr(plant, C.T @ C, D.T @ D, C.T @ D)
+    row: Floats = np.asarray(gain, dtype=np.float64)[0]
     return row
+
+
+def _outputs(
+    A: Floats, B: Floats, dt: float, rate_weight: float, integral_time: float, rudder_weight: float
+) -> tuple[Floats, Floats]:
+    """C, shape (n, 4, 5), and D, shape (n, 4, 1), of the outputs whose squares the cost adds up.
+
+    The reward of an interval is on the state at its end: z[k] = C x[k] + D order[k] = (error, weighted
+    rudder, weighted rudder rate, weighted integral)[k + 1], which couples state and input.
+    """
+    weights = np.array([1.0, np.sqrt(rudder_weight), np.sqrt(rate_weight) / dt, 1.0 / integral_time])
+    rows = [ERROR, RUDDER, RUDDER, INTEGRAL]
+    C, D = A[:, rows].copy(), B[:, rows]
+    C[:, 2, RUDDER] -= 1.0
+    return weights[:, None] * C, (weights * D)[:, :, None]
 
 
 def lq_rows(
@@ -151,19 +169,13 @@ def lq_rows(
     integral_time: float,
     rudder_weight: float = RUDDER_WEIGHT,
 ) -> Floats:
-    """Feedback rows of order = row x that minimise the environment's cost, one a ship.
+    """The same for many ships at once, as designs made while sailing: rows of order = row x, shape (n, 5).
 
-    The reward of an interval is on the state at its end, so the cost is that of the outputs z[k] = C x[k] + D
-    order[k] = (error, weighted rudder, weighted rudder rate, weighted integral)[k + 1], which couples state
-    and input. `A`, `B`: sampled ships, shape (n, 5, 5) and (n, 5); `dt`: control interval, s; `rate_weight`:
-    of the rudder rate, s^2; `integral_time`: for an offset to decay, s. Returns the gains, shape (n, 5), NaN
-    where no stabilising one was found.
+    `A`, `B`: sampled ships, shape (n, 5, 5) and (n, 5); `dt`: control interval, s. NaN where no stabilising
+    one was found. Source: Anderson & Moore 1990, chapter 3 (cross terms).
     """
-    weights = np.array([1.0, np.sqrt(rudder_weight), np.sqrt(rate_weight) / dt, 1.0 / integral_time])
-    rows = [ERROR, RUDDER, RUDDER, INTEGRAL]
-    C, D = A[:, rows].copy(), B[:, rows]
-    C[:, 2, RUDDER] -= 1.0
-    C, D, column = weights[:, None] * C, (weights * D)[:, :, None], B[:, :, None]
+    C, D = _outputs(A, B, dt, rate_weight, integral_time, rudder_weight)
+    column = B[:, :, None]
     Ct, Dt, row = C.transpose(0, 2, 1), D.transpose(0, 2, 1), B[:, None, :]
     R, S = Dt @ D, Dt @ C
     plain = A - column @ (S / R)  # with commands that take the cross term away
