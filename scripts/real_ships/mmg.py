@@ -252,7 +252,7 @@ deg):
 {circles}
 
 A fit, its strength chosen and every trial predicted, takes about {seconds:.1f} s of processor time with a
-warm cache.
+warm cache (aim: 3 s).
 
 **Limits.** {limits}
 
