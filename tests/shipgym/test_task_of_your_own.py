@@ -206,7 +206,7 @@ RECORD = "from typing import NamedTuple\n\n\nclass Settings(NamedTuple):\n    we
         ("Settings = 3\n", "Settings is no NamedTuple, expected a NamedTuple 'Settings' of floats"),
         (RECORD.replace("float", "flaot"), "Settings: an annotation cannot be read: name 'flaot'"),
         ("from collections import namedtuple\nSettings = namedtuple('Settings', '')\n", "no fields found"),
-        (RECORD.replace(" = 1.0", ""), None),
+        (RECORD.replace(" = 1.0", ""), "Settings.weight: no default found, expected one"),
         (
             RECORD.replace("1.0", "'1'"),
             "Settings.weight: '1' found, expected a number, or a list as the last",
