@@ -37,7 +37,7 @@ from agents.controllers.controller import Controller, Policy
 from agents.controllers.designs import NO_BASES, design, tuned
 from agents.rollouts.metrics import evaluate
 from agents.suites.reference import load_tuned
-from agents.suites.suite import SETS, BenchmarkTask, load_suite
+from agents.suites.suite import SETS, BenchmarkTask, load_suite, suite_file
 from agents.training import run_folder
 from agents.training.plan import Plan
 from agents.training.settings import load_settings
@@ -105,8 +105,10 @@ def base_of(task: BenchmarkTask) -> str:
 
 def tuned_on(task: BenchmarkTask, kind: str) -> Controller:
     """A controller with the suite's search budget on a task; guidance leads the LQ found first."""
-    lq = tune("lq", task).settings
-    return design(kind, task, tune(kind, task, {"lq": lq}).settings)
+    kept = read_json(suite_file(SUITE, "tuned"), "tuned settings", "take another copy")
+    budget = kept["evaluations"], kept["episodes"]
+    lq = tune("lq", task, None, *budget).settings
+    return design(kind, task, tune(kind, task, {"lq": lq}, *budget).settings)
 
 
 def learned_on(task: BenchmarkTask, base: Path, seed: int, out: Path) -> Policy:
