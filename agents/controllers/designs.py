@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
+from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
 
 from agents.agent_file import load_agent
-from agents.controllers.controller import Controller
+from agents.controllers.controller import Controller, model_hash
 from agents.controllers.registry import BUILT_IN, controller_class
 from agents.suites.reference import load_tuned
 from agents.suites.suite import BenchmarkTask, suite_of
@@ -36,7 +37,7 @@ def design(kind: str, task: BenchmarkTask, settings: Mapping[str, Any] | None = 
     given = settings or {}
     if not made.has_autopilot:
         written = json.dumps(dict(given), sort_keys=True)
-        return _designed(made, task.ship, task.task.interval(task.ship), written)
+        return _designed(made, _Ship(task.ship), task.task.interval(task.ship), written)
     if not task.task.follows_path:
         raise no_path(kind, task)
     inner = {key.removeprefix(INNER): value for key, value in given.items() if key.startswith(INNER)}
@@ -71,8 +72,8 @@ def no_path(kind: str, task: BenchmarkTask) -> InputError:
 
 
 @lru_cache(maxsize=256)
-def _designed(kind: Any, ship: ShipModel, dt: float, settings: str) -> Controller:
-    made: Controller = kind.from_model(ship, dt=dt, **json.loads(settings))
+def _designed(kind: Any, ship: _Ship, dt: float, settings: str) -> Controller:
+    made: Controller = kind.from_model(ship.model, dt=dt, **json.loads(settings))
     return made
 
 
@@ -98,3 +99,16 @@ def design_base(name: str, task: BenchmarkTask) -> Controller | None:
             raise InputError(f"base: {name} holds a learned policy, expected a classical controller")
         return agent
     return design(name, task)
+
+
+@dataclass(frozen=True)
+class _Ship:
+    """A ship that equals another of the same numbers."""
+
+    model: ShipModel
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Ship) and hash(self) == hash(other)
+
+    def __hash__(self) -> int:
+        return hash(model_hash(self.model))

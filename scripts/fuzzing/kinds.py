@@ -165,7 +165,7 @@ def use_training(run: Any) -> None:
 
     run.agent.predict(run.agent._last_obs)
     checkpoints.take(run.agent)
-    written(run._found)
+    written(run.found)
 
 
 def keep_study(folder: Path) -> None:

@@ -210,7 +210,7 @@ def test_the_free_running_error_is_relative_to_the_motion_of_each_trial(
     moving = Trial(ramp, {"u": 1.0 + ramp, "v": 2.0 * ramp, "r": np.zeros(4)})
     mean = {name: np.full(4, moving[name].mean()) for name in "uvr"}
     answers = iter([{name: moving[name] for name in "uvr"}, mean, None, {"u": 1e9 * ramp, "v": ramp}])
-    monkeypatch.setattr("identification.estimators.free_running.predict", lambda model, trial: next(answers))
+    monkeypatch.setattr("identification.estimators.tuned.predict", lambda model, trial: next(answers))
     found = [free_running_error(mariner, [moving]) for _ in range(4)]
     assert found == [0.0, pytest.approx(1.0), 1e3, 1e3]  # the last is as if it had run away
     answers = iter([mean, None])

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from identification.search.bee_colony import _chances, _moved, _settle
 from sklearn.linear_model import Ridge
 
 from identification import (
@@ -20,6 +19,7 @@ from identification import (
 )
 from identification.search import get_optimiser
 from identification.search.objectives import held_out_error, time_blocks, training_error
+from identification.search.optimisers import _chances, _moved, _settle
 from identification.search.pattern_search import pattern_search
 from identification.search.search import Optimiser
 from shipgym import InputError
