@@ -356,7 +356,7 @@ def test_results_that_do_not_agree_with_their_episodes_are_refused(copy):
     _rewritten(copy, one_more)
     with pytest.raises(
         InputError,
-        match=r"5 episodes of 'pid' on 'mariner-calm' found in episodes.parquet, expected 1 runs of 4",
+        match=r"[35] episodes of '(lq|pid)' on 'mariner-calm' found in episodes.parquet, expected 1 runs of 4",
     ):
         load_results(copy)
     (copy / "results.json").write_text(json.dumps({k: v for k, v in summary.items() if k != "seeds"}))
@@ -374,7 +374,10 @@ def test_contestants_of_the_file_and_of_the_table_are_the_same(copy):
         columns["contestant"][columns["contestant"] == "lq"] = "los"
 
     _rewritten(copy, exchange)
-    with pytest.raises(InputError, match=r"found in episodes.parquet, expected 0 runs of 4"):
+    with pytest.raises(
+        InputError,
+        match=r"4 episodes of 'los' .* expected 0 runs of 4|0 episodes of 'lq' .* expected 1 runs of 4",
+    ):
         load_results(copy)
 
 
