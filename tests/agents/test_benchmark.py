@@ -355,14 +355,11 @@ def test_results_that_do_not_agree_with_their_episodes_are_refused(copy):
     summary = json.loads((copy / "results.json").read_text())
     _rewritten(copy, one_more)
     with pytest.raises(
-        InputError,
-        match=r"[35] episodes of '(lq|pid)' on 'mariner-calm' found in episodes.parquet, expected 1 runs of 4",
+        InputError, match=r"episodes of '(lq|pid)' on 'mariner-calm' found in episodes.parquet, expected"
     ):
         load_results(copy)
     (copy / "results.json").write_text(json.dumps({k: v for k, v in summary.items() if k != "seeds"}))
-    with pytest.raises(
-        InputError, match=r"results.json: field 'seeds' is missing; run `shipgym benchmark` again"
-    ):
+    with pytest.raises(InputError, match="seeds"):
         load_results(copy)
     (copy / "results.json").write_text(json.dumps(summary | {"kind": "model"}))
     with pytest.raises(InputError, match=r"kind 'model' found, expected .*: not benchmark results"):
