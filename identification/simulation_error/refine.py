@@ -313,7 +313,7 @@ class _Problem:
 def stretch(model: ShipModel, segments: Sequence[Segment]) -> float:
     """Width of the bins of time in which residuals are added up, s: a block, or a sampling step."""
     steps = [float(np.median(np.diff(s.times))) for s in segments if len(s.times) > 1]
-    return float(max(BLOCK * model.travel_time, *steps))
+    return max([float(BLOCK * model.travel_time), *steps])
 
 
 def _term_sizes(samples: Samples, equation: str) -> Floats:
