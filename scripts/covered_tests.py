@@ -45,7 +45,7 @@ def processor_s() -> float:
     return sum(one.ru_utime + one.ru_stime for one in used)
 
 
-@dataclass
+@dataclass(eq=False)
 class Recorder:
     """Plugin of pytest: the lines that each test reaches, its seconds, and the tests that fail."""
 
@@ -99,7 +99,7 @@ class Recorder:
         draft.replace(path)
 
 
-@dataclass
+@dataclass(eq=False)  # pytest keeps plugins in sets
 class Order:
     """Plugin of pytest: the tests that come first, or the only ones; ends tests that run on and on."""
 
