@@ -39,7 +39,7 @@ import shipgym  # noqa: E402 - the folder above has to be found first
 from agents.agent_file import read_agent  # noqa: E402
 from agents.controllers.designs import design  # noqa: E402
 from agents.policies.network import Network  # noqa: E402
-from agents.policies.one_for_all import CONTEXT, ONE_FOR_ALL, OneForAll  # noqa: E402
+from agents.policies.one_for_all import CONTEXT, ONE_FOR_ALL, RULED, OneForAll  # noqa: E402
 from agents.policies.policy_extraction import _network  # noqa: E402
 from agents.rollouts.rollout import episode_costs  # noqa: E402
 from agents.suites.suite import FIRST_SEED, N_EPISODES, BenchmarkTask  # noqa: E402
@@ -66,11 +66,9 @@ SETTINGS = {
     "action_repeat": DECISION, "log_std_init": -2.0, "log_std_end": -3.0, "net_arch": [64, 64],
     "reward_scale": 5.0,
 }  # fmt: skip
-#: The rule that is searched begins with the design's own settings; only these change with the corridor.
-START = {
-    "lookahead": 1.0, "reach": 1.0, "crab_share": 1.0, "rudder_weight": 1.0, "rate_weight": 1.0,
-    "integral": 1.0, "lookahead_power": 0.0, "rudder_weight_power": 0.0, "reach_power": 0.0,
-}  # fmt: skip
+#: The rule that is searched, powers of a corridor narrower than a ship length: in wider ones the settings are
+#: the design's own.
+START = dict.fromkeys((f"{name}_power" for name in RULED), 0.0)
 EVALUATIONS, INSANE = 80, 0.02  # of the search; share of ships whose loops may have less than the margins
 BUDGET = 24, 16  # of tuning: settings, episodes
 RULE, ALONE, SHIPPED = "rule.json", "alone.json", ROOT / "agents" / "pretrained" / f"{ONE_FOR_ALL}.json"
@@ -108,14 +106,11 @@ def search(out: Path) -> None:
     """Find the rule of the base's settings on a part of the fleet: least cost over the design's own."""
     fleets = [replace(one, lanes=one.lanes[:2]) for one in draw_fleets(FLEET_SEED, PATHS, SHIPS, out)[::2]]
     zero = [fleet.cost_of(Pilots(fleet.pilots), 0).mean() for fleet in fleets]
-    names, steps = list(START), np.where([name.endswith("_power") for name in START], 0.3, 0.4)
+    names = list(START)
     found: list[tuple[float, dict[str, float]]] = []
 
     def cost(x: Any) -> float:
-        rule = {
-            name: float(value if name.endswith("_power") else np.exp(value))
-            for name, value in zip(names, x, strict=True)
-        }
+        rule = dict(zip(names, x.tolist(), strict=True))
         try:
             ruled = [fleet.ruled(rule) for fleet in fleets]
             insane = np.mean([not is_sane(pilot) for fleet in ruled for pilot in fleet.pilots])
@@ -135,7 +130,7 @@ def search(out: Path) -> None:
         return found[-1][0]
 
     start = np.zeros(len(names))
-    simplex = np.vstack([start, start - np.diag(steps)])
+    simplex = np.vstack([start, start + 0.3 * np.eye(len(names))])
     options = {"initial_simplex": simplex, "maxfev": EVALUATIONS, "xatol": 0.02, "fatol": 1e-4}
     minimize(cost, start, method="Nelder-Mead", options=options)
     least, rule = min(found, key=lambda one: one[0])

@@ -312,7 +312,8 @@ class Controller(Agent):
         memory : array of shape (n, memory_size)
         """
         found = deviations(seen, self.neutral_rudder, self.neutral_sway)
-        return self.neutral_rudder + np.einsum("ij,j->i", found, self.row), memory
+        rows = np.broadcast_to(self.row.T, found.shape)  # the same for all ships, or one for each
+        return self.neutral_rudder + np.einsum("ij,ij->i", found, rows), memory
 
     @property
     def made_for(self) -> str:

@@ -43,7 +43,7 @@ CONTEXT = (
     "turn_radius", "turn_reach", "path_radius", "corridor",
 )  # fmt: skip
 #: Settings of its base for which the fleet has a rule: a factor on the design's own where the corridor is one
-#: ship length, and NAME_power, the power of the corridor that it changes with.
+#: ship length or wider, and NAME_power, the power of a narrower corridor that it changes with.
 RULED = ("lookahead", "reach", "crab_share", "rudder_weight", "rate_weight", "integral")
 RULES = (*RULED, *(f"{name}_power" for name in RULED))
 LARGEST = 3.0  # deviation from the fleet's mean, in its standard deviations, that the network is shown
@@ -85,7 +85,7 @@ def base_for(model: ShipModel, task: Task, rule: Mapping[str, float]) -> WheelOv
     """
 
     def factor(name: str) -> float:
-        return float(rule.get(name, 1.0) * task.corridor ** rule.get(f"{name}_power", 0.0))
+        return float(rule.get(name, 1.0) * min(task.corridor, 1.0) ** rule.get(f"{name}_power", 0.0))
 
     pilot = LQ.from_model(
         model,

@@ -76,6 +76,7 @@ def test_costs_add_up_and_are_those_of_the_environment():
     parts = episodes.heading_cost + episodes.rudder_cost + episodes.rudder_rate_cost + episodes.end_cost
     np.testing.assert_allclose(episodes.cost, parts)
     assert np.all(episodes.duration_s == 150.0)
+    assert sail(PILOT, MARINER, SHORT.changed(dt=0.5), seeds=0).duration_s == 75.0
     env = gym.make("shipgym/CourseKeeping-v0", model=MARINER, episode_steps=150)
     observation, _ = env.reset(seed=0)
     cost, errors, over = 0.0, [], False

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from fleet import Pilots
 
 from agents.agent_file import load_agent, read_agent
 from agents.benchmarking.contestants import contestants
@@ -130,6 +131,19 @@ def test_the_base_follows_the_rule_for_its_path():
     assert ruled.gains["lookahead"] == pytest.approx(plain.gains["lookahead"] * 2.0 * 0.25)
     assert ruled.gains["crab_share"] == 0.5
     assert ruled.autopilot.design["rudder_weight"] == 4.0 * plain.autopilot.design["rudder_weight"]
+    wide = TASK.changed(corridor=3.0)
+    plain, ruled = (base_for(SHIP, wide, one) for one in ({}, rule))
+    assert ruled.gains["lookahead"] == pytest.approx(plain.gains["lookahead"] * 2.0)
+
+
+def test_pilots_asked_at_once_steer_as_each_alone():
+    ships = [load_model(name) for name in ("container-abc-lssvr", "container-4dof-output-error")]
+    pilots = [base_for(ship, TASK, {}) for ship in ships]
+    nearly_on_course = np.where([one.name.endswith("_cos") for one in OBSERVED], 1.0, 0.02 * SEEN[:2])
+    actions, _ = Pilots(pilots).predict(nearly_on_course)
+    for seen, pilot, action in zip(nearly_on_course, pilots, actions, strict=True):
+        assert np.abs(action) < 1.0
+        assert pilot.predict(seen[None])[0][0] == pytest.approx(action, abs=1e-6)
 
 
 @pytest.mark.parametrize(("rule", "why"), [({"speed": 1.0}, "unknown"), ({"reach": 0.0}, "rule.reach")])

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from agents import PID
+from agents.verification import chain
 from agents.verification.page import headline
 from agents.verification.result import pilot_metrics, track_metrics
 from shipgym import load_model
@@ -31,6 +32,16 @@ def test_the_first_ship_of_a_track_is_the_identified_one_and_the_others_are_draw
         False,
         0,
     )
+
+
+def test_a_path_autopilot_that_does_not_arrive_on_the_identified_model_is_refused(monkeypatch):
+    guides = {"here": track([1.0, 2.0], [1.0, 1.0], [True, False]), "lost": track([1.0], [1.0], [False])}
+    for key, one in guides.items():
+        one.key = key
+    monkeypatch.setattr(chain, "keep_track", lambda guide, models: guides[guide])
+    refused = {}
+    assert chain._tracks(list(guides), [], refused) == tuple(guides.values())
+    assert refused == {"lost": "it does not reach the end of the track on the identified model"}
 
 
 def episodes(count=101):
