@@ -139,9 +139,10 @@ def test_the_base_follows_the_rule_for_its_path():
 def test_pilots_asked_at_once_steer_as_each_alone():
     ships = [load_model(name) for name in ("container-abc-lssvr", "container-4dof-output-error")]
     pilots = [base_for(ship, TASK, {}) for ship in ships]
-    nearly_on_course = np.where([one.name.endswith("_cos") for one in OBSERVED], 1.0, 0.02 * SEEN[:2])
-    actions, _ = Pilots(pilots).predict(nearly_on_course)
-    for seen, pilot, action in zip(nearly_on_course, pilots, actions, strict=True):
+    on_course = np.array([[1.0 if one.name.endswith("_cos") else 0.0 for one in OBSERVED]] * 2)
+    on_course[:, [one.name for one in OBSERVED].index("yaw_rate")] = 0.01, -0.02
+    actions, _ = Pilots(pilots).predict(on_course)
+    for seen, pilot, action in zip(on_course, pilots, actions, strict=True):
         assert np.abs(action) < 1.0
         assert pilot.predict(seen[None])[0][0] == pytest.approx(action, abs=1e-6)
 
