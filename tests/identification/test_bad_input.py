@@ -39,6 +39,20 @@ def test_a_rudder_that_never_moves_excites_nothing(cao_zigzag: Trial, refusal: C
     assert "such as a zigzag" in told
 
 
+@pytest.mark.parametrize(
+    ("channel", "more"), [("u", "; nomoto, norrbin and nomoto2 take the speed of [ship]"), ("v", "")]
+)
+def test_a_channel_that_is_missing_is_named(
+    cao_zigzag: Trial, refusal: Callable[..., str], channel: str, more: str
+) -> None:
+    kept = {name: values for name, values in cao_zigzag.channels.items() if name != channel}
+    told = refusal(Trial(cao_zigzag.t, kept, name="short"), structure="abkowitz")
+    assert told == (
+        f"trial 'short': channel '{channel}' is missing, structure 'abkowitz' needs u, v, r, delta; name its "
+        f'column, or leave the trial out (use = "skip"){more}'
+    )
+
+
 @pytest.mark.parametrize(("channel", "structure"), [("v", "abkowitz"), ("r", "nomoto")])
 def test_a_motion_that_never_changes_is_named(
     cao_zigzag: Trial, refusal: Callable[..., str], channel: str, structure: str

@@ -104,6 +104,20 @@ def test_kalman_smoother_makes_velocities_better_and_keeps_the_record(
         assert after < 0.7 * before
 
 
+def test_kalman_smoother_takes_positions_without_velocities(
+    mariner: ShipModel, record: Callable[..., Trial]
+) -> None:
+    run = zigzag(mariner, 20, 20, duration=200, dt=0.1)
+    truth, noisy = (
+        Trial(one.t, {name: one[name] for name in ("x", "y", "psi", "r", "delta")}, name="positions")
+        for one in (record(run, 10), record(run, 10, 1.0, 5))
+    )
+    smoothed = smooth_kinematics(noisy)
+    for channel in ("x", "y"):
+        before, after = (np.std(trial[channel] - truth[channel]) for trial in (noisy, smoothed))
+        assert after < 0.7 * before
+
+
 def test_preprocessing_that_does_not_exist_is_refused(mariner: ShipModel, cao_zigzag: Trial) -> None:
     with pytest.raises(InputError, match="preprocessing: 'fourier'"):
         identify([cao_zigzag], preprocessing="fourier", particulars=mariner.particulars)
