@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from shipgym.errors import InputError
-from shipgym.files import abandoned_drafts, draft_name, remove_drafts, write_text
+from shipgym.files import abandoned_drafts, draft_name, make_folder, remove_drafts, write_text
 
 WEEK = 7 * 86400
 
@@ -60,3 +60,12 @@ def test_what_cannot_be_a_file_is_refused_and_stays(path):
     with pytest.raises(InputError, match=r"cannot be written|is not a file"):
         write_text("text", Path(path))
     assert Path("/dev/null").is_char_device()
+
+
+def test_a_folder_is_made_with_those_above_it_and_may_be_there(tmp_path):
+    for _ in range(2):
+        make_folder(tmp_path / "runs" / "first")
+    assert (tmp_path / "runs" / "first").is_dir()
+    write_text("a file", tmp_path / "file")
+    with pytest.raises(InputError, match="file.first: no folder can be made there"):
+        make_folder(tmp_path / "file" / "first")
