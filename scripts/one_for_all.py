@@ -69,6 +69,7 @@ SETTINGS = {
 #: The rule that is searched, powers of a corridor narrower than a ship length: in wider ones the settings are
 #: the design's own.
 START = dict.fromkeys((f"{name}_power" for name in RULED), 0.0)
+LARGEST_POWER = 4.0
 EVALUATIONS, INSANE = 80, 0.02  # of the search; share of ships whose loops may have less than the margins
 BUDGET = 24, 16  # of tuning: settings, episodes
 RULE, ALONE, SHIPPED = "rule.json", "alone.json", ROOT / "agents" / "pretrained" / f"{ONE_FOR_ALL}.json"
@@ -110,7 +111,7 @@ def search(out: Path) -> None:
     found: list[tuple[float, dict[str, float]]] = []
 
     def cost(x: Any) -> float:
-        rule = dict(zip(names, x.tolist(), strict=True))
+        rule = dict(zip(names, np.clip(x, -LARGEST_POWER, LARGEST_POWER).tolist(), strict=True))
         try:
             ruled = [fleet.ruled(rule) for fleet in fleets]
             insane = np.mean([not is_sane(pilot) for fleet in ruled for pilot in fleet.pilots])
@@ -243,6 +244,12 @@ def kinds(ship: Any) -> dict[str, dict[str, Any]]:
         "current": {"sea": Weather(current=current), "ground": 6.0},
         "narrow": {"corridor": 0.25, "ground": 1.0, "max_turn_deg": 45.0},
         "channel": {"corridor": 0.4, "ground": 1.5, "max_turn_deg": 75.0, "turn_radius": 3.5},
+        "river": {
+            "sea": Weather(current=Current(0.1 * speed)),
+            "corridor": 0.6,
+            "ground": 2.0,
+            "max_turn_deg": 60.0,
+        },
     }
 
 

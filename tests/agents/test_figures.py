@@ -41,6 +41,20 @@ def test_criteria_are_drawn_in_per_cent_of_their_limits():
     assert list(figure.layout.yaxis.ticktext) == [figures.CRITERIA[name] for name in ("advance", "stopping")]
 
 
+def test_tracks_are_drawn_east_to_the_right_in_ship_lengths_and_their_errors_along_the_way():
+    kept = SimpleNamespace(
+        waypoints=np.array([[0.0, 0.0], [300.0, 400.0]]),
+        positions=np.array([[0.0, 10.0], [30.0, 50.0], [60.0, 90.0]]),
+        cross_track=np.array([1.0, 2.0, 3.0]),
+    )
+    figure = figures.tracks_figure({"wheel-over": kept, "ilos": kept}, 100.0)
+    planned = only(figure, "waypoints")
+    np.testing.assert_allclose((planned.x, planned.y), ([0.0, 4.0], [0.0, 3.0]))
+    track, error = traces(figure, "ilos")
+    np.testing.assert_allclose((track.x, track.y), ([0.1, 0.5, 0.9], [0.0, 0.3, 0.6]), rtol=1e-6)
+    np.testing.assert_allclose((error.x, error.y), ([0.0, 0.5, 1.0], [1.0, 2.0, 3.0]), rtol=1e-6)
+
+
 def test_manoeuvres_are_drawn_in_degrees_and_ship_lengths():
     t = np.arange(4.0)
     zigzag = Trial(t, {"psi": np.radians(t), "delta": np.radians(-2.0 * t)})

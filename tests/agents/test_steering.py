@@ -14,6 +14,7 @@ from typer.testing import CliRunner
 
 from agents import LQ, PID, IntegralLineOfSight, TurnRate, WheelOver, load_agent
 from agents.cli import app
+from agents.deployment import scheduling
 from agents.deployment.nmea import Link, Reading, readings, sentences
 from agents.deployment.route import Route
 from agents.deployment.simulated import SimulatedShip, simulate_ship
@@ -21,6 +22,19 @@ from agents.deployment.steering import MANUAL, STANDBY, STEERING, Helm, Limits, 
 from shipgym.errors import InputError
 from shipgym.tasks.task import Task
 from tests.agents.policies import MARINER
+
+
+def test_the_time_slice_is_the_shortest_for_a_while_and_then_the_default_again(monkeypatch):
+    asked = []
+    monkeypatch.setattr(scheduling, "_ask", asked.append)
+    monkeypatch.setattr(scheduling.platform, "system", lambda: "Linux")
+    monkeypatch.setattr(scheduling.os, "sched_getscheduler", lambda _: os.SCHED_OTHER, raising=False)
+    with scheduling.short_slice():
+        assert asked == [scheduling.SLICE_NS]
+    assert asked == [scheduling.SLICE_NS, 0]
+    monkeypatch.setattr(scheduling.platform, "system", lambda: "Darwin")
+    with scheduling.short_slice():
+        assert len(asked) == 2
 
 
 def sentence(address, *fields):

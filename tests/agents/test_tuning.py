@@ -132,6 +132,7 @@ def test_a_trial_must_keep_up_with_the_median_of_finished_ones():
     assert limits(trials[:3], 400) == []
     found = limits(trials, 400)
     assert found == [(100, 7.5), (200, 6.5), (300, 6.5)]
+    assert limits(trials, 800) == [(200, 6.5), (300, 6.5)]  # in the first quarter nobody is stopped
     assert allowed(found, 50) == float("inf")
     assert allowed(found, 250) == 6.5
 

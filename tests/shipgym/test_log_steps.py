@@ -232,6 +232,10 @@ def test_offsets_are_estimated_from_straight_parts_on_several_courses_only():
     assert straight[[0, 185, 215, 399]].all()
     assert not straight[[195, 200, 205]].any()
     assert heading_offset(channels, straight)[0] == pytest.approx(3.0 * DEGREE, abs=1e-6)
+    few = np.isin(t, [*range(4), *range(300, 305)])
+    assert heading_offset(channels, few) is None
+    assert heading_offset(channels, few | np.isin(t, [4, 305]))[0] == pytest.approx(3.0 * DEGREE, abs=1e-6)
+    assert heading_offset({"psi": psi}, straight) is None
     tools = Instruments(heading_offset="estimate", rudder_offset="estimate")
     log = Log(t, dict(channels), "log", [])
     correct_offsets(log, tools)

@@ -67,5 +67,5 @@ def test_a_folder_is_made_with_those_above_it_and_may_be_there(tmp_path):
         make_folder(tmp_path / "runs" / "first")
     assert (tmp_path / "runs" / "first").is_dir()
     write_text("a file", tmp_path / "file")
-    with pytest.raises(InputError, match="file.first: no folder can be made there"):
+    with pytest.raises(InputError, match="file/first: no folder can be made there"):
         make_folder(tmp_path / "file" / "first")
