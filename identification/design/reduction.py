@@ -47,10 +47,18 @@ class ReductionStep:
 
 @dataclass(frozen=True)
 class Reduction:
-    """The whole path of a reduction and the model that it chose."""
+    """The whole path of a reduction and the model that it chose.
 
-    path: tuple[ReductionStep, ...]  # in the order in which terms were dropped or added
-    chosen: int  # which of them
+    Attributes
+    ----------
+    path : tuple of ReductionStep
+        In the order in which terms were dropped or added.
+    chosen : int
+        Which of them.
+    """
+
+    path: tuple[ReductionStep, ...]
+    chosen: int
 
     @property
     def terms(self) -> tuple[str, ...]:
@@ -106,7 +114,7 @@ def backward_elimination(
     Raises
     ------
     InputError
-        For shapes that do not fit and fewer samples than terms.
+        For shapes that do not fit and fewer than five samples a term.
     """
     features, targets, labels = _checked(X, y, names)
     check_number(tolerance, "tolerance", at_least=0.0)
@@ -136,9 +144,24 @@ def forward_selection(
 ) -> Reduction:
     """Add terms by error reduction ratio; choose the shortest model near the best on what is held out.
 
-    `X`, `y` and `names` are as in `backward_elimination`. The held-out R2 of the chosen model may lie below
-    the best of the path, which goes on beyond it, by `tolerance`; `most` is the number of terms at which to
-    stop. Raises InputError for shapes that do not fit and fewer samples than terms.
+    Parameters
+    ----------
+    X, y, names
+        As in `backward_elimination`.
+    tolerance : float
+        By how much the held-out R2 of the chosen model may lie below the best of the path.
+    most : int, optional
+        Terms at which to stop.
+
+    Returns
+    -------
+    Reduction
+        The path goes on beyond the chosen model.
+
+    Raises
+    ------
+    InputError
+        For shapes that do not fit and fewer than five samples a term.
     """
     features, targets, labels = _checked(X, y, names)
     check_number(tolerance, "tolerance", at_least=0.0)
@@ -209,10 +232,25 @@ def sensitivity(
 ) -> dict[str, float]:
     """Change of a simulated manoeuvre per per cent of each coefficient (Cao 2015).
 
-    `manoeuvre` simulates it with a model, such as ``zigzag``; `change` is the relative step to either side.
-    Returns, by coefficient, the largest first, the root mean square change of u, v, r and psi, each by its
-    span, in per cent per per cent; infinite where the changed ship runs away. Raises InputError for a
-    reference ship, whose coefficients are compiled in.
+    Parameters
+    ----------
+    model : ShipModel
+        With a table of terms.
+    manoeuvre : callable
+        Simulates it with a model, such as ``zigzag``.
+    change : float
+        Relative step to either side.
+
+    Returns
+    -------
+    dict of str to float
+        By coefficient, the largest first: root mean square change of u, v, r and psi, each by its span, in
+        per cent per per cent. Infinite where the changed ship runs away.
+
+    Raises
+    ------
+    InputError
+        For a ship with equations written by hand.
     """
     check_number(change, "change", above=0.0, below=1.0)
     table_of(model)

@@ -22,12 +22,23 @@ from shipgym.trials.trial import Trial
 
 @dataclass(frozen=True, eq=False)
 class CoefficientHistory:
-    """Coefficients over time."""
+    """Coefficients over time.
 
-    names: tuple[str, ...]  # of the coefficients
-    t: Floats  # end of each row's window, s, in the time of its trial, shape (n_rows,)
-    trial: NDArray[np.int64]  # index of the trial, shape (n_rows,)
-    #: estimate after each row, in the normalisation of the structure, shape (n_rows, n_coefficients)
+    Attributes
+    ----------
+    names : tuple of str
+        Of the coefficients.
+    t : array of shape (n_rows,)
+        End of each row's window, s, in the time of its trial.
+    trial : array of shape (n_rows,)
+        Index of the trial.
+    values : array of shape (n_rows, n_coefficients)
+        Estimate after each row, in the normalisation of the structure.
+    """
+
+    names: tuple[str, ...]
+    t: Floats
+    trial: NDArray[np.int64]
     values: Floats
 
     def __getitem__(self, name: str) -> Floats:

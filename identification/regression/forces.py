@@ -37,14 +37,27 @@ METHODS = {"ls": "full", "tls-svm": "l-curve"}  # how each chooses the direction
 
 @dataclass(frozen=True, eq=False)
 class ForceRegression:
-    """Forces of captive tests as a linear function of the coefficients, prime system."""
+    """Forces of captive tests as a linear function of the coefficients, prime system.
 
-    #: share of each coefficient; rows of all X, then all Y, then all N, shape (n_rows, n_coefficients)
+    Attributes
+    ----------
+    features : array of shape (n_rows, n_coefficients)
+        The share of each coefficient; rows of all X, then all Y, then all N.
+    targets : array of shape (n_rows,)
+        Hydrodynamic force or moment.
+    names : tuple of str
+        Of the coefficients, in the order of the columns.
+    equation : array of shape (n_rows,)
+        0, 1, 2 for X, Y, N.
+    trial : array of shape (n_rows,)
+        Index of the trial.
+    """
+
     features: Floats
-    targets: Floats  # hydrodynamic force or moment, shape (n_rows,)
-    names: tuple[str, ...]  # of the coefficients, in the order of the columns
-    equation: NDArray[np.int64]  # 0, 1, 2 for X, Y, N, shape (n_rows,)
-    trial: NDArray[np.int64]  # index of the trial, shape (n_rows,)
+    targets: Floats
+    names: tuple[str, ...]
+    equation: NDArray[np.int64]
+    trial: NDArray[np.int64]
 
     def __len__(self) -> int:
         return len(self.targets)

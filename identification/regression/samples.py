@@ -44,14 +44,30 @@ FEWEST_SAMPLES = 10  # between gaps; fewer are left out
 
 @dataclass(frozen=True, eq=False)
 class Samples:
-    """A regression for each equation of motion (`u`, `v`, `r`, `p`), all with the same rows."""
+    """A regression for each equation of motion, all with the same rows.
 
-    features: dict[str, Floats]  # integrals of the terms over each row's window, shape (n_rows, n_terms)
-    targets: dict[str, Floats]  # change of the velocity there, less that by measured wind, shape (n_rows,)
-    start: Floats  # time at which the window begins, s, shape (n_rows,)
-    duration: Floats  # length of the window, s, shape (n_rows,)
-    trial: NDArray[np.int64]  # index of the trial, shape (n_rows,)
-    window: int  # steps per window of the longest-windowed trial
+    Attributes
+    ----------
+    features : dict of str to array of shape (n_rows, n_terms)
+        Integrals of the terms over each row's window, by equation (`u`, `v`, `r`, `p`).
+    targets : dict of str to array of shape (n_rows,)
+        Change of the velocity over the window, less that by measured wind.
+    start : array of shape (n_rows,)
+        Time at which the window begins, s.
+    duration : array of shape (n_rows,)
+        Length of the window, s.
+    trial : array of shape (n_rows,)
+        Index of the trial.
+    window : int
+        Steps per window of the longest-windowed trial.
+    """
+
+    features: dict[str, Floats]
+    targets: dict[str, Floats]
+    start: Floats
+    duration: Floats
+    trial: NDArray[np.int64]
+    window: int
 
     def __len__(self) -> int:
         return len(self.start)

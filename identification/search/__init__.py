@@ -54,5 +54,15 @@ def minimise(
         The same seed gives the same search.
     optimiser : {"abc", "pso", "grid", "de"} or Optimiser
         By name with its usual settings, or one with your own.
+
+    Returns
+    -------
+    SearchResult
+        The best candidate, its value, and the course of the search.
+
+    Raises
+    ------
+    InputError
+        For bounds and settings that cannot be.
     """
     return get_optimiser(optimiser).minimise(objective, bounds, seed)
