@@ -107,7 +107,10 @@ class _Runs:
             ahead, aside = over_ground(trial)
             c, s = np.cos(trial["psi"]), np.sin(trial["psi"])
             north, east = ahead * c - aside * s, ahead * s + aside * c
-            logged = np.where("v" in trial.derived and "u" not in trial.derived, trial["u"], np.nan)
+            if "v" in trial.derived and "u" not in trial.derived:  # a speed log, through the water
+                logged = trial["u"]
+            else:
+                logged = np.full(len(trial), np.nan)
             seen_at = [row / speed for row in (north, east, logged)]
             rows = [trial["r"] * travel, trial["delta"], n, *wind, trial["psi"], *seen_at]
             times = (trial.t - trial.t[0]) / travel

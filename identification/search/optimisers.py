@@ -71,8 +71,8 @@ class ParticleSwarm(Optimiser):
     def _search(self, record: Recorder, low: Floats, high: Floats, rng: np.random.Generator) -> None:
         n = check_whole(self.particles, "particles", at_least=1, at_most=MOST)
         check_whole(self.rounds, "rounds", at_least=1, at_most=MOST)
-        shape = (n, len(low))
-        place = low + (high - low) * rng.random(shape)
+        place = _drawn(n, low, high, rng)
+        shape = place.shape
         velocity = np.zeros(shape)
         best = place.copy()
         values = record(place)
@@ -150,7 +150,7 @@ class ArtificialBeeColony(Optimiser):
         n = check_whole(self.sources, "sources", at_least=2, at_most=MOST)
         check_whole(self.rounds, "rounds", at_least=1, at_most=MOST)
         check_whole(self.limit, "limit", at_least=1, at_most=MOST)
-        sources = low + (high - low) * rng.random((n, len(low)))
+        sources = _drawn(n, low, high, rng)
         values = record(sources)
         record.end_round()
         idle = np.zeros(n, dtype=np.int64)
@@ -161,10 +161,15 @@ class ArtificialBeeColony(Optimiser):
                 _settle(sources, values, idle, chosen, moved, record(moved))
             left = np.flatnonzero(idle > self.limit)
             if left.size:
-                sources[left] = low + (high - low) * rng.random((left.size, len(low)))
+                sources[left] = _drawn(left.size, low, high, rng)
                 values[left] = record(sources[left])
                 idle[left] = 0
             record.end_round()
+
+
+def _drawn(count: int, low: Floats, high: Floats, rng: np.random.Generator) -> Floats:
+    """Candidates evenly distributed in the box, shape (count, n_dimensions)."""
+    return low + (high - low) * rng.random((count, len(low)))
 
 
 def _moved(sources: Floats, chosen: Integers, rng: np.random.Generator) -> Floats:

@@ -156,14 +156,18 @@ def _is(value: Any, *kinds: type) -> bool:
     return isinstance(value, kinds) and not (isinstance(value, str) and not value.strip())
 
 
+def _is_number(value: Any) -> bool:
+    return _is(value, Real)
+
+
 #: How each kind of value is recognised in a file; the words stand in messages.
 KINDS: dict[str, Callable[[Any], bool]] = {
     TEXT: lambda value: _is(value, str),
     FLAG: lambda value: _is(value, bool),
-    NUMBER: lambda value: _is(value, Real),
+    NUMBER: _is_number,
     WHOLE: lambda value: _is(value, int),
     TEXTS: lambda value: isinstance(value, list) and all(_is(one, str) for one in value),
-    TWO_NUMBERS: lambda value: isinstance(value, list) and [_is(one, Real) for one in value] == [True] * 2,
+    TWO_NUMBERS: lambda value: isinstance(value, list) and len(value) == 2 and all(map(_is_number, value)),
     WHOLE_OR_TEXT: lambda value: _is(value, int, str),
     TEXT_OR_TABLE: lambda value: _is(value, str, Mapping),
 }

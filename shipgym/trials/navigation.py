@@ -195,6 +195,6 @@ def set_and_drift(psi: Floats, water: Floats, ground: tuple[Floats, Floats]) -> 
     size, toward = float(np.hypot(*current)), math.degrees(math.atan2(current[1], current[0])) % 360.0
     return current, (
         f"set and drift by the speed log against the ground: {size:.2f} m/s ({size * 3.6 / 1.852:.2f} kn) "
-        "toward "
-        f"{toward:03.0f} deg, {np.std(values - rows @ current):.2f} m/s unexplained; taken out of the sway"
+        f"toward {toward:03.0f} deg, {np.std(values - rows @ current):.2f} m/s unexplained; "
+        "taken out of the sway"
     )

@@ -294,8 +294,8 @@ def _check_course(psi: Floats, course: Floats, tools: Instruments, source: Sourc
     if turned > _TURNED and np.sqrt(np.mean(np.angle(apart) ** 2)) < _SAME:
         raise InputError(
             f"{head}is the course over ground, from which it differs by less than 0.3 deg in a turn of "
-            f"{turned / DEGREE:.0f} deg, where a ship drifts; name the gyro's column: psi = "
-            f'{{ column = "..." }}'
+            f"{turned / DEGREE:.0f} deg, where a ship drifts; name the gyro's column: "
+            'psi = { column = "..." }'
         )
     if turned > _TURNED and abs(mirrored.mean()) > max(0.95, abs(apart.mean()) + 0.02):
         raise InputError(
@@ -305,6 +305,6 @@ def _check_course(psi: Floats, course: Floats, tools: Instruments, source: Sourc
     if abs(mean) > _CONTRADICTION and abs(apart.mean()) > 0.7 and not tools.heading_offset:
         raise InputError(
             f"{head}contradicts the course over ground by {-mean / DEGREE:.0f} deg, expected it clockwise "
-            "from "
-            f"north; name the right column, or write heading_offset_deg = {-mean / DEGREE:.0f} in [sensors]"
+            "from north; name the right column, or write "
+            f"heading_offset_deg = {-mean / DEGREE:.0f} in [sensors]"
         )

@@ -1,6 +1,6 @@
 """From the columns of a file to channels in SI units with the project's signs, frame and origin."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
@@ -279,26 +279,22 @@ def _earth_to_body(log: Log) -> None:
     channels["u"], channels["v"] = rotate_to_body(channels["u"], channels["v"], channels["psi"])
 
 
-#: What moves from the centre of gravity, `xg` forward of midship, to midship: by xg times a function of
-#: another channel.
-_LEVERS: dict[str, tuple[str, Callable[[Floats], Floats]]] = {
-    "v": ("r", np.negative),
-    "x": ("psi", lambda psi: -np.cos(psi)),
-    "y": ("psi", lambda psi: -np.sin(psi)),
-    "N": ("Y", np.positive),
-}
-
-
 def _cg_to_midship(log: Log, xg: float) -> None:
-    """Move position, sway and yaw moment from the centre of gravity to midship: v = v_cg - xg r."""
-    for name, (other, lever) in _LEVERS.items():
-        if name not in log.channels:
-            continue
-        if other not in log.channels:
+    """Move position, sway and yaw moment from the centre of gravity, `xg` forward of midship, to midship."""
+    channels = log.channels
+    for name, other in (("v", "r"), ("x", "psi"), ("y", "psi"), ("N", "Y")):
+        if name in channels and other not in channels:
             raise InputError(
                 f'{log.where}: origin = "cg" needs {other} to move {name} to midship; name its column'
             )
-        log.channels[name] = log.channels[name] + xg * lever(log.channels[other])
+    if "v" in channels:
+        channels["v"] = channels["v"] - xg * channels["r"]
+    if "x" in channels:
+        channels["x"] = channels["x"] - xg * np.cos(channels["psi"])
+    if "y" in channels:
+        channels["y"] = channels["y"] - xg * np.sin(channels["psi"])
+    if "N" in channels:
+        channels["N"] = channels["N"] + xg * channels["Y"]
 
 
 def _antiderivative(t: Floats, values: Floats) -> Floats:
