@@ -97,6 +97,6 @@ def coefficient_history(
     if not isinstance(source, Samples):
         trials = [source] if isinstance(source, Trial) else list(source)
         source = build_samples(trials, table, ship, shaft_speed=shaft_speed, **sampling)
-    found = [clone(estimator).fit_history(source.features[q], source.targets[q]) for q in table.equations]
+    found = [clone(estimator).fit_history(source.features[q], source.targets[q]) for q in table.regressed]
     values = np.linalg.solve(table.acceleration_matrix(ship, shaft_speed), np.hstack(found).T).T
     return CoefficientHistory(table.coefficient_names, source.start + source.duration, source.trial, values)

@@ -18,9 +18,8 @@ from sklearn.cluster import KMeans
 from identification.estimators.estimator import Estimators
 from identification.estimators.lssvm import LSSVM
 from identification.estimators.rm_svm import heading_error, most_regularised
-from identification.regression.grey_box import structure_samples
 from identification.regression.preprocess import smoothed_channels
-from identification.regression.samples import Samples
+from identification.regression.samples import Samples, build_samples
 from identification.validation.folds import TRIALS, held_out_rows
 from shipgym.arrays import Floats
 from shipgym.checks import check_number, check_whole
@@ -202,7 +201,7 @@ class _Search:
             coefficients=dict.fromkeys(table.coefficient_names, 0.0),
         )  # fmt: skip
         given = {"shaft_speed": blank.service_shaft_speed, **self.sampling}
-        return KernelFit(blank, structure_samples(self.trials, table, ship, **given))
+        return KernelFit(blank, build_samples(self.trials, table, ship, **given))
 
     def unit(self, samples: Samples) -> float:
         """What the weight of the errors, by ship length and in the prime system, is in SI units by row."""

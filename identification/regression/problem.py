@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 
 from identification.options import Given, name_of, whole_call
-from identification.regression.grey_box import chosen_box, structure_samples
+from identification.regression.grey_box import chosen_box
 from identification.regression.preprocess import repaired
 from identification.regression.rudder import estimated_gear
-from identification.regression.samples import Samples
+from identification.regression.samples import Samples, build_samples
 from identification.regression.still_water import in_still_water
 from identification.regression.wind import constant_wind, with_constant_wind
 from identification.validation.diagnostics import check_samples, check_trials
@@ -72,13 +72,13 @@ def pose(
     shaft = _shaft_speed(options.service_shaft_speed, used, table)
     smooth = options.preprocessing or options.smooth
     sampling = dict[str, Any](samples=options.samples, window=options.window, gear=steering, smooth=smooth)
-    regression = structure_samples(used, table, ship, shaft_speed=shaft, **sampling)
+    regression = build_samples(used, table, ship, shaft_speed=shaft, **sampling)
     if options.wind == "constant":
         constants = constant_wind(used, regression, options.structure)
         used, everything = (
             [with_constant_wind(one, constants) for one in group] for group in (used, everything)
         )
-        regression = structure_samples(used, table, ship, shaft_speed=shaft, **sampling)
+        regression = build_samples(used, table, ship, shaft_speed=shaft, **sampling)
         sea["wind"] = {"option": "constant", "accelerations": constants}
     check_samples(regression, used, table)
     gear = steering or (estimated_gear(used) if table.has_rudder else SteeringGear())

@@ -29,6 +29,7 @@ from identification.regression.rudder import rebuild, straight
 from shipgym.arrays import Floats, integral
 from shipgym.checks import check_whole
 from shipgym.errors import InputError
+from shipgym.ships.grey_boxes import GreyBox
 from shipgym.ships.particulars import Particulars
 from shipgym.ships.steering import SteeringGear
 from shipgym.ships.term_table import Structure
@@ -97,7 +98,7 @@ def build_samples(
     """Stack the regressions of all trials.
 
     A trial with gaps in time is taken for several (`between_gaps`): nothing is smoothed or integrated across
-    a gap.
+    a gap. Of a grey box the targets are what the reference ship's converted acceleration leaves.
 
     Parameters
     ----------
@@ -182,6 +183,9 @@ class _Sampling:
             if f"wind_{q}dot" in trial:
                 by_wind = integral(t, trial[f"wind_{q}dot"])
                 targets[q] -= by_wind[last] - by_wind[first]
+            if isinstance(self.structure, GreyBox):
+                features[q], by_reference = features[q][:, :-1], features[q][:, -1]
+                targets[q] -= by_reference
         part = Samples(features, targets, t[first], t[last] - t[first], np.full(len(first), index), window)
         return without_memory(part) if "q" in equations else part
 
@@ -195,7 +199,12 @@ class _Sampling:
         return spline_integrals(t, channels, equations, self._terms, rudder)
 
     def _terms(self, equation: str, channels: Channels) -> Floats:
-        return self.structure.features(equation, channels, self.particulars, self.shaft_speed)
+        """The terms of an equation, of a grey box followed by the reference ship's acceleration."""
+        terms = self.structure.features(equation, channels, self.particulars, self.shaft_speed)
+        if not isinstance(self.structure, GreyBox):
+            return terms
+        known = self.structure.converted_accelerations(channels, self.particulars, self.shaft_speed)
+        return np.column_stack([terms, known[equation]])
 
 
 def between_gaps(trial: Trial, particulars: Particulars, fewest: int = FEWEST_SAMPLES) -> list[Trial]:
