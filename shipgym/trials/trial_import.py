@@ -16,8 +16,14 @@ from shipgym.trials.clock_texts import read_angles, read_clock, zone_seconds
 from shipgym.trials.columns import Column, Source, choose_columns
 from shipgym.trials.csv_reader import Table, is_number
 from shipgym.trials.derivatives import time_derivative
-from shipgym.trials.navigation import NO_OFFSETS, Instruments, correct_offsets, local_metres, to_midship
-from shipgym.trials.navigation import rotate_to_body as rotate_to_body
+from shipgym.trials.navigation import (
+    NO_OFFSETS,
+    Instruments,
+    correct_offsets,
+    local_metres,
+    rotate_to_body,
+    to_midship,
+)
 from shipgym.trials.resampling import Log, Series, have_own_clocks, on_one_clock, own_clock
 from shipgym.trials.units import QUANTITIES, si_factor
 
@@ -115,12 +121,15 @@ def _recorded(table: Table, chosen: dict[str, Column], repair: str | None) -> _R
             )
     t, start = _read_times(table, chosen)
     numbers = {c: table.numbers(column.name) for c, column in chosen.items() if c not in ("t", "lat", "lon")}
+    filled: dict[str, int] = {}
     if "lat" in chosen:
-        numbers |= _local_positions(table, chosen, t, repair)
+        positions, outliers = _local_positions(table, chosen, t, repair)
+        numbers |= positions
+        filled = dict.fromkeys(positions, outliers)
         chosen |= {new: replace(chosen.pop(old), unit="m") for new, old in (("x", "lat"), ("y", "lon"))}
     values = np.column_stack([t, *numbers.values()])
     source = Source(table, {name: chosen[name] for name in ("t", *numbers)}, np.arange(len(values)))
-    present, filled = np.isfinite(values), {}
+    present = np.isfinite(values)
     own_clocks = bool(present[:, 0].all()) and have_own_clocks(present[:, 1:])
     if not own_clocks:
         values, source = _repaired(values, source, repair)
@@ -200,12 +209,12 @@ def _read_position(table: Table, column: Column) -> Floats:
 
 def _local_positions(
     table: Table, chosen: dict[str, Column], t: Floats, repair: str | None
-) -> dict[str, Floats]:
-    """North and east of the first position, m, nan where there is none."""
+) -> tuple[dict[str, Floats], int]:
+    """North and east of the first position, m, nan where there is none, and the number of outliers."""
     lat, lon = (_read_position(table, chosen[name]) for name in ("lat", "lon"))
     source = Source(table, chosen, np.arange(t.size))
     here = np.flatnonzero(np.isfinite(lat) & np.isfinite(lon) & np.isfinite(t))
-    local = np.full((2, t.size), np.nan)
+    local, far = np.full((2, t.size), np.nan), here[:0]
     if here.size:
         plausibility.check_ranges({"lat": lat, "lon": lon}, source)
         local[:, here] = local_metres(lat[here], lon[here], (lat[here[0]], lon[here[0]]))
@@ -220,7 +229,7 @@ def _local_positions(
                 'such rows to be filled with repair = "interpolate"'
             )
         local[:, far] = np.nan
-    return dict(zip(("x", "y"), local, strict=True))
+    return dict(zip(("x", "y"), local, strict=True)), far.size
 
 
 def _joined(recorded: Sequence[_Recorded]) -> Series:
