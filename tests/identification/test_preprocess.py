@@ -10,6 +10,7 @@ from identification import identify
 from identification.regression.preprocess import (
     median,
     noise_level,
+    outliers,
     repaired,
     savitzky_golay,
     smooth,
@@ -85,6 +86,12 @@ def test_outliers_and_short_dropouts_are_repaired_and_told(noisy_trials: list[Tr
     np.testing.assert_allclose(mended.t, trial.t)
     assert np.abs(mended["u"] - trial["u"]).max() < 0.2
     assert repaired(mended)["u"].max() < 9.0
+
+
+def test_a_rudder_put_over_at_the_first_or_the_last_sample_is_no_outlier() -> None:
+    t = np.arange(0.0, 600.0, 10.0)
+    for angles in ([0.0, 23.0, *[35.0] * 58], [*[10.0] * 59, 20.0]):
+        assert not outliers(t, np.radians(angles)).any()
 
 
 def test_clean_trials_are_left_alone(cao_zigzag: Trial) -> None:

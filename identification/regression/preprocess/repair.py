@@ -26,7 +26,9 @@ def outliers(t: ArrayLike, values: ArrayLike, threshold: float = OUTLYING) -> Fl
     """Samples away from the running median by several times the noise (Hampel 1974, JASA 69), as flags.
 
     What the signal itself moves from sample to sample is allowed for by the running median's own steps, so
-    that corners of a clean signal are no outliers. The threshold is in standard deviations of the noise.
+    that corners of a clean signal are no outliers. The first and the last sample are never found: they cannot
+    be told from a rudder that has just moved, or begins to. The threshold is in standard deviations of the
+    noise.
     """
     t, values = np.asarray(t, dtype=float), np.asarray(values, dtype=float)
     if len(values) < WIDTH:
