@@ -12,8 +12,8 @@ from identification.fit import Fit
 from identification.regression.still_water import SIGNIFICANT
 from shipgym.plots import LIMIT, MEASURED, MODEL, Panel, axis, line, panels
 from shipgym.plots.style import Figure
+from shipgym.trials.units import KNOT
 
-KNOT = 1852.0 / 3600.0
 NORMAL_95 = 1.96
 SOURCES = {"all trials": "one of all", "trial": "its own", "given": "as given", "columns": "of its columns"}
 

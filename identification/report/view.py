@@ -16,8 +16,8 @@ from identification.validation.warnings import EQUATIONS, heading_errors_deg, mo
 from shipgym.ships import ShipModel
 from shipgym.ships.particulars import ADDED_MASSES
 from shipgym.trials.trial import Trial
+from shipgym.trials.units import KNOT
 
-KNOT = 1852.0 / 3600.0
 SIGNIFICANT_T = 2.0  # a coefficient with a smaller |t| is not significantly different from zero
 FORCES = {"X": "Surge force X", "Y": "Sway force Y", "N": "Yaw moment N", "K": "Roll moment K"}
 INDICES = {

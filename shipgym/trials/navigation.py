@@ -15,11 +15,11 @@ from shipgym.checks import check_choice, check_keys, check_number, check_table
 from shipgym.errors import InputError
 from shipgym.trials.derivatives import time_derivative
 from shipgym.trials.resampling import Log
+from shipgym.trials.units import DEGREE
 
 if TYPE_CHECKING:
     from shipgym.ships.particulars import Particulars
 
-DEGREE = math.pi / 180.0
 #: A straight part lasts this long, s, with heading and rudder within this range, rad.
 STRAIGHT_S, STRAIGHT_RANGE = 20.0, 2.0 * DEGREE
 #: Courses this far apart tell an offset of the heading, and a current across, from each other.
@@ -81,8 +81,11 @@ def local_metres(lat: Floats, lon: Floats, origin: tuple[float, float]) -> tuple
     return meridian * (lat - origin[0]) * DEGREE, parallel * east * DEGREE
 
 
-def rotate_to_body(north: Floats, east: Floats, psi: Floats) -> tuple[Floats, Floats]:
-    """Surge and sway from north and east velocity, m/s, and heading, rad; all of shape (n_samples,)."""
+def rotate_to_body(north: Any, east: Any, psi: Any) -> tuple[Any, Any]:
+    """Surge and sway from north and east velocity, m/s, or way, m, and heading, rad; back by -psi.
+
+    Numbers, or arrays of shape (n_samples,).
+    """
     c, s = np.cos(psi), np.sin(psi)
     return north * c + east * s, east * c - north * s
 

@@ -16,20 +16,9 @@ from shipgym.arrays import Floats, integral
 from shipgym.errors import InputError
 from shipgym.trials.columns import Source
 from shipgym.trials.derivatives import time_derivative
-from shipgym.trials.navigation import DEGREE, Instruments, heading_offset, straight_parts
+from shipgym.trials.navigation import Instruments, heading_offset, straight_parts
 from shipgym.trials.resampling import Log, Series
-from shipgym.trials.units import QUANTITIES, UNITS, si_factor
-
-#: Largest magnitude of each channel that can be a ship's, or a small model's; SI units.
-LIMITS: dict[str, float] = {
-    "psi": 100.0, "r": 60.0 * DEGREE, "p": 360.0 * DEGREE, "phi": 180.0 * DEGREE, "delta": 90.0 * DEGREE,
-    "delta_command": 90.0 * DEGREE, "u": 50.0, "v": 50.0, "n": 200.0, "n_command": 200.0,
-    "t": 1e10, "x": 1e8, "y": 1e8, "X": 1e10, "Y": 1e10, "N": 1e13, "psi_wave": 100.0,
-    "r_wave": 60.0 * DEGREE, "phi_wave": 180.0 * DEGREE, "p_wave": 360.0 * DEGREE,
-    "current_north": 50.0, "current_east": 50.0, "wind_speed": 200.0, "wind_from": 100.0,
-    "lat": 90.0, "lon": 360.0, "sog": 50.0, "cog": 100.0, "stw": 50.0,
-    "wind_udot": 10.0, "wind_vdot": 10.0, "wind_rdot": 60.0 * DEGREE,
-}  # fmt: skip
+from shipgym.trials.units import DEGREE, LIMITS, QUANTITIES, UNITS, si_factor
 
 _FASTEST_TURN = 60.0 * DEGREE
 _LARGEST_JUMP = 30.0 * DEGREE

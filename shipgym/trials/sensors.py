@@ -12,9 +12,8 @@ from shipgym.checks import check_number, check_whole
 from shipgym.engine.passages import SEA_CHANNELS
 from shipgym.errors import InputError
 from shipgym.trials.trial import Trial
-from shipgym.trials.units import CHANNELS, check_channel
+from shipgym.trials.units import CHANNELS, DEGREE, check_channel
 
-DEGREE = float(np.pi / 180.0)
 FEWEST_SAMPLES = 3  # of a trial
 
 
