@@ -287,9 +287,11 @@ def _offers(
     offers = {}
     for name, manoeuvre in candidates.items():
         try:
-            trial = _recorded(model, manoeuvre(model))
+            trial = manoeuvre(model)
         except UnstableModelError:
             continue
+        if "n_command" in trial and "n" not in trial:  # what is only commanded is as commanded
+            trial = trial.with_channels({"n": trial["n_command"]})
         offers[name] = fisher_information(model, _regression(model, trial), noise)
     if not offers:
         raise InputError(
@@ -297,11 +299,6 @@ def _offers(
             "that can be simulated; give gentler manoeuvres"
         )
     return offers
-
-
-def _recorded(model: ShipModel, run: Trial) -> Trial:
-    """A simulated trial with its shaft speed, where that is only commanded."""
-    return run if "n" in run or "n_command" not in run else run.with_channels({"n": run["n_command"]})
 
 
 def _size(model: ShipModel, information: Floats) -> Floats:

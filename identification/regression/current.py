@@ -17,8 +17,8 @@ import numpy as np
 from shipgym.arrays import Floats
 from shipgym.ships.simulate import wind_accelerations
 from shipgym.trials.derivatives import time_derivative
+from shipgym.trials.navigation import rotate_to_body
 from shipgym.trials.trial import Trial
-from shipgym.trials.trial_import import rotate_to_body
 
 STEP, STEPS = 0.2, 5  # of the simulation, ship lengths at service speed; steps in a mean
 #: Mean and standard deviation of the coefficients of `_accelerations` before any trial, in units of L and U0.
@@ -104,9 +104,7 @@ class _Runs:
         for k, trial in enumerate(trials):
             wind = wind_accelerations(trial).T[:2] * travel / speed
             n = trial["n"] / shaft if shaft is not None else np.ones(len(trial))
-            ahead, aside = over_ground(trial)
-            c, s = np.cos(trial["psi"]), np.sin(trial["psi"])
-            north, east = ahead * c - aside * s, ahead * s + aside * c
+            north, east = rotate_to_body(*over_ground(trial), -trial["psi"])
             if "v" in trial.derived and "u" not in trial.derived:  # a speed log, through the water
                 logged = trial["u"]
             else:

@@ -22,6 +22,7 @@ from identification.estimators.threads import single_threaded
 from shipgym.arrays import Floats
 from shipgym.checks import check_choice
 from shipgym.errors import InputError
+from shipgym.manoeuvres.towing_tank import rigid_body_forces
 from shipgym.ships import ShipModel, get_structure
 from shipgym.ships.particulars import Particulars
 from shipgym.ships.shared_structure import ACCELERATIONS, AXES, SharedStructure
@@ -149,7 +150,9 @@ def _one_piece(
     unit = 0.5 * ship.require("water_density") * length**2 * speed**2
     targets = np.array([trial[force][rows] / unit / (length if force == "N" else 1.0) for force in FORCES])
     if model_inertia:
-        targets += _rigid_body_forces(prime, ship)
+        inertia = ship.mass_prime, ship.mass_prime * ship.xg_prime, ship.inertia_prime
+        motion = ([prime[name] for name in names] for names in (AXES, ACCELERATIONS))
+        targets += rigid_body_forces(inertia, *motion)
     column = {name: i for i, name in enumerate(structure.coefficient_names)}
     features = np.zeros((len(AXES), len(t), len(column)))
     for own, axis in zip(features, AXES, strict=True):
@@ -157,14 +160,6 @@ def _one_piece(
             factors = [prime[symbol] ** float(power) for symbol, power in share.term.powers]
             own[:, column[share.coefficient]] += share.sign * np.prod(factors, axis=0)
     return features, targets
-
-
-def _rigid_body_forces(prime: dict[str, Floats], ship: Particulars) -> list[Floats]:
-    """Force and moment that accelerate the ship without water, about midship (Fossen 2011, 3.3), prime."""
-    m, static, yaw = ship.mass_prime, ship.mass_prime * ship.xg_prime, ship.inertia_prime
-    u, v, r, udot, vdot, rdot = (prime[name] for name in (*AXES, *ACCELERATIONS))
-    aside = vdot + u * r
-    return [m * (udot - v * r) - static * r * r, m * aside + static * rdot, yaw * rdot + static * aside]
 
 
 def fit_forces(regression: ForceRegression, estimator: Estimator) -> tuple[Floats, Floats]:

@@ -16,8 +16,8 @@ from shipgym.checks import check_choice, check_keys, check_number
 from shipgym.errors import InputError
 from shipgym.ships.particulars import Particulars
 from shipgym.trials.identify_table import OPTIONS, Options
+from shipgym.trials.navigation import rotate_to_body
 from shipgym.trials.trial import Trial
-from shipgym.trials.trial_import import rotate_to_body
 
 NEEDED = {"psi", "u", "v", "r", "delta"}
 COLUMNS = ("current_north", "current_east")

@@ -15,8 +15,8 @@ from shipgym.ships.inertia import particulars_inertia
 from shipgym.ships.mmg import MMG
 from shipgym.ships.particulars import Particulars
 from shipgym.ships.simulate import WIND
+from shipgym.trials.navigation import rotate_to_body
 from shipgym.trials.trial import Trial
-from shipgym.trials.trial_import import rotate_to_body
 
 COLLINEAR = 1e-6  # share of a constant that no term explains, below which the structure has one itself
 
