@@ -1,7 +1,5 @@
 """An identified model and how it came about, as reports and warnings read it."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The options of `identify`, as a model's provenance and settings.json record them."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, is_dataclass
 from typing import Any

@@ -1,7 +1,5 @@
 """From trials to a ship model: `identify`."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial

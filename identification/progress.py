@@ -1,7 +1,5 @@
 """How far a long identification has come, for a command that shows it."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Sequence
 from contextvars import ContextVar
 from typing import TypeVar

@@ -7,8 +7,6 @@ coefficient, D-optimal for the volume of the ellipsoid of all of them, E-optimal
 Coefficients count relative to their size.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial

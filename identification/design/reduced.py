@@ -1,7 +1,5 @@
 """Identify with the terms that are needed: reduce the full structure, then identify what is left."""
 
-from __future__ import annotations
-
 import hashlib
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass

@@ -6,8 +6,6 @@ Forward (Chen, Billings & Luo 1989, Int. J. Control 50(5)): by orthogonal least 
 explains most of what is left. Held out are five stretches of the samples, each predicted from the others.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 

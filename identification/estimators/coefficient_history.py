@@ -1,7 +1,5 @@
 """The history of a model's coefficients over a trial, as a recursive method estimates them."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any

@@ -7,8 +7,6 @@ the singular value decomposition costs nothing. Triangles of parts of the data, 
 the whole. X'X would be as small but loses half of the digits.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

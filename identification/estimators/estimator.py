@@ -1,7 +1,5 @@
 """What every estimator offers that `identify` may fit to an equation, and what a method may use."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol, Self

@@ -1,7 +1,5 @@
 """What the linear estimators share: the decorator of their settings, prediction, checks."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import partial
 from numbers import Real

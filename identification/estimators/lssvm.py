@@ -5,8 +5,6 @@ decomposition of the centred and scaled features, X = U S V', gives the coeffici
 V diag(s / (s^2 + 1/C)) U' y, at a cost of O(n m^2) instead of the O(n^3) of the dual system.
 """
 
-from __future__ import annotations
-
 from itertools import combinations_with_replacement
 from math import factorial, prod
 from typing import Any, Self

@@ -1,7 +1,5 @@
 """Methods of identification: which estimator is fitted to the regression of each equation."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial

@@ -10,8 +10,6 @@ which makes the correction even in e: an error of either sign would push the sam
 tanh(omega e) / omega everywhere, odd and of slope 1 at 0, with e in units of the targets' root mean square.
 """
 
-from __future__ import annotations
-
 from abc import abstractmethod
 from typing import Any, Self
 

@@ -5,8 +5,6 @@ minor rudder. The Lagrangian printed there (9) is that of LS-SVM, but insensitiv
 the epsilon-SVR that is fitted here (Drucker et al. 1997, Support vector regression estimators).
 """
 
-from __future__ import annotations
-
 import warnings
 from collections.abc import Callable, Sequence
 from typing import Any, Self, TypeVar

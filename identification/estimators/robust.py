@@ -1,7 +1,5 @@
 """Weights that bound the influence of outliers: weighted LS-SVM."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

@@ -1,7 +1,5 @@
 """LS-SVM that chooses its own weight of the errors."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Self
 

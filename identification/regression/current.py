@@ -7,8 +7,6 @@ with prior). So the current does not depend on the structure to be identified. I
 estimates with each trial, or each third of one, left out (jackknife): it holds what the equations miss.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import NamedTuple
 

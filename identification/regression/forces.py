@@ -5,8 +5,6 @@ of X, Y and N are stacked. Source: Xu, Hassani & Guedes Soares 2020, equations 1
 equations one after the other.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise

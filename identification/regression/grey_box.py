@@ -1,7 +1,5 @@
 """The regression of a grey box: what the converted reference ship leaves of the target's accelerations."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any

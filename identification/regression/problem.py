@@ -1,7 +1,5 @@
 """What is to be identified: the trials used, the structure, the ship, and the regression they make."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any

@@ -5,8 +5,6 @@ polynomial misses both. The orders, the times at which they changed and, where n
 the lag of the gear are found from the samples of the rudder angle alone.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any

@@ -6,12 +6,10 @@ Cao 2015), the integral structure the trapezoid rule (ISSI of Cao 2015), the spl
 quadrature on splines through the samples, broken where the rudder has corners.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -73,7 +71,7 @@ class Samples:
     def __len__(self) -> int:
         return len(self.start)
 
-    def select(self, rows: NDArray[Any]) -> Samples:
+    def select(self, rows: NDArray[Any]) -> Self:
         """Some of the rows, by mask or index."""
         return replace(
             self,

@@ -1,7 +1,5 @@
 """Trials as they would have been in still water: current and wind taken out, and what is known of them."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import PurePath
 from typing import Any

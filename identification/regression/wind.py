@@ -1,7 +1,5 @@
 """What the wind does to a ship in her trials: accelerations by measured wind, or constant ones by trial."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 

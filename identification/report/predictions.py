@@ -1,7 +1,5 @@
 """Figures of trials and what a model predicts of them."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from pathlib import PurePath
 from typing import Any

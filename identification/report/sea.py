@@ -1,7 +1,5 @@
 """What was taken out of the trials for current and wind: sentences, and tracks through the water."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from pathlib import PurePath
 from typing import Any

@@ -1,7 +1,5 @@
 """The table of coefficients that `IdentificationResult.summary` prints."""
 
-from __future__ import annotations
-
 from math import degrees
 from typing import Any
 

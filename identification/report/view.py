@@ -1,7 +1,5 @@
 """What the templates of reports show of a fit: rows of tables, and figures of its trials."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import PurePath
 from typing import Any

@@ -1,7 +1,5 @@
 """Search for settings: optimisers behind one signature, by name."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from typing import Any, cast
 

@@ -1,7 +1,5 @@
 """What a search for C minimises: the samples are read once, and a candidate costs the same for any number."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Optimisers: grid, particle swarm, differential evolution, artificial bee colony."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

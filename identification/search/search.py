@@ -1,10 +1,9 @@
 """What every optimiser has in common: its signature, its result, and the record of a search."""
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -46,7 +45,7 @@ class SearchResult:
     evaluations: int
     variable: str = LOG_C
 
-    def of(self, dimension: int, variable: str = LOG_C) -> SearchResult:
+    def of(self, dimension: int, variable: str = LOG_C) -> Self:
         """What was found of one dimension."""
         return replace(self, x=self.x[[dimension]], course=self.course[:, [dimension]], variable=variable)
 

@@ -6,8 +6,6 @@ manoeuvring performance of a ship with the parameter of loading condition, J. So
 Japan 168 (hull). Both about midship, even keel, prime system by rho L^2 U^2 / 2 and rho L^3 U^2 / 2.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 

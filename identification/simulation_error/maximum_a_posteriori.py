@@ -5,8 +5,6 @@ by their own scatter, plus the squared distance from the prior (Maine & Iliff 19
 error with prior). How much narrower the prior is made, the trials decide, each predicted from the others.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any

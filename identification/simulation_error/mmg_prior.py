@@ -8,8 +8,6 @@ charts (added mass); Fujii & Tuda 1961 (rudder lift slope); Quadvlieg 2013 (a_H,
 1957 and Denny-Mumford (resistance); Wageningen B4-50 (thrust).
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace

@@ -9,8 +9,6 @@ reference ship's zigzags and turns into the regression. Formulas (Clarke 1983, K
 and S is diagonal, each coefficient weighed by what its term contributes in a hard turn.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Any

@@ -5,8 +5,6 @@ compared. Whole trials would let a drift of heading leak into the coefficients, 
 (multiple shooting, Bock 1983; the output-error method of Maine & Iliff 1985, NASA RP-1138).
 """
 
-from __future__ import annotations
-
 import copy
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace

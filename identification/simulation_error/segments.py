@@ -1,7 +1,5 @@
 """Stretches of trials that a model sails from a start of their own: multiple shooting."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 

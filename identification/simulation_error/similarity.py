@@ -1,7 +1,5 @@
 """Which ship is most like another, by its main dimensions (Mei 2019, equations 3 to 6)."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Mapping
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Covariance of coefficients by refits to blocks of the record drawn with replacement."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
 

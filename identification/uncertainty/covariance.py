@@ -1,7 +1,5 @@
 """How certain the coefficients are, together: one covariance over all equations of motion."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 import numpy as np

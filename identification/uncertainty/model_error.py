@@ -6,8 +6,6 @@ others and by models drawn from its covariance; standard errors are scaled until
 one.
 """
 
-from __future__ import annotations
-
 import copy
 from collections.abc import Mapping, Sequence
 from dataclasses import replace

@@ -4,8 +4,6 @@ Open loop, a tenth of a degree of neutral helm moves the second overshoot of a 1
 because the rudder is reversed when the measured ship got there, not the simulated one.
 """
 
-from __future__ import annotations
-
 from itertools import pairwise
 
 import numpy as np

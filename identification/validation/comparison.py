@@ -1,7 +1,5 @@
 """Structures and methods on the same trials, ranked by what they predict of trials not seen."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import fields
 from pathlib import Path

@@ -1,7 +1,5 @@
 """What the data can determine and what the fit left over: excitation, collinearity, residuals."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any

@@ -1,7 +1,5 @@
 """Which trials a choice is validated on: each held out in turn, or those of the largest rudder."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
 

@@ -3,8 +3,6 @@
 A fit of zigzags extrapolates in hard turns, where terms that hardly mattered in the data take over.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial

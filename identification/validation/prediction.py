@@ -1,7 +1,5 @@
 """How well a model predicts recorded trials, open loop from the measured rudder."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

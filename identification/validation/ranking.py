@@ -1,7 +1,5 @@
 """Structures and methods on the same trials, ranked by how well they predict trials held out."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any

@@ -1,7 +1,5 @@
 """Which structure and which method predict trials held out best, for `structure = "auto"`."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, replace
 from typing import Any

@@ -1,7 +1,5 @@
 """The state at which a prediction starts, where the record has velocities only as derivatives."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from shipgym.arrays import Floats

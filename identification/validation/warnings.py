@@ -1,7 +1,5 @@
 """What speaks against an identified model: why it must not be used, and what to know before using it."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from pathlib import PurePath
 from typing import Any

@@ -5,12 +5,10 @@ options of `shipgym identify` and the tables of `docs/identification.md`: all ar
 `identify_table.toml`, which says of each field what it sets and which values it may have.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from numbers import Real
-from typing import Any
+from typing import Any, Self
 
 from shipgym.checks import (
     check_choice,
@@ -128,7 +126,7 @@ class Options:
                 raise InputError(f"{name}: {found!r} found without a prior; name one, or leave it out")
 
     @classmethod
-    def of(cls, given: Mapping[str, Any]) -> Options:
+    def of(cls, given: Mapping[str, Any]) -> Self:
         """Options by name; InputError for an unknown name."""
         for name in given:
             if name not in OPTIONS:

@@ -1,7 +1,5 @@
 """From a noisy record to channels that can be differentiated: noise, filters, smoothers, repair."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 
 from identification.regression.preprocess.filters import median, savitzky_golay, smooth

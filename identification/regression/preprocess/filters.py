@@ -1,7 +1,5 @@
 """Filters of single channels: running median, Savitzky-Golay and smoothing splines."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.linalg import solveh_banded

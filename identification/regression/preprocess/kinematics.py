@@ -1,7 +1,5 @@
 """Positions, heading and velocities smoothed together, so that each is the derivative of the other."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Outliers and dropouts of a record: found, filled from their neighbours, and counted."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.interpolate import PchipInterpolator
