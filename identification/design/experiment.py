@@ -18,7 +18,7 @@ from rich.table import Table
 from identification.design.reduction import table_of
 from identification.regression.samples import Samples, build_samples
 from identification.text import as_text, lined_table
-from identification.validation.diagnostics import scaled_features
+from identification.validation.diagnostics import JITTER, scaled_features, variance_inflation
 from identification.validation.guard import hard_turn_features
 from shipgym.arrays import Floats
 from shipgym.checks import check_choice
@@ -34,7 +34,6 @@ DURATION = 40.0  # of a candidate, in the time to sail one ship length
 STEPS = 60  # samples of a candidate in that time
 WINDOW = 0.2  # over which velocities are integrated, in that time
 FLOOR = 1e-14  # of the eigenvalues of an information, by the largest
-JITTER = 1e-12
 
 
 @dataclass(frozen=True, eq=False)
@@ -272,9 +271,8 @@ def _information_of(
     inflation: dict[str, float] = {}
     for q, X in samples.features.items():
         scaled, condition[q] = scaled_features(X)
-        moment = scaled.T @ scaled / len(scaled)
-        factors = np.diag(np.linalg.inv(moment + JITTER * np.eye(len(moment)))) * np.diag(moment)
-        inflation |= dict(zip(model.table.regression_names(q), factors.tolist(), strict=True))
+        factors = variance_inflation(scaled).tolist()
+        inflation |= dict(zip(model.table.regression_names(q), factors, strict=True))
     return TrialInformation(name, condition, inflation, fisher_information(model, samples, noise))
 
 

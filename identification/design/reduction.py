@@ -16,6 +16,7 @@ from rich.table import Table
 from identification.estimators.lssvm import TruncatedLSSVM
 from identification.regression.samples import Samples
 from identification.text import as_text
+from identification.validation.diagnostics import COLLINEAR, JITTER, variance_inflation
 from shipgym.arrays import Floats
 from shipgym.checks import check_choice, check_number
 from shipgym.errors import InputError, UnstableModelError
@@ -23,8 +24,6 @@ from shipgym.ships import ShipModel, Structure
 from shipgym.trials.trial import Trial
 
 FOLDS = 5
-COLLINEAR = 0.98  # correlation of a pair, and multiple correlation of a group
-JITTER = 1e-12  # of a correlation matrix, so that exact collinearity shows as a large inflation
 SENSED = ("u", "v", "r", "psi")
 
 
@@ -301,9 +300,8 @@ def _collinear(features: Floats, kept: Sequence[int]) -> set[int]:
     """Terms that others nearly make up, by pair or by variance inflation."""
     scaled = features[:, kept] / np.sqrt(np.mean(features[:, kept] ** 2, axis=0))
     correlation = scaled.T @ scaled / len(scaled)
-    inflation = np.diag(np.linalg.inv(correlation + JITTER * np.eye(len(kept))))
     pairs = np.abs(correlation - np.diag(np.diag(correlation))) > COLLINEAR
-    member = pairs.any(axis=0) | (inflation > 1.0 / (1.0 - COLLINEAR**2))
+    member = pairs.any(axis=0) | (variance_inflation(scaled) > 1.0 / (1.0 - COLLINEAR**2))
     return {i for i, yes in zip(kept, member.tolist(), strict=True) if yes}
 
 

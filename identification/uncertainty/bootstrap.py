@@ -1,13 +1,13 @@
 """Covariance of coefficients by refits to blocks of the record drawn with replacement."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 from sklearn.base import clone
 
-from identification.estimators.estimator import Estimator
+from identification.estimators.estimator import Estimator, Estimators
 from identification.estimators.lssvm import LSSVM, TruncatedLSSVM
 from identification.estimators.threads import single_threaded
 from identification.progress import counted
@@ -36,7 +36,7 @@ def moving_blocks(groups: Sequence[Rows], lengths: Sequence[int], rng: np.random
 
 @single_threaded()
 def bootstrap_covariance(
-    estimators: Mapping[str, Estimator], samples: Samples, memory: float, draws: int = DRAWS, seed: int = 0
+    estimators: Estimators, samples: Samples, memory: float, draws: int = DRAWS, seed: int = 0
 ) -> Floats:
     """Covariance of the coefficients of all equations by a block bootstrap over time.
 

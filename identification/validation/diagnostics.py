@@ -23,6 +23,7 @@ MOST_RUDDER = np.radians(3.0)  # unless it moves more than this
 SHORTEST_STEP = 1e-4  # of the median time step; a shorter one is a row written twice
 MEDIAN_WIDTH = 5  # samples; shorter excursions of a rudder are outliers
 COLLINEAR = 0.98  # correlation of two features
+JITTER = 1e-12  # of a correlation matrix, so that exact collinearity shows as a large inflation
 MOTIONS = {"u": "surge speed", "v": "sway speed", "r": "yaw rate", "p": "roll rate"}
 
 
@@ -178,10 +179,10 @@ def cross_correlation(first: Floats, second: Floats, lags: NDArray[np.int64]) ->
 def variance_inflation(scaled: Floats) -> Floats:
     """Factor by which the other features increase the variance of each coefficient.
 
-    Features have a root mean square of 1.
+    Features have a root mean square of 1; of exactly collinear ones it is large, up to 1e12.
     """
     moment = scaled.T @ scaled / len(scaled)
-    factors: Floats = np.diag(np.linalg.pinv(moment, rcond=1e-14)) * np.diag(moment)
+    factors: Floats = np.diag(np.linalg.inv(moment + JITTER * np.eye(len(moment)))) * np.diag(moment)
     return factors
 
 
