@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from shipgym.arrays import Floats
-from shipgym.checks import check_choice, check_keys, check_number, check_table
+from shipgym.checks import check_choice, check_number, check_table
 from shipgym.errors import InputError
 from shipgym.trials.derivatives import time_derivative
 from shipgym.trials.resampling import Log
@@ -42,27 +42,35 @@ class Instruments:
     @classmethod
     def from_mapping(cls, table: Any, where: str, ship: Particulars | None = None) -> Instruments:
         """Check the table ``[sensors]`` of a ship file; InputError also for an antenna outside the ship."""
-        check_keys(check_table(table, where), ("gnss_antenna", *_OFFSETS, "clock_offsets"), where)
-        antenna = check_table(table.get("gnss_antenna", {}), place := f"{where} gnss_antenna")
-        check_keys(antenna, ("forward", "starboard"), place)
-        at = {key: check_number(antenna.get(key, 0.0), f"{place}.{key}") for key in ("forward", "starboard")}
-        for key, size in (("forward", "length"), ("starboard", "beam")):
-            limit = 0.6 * float((ship and (ship.get(size) or ship.length)) or np.inf)
-            if ship is not None and abs(at[key]) > limit:
-                raise InputError(
-                    f"{place}.{key}: {at[key]:g} m found, outside the ship of {ship.length:g} m, expected at "
-                    f"most {limit:.4g} m from midship; measured from the aft perpendicular take off "
-                    f"{ship.length / 2:g}"
-                )
-        offsets = [
-            value
-            if (value := table.get(key, 0.0)) == _ESTIMATE
-            else DEGREE * check_number(value, f"{where} {key}", at_least=-180.0, hint=f'or "{_ESTIMATE}"')
-            for key in _OFFSETS
-        ]
-        if (clocks := table.get("clock_offsets")) is not None:
+        check_table(table, where, ("gnss_antenna", *_OFFSETS, "clock_offsets"))
+        place = f"{where} gnss_antenna"
+        antenna = check_table(table.get("gnss_antenna", {}), place, ("forward", "starboard"))
+        forward = check_number(antenna.get("forward", 0.0), f"{place}.forward")
+        starboard = check_number(antenna.get("starboard", 0.0), f"{place}.starboard")
+        if ship is not None:
+            _check_aboard(forward, ship.length, ship, f"{place}.forward")
+            _check_aboard(starboard, ship.beam or ship.length, ship, f"{place}.starboard")
+        heading, rudder = (_offset(table.get(key, 0.0), f"{where} {key}") for key in _OFFSETS)
+        clocks = table.get("clock_offsets")
+        if clocks is not None:
             check_choice(clocks, ("correct", "keep"), f"{where} clock_offsets")
-        return cls(at["forward"], at["starboard"], offsets[0], offsets[1], clocks)
+        return cls(forward, starboard, heading, rudder, clocks)
+
+
+def _check_aboard(distance: float, size: float, ship: Particulars, where: str) -> None:
+    limit = 0.6 * size
+    if abs(distance) > limit:
+        raise InputError(
+            f"{where}: {distance:g} m found, outside the ship of {ship.length:g} m, expected at most "
+            f"{limit:.4g} m from midship; measured from the aft perpendicular take off {ship.length / 2:g}"
+        )
+
+
+def _offset(value: Any, where: str) -> float | str:
+    """An offset in rad, of one in degrees, or that it is to be estimated."""
+    if value == _ESTIMATE:
+        return _ESTIMATE
+    return DEGREE * check_number(value, where, at_least=-180.0, hint=f'or "{_ESTIMATE}"')
 
 
 NO_OFFSETS = Instruments()

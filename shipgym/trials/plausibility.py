@@ -182,16 +182,16 @@ def _unit_remedy(channel: str, excess: float, source: Source) -> str:
 
 def _angle_remedy(gain: float, source: Source) -> str:
     """Name the unit of heading or yaw rate that would bring the two together."""
-    psi_unit, r_unit = source.columns["psi"].unit, source.columns["r"].unit
-    options = {
-        source.declare(channel, unit): abs(math.log(gain * change) if gain * change > 0.0 else math.inf)
-        for channel, own, sign in (("psi", psi_unit, 1.0), ("r", r_unit, -1.0))
-        for unit in UNITS[QUANTITIES[channel]]
-        if unit != own
-        for change in ((si_factor(channel, unit) / si_factor(channel, own)) ** sign,)
-    }
-    nearest = min(options.values())
-    return "declare " + " or ".join(text for text, distance in options.items() if distance < nearest + 0.01)
+    distances = {}  # of the gain from 1, by declaration
+    for channel, sign in (("psi", 1.0), ("r", -1.0)):
+        own = source.columns[channel].unit
+        for unit, factor in UNITS[QUANTITIES[channel]].items():
+            if unit != own:
+                changed = gain * (factor / si_factor(channel, own)) ** sign
+                distance = abs(math.log(changed)) if changed > 0.0 else math.inf
+                distances[source.declare(channel, unit)] = distance
+    nearest = min(distances.values())
+    return "declare " + " or ".join(text for text, distance in distances.items() if distance < nearest + 0.01)
 
 
 def find_outliers(
