@@ -9,8 +9,7 @@ from identification.estimators.estimator import Estimator
 from identification.regression.samples import Samples
 from identification.search import SearchResult
 from identification.validation.diagnostics import EquationDiagnostics
-from shipgym.ships import ShipModel
-from shipgym.trials.trial import Trial
+from shipgym import ShipModel, Trial
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,11 +7,9 @@ from typing import Any
 import numpy as np
 
 import shipgym
-from shipgym.ships import ShipModel, Structure
-from shipgym.ships.particulars import Particulars
-from shipgym.ships.steering import SteeringGear
+from shipgym import Particulars, ShipModel, SteeringGear, Trial
+from shipgym.ships import Structure
 from shipgym.trials.identify_table import Options
-from shipgym.trials.trial import Trial
 
 Given = Particulars | Mapping[str, Any] | None  # particulars, as `identify` takes them
 

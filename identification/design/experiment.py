@@ -20,12 +20,10 @@ from identification.regression.samples import Samples, build_samples
 from identification.text import as_text, lined_table
 from identification.validation.diagnostics import JITTER, scaled_features, variance_inflation
 from identification.validation.guard import hard_turn_features
+from shipgym import InputError, ShipModel, Trial, UnstableModelError
 from shipgym.arrays import Floats
 from shipgym.checks import check_choice
-from shipgym.errors import InputError, UnstableModelError
 from shipgym.manoeuvres import prbs_rudder, turning_circle, zigzag
-from shipgym.ships import ShipModel
-from shipgym.trials.trial import Trial
 
 Manoeuvre = Callable[[ShipModel], Trial]
 

@@ -9,10 +9,9 @@ from typing import Any
 from identification.design.reduction import Reduction, reduce, reduced_structure, sensitivity
 from identification.pipeline import identify
 from identification.result import IdentificationResult
-from shipgym.errors import InputError, UnstableModelError
+from shipgym import InputError, ShipModel, Trial, UnstableModelError, register_structure
 from shipgym.manoeuvres import zigzag
-from shipgym.ships import GreyBox, ShipModel, Structure, register_structure
-from shipgym.trials.trial import Trial
+from shipgym.ships import GreyBox, Structure
 
 
 @dataclass(frozen=True, eq=False)

@@ -17,11 +17,10 @@ from identification.estimators.lssvm import TruncatedLSSVM
 from identification.regression.samples import Samples
 from identification.text import as_text
 from identification.validation.diagnostics import COLLINEAR, JITTER, variance_inflation
+from shipgym import InputError, ShipModel, Trial, UnstableModelError
 from shipgym.arrays import Floats
 from shipgym.checks import check_choice, check_number
-from shipgym.errors import InputError, UnstableModelError
-from shipgym.ships import ShipModel, Structure
-from shipgym.trials.trial import Trial
+from shipgym.ships import Structure
 
 FOLDS = 5
 SENSED = ("u", "v", "r", "psi")

@@ -11,11 +11,9 @@ from sklearn.base import clone
 from identification.estimators.methods import get_method
 from identification.estimators.recursive import Recursion
 from identification.regression.samples import Samples, build_samples
+from shipgym import InputError, Particulars, Trial
 from shipgym.arrays import Floats
-from shipgym.errors import InputError
 from shipgym.ships import Structure, get_structure
-from shipgym.ships.particulars import Particulars
-from shipgym.trials.trial import Trial
 
 
 @dataclass(frozen=True, eq=False)

@@ -15,8 +15,8 @@ from numpy.typing import ArrayLike
 from scipy.linalg import lapack
 
 from identification.estimators.threads import single_threaded
+from shipgym import InputError
 from shipgym.arrays import Floats
-from shipgym.errors import InputError
 
 CONSTANT = 100 * np.finfo(float).eps  # of its size; a feature that varies less is constant but for rounding
 BLOCK = 32  # columns that LAPACK handles at once

@@ -8,9 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from identification.regression.samples import Samples
+from shipgym import ShipModel, Trial
 from shipgym.arrays import Floats
-from shipgym.ships import ShipModel
-from shipgym.trials.trial import Trial
 
 
 class Estimator(Protocol):

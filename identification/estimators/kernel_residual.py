@@ -21,14 +21,13 @@ from identification.estimators.rm_svm import heading_error, most_regularised
 from identification.regression.preprocess import smoothed_channels
 from identification.regression.samples import Samples, build_samples
 from identification.validation.folds import TRIALS, held_out_rows
+from shipgym import InputError, ShipModel, Trial
 from shipgym.arrays import Floats
 from shipgym.checks import check_number, check_whole
-from shipgym.errors import InputError
-from shipgym.ships import GreyBox, ShipModel
+from shipgym.ships import GreyBox
 from shipgym.ships.grey_boxes import GREY_BOX
 from shipgym.ships.kernel_boxes import RBF, SIZES, Kernel, gaussians, kernel_box, kernel_inputs
 from shipgym.trials.identify_table import AUTO, Options
-from shipgym.trials.trial import Trial
 
 OWN = ("kernel", "centres", "kernel_length", "C", "folds")  # options of the kernel alone
 BLACK_BOX = "linear"  # the structure beneath a kernel where none is named

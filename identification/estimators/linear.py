@@ -10,8 +10,8 @@ from numpy.typing import ArrayLike
 from sklearn.base import BaseEstimator, RegressorMixin
 from sklearn.utils.validation import check_is_fitted, validate_data
 
+from shipgym import InputError
 from shipgym.arrays import Floats
-from shipgym.errors import InputError
 
 #: A dataclass is an estimator of scikit-learn's: its fields are the settings, which `__init__` only stores.
 settings = partial(dataclass, eq=False, repr=False)

@@ -19,9 +19,9 @@ from identification.estimators.decomposition import Decomposition, centre_and_sc
 from identification.estimators.l_curve import corner_rank, gcv_rank, l_curve, variance_rank
 from identification.estimators.linear import LinearRegressor, check_weight, settings, validated
 from identification.estimators.robust import fit_weighted
+from shipgym import InputError
 from shipgym.arrays import Floats
 from shipgym.checks import check_choice, check_whole
-from shipgym.errors import InputError
 
 KERNELS = ("linear", "rbf", "poly")
 SELECTIONS = ("l-curve", "gcv", "explained-variance", "full")

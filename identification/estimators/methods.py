@@ -20,9 +20,9 @@ from identification.estimators.recursive import (
 from identification.estimators.rm_svm import RMSVM, fit_rm_svm
 from identification.estimators.tuned import TunedLSSVM, fit_tuned
 from identification.regression.samples import Samples
+from shipgym import InputError
 from shipgym.arrays import Floats
 from shipgym.checks import check_choice, check_number, quoted
-from shipgym.errors import InputError
 
 
 def fit_all(estimator: Callable[[], Estimator], samples: Samples) -> Estimators:

@@ -20,9 +20,9 @@ from sklearn.utils.validation import check_is_fitted
 from identification.estimators.decomposition import scales_of
 from identification.estimators.linear import LinearRegressor, settings, validated
 from identification.estimators.lssvm import LSSVM
+from shipgym import InputError
 from shipgym.arrays import Floats
 from shipgym.checks import check_number, check_whole
-from shipgym.errors import InputError
 
 
 @settings()

@@ -21,11 +21,10 @@ from identification.search.pattern_search import pattern_search
 from identification.search.search import BAND, SearchResult
 from identification.validation.folds import FOLDS, TRIALS, held_out_rows
 from identification.validation.prediction import predict
+from shipgym import InputError, ShipModel, Trial
 from shipgym.arrays import Floats
 from shipgym.checks import check_choice, check_number
-from shipgym.errors import InputError
-from shipgym.ships import GreyBox, ShipModel
-from shipgym.trials.trial import Trial
+from shipgym.ships import GreyBox
 
 OBJECTIVES = ("rmse", "correlation")
 REGRESSIONS = ("svr", "ls-svm")

@@ -12,11 +12,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from shipgym import Trial
 from shipgym.arrays import Floats
 from shipgym.ships.simulate import wind_accelerations
 from shipgym.trials.derivatives import time_derivative
 from shipgym.trials.navigation import rotate_to_body
-from shipgym.trials.trial import Trial
 
 STEP, STEPS = 0.2, 5  # of the simulation, ship lengths at service speed; steps in a mean
 #: Mean and standard deviation of the coefficients of `_accelerations` before any trial, in units of L and U0.

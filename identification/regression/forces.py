@@ -17,15 +17,12 @@ from sklearn.metrics import r2_score
 from identification.estimators.estimator import Estimator
 from identification.estimators.lssvm import TruncatedLSSVM
 from identification.estimators.threads import single_threaded
+from shipgym import InputError, Particulars, ShipModel, SteeringGear, Trial
 from shipgym.arrays import Floats
 from shipgym.checks import check_choice
-from shipgym.errors import InputError
 from shipgym.manoeuvres.towing_tank import rigid_body_forces
-from shipgym.ships import ShipModel, get_structure
-from shipgym.ships.particulars import Particulars
+from shipgym.ships import get_structure
 from shipgym.ships.shared_structure import ACCELERATIONS, AXES, SharedStructure
-from shipgym.ships.steering import SteeringGear
-from shipgym.trials.trial import Trial
 
 FORCES = ("X", "Y", "N")
 NEEDED = ("u", "v", "r", *FORCES)

@@ -11,11 +11,9 @@ from identification.estimators.lssvm import TruncatedLSSVM
 from identification.regression.samples import Samples, build_samples
 from identification.simulation_error.similarity import AUTO, check_alike, select_reference
 from identification.validation.prediction import predict, trial_metrics
+from shipgym import InputError, Particulars, ShipModel, Trial
 from shipgym.arrays import Floats
-from shipgym.errors import InputError
-from shipgym.ships import GreyBox, ShipModel, grey_box
-from shipgym.ships.particulars import Particulars
-from shipgym.trials.trial import Trial
+from shipgym.ships import GreyBox, grey_box
 
 
 class _OwnAccelerations:

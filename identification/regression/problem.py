@@ -14,17 +14,14 @@ from identification.regression.samples import Samples, build_samples
 from identification.regression.still_water import in_still_water
 from identification.regression.wind import constant_wind, with_constant_wind
 from identification.validation.diagnostics import check_samples, check_trials
+from shipgym import InputError, Particulars, ShipModel, SteeringGear, Trial
 from shipgym.checks import check_choice, check_number
-from shipgym.errors import InputError
-from shipgym.ships import Envelope, ShipModel, Structure, Term, get_structure
+from shipgym.ships import Envelope, Structure, Term, get_structure
 from shipgym.ships.grey_boxes import GREY_BOX
 from shipgym.ships.mmg import MMG
-from shipgym.ships.particulars import Particulars
-from shipgym.ships.steering import SteeringGear
 from shipgym.ships.structures import STRUCTURES, get_dynamics
 from shipgym.trials.identify_table import Options
 from shipgym.trials.scale import check_scale
-from shipgym.trials.trial import Trial
 
 ENVELOPE_CHANNELS = ("u", "v", "r", "delta")
 #: Stands for the MMG form where channels, excitation and particulars are checked.

@@ -15,9 +15,8 @@ from scipy.optimize import brentq, minimize_scalar
 from scipy.special import lambertw
 
 from identification.regression.preprocess import is_noisy
+from shipgym import SteeringGear, Trial
 from shipgym.arrays import Floats
-from shipgym.ships.steering import SteeringGear
-from shipgym.trials.trial import Trial
 
 Flags = NDArray[np.bool_]
 

@@ -24,14 +24,11 @@ from identification.regression.integrals import (
     twice_integrated,
 )
 from identification.regression.rudder import rebuild, straight
+from shipgym import InputError, Particulars, SteeringGear, Trial
 from shipgym.arrays import Floats, integral
 from shipgym.checks import check_whole
-from shipgym.errors import InputError
 from shipgym.ships.grey_boxes import GreyBox
-from shipgym.ships.particulars import Particulars
-from shipgym.ships.steering import SteeringGear
 from shipgym.ships.term_table import Structure
-from shipgym.trials.trial import Trial
 
 SAMPLE_STRUCTURES = ("euler", "integral", "spline")
 LONGEST_WINDOW = 1.0 / 3.0  # of the time to sail one ship length

@@ -9,13 +9,11 @@ from scipy.stats import chi2
 
 from identification.regression.current import estimate_current, over_ground
 from identification.regression.wind import measured_wind
+from shipgym import InputError, Particulars, Trial
 from shipgym.arrays import Floats, integral
 from shipgym.checks import check_choice, check_keys, check_number
-from shipgym.errors import InputError
-from shipgym.ships.particulars import Particulars
 from shipgym.trials.identify_table import OPTIONS, Options
 from shipgym.trials.navigation import rotate_to_body
-from shipgym.trials.trial import Trial
 
 NEEDED = {"psi", "u", "v", "r", "delta"}
 COLUMNS = ("current_north", "current_east")

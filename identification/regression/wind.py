@@ -6,15 +6,13 @@ from typing import Any
 import numpy as np
 
 from identification.regression.samples import Samples
+from shipgym import InputError, Particulars, Trial
 from shipgym.checks import check_flag, check_keys
-from shipgym.errors import InputError
 from shipgym.sea.wind import AIR_DENSITY, WindTable, wind_curves
 from shipgym.ships.inertia import particulars_inertia
 from shipgym.ships.mmg import MMG
-from shipgym.ships.particulars import Particulars
 from shipgym.ships.simulate import WIND
 from shipgym.trials.navigation import rotate_to_body
-from shipgym.trials.trial import Trial
 
 COLLINEAR = 1e-6  # share of a constant that no term explains, below which the structure has one itself
 

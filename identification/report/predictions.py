@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 
+from shipgym import Trial
 from shipgym.plots import AXES, MEASURED, MODEL, Panel, axis, line, panels
 from shipgym.plots.style import Figure
 from shipgym.trials.navigation import rotate_to_body
-from shipgym.trials.trial import Trial
 
 RUDDER = "#9aa5b1"
 

@@ -11,9 +11,8 @@ from identification.report.predictions import overview_figure, prediction_figure
 from identification.report.sea import sea_sentences, track_figure
 from identification.report.summary import PRIME, are_derivatives, kernel_text
 from identification.validation.warnings import EQUATIONS, heading_errors_deg, model_warnings
-from shipgym.ships import ShipModel
+from shipgym import ShipModel, Trial
 from shipgym.ships.particulars import ADDED_MASSES
-from shipgym.trials.trial import Trial
 from shipgym.trials.units import KNOT
 
 SIGNIFICANT_T = 2.0  # a coefficient with a smaller |t| is not significantly different from zero

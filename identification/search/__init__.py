@@ -12,8 +12,8 @@ from identification.search.optimisers import (
     ParticleSwarm,
 )
 from identification.search.search import Objective, Optimiser, SearchResult
+from shipgym import InputError
 from shipgym.checks import check_choice
-from shipgym.errors import InputError
 
 __all__ = [
     "OPTIMISERS", "ArtificialBeeColony", "DifferentialEvolution", "GridSearch", "Optimiser",

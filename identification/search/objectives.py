@@ -7,8 +7,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from identification.estimators.decomposition import Decomposition, decompose_triangle, stacked, triangle
+from shipgym import InputError
 from shipgym.arrays import Floats
-from shipgym.errors import InputError
 
 
 @dataclass(frozen=True, eq=False)

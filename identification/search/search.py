@@ -8,8 +8,8 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike
 
+from shipgym import InputError
 from shipgym.arrays import Floats
-from shipgym.errors import InputError
 
 LOG_C, BAND = "log10 C", "insensitive band"  # what searches look for
 MOST = 100_000  # particles, rounds and the like of a search

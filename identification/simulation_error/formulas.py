@@ -12,9 +12,8 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
+from shipgym import InputError, Particulars
 from shipgym.arrays import Floats
-from shipgym.errors import InputError
-from shipgym.ships.particulars import Particulars
 from shipgym.ships.term_table import Structure, inertia
 from shipgym.ships.terms import Term
 

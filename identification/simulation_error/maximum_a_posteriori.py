@@ -17,14 +17,12 @@ from identification.options import Options, name_of
 from identification.regression.problem import Problem
 from identification.simulation_error.mmg_prior import YOSHIMURA, MMGPrior, mmg_prior
 from identification.simulation_error.segments import Segment, channel_units, compared_channels, cut, sailed
+from shipgym import InputError, ShipModel, Trial
 from shipgym.arrays import Floats
 from shipgym.checks import check_number
 from shipgym.engine.motion import Ship
 from shipgym.engine.records import LANES
-from shipgym.errors import InputError
-from shipgym.ships import ShipModel
 from shipgym.ships.mmg import IDENTIFIED
-from shipgym.trials.trial import Trial
 
 Rows = NDArray[np.int64]
 

@@ -24,14 +24,13 @@ from identification.simulation_error.similarity import (
     select_reference,
     similarity_vector,
 )
+from shipgym import InputError, Particulars, ShipModel, load_model
 from shipgym.arrays import Floats
 from shipgym.checks import check_choice, quoted
-from shipgym.errors import InputError
 from shipgym.files import shipped_toml
-from shipgym.ships import ShipModel, load_model
 from shipgym.ships.catalogue import REFERENCE_SHIPS
 from shipgym.ships.mmg import IDENTIFIED, MMG, SHIP, dimensions, standard_form
-from shipgym.ships.particulars import ADDED_MASSES, Particulars
+from shipgym.ships.particulars import ADDED_MASSES
 
 YOSHIMURA, KIJIMA = "yoshimura", "kijima"
 HULL_FORMULAS = (YOSHIMURA, KIJIMA)

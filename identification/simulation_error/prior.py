@@ -24,12 +24,11 @@ from identification.simulation_error.formulas import FORMULAS, formula_coefficie
 from identification.simulation_error.similarity import AUTO, select_reference
 from identification.validation.folds import FOLDS, LARGEST_RUDDER, TRIALS, of_largest_rudder
 from identification.validation.guard import hard_turn_features, reasons_unstable, with_coefficients
+from shipgym import InputError, ShipModel, Trial
 from shipgym.arrays import Floats
 from shipgym.checks import check_choice, check_number
-from shipgym.errors import InputError
 from shipgym.manoeuvres import turning_circle, zigzag
-from shipgym.ships import GreyBox, ShipModel, converted_model
-from shipgym.trials.trial import Trial
+from shipgym.ships import GreyBox, converted_model
 
 STRENGTHS = (0.0, *np.geomspace(1e-4, 10.0, 11).tolist(), np.inf)
 BLOCKS = 5  # of time, into which a single trial is cut

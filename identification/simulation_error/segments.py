@@ -9,12 +9,12 @@ from numpy.typing import NDArray
 from identification.regression import preprocess
 from identification.regression.rudder import Rudder, rebuild, straight
 from identification.regression.samples import between_gaps
+from shipgym import ShipModel, Trial
 from shipgym.arrays import Floats
 from shipgym.engine.loops import ship_loop
 from shipgym.engine.records import LANES
-from shipgym.ships import ShipModel, Structure
+from shipgym.ships import Structure
 from shipgym.ships.simulate import LONGEST_STEP, wind_accelerations
-from shipgym.trials.trial import Trial
 
 Integers = NDArray[np.int64]
 

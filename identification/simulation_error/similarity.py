@@ -6,12 +6,10 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike
 
+from shipgym import InputError, Particulars, ShipModel, load_model
 from shipgym.arrays import Floats
 from shipgym.checks import quoted
-from shipgym.errors import InputError
-from shipgym.ships import ShipModel, load_model
 from shipgym.ships.catalogue import REFERENCE_SHIPS
-from shipgym.ships.particulars import Particulars
 
 GRAVITY = 9.81
 AUTO = "auto"

@@ -22,8 +22,7 @@ from identification.regression.samples import Samples
 from identification.uncertainty.covariance import residuals
 from identification.validation.closed_loop import closed_loop
 from identification.validation.prediction import COMPARED, ZIGZAG, index_reader, predict
-from shipgym.ships import ShipModel
-from shipgym.trials.trial import Trial
+from shipgym import ShipModel, Trial
 
 Error = tuple[float, float, float]  # squared error, variance over the draws, variance of the measurement
 

@@ -12,10 +12,9 @@ from identification.estimators.estimator import Estimator
 from identification.regression import preprocess
 from identification.regression.samples import Samples
 from identification.uncertainty.covariance import residuals
+from shipgym import InputError, Trial
 from shipgym.arrays import Floats
-from shipgym.errors import InputError
 from shipgym.ships import Structure
-from shipgym.trials.trial import Trial
 
 LEAST_RUDDER = np.radians(0.5)  # a rudder that moves less than this excites nothing
 RUDDER_NOISE = 6.0  # neither does one that moves less than this many times its noise,

@@ -7,9 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.regression.samples import Samples
+from shipgym import InputError, Trial
 from shipgym.checks import check_choice
-from shipgym.errors import InputError
-from shipgym.trials.trial import Trial
 
 TRIALS, LARGEST_RUDDER = "trials", "largest-rudder"
 FOLDS = (TRIALS, LARGEST_RUDDER)

@@ -8,7 +8,7 @@ import numpy as np
 
 from identification.result import IdentificationResult
 from identification.validation.prediction import COMPARED
-from shipgym.trials.trial import Trial
+from shipgym import Trial
 
 
 @dataclass(frozen=True)

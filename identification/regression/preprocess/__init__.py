@@ -6,9 +6,9 @@ from identification.regression.preprocess.filters import median, savitzky_golay,
 from identification.regression.preprocess.kinematics import smooth_kinematics
 from identification.regression.preprocess.noise import NOISY, is_noisy, noise_level, noise_ratio
 from identification.regression.preprocess.repair import outliers, repaired
+from shipgym import Trial
 from shipgym.arrays import Floats
 from shipgym.checks import check_choice
-from shipgym.trials.trial import Trial
 
 #: Filters of single channels by name.
 FILTERS: dict[str, Callable[[Floats, Floats], Floats]] = {

@@ -6,10 +6,9 @@ from scipy.interpolate import PchipInterpolator
 from scipy.ndimage import median_filter
 
 from identification.regression.preprocess.noise import noise_level
+from shipgym import InputError, Trial
 from shipgym.arrays import Floats
 from shipgym.checks import check_number
-from shipgym.errors import InputError
-from shipgym.trials.trial import Trial
 
 Flags = NDArray[np.bool_]
 
