@@ -69,12 +69,10 @@ class ParticleSwarm(Optimiser):
     def _search(self, record: Recorder, low: Floats, high: Floats, rng: np.random.Generator) -> None:
         n = check_whole(self.particles, "particles", at_least=1, at_most=MOST)
         check_whole(self.rounds, "rounds", at_least=1, at_most=MOST)
-        place = _drawn(n, low, high, rng)
+        place, values = _start(record, n, low, high, rng)
         shape = place.shape
         velocity = np.zeros(shape)
         best = place.copy()
-        values = record(place)
-        record.end_round()
         for _ in range(self.rounds):
             towards_own = self.own * rng.random(shape) * (best - place)
             towards_common = self.common * rng.random(shape) * (record.x - place)
@@ -148,9 +146,7 @@ class ArtificialBeeColony(Optimiser):
         n = check_whole(self.sources, "sources", at_least=2, at_most=MOST)
         check_whole(self.rounds, "rounds", at_least=1, at_most=MOST)
         check_whole(self.limit, "limit", at_least=1, at_most=MOST)
-        sources = _drawn(n, low, high, rng)
-        values = record(sources)
-        record.end_round()
+        sources, values = _start(record, n, low, high, rng)
         idle = np.zeros(n, dtype=np.int64)
         for _ in range(self.rounds):
             for onlookers in (False, True):
@@ -168,6 +164,16 @@ class ArtificialBeeColony(Optimiser):
 def _drawn(count: int, low: Floats, high: Floats, rng: np.random.Generator) -> Floats:
     """Candidates evenly distributed in the box, shape (count, n_dimensions)."""
     return low + (high - low) * rng.random((count, len(low)))
+
+
+def _start(
+    record: Recorder, count: int, low: Floats, high: Floats, rng: np.random.Generator
+) -> tuple[Floats, Floats]:
+    """The first round: candidates drawn in the box, and their values."""
+    drawn = _drawn(count, low, high, rng)
+    values = record(drawn)
+    record.end_round()
+    return drawn, values
 
 
 def _moved(sources: Floats, chosen: Integers, rng: np.random.Generator) -> Floats:
