@@ -1,4 +1,4 @@
-"""The regression of a grey box: what the converted reference ship leaves of the target's accelerations."""
+"""Grey boxes: their reference ship, how well she alone predicts, and the regression of a model on itself."""
 
 from collections.abc import Sequence
 from dataclasses import replace
