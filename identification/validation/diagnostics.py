@@ -1,6 +1,6 @@
 """What the data can determine and what the fit left over: excitation, collinearity, residuals."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import correlate
 
-from identification.estimators.estimator import Estimator
+from identification.estimators.estimator import Estimators
 from identification.regression import preprocess
 from identification.regression.samples import Samples
 from identification.uncertainty.covariance import residuals
@@ -121,7 +121,7 @@ def check_samples(samples: Samples, trials: Sequence[Trial], structure: Structur
 
 
 def diagnose(
-    estimators: Mapping[str, Estimator], samples: Samples, structure: Structure
+    estimators: Estimators, samples: Samples, structure: Structure
 ) -> dict[str, EquationDiagnostics]:
     """Diagnostics of each equation, of estimators fitted to the samples."""
     errors = residuals(estimators, samples)
