@@ -98,6 +98,8 @@ def test_the_first_and_the_last_sample_may_be_outliers() -> None:
     assert found["u"][[0, -1]] == pytest.approx(u[[1, -2]])
     for clean in (0.1 * t, np.sin(0.05 * t), np.abs(t - 196.0), np.minimum(t, 5.0), np.exp(-0.3 * t)):
         assert not outliers(t, clean, may_step=False).any()
+    gap = np.append(t[:-40], t[-1])
+    assert not outliers(gap, 0.1 * gap, may_step=False).any()
 
 
 def test_a_rudder_put_over_at_the_first_or_the_last_sample_is_no_outlier() -> None:

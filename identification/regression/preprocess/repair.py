@@ -39,7 +39,8 @@ def outliers(t: ArrayLike, values: ArrayLike, threshold: float = OUTLYING, may_s
     found: Flags = np.abs(values - middle) > least + 0.5 * WIDTH * moves
     if not may_step and len(values) >= FEWEST_FOR_ENDS:
         ends, inside = np.array([0, -1]), np.abs(np.diff(middle[WIDTH // 2 : -(WIDTH // 2)]))
-        found[ends] = np.abs(np.diff(values))[ends] > least + WIDTH * inside.max()
+        longer = np.maximum(np.diff(t)[ends] / np.median(np.diff(t)), 1.0)  # beside a gap it moves further
+        found[ends] = np.abs(np.diff(values))[ends] > (least + WIDTH * inside.max()) * longer
     return found
 
 
