@@ -5,14 +5,13 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from sklearn.base import clone
 
 from identification.estimators.methods import get_method
 from identification.estimators.recursive import Recursion
 from identification.regression.samples import Samples, build_samples
 from shipgym import InputError, Particulars, Trial
-from shipgym.arrays import Floats
+from shipgym.arrays import Floats, Integers
 from shipgym.ships import Structure, get_structure
 
 
@@ -34,7 +33,7 @@ class CoefficientHistory:
 
     names: tuple[str, ...]
     t: Floats
-    trial: NDArray[np.int64]
+    trial: Integers
     values: Floats
 
     def __getitem__(self, name: str) -> Floats:

@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 from sklearn.metrics import r2_score
 
@@ -18,7 +17,7 @@ from identification.estimators.estimator import Estimator
 from identification.estimators.lssvm import TruncatedLSSVM
 from identification.estimators.threads import single_threaded
 from shipgym import InputError, Particulars, ShipModel, SteeringGear, Trial
-from shipgym.arrays import Floats
+from shipgym.arrays import Floats, Integers
 from shipgym.checks import check_choice
 from shipgym.manoeuvres.towing_tank import rigid_body_forces
 from shipgym.ships import get_structure
@@ -52,8 +51,8 @@ class ForceRegression:
     features: Floats
     targets: Floats
     names: tuple[str, ...]
-    equation: NDArray[np.int64]
-    trial: NDArray[np.int64]
+    equation: Integers
+    trial: Integers
 
     def __len__(self) -> int:
         return len(self.targets)
@@ -172,7 +171,7 @@ def fit_forces(regression: ForceRegression, estimator: Estimator) -> tuple[Float
     return estimator.coef_, 0.5 * (covariance + covariance.T)
 
 
-def force_variances(equation: NDArray[np.int64], residuals: Floats, leverages: Floats) -> Floats:
+def force_variances(equation: Integers, residuals: Floats, leverages: Floats) -> Floats:
     """Variances of the errors of X, Y and N, each by its residuals, shape (3, ...).
 
     `equation`: 0, 1, 2 for X, Y, N, shape (n_rows,); `residuals`: of the fit, shape (n_rows, ...);

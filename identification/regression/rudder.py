@@ -10,15 +10,13 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.optimize import brentq, minimize_scalar
 from scipy.special import lambertw
 
 from identification.regression.preprocess import is_noisy
 from shipgym import SteeringGear, Trial
-from shipgym.arrays import Floats
-
-Flags = NDArray[np.bool_]
+from shipgym.arrays import Flags, Floats, Integers
 
 TOLERANCE = 1e-3  # of the rudder's range: orders closer than this are one order
 RAMP = 1e-4  # a rate within this part of the gear's rate is the gear's rate
@@ -49,7 +47,7 @@ class Rudder:
     corners: Floats  # times at which rate or acceleration of the rudder jump, s, shape (n_corners,)
     #: derivatives of the rudder that are continuous there: 0 where the rate jumps, 1 otherwise, shape
     #: (n_corners,)
-    smoothness: NDArray[np.int64]
+    smoothness: Integers
 
     def __call__(self, times: ArrayLike) -> Floats:
         """Rudder angle, rad, at times within the samples."""
@@ -60,7 +58,7 @@ class Rudder:
         k = np.clip(np.searchsorted(self.t, times, side="right") - 1, 0, len(self.t) - 2)
         return self._within(k, times - self.t[k])
 
-    def _within(self, k: NDArray[np.int64], elapsed: Floats) -> Floats:
+    def _within(self, k: Integers, elapsed: Floats) -> Floats:
         """The angle some time after the start of intervals."""
         gear, first = (self.rate, self.time_constant), np.minimum(elapsed, self.switch[k])
         middle = _flow(self.delta[k], self.before[k], first, *gear)

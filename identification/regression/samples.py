@@ -25,7 +25,7 @@ from identification.regression.integrals import (
 )
 from identification.regression.rudder import rebuild, straight
 from shipgym import InputError, Particulars, SteeringGear, Trial
-from shipgym.arrays import Floats, integral
+from shipgym.arrays import Floats, Integers, integral
 from shipgym.checks import check_whole
 from shipgym.ships.grey_boxes import GreyBox
 from shipgym.ships.term_table import Structure
@@ -62,7 +62,7 @@ class Samples:
     targets: dict[str, Floats]
     start: Floats
     duration: Floats
-    trial: NDArray[np.int64]
+    trial: Integers
     window: int
 
     def __len__(self) -> int:

@@ -4,11 +4,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from identification.estimators.decomposition import Decomposition, decompose_triangle, stacked, triangle
 from shipgym import InputError
-from shipgym.arrays import Floats
+from shipgym.arrays import Floats, Integers
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,7 +45,7 @@ def held_out_error(
     y: Floats,
     scale: bool | ArrayLike,
     fit_intercept: bool,
-    blocks: NDArray[np.int64],
+    blocks: Integers,
     weights: Floats | None = None,
 ) -> ErrorOfC:
     """Error on each block of samples, by their indices from 0, of the fit to all others."""
@@ -78,7 +78,7 @@ def _errors(
     return ErrorOfC(offset, gain, squares, n_samples)
 
 
-def time_blocks(n_samples: int, folds: int | str = 5, groups: ArrayLike | None = None) -> NDArray[np.int64]:
+def time_blocks(n_samples: int, folds: int | str = 5, groups: ArrayLike | None = None) -> Integers:
     """Index of each sample's block; blocks follow each other, never shuffled: neighbours in time are alike.
 
     `folds`: number of blocks, equally long but for one sample; "trials" makes a block of each trial, by

@@ -4,13 +4,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identification.search.search import MOST, Optimiser, Recorder
-from shipgym.arrays import Floats
+from shipgym.arrays import Floats, Integers
 from shipgym.checks import check_whole
-
-Integers = NDArray[np.int64]
 
 
 @dataclass(frozen=True)

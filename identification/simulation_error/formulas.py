@@ -10,10 +10,9 @@ import math
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
 from shipgym import InputError, Particulars
-from shipgym.arrays import Floats
+from shipgym.arrays import Flags, Floats
 from shipgym.ships.term_table import Structure, inertia
 from shipgym.ships.terms import Term
 
@@ -76,7 +75,7 @@ FORMULAS: dict[str, Callable[[Particulars], dict[str, float]]] = {
 
 def formula_coefficients(
     formula: str, structure: Structure, particulars: Particulars
-) -> dict[str, tuple[Floats, NDArray[np.bool_]]]:
+) -> dict[str, tuple[Floats, Flags]]:
     """Coefficients of the SI features of a structure, as far as formulas give them.
 
     `formula`: which, one of `clarke`, `kijima`; `structure`: with sway and yaw, and terms in v, r and delta

@@ -10,7 +10,6 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from identification.options import Options, name_of
@@ -18,13 +17,11 @@ from identification.regression.problem import Problem
 from identification.simulation_error.mmg_prior import YOSHIMURA, MMGPrior, mmg_prior
 from identification.simulation_error.segments import Segment, channel_units, compared_channels, cut, sailed
 from shipgym import InputError, ShipModel, Trial
-from shipgym.arrays import Floats
+from shipgym.arrays import Floats, Integers
 from shipgym.checks import check_number
 from shipgym.engine.motion import Ship
 from shipgym.engine.records import LANES
 from shipgym.ships.mmg import IDENTIFIED
-
-Rows = NDArray[np.int64]
 
 MAP, DEFAULT_METHOD = "map", Options.method
 SEGMENT_LENGTHS, INTERVAL = 1.7, 0.067  # of segments, and between samples, ship lengths at service speed
@@ -131,14 +128,14 @@ class _Problem:
         values = dict(zip(IDENTIFIED, (self.mean + z * self.prior.deviation).tolist(), strict=True))
         return replace(self.blank, coefficients=self.prior.mean | values)
 
-    def at(self, z: Floats, which: Rows) -> tuple[Floats, Floats]:
+    def at(self, z: Floats, which: Integers) -> tuple[Floats, Floats]:
         """As `simulated`, which is not done twice in a row."""
         key = z.tobytes() + which.tobytes()
         if key not in self.kept:
             self.kept = {key: self.simulated(z, which)}
         return self.kept[key]
 
-    def rows(self, z: Floats, which: Rows, scales: Floats, strength: float) -> tuple[Floats, Floats]:
+    def rows(self, z: Floats, which: Integers, scales: Floats, strength: float) -> tuple[Floats, Floats]:
         """Errors of some segments in their scales, then those of the prior, and their slopes.
 
         Shapes (n_rows + 41,) and (n_rows + 41, 41).
@@ -150,7 +147,7 @@ class _Problem:
         own = strength * np.eye(len(z))
         return np.append(scaled, strength * z), np.vstack([steep.reshape(len(scaled), -1), own])
 
-    def simulated(self, z: Floats, which: Rows) -> tuple[Floats, Floats]:
+    def simulated(self, z: Floats, which: Integers) -> tuple[Floats, Floats]:
         """Errors of the simulated channels and their slopes, of some segments.
 
         Each times the root of the share that its step has of the time over which errors are one error;
@@ -175,7 +172,7 @@ class _Problem:
         found: Floats = (lanes - segment.measured[1:, :, None]) * share
         return found
 
-    def scales(self, errors: Floats, which: Rows) -> Floats:
+    def scales(self, errors: Floats, which: Integers) -> Floats:
         """Root mean square of the errors by channel, not below the floors."""
         shares = sum(self._weight(self.segments[k]) for k in which)
         with np.errstate(invalid="ignore", over="ignore"):
@@ -230,7 +227,7 @@ def _covariance(slopes: Floats) -> Floats:
     return symmetric
 
 
-def _groups(segments: Sequence[Segment]) -> Rows:
+def _groups(segments: Sequence[Segment]) -> Integers:
     """Which segments are held out together: of a trial, of every fifth one, or a third of a single one."""
     trial = np.array([segment.trial for segment in segments])
     if trial.max() == trial.min():

@@ -14,7 +14,6 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identification.estimators.estimator import Estimator, Estimators, FitTask
 from identification.estimators.lssvm import TruncatedLSSVM
@@ -25,7 +24,7 @@ from identification.simulation_error.similarity import AUTO, select_reference
 from identification.validation.folds import FOLDS, LARGEST_RUDDER, TRIALS, of_largest_rudder
 from identification.validation.guard import hard_turn_features, reasons_unstable, with_coefficients
 from shipgym import InputError, ShipModel, Trial
-from shipgym.arrays import Floats
+from shipgym.arrays import Flags, Floats
 from shipgym.checks import check_choice, check_number
 from shipgym.manoeuvres import turning_circle, zigzag
 from shipgym.ships import GreyBox, converted_model
@@ -48,7 +47,7 @@ class Prior:
     #: (n_rows, n_terms)
     roots: dict[str, Floats]
     #: which coefficients the prior determines; the others are free, shape (n_terms,)
-    known: dict[str, NDArray[np.bool_]]
+    known: dict[str, Flags]
 
 
 def formula_prior(formula: str, blank: ShipModel) -> Prior:
@@ -218,9 +217,7 @@ def _toward(estimator: Estimator, samples: Samples, q: str, prior: Prior, streng
     return estimator
 
 
-def _held(
-    estimator: Estimator, X: Floats, rest: Floats, centre: Floats, known: NDArray[np.bool_]
-) -> Estimator:
+def _held(estimator: Estimator, X: Floats, rest: Floats, centre: Floats, known: Flags) -> Estimator:
     """The prior's own coefficients; those it leaves open are fitted."""
     free = np.flatnonzero(~known)
     estimator.fit(X[:, free] if free.size else X, rest)  # without free ones for its attributes alone

@@ -4,19 +4,16 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identification.regression import preprocess
 from identification.regression.rudder import Rudder, rebuild, straight
 from identification.regression.samples import between_gaps
 from shipgym import ShipModel, Trial
-from shipgym.arrays import Floats
+from shipgym.arrays import Floats, Integers
 from shipgym.engine.loops import ship_loop
 from shipgym.engine.records import LANES
 from shipgym.ships import Structure
 from shipgym.ships.simulate import LONGEST_STEP, wind_accelerations
-
-Integers = NDArray[np.int64]
 
 STEP = 1e-5  # of finite differences, of parameters that are about 1
 BLOCK = 0.05  # time over which residuals are averaged, of that to sail one ship length

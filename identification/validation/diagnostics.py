@@ -5,7 +5,6 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.signal import correlate
 
 from identification.estimators.estimator import Estimators
@@ -13,7 +12,7 @@ from identification.regression import preprocess
 from identification.regression.samples import Samples
 from identification.uncertainty.covariance import residuals
 from shipgym import InputError, Trial
-from shipgym.arrays import Floats
+from shipgym.arrays import Floats, Integers
 from shipgym.ships import Structure
 
 LEAST_RUDDER = np.radians(0.5)  # a rudder that moves less than this excites nothing
@@ -164,7 +163,7 @@ def autocorrelation(values: Floats, lags: int) -> tuple[float, ...]:
     return tuple(float(centred[k:] @ centred[:-k]) / power for k in range(1, min(lags + 1, len(values))))
 
 
-def cross_correlation(first: Floats, second: Floats, lags: NDArray[np.int64]) -> Floats:
+def cross_correlation(first: Floats, second: Floats, lags: Integers) -> Floats:
     """Correlation, shape (n_lags,), of one series with another at the same times that is shifted.
 
     Lags are samples by which the first comes after the second. 0 for a constant or shorter series.
@@ -185,7 +184,7 @@ def variance_inflation(scaled: Floats) -> Floats:
     return factors
 
 
-def without_overlap(samples: Samples) -> NDArray[np.int64]:
+def without_overlap(samples: Samples) -> Integers:
     """Rows whose windows do not overlap."""
     step = 1 if samples.window == 1 else int(np.ceil(samples.window / max(samples.window // 2, 1)))
     return np.arange(0, len(samples), step)

@@ -4,9 +4,8 @@ from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
-from shipgym.arrays import Floats
+from shipgym.arrays import Flags, Floats
 from shipgym.manoeuvres.execution import (
     execute_time,
     number_of_steps,
@@ -98,9 +97,7 @@ def track_from_order(trial: Trial, length: float) -> tuple[Floats, Floats, Float
     return ahead / length, aside / length, trial["psi"] - psi0
 
 
-def _steady(
-    trial: Trial, after: NDArray[np.bool_], steady: NDArray[np.bool_], side: float, lpp: float
-) -> tuple[float, float, float]:
+def _steady(trial: Trial, after: Flags, steady: Flags, side: float, lpp: float) -> tuple[float, float, float]:
     """Speed ratio, drift angle in degrees and diameter in ship lengths of the steady turn."""
     u, v, r = (trial[name][after] for name in ("u", "v", "r"))
     speed = np.hypot(u, v)

@@ -8,9 +8,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import numpy.typing as npt
 
-from shipgym.arrays import Floats
+from shipgym.arrays import Flags, Floats
 from shipgym.checks import check_choice, check_number, check_table
 from shipgym.errors import InputError
 from shipgym.trials.derivatives import time_derivative
@@ -98,7 +97,7 @@ def rotate_to_body(north: Any, east: Any, psi: Any) -> tuple[Any, Any]:
     return north * c + east * s, east * c - north * s
 
 
-def straight_parts(t: Floats, channels: Mapping[str, Floats]) -> npt.NDArray[np.bool_]:
+def straight_parts(t: Floats, channels: Mapping[str, Floats]) -> Flags:
     """Which samples lie amid a straight steady part, where heading and rudder hardly change."""
     from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
@@ -134,9 +133,7 @@ def correct_offsets(log: Log, tools: Instruments) -> None:
         channels[name] = channels[name] - offset if offset else channels[name]
 
 
-def heading_offset(
-    channels: Mapping[str, Floats], straight: npt.NDArray[np.bool_]
-) -> tuple[float, float] | None:
+def heading_offset(channels: Mapping[str, Floats], straight: Flags) -> tuple[float, float] | None:
     """What the heading shows too much by the course over ground, with its standard error, rad.
 
     An offset turns with the ship, a current does not: None without straight parts on several courses.

@@ -5,9 +5,8 @@ from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
-from shipgym.arrays import Floats
+from shipgym.arrays import Flags, Floats
 from shipgym.checks import check_choice, check_number, quoted
 from shipgym.errors import InputError
 from shipgym.trials import plausibility
@@ -350,7 +349,7 @@ def _repaired(values: Floats, source: Source, repair: str | None) -> tuple[Float
     return filled, repaired
 
 
-def _check_holes(t: Floats, missing: npt.NDArray[np.bool_], channel: str, source: Source) -> None:
+def _check_holes(t: Floats, missing: Flags, channel: str, source: Source) -> None:
     """Refuse to fill a hole of many rows; the first and the last row are whole."""
     edges = np.flatnonzero(np.diff(missing))
     first, after = edges[::2] + 1, edges[1::2] + 1

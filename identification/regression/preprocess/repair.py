@@ -1,16 +1,14 @@
 """Outliers and dropouts of a record: found, filled from their neighbours, and counted."""
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.interpolate import PchipInterpolator
 from scipy.ndimage import median_filter
 
 from identification.regression.preprocess.noise import noise_level
 from shipgym import InputError, Trial
-from shipgym.arrays import Floats
+from shipgym.arrays import Flags, Floats
 from shipgym.checks import check_number
-
-Flags = NDArray[np.bool_]
 
 WIDTH = 7  # samples of the running median
 OUTLYING = 6.0  # times the noise
