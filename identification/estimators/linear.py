@@ -28,8 +28,7 @@ class LinearRegressor(RegressorMixin, BaseEstimator):  # type: ignore[misc]
         """Targets, shape (n_samples,), of samples of shape (n_samples, n_features)."""
         check_is_fitted(self)
         features: Floats = validate_data(self, X, reset=False, dtype=np.float64)
-        prediction: Floats = features @ self.coef_ + self.intercept_
-        return prediction
+        return features @ self.coef_ + self.intercept_
 
 
 def validated(estimator: Any, X: ArrayLike, y: ArrayLike) -> tuple[Floats, Floats]:

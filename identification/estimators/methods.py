@@ -176,8 +176,7 @@ class Adapted:
 
     def predict(self, X: ArrayLike) -> Floats:
         """Targets, shape (n_samples,)."""
-        prediction: Floats = np.asarray(X, dtype=float) @ self.coef_
-        return prediction
+        return np.asarray(X, dtype=float) @ self.coef_
 
 
 def without_constant(estimator: Any) -> Estimator:
@@ -187,5 +186,4 @@ def without_constant(estimator: Any) -> Estimator:
         copied.set_params(fit_intercept=False)
     # our own estimators know their moment; that of others is estimated
     known = type(copied).__module__.partition(".")[0] == "identification"
-    adapted: Estimator = copied if known else Adapted(copied)
-    return adapted
+    return copied if known else Adapted(copied)

@@ -122,8 +122,7 @@ class Recursion(LinearRegressor):
     def theta(self) -> Floats:
         """Estimate after the last sample, shape (n_features,) or (n_signals, n_features)."""
         check_is_fitted(self, "coef_")
-        estimate: Floats = self.coef_
-        return estimate
+        return self.coef_
 
     @property
     def covariance(self) -> Floats | None:

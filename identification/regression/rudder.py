@@ -53,8 +53,7 @@ class Rudder:
         """Rudder angle, rad, at times within the samples."""
         times = np.asarray(times, dtype=float)
         if not self.follows_gear:
-            between: Floats = np.interp(times, self.t, self.delta)
-            return between
+            return np.interp(times, self.t, self.delta)
         k = np.clip(np.searchsorted(self.t, times, side="right") - 1, 0, len(self.t) - 2)
         return self._within(k, times - self.t[k])
 
@@ -127,8 +126,7 @@ def _flow(start: Any, order: Any, elapsed: Any, rate: float, lag: float) -> Floa
     ramping = np.minimum(elapsed, (distance - tail) / rate)
     decay = np.exp(-(elapsed - ramping) / lag) if lag > 0.0 else 1.0
     moved = rate * ramping + np.where(ramping < elapsed, tail * (1.0 - decay), 0.0)
-    flow: Floats = start + side * moved
-    return flow
+    return start + side * moved
 
 
 def _orders(t: Floats, delta: Floats, rate: float, lag: float) -> Floats:
@@ -151,8 +149,7 @@ def _continues(orders: Floats, delta: Floats, tolerance: float) -> Flags:
     ramped, ramps = np.isinf(before), np.isinf(now)
     same = np.abs(np.where(ramps, 0.0, now) - np.where(ramped, 0.0, before)) <= tolerance
     ahead = np.where(ramps, np.sign(now), np.sign(np.where(ramps, 0.0, now) - at)) * np.sign(before)
-    flags: Flags = np.where(ramped, np.where(ramps, now == before, ahead >= 0), ~ramps & same)
-    return flags
+    return np.where(ramped, np.where(ramps, now == before, ahead >= 0), ~ramps & same)
 
 
 def _explained(t: Floats, delta: Floats, rate: float, lag: float) -> float:

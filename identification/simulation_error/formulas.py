@@ -117,8 +117,7 @@ def _accelerations(derivatives: dict[str, float], ship: Particulars) -> Floats:
     """Sway and yaw acceleration by v, r and delta, prime system, shape (2, 3)."""
     forces = np.array([[derivatives[f"{force}_{s}"] for s in LINEAR_SYMBOLS] for force in "YN"])
     forces[:, 1] -= [ship.mass_prime, ship.mass_prime * ship.xg_prime]  # turning with the body's axes
-    accelerations: Floats = np.linalg.solve(inertia(ship)[1:, 1:], forces)
-    return accelerations
+    return np.linalg.solve(inertia(ship)[1:, 1:], forces)
 
 
 def _linear_symbol(term: Term) -> str | None:

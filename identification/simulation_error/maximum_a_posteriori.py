@@ -169,16 +169,14 @@ class _Problem:
         lanes = sailed(self.blank, segment, ships, starts, np.zeros(LANES))
         lanes = lanes[1:, self.columns, : len(IDENTIFIED) + 1]
         share = np.sqrt(self._weight(segment) / len(lanes))
-        found: Floats = (lanes - segment.measured[1:, :, None]) * share
-        return found
+        return (lanes - segment.measured[1:, :, None]) * share
 
     def scales(self, errors: Floats, which: Integers) -> Floats:
         """Root mean square of the errors by channel, not below the floors."""
         shares = sum(self._weight(self.segments[k]) for k in which)
         with np.errstate(invalid="ignore", over="ignore"):
             rms = np.sqrt(np.sum(errors**2, axis=0) / shares)
-        found: Floats = np.maximum(np.where(np.isfinite(rms), rms, 1e2 * self.floors), self.floors)
-        return found
+        return np.maximum(np.where(np.isfinite(rms), rms, 1e2 * self.floors), self.floors)
 
     def _weight(self, segment: Segment) -> float:
         return float(segment.inputs[-1, 0] - segment.times[0]) / (CORRELATED * self.blank.travel_time)
@@ -223,8 +221,7 @@ class _Problem:
 def _covariance(slopes: Floats) -> Floats:
     """Gauss-Newton covariance with the prior as it is: a stronger one chosen for the fit is no knowledge."""
     inverse = np.linalg.inv(slopes.T @ slopes + np.eye(slopes.shape[1]))
-    symmetric: Floats = 0.5 * (inverse + inverse.T)
-    return symmetric
+    return 0.5 * (inverse + inverse.T)
 
 
 def _groups(segments: Sequence[Segment]) -> Integers:

@@ -180,8 +180,7 @@ def variance_inflation(scaled: Floats) -> Floats:
     Features have a root mean square of 1; of exactly collinear ones it is large, up to 1e12.
     """
     moment = scaled.T @ scaled / len(scaled)
-    factors: Floats = np.diag(np.linalg.inv(moment + JITTER * np.eye(len(moment)))) * np.diag(moment)
-    return factors
+    return np.diag(np.linalg.inv(moment + JITTER * np.eye(len(moment)))) * np.diag(moment)
 
 
 def without_overlap(samples: Samples) -> Integers:
