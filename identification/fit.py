@@ -1,7 +1,5 @@
 """An identified model and how it came about, as reports and warnings read it."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -11,8 +9,7 @@ from identification.estimators.estimator import Estimator
 from identification.regression.samples import Samples
 from identification.search import SearchResult
 from identification.validation.diagnostics import EquationDiagnostics
-from shipgym.ships import ShipModel
-from shipgym.trials.trial import Trial
+from shipgym import ShipModel, Trial
 
 
 @dataclass(frozen=True, eq=False)

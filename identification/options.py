@@ -1,7 +1,5 @@
 """The options of `identify`, as a model's provenance and settings.json record them."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, is_dataclass
 from typing import Any
@@ -9,11 +7,9 @@ from typing import Any
 import numpy as np
 
 import shipgym
-from shipgym.ships import ShipModel, Structure
-from shipgym.ships.particulars import Particulars
-from shipgym.ships.steering import SteeringGear
+from shipgym import Particulars, ShipModel, SteeringGear, Trial
+from shipgym.ships import Structure
 from shipgym.trials.identify_table import Options
-from shipgym.trials.trial import Trial
 
 Given = Particulars | Mapping[str, Any] | None  # particulars, as `identify` takes them
 

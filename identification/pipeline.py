@@ -1,7 +1,5 @@
 """From trials to a ship model: `identify`."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
@@ -29,13 +27,12 @@ from identification.validation.diagnostics import diagnose
 from identification.validation.guard import GuardedFit, guarded_fit, reasons_unstable, with_coefficients
 from identification.validation.prediction import predict, trial_metrics
 from identification.validation.selection import select
+from shipgym import ShipModel, SteeringGear, Trial
 from shipgym.arrays import Floats
-from shipgym.ships import GreyBox, ShipModel, Structure
+from shipgym.ships import GreyBox, Structure
 from shipgym.ships.catalogue import fitted_box
 from shipgym.ships.mmg import MMG
-from shipgym.ships.steering import SteeringGear
 from shipgym.trials.identify_table import AUTO
-from shipgym.trials.trial import Trial
 
 MEMORY = 1.0  # of residuals, in the time to sail one ship length
 

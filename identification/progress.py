@@ -1,7 +1,5 @@
 """How far a long identification has come, for a command that shows it."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Sequence
 from contextvars import ContextVar
 from typing import TypeVar
@@ -11,11 +9,11 @@ T = TypeVar("T")
 Progress = Callable[[str, int, int], None]
 
 
-def _untold(stage: str, done: int, total: int) -> None:
-    """Nobody listens."""
+def _ignored(stage: str, done: int, total: int) -> None:
+    """Nobody wants to know."""
 
 
-PROGRESS: ContextVar[Progress] = ContextVar("progress", default=_untold)
+PROGRESS: ContextVar[Progress] = ContextVar("progress", default=_ignored)
 
 
 def counted(stage: str, items: Sequence[T]) -> Iterator[T]:
@@ -23,7 +21,7 @@ def counted(stage: str, items: Sequence[T]) -> Iterator[T]:
     tell = PROGRESS.get()
     for done, item in enumerate(items):
         tell(stage, done, len(items))
-        token = PROGRESS.set(_untold)
+        token = PROGRESS.set(_ignored)
         try:
             yield item
         finally:

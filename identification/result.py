@@ -10,7 +10,7 @@ from identification.fit import Fit
 from identification.report.figures import all_figures
 from identification.report.page import report_page
 from identification.report.summary import summary_table
-from shipgym.errors import InputError
+from shipgym import InputError
 from shipgym.files import draft_folder, write_json, write_text
 
 if TYPE_CHECKING:

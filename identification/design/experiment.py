@@ -7,8 +7,6 @@ coefficient, D-optimal for the volume of the ellipsoid of all of them, E-optimal
 Coefficients count relative to their size.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -20,14 +18,12 @@ from rich.table import Table
 from identification.design.reduction import table_of
 from identification.regression.samples import Samples, build_samples
 from identification.text import as_text, lined_table
-from identification.validation.diagnostics import scaled_features
+from identification.validation.diagnostics import JITTER, scaled_features, variance_inflation
 from identification.validation.guard import hard_turn_features
+from shipgym import InputError, ShipModel, Trial, UnstableModelError
 from shipgym.arrays import Floats
 from shipgym.checks import check_choice
-from shipgym.errors import InputError, UnstableModelError
 from shipgym.manoeuvres import prbs_rudder, turning_circle, zigzag
-from shipgym.ships import ShipModel
-from shipgym.trials.trial import Trial
 
 Manoeuvre = Callable[[ShipModel], Trial]
 
@@ -36,7 +32,6 @@ DURATION = 40.0  # of a candidate, in the time to sail one ship length
 STEPS = 60  # samples of a candidate in that time
 WINDOW = 0.2  # over which velocities are integrated, in that time
 FLOOR = 1e-14  # of the eigenvalues of an information, by the largest
-JITTER = 1e-12
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,17 +48,34 @@ class TrialInformation:
 
 @dataclass(frozen=True, eq=False)
 class Advice:
-    """Which manoeuvres to run next."""
+    """Which manoeuvres to run next.
 
-    criterion: str  # "c", "D" or "E"
-    coefficient: str  # that which "c" shrinks
-    trials: tuple[TrialInformation, ...]  # so far
-    before: dict[str, float]  # relative standard error of each coefficient from the trials so far
-    #: of each choice the gain of all candidates, the largest is best: by what factor the standard error
-    #: ("c"), the mean axis ("D") or the longest axis ("E") of the relative errors shrinks
+    Attributes
+    ----------
+    criterion : str
+        "c", "D" or "E".
+    coefficient : str
+        That which "c" shrinks.
+    trials : tuple of TrialInformation
+        Of the trials so far.
+    before : dict of str to float
+        Relative standard error of each coefficient from the trials so far.
+    steps : tuple of dict of str to float
+        Of each choice the gain of all candidates, the largest is best: by what factor the standard error
+        ("c"), the mean axis ("D") or the longest axis ("E") of the relative errors shrinks.
+    chosen : tuple of str
+        The candidates to run, in this order.
+    after : dict of str to float
+        Relative standard errors with them.
+    """
+
+    criterion: str
+    coefficient: str
+    trials: tuple[TrialInformation, ...]
+    before: dict[str, float]
     steps: tuple[dict[str, float], ...]
-    chosen: tuple[str, ...]  # the candidates to run, in this order
-    after: dict[str, float]  # relative standard errors with them
+    chosen: tuple[str, ...]
+    after: dict[str, float]
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values, ready for JSON; of each trial's information the diagonal."""
@@ -257,9 +269,8 @@ def _information_of(
     inflation: dict[str, float] = {}
     for q, X in samples.features.items():
         scaled, condition[q] = scaled_features(X)
-        moment = scaled.T @ scaled / len(scaled)
-        factors = np.diag(np.linalg.inv(moment + JITTER * np.eye(len(moment)))) * np.diag(moment)
-        inflation |= dict(zip(model.table.regression_names(q), factors.tolist(), strict=True))
+        factors = variance_inflation(scaled).tolist()
+        inflation |= dict(zip(model.table.regression_names(q), factors, strict=True))
     return TrialInformation(name, condition, inflation, fisher_information(model, samples, noise))
 
 
@@ -270,9 +281,11 @@ def _offers(
     offers = {}
     for name, manoeuvre in candidates.items():
         try:
-            trial = _recorded(model, manoeuvre(model))
+            trial = manoeuvre(model)
         except UnstableModelError:
             continue
+        if "n_command" in trial and "n" not in trial:  # what is only commanded is as commanded
+            trial = trial.with_channels({"n": trial["n_command"]})
         offers[name] = fisher_information(model, _regression(model, trial), noise)
     if not offers:
         raise InputError(
@@ -280,11 +293,6 @@ def _offers(
             "that can be simulated; give gentler manoeuvres"
         )
     return offers
-
-
-def _recorded(model: ShipModel, run: Trial) -> Trial:
-    """A simulated trial with its shaft speed, where that is only commanded."""
-    return run if "n" in run or "n_command" not in run else run.with_channels({"n": run["n_command"]})
 
 
 def _size(model: ShipModel, information: Floats) -> Floats:

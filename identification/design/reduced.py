@@ -1,7 +1,5 @@
 """Identify with the terms that are needed: reduce the full structure, then identify what is left."""
 
-from __future__ import annotations
-
 import hashlib
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
@@ -11,20 +9,31 @@ from typing import Any
 from identification.design.reduction import Reduction, reduce, reduced_structure, sensitivity
 from identification.pipeline import identify
 from identification.result import IdentificationResult
-from shipgym.errors import InputError, UnstableModelError
+from shipgym import InputError, ShipModel, Trial, UnstableModelError, register_structure
 from shipgym.manoeuvres import zigzag
-from shipgym.ships import GreyBox, ShipModel, Structure, register_structure
-from shipgym.trials.trial import Trial
+from shipgym.ships import GreyBox, Structure
 
 
 @dataclass(frozen=True, eq=False)
 class ReducedIdentification:
-    """A structure reduced on its trials, and both models."""
+    """A structure reduced on its trials, and both models.
 
-    full: IdentificationResult  # with all terms
-    reductions: dict[str, Reduction]  # by equation, the path and the terms chosen
-    structure: Structure  # of the terms chosen, registered by its name
-    reduced: IdentificationResult  # with it
+    Attributes
+    ----------
+    full : IdentificationResult
+        With all terms.
+    reductions : dict of str to Reduction
+        By equation, the path and the terms chosen.
+    structure : Structure
+        Of the terms chosen, registered by its name.
+    reduced : IdentificationResult
+        With it.
+    """
+
+    full: IdentificationResult
+    reductions: dict[str, Reduction]
+    structure: Structure
+    reduced: IdentificationResult
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values, ready for JSON."""
@@ -51,10 +60,26 @@ def identify_reduced(
 ) -> ReducedIdentification:
     """Identify a structure, reduce it on the same samples, and identify the smaller one.
 
-    Trials that are held out have no part in the reduction either. `direction` is "backward" for elimination
-    or "forward" for selection; `tolerance` is by how much the R2 of stretches held out may fall; `arguments`
-    are those of `identify`. Raises InputError for a grey box, whose table is what its reference ship leaves,
-    and fewer than five samples a term.
+    Parameters
+    ----------
+    trials : sequence of Trial
+        As for `identify`. Those held out have no part in the reduction either.
+    direction : {"backward", "forward"}
+        Elimination or selection (`reduction`).
+    tolerance : float
+        By how much the R2 of stretches held out may fall.
+    **arguments
+        Of `identify`.
+
+    Returns
+    -------
+    ReducedIdentification
+        The identification with all terms, and that with those that are needed.
+
+    Raises
+    ------
+    InputError
+        For a grey box, whose table is what its reference ship leaves, and fewer than five samples a term.
     """
     full = identify(trials, **arguments)
     table = full.model.table

@@ -6,8 +6,6 @@ Forward (Chen, Billings & Luo 1989, Int. J. Control 50(5)): by orthogonal least 
 explains most of what is left. Held out are five stretches of the samples, each predicted from the others.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
@@ -18,15 +16,13 @@ from rich.table import Table
 from identification.estimators.lssvm import TruncatedLSSVM
 from identification.regression.samples import Samples
 from identification.text import as_text
+from identification.validation.diagnostics import COLLINEAR, JITTER, variance_inflation
+from shipgym import InputError, ShipModel, Trial, UnstableModelError
 from shipgym.arrays import Floats
 from shipgym.checks import check_choice, check_number
-from shipgym.errors import InputError, UnstableModelError
-from shipgym.ships import ShipModel, Structure
-from shipgym.trials.trial import Trial
+from shipgym.ships import Structure
 
 FOLDS = 5
-COLLINEAR = 0.98  # correlation of a pair, and multiple correlation of a group
-JITTER = 1e-12  # of a correlation matrix, so that exact collinearity shows as a large inflation
 SENSED = ("u", "v", "r", "psi")
 
 
@@ -47,10 +43,18 @@ class ReductionStep:
 
 @dataclass(frozen=True)
 class Reduction:
-    """The whole path of a reduction and the model that it chose."""
+    """The whole path of a reduction and the model that it chose.
 
-    path: tuple[ReductionStep, ...]  # in the order in which terms were dropped or added
-    chosen: int  # which of them
+    Attributes
+    ----------
+    path : tuple of ReductionStep
+        In the order in which terms were dropped or added.
+    chosen : int
+        Which of them.
+    """
+
+    path: tuple[ReductionStep, ...]
+    chosen: int
 
     @property
     def terms(self) -> tuple[str, ...]:
@@ -106,7 +110,7 @@ def backward_elimination(
     Raises
     ------
     InputError
-        For shapes that do not fit and fewer samples than terms.
+        For shapes that do not fit and fewer than five samples a term.
     """
     features, targets, labels = _checked(X, y, names)
     check_number(tolerance, "tolerance", at_least=0.0)
@@ -136,9 +140,24 @@ def forward_selection(
 ) -> Reduction:
     """Add terms by error reduction ratio; choose the shortest model near the best on what is held out.
 
-    `X`, `y` and `names` are as in `backward_elimination`. The held-out R2 of the chosen model may lie below
-    the best of the path, which goes on beyond it, by `tolerance`; `most` is the number of terms at which to
-    stop. Raises InputError for shapes that do not fit and fewer samples than terms.
+    Parameters
+    ----------
+    X, y, names
+        As in `backward_elimination`.
+    tolerance : float
+        By how much the held-out R2 of the chosen model may lie below the best of the path.
+    most : int, optional
+        Terms at which to stop.
+
+    Returns
+    -------
+    Reduction
+        The path goes on beyond the chosen model.
+
+    Raises
+    ------
+    InputError
+        For shapes that do not fit and fewer than five samples a term.
     """
     features, targets, labels = _checked(X, y, names)
     check_number(tolerance, "tolerance", at_least=0.0)
@@ -209,10 +228,25 @@ def sensitivity(
 ) -> dict[str, float]:
     """Change of a simulated manoeuvre per per cent of each coefficient (Cao 2015).
 
-    `manoeuvre` simulates it with a model, such as ``zigzag``; `change` is the relative step to either side.
-    Returns, by coefficient, the largest first, the root mean square change of u, v, r and psi, each by its
-    span, in per cent per per cent; infinite where the changed ship runs away. Raises InputError for a
-    reference ship, whose coefficients are compiled in.
+    Parameters
+    ----------
+    model : ShipModel
+        With a table of terms.
+    manoeuvre : callable
+        Simulates it with a model, such as ``zigzag``.
+    change : float
+        Relative step to either side.
+
+    Returns
+    -------
+    dict of str to float
+        By coefficient, the largest first: root mean square change of u, v, r and psi, each by its span, in
+        per cent per per cent. Infinite where the changed ship runs away.
+
+    Raises
+    ------
+    InputError
+        For a ship with equations written by hand.
     """
     check_number(change, "change", above=0.0, below=1.0)
     table_of(model)
@@ -265,9 +299,8 @@ def _collinear(features: Floats, kept: Sequence[int]) -> set[int]:
     """Terms that others nearly make up, by pair or by variance inflation."""
     scaled = features[:, kept] / np.sqrt(np.mean(features[:, kept] ** 2, axis=0))
     correlation = scaled.T @ scaled / len(scaled)
-    inflation = np.diag(np.linalg.inv(correlation + JITTER * np.eye(len(kept))))
     pairs = np.abs(correlation - np.diag(np.diag(correlation))) > COLLINEAR
-    member = pairs.any(axis=0) | (inflation > 1.0 / (1.0 - COLLINEAR**2))
+    member = pairs.any(axis=0) | (variance_inflation(scaled) > 1.0 / (1.0 - COLLINEAR**2))
     return {i for i, yes in zip(kept, member.tolist(), strict=True) if yes}
 
 

@@ -1,33 +1,39 @@
 """The history of a model's coefficients over a trial, as a recursive method estimates them."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from sklearn.base import clone
 
 from identification.estimators.methods import get_method
 from identification.estimators.recursive import Recursion
 from identification.regression.samples import Samples, build_samples
-from shipgym.arrays import Floats
-from shipgym.errors import InputError
+from shipgym import InputError, Particulars, Trial
+from shipgym.arrays import Floats, Integers
 from shipgym.ships import Structure, get_structure
-from shipgym.ships.particulars import Particulars
-from shipgym.trials.trial import Trial
 
 
 @dataclass(frozen=True, eq=False)
 class CoefficientHistory:
-    """Coefficients over time."""
+    """Coefficients over time.
 
-    names: tuple[str, ...]  # of the coefficients
-    t: Floats  # end of each row's window, s, in the time of its trial, shape (n_rows,)
-    trial: NDArray[np.int64]  # index of the trial, shape (n_rows,)
-    #: estimate after each row, in the normalisation of the structure, shape (n_rows, n_coefficients)
+    Attributes
+    ----------
+    names : tuple of str
+        Of the coefficients.
+    t : array of shape (n_rows,)
+        End of each row's window, s, in the time of its trial.
+    trial : array of shape (n_rows,)
+        Index of the trial.
+    values : array of shape (n_rows, n_coefficients)
+        Estimate after each row, in the normalisation of the structure.
+    """
+
+    names: tuple[str, ...]
+    t: Floats
+    trial: Integers
     values: Floats
 
     def __getitem__(self, name: str) -> Floats:
@@ -86,6 +92,6 @@ def coefficient_history(
     if not isinstance(source, Samples):
         trials = [source] if isinstance(source, Trial) else list(source)
         source = build_samples(trials, table, ship, shaft_speed=shaft_speed, **sampling)
-    found = [clone(estimator).fit_history(source.features[q], source.targets[q]) for q in table.equations]
+    found = [clone(estimator).fit_history(source.features[q], source.targets[q]) for q in table.regressed]
     values = np.linalg.solve(table.acceleration_matrix(ship, shaft_speed), np.hstack(found).T).T
     return CoefficientHistory(table.coefficient_names, source.start + source.duration, source.trial, values)

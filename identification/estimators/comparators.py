@@ -1,7 +1,5 @@
 """Scikit-learn's estimators in the form that `identify` fits, to compare with."""
 
-from __future__ import annotations
-
 import warnings
 from typing import Self
 

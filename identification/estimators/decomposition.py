@@ -7,8 +7,6 @@ the singular value decomposition costs nothing. Triangles of parts of the data, 
 the whole. X'X would be as small but loses half of the digits.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -17,8 +15,8 @@ from numpy.typing import ArrayLike
 from scipy.linalg import lapack
 
 from identification.estimators.threads import single_threaded
+from shipgym import InputError
 from shipgym.arrays import Floats
-from shipgym.errors import InputError
 
 CONSTANT = 100 * np.finfo(float).eps  # of its size; a feature that varies less is constant but for rounding
 BLOCK = 32  # columns that LAPACK handles at once

@@ -1,7 +1,5 @@
 """What every estimator offers that `identify` may fit to an equation, and what a method may use."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol, Self
@@ -10,9 +8,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from identification.regression.samples import Samples
+from shipgym import ShipModel, Trial
 from shipgym.arrays import Floats
-from shipgym.ships import ShipModel
-from shipgym.trials.trial import Trial
 
 
 class Estimator(Protocol):

@@ -18,18 +18,16 @@ from sklearn.cluster import KMeans
 from identification.estimators.estimator import Estimators
 from identification.estimators.lssvm import LSSVM
 from identification.estimators.rm_svm import heading_error, most_regularised
-from identification.regression.grey_box import structure_samples
 from identification.regression.preprocess import smoothed_channels
-from identification.regression.samples import Samples
+from identification.regression.samples import Samples, build_samples
 from identification.validation.folds import TRIALS, held_out_rows
+from shipgym import InputError, ShipModel, Trial
 from shipgym.arrays import Floats
 from shipgym.checks import check_number, check_whole
-from shipgym.errors import InputError
-from shipgym.ships import GreyBox, ShipModel
+from shipgym.ships import GreyBox
 from shipgym.ships.grey_boxes import GREY_BOX
 from shipgym.ships.kernel_boxes import RBF, SIZES, Kernel, gaussians, kernel_box, kernel_inputs
 from shipgym.trials.identify_table import AUTO, Options
-from shipgym.trials.trial import Trial
 
 OWN = ("kernel", "centres", "kernel_length", "C", "folds")  # options of the kernel alone
 BLACK_BOX = "linear"  # the structure beneath a kernel where none is named
@@ -202,7 +200,7 @@ class _Search:
             coefficients=dict.fromkeys(table.coefficient_names, 0.0),
         )  # fmt: skip
         given = {"shaft_speed": blank.service_shaft_speed, **self.sampling}
-        return KernelFit(blank, structure_samples(self.trials, table, ship, **given))
+        return KernelFit(blank, build_samples(self.trials, table, ship, **given))
 
     def unit(self, samples: Samples) -> float:
         """What the weight of the errors, by ship length and in the prime system, is in SI units by row."""

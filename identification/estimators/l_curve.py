@@ -1,7 +1,5 @@
 """How many singular directions to keep: the L-curve and generalised cross-validation."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What the linear estimators share: the decorator of their settings, prediction, checks."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import partial
 from numbers import Real
@@ -12,8 +10,8 @@ from numpy.typing import ArrayLike
 from sklearn.base import BaseEstimator, RegressorMixin
 from sklearn.utils.validation import check_is_fitted, validate_data
 
+from shipgym import InputError
 from shipgym.arrays import Floats
-from shipgym.errors import InputError
 
 #: A dataclass is an estimator of scikit-learn's: its fields are the settings, which `__init__` only stores.
 settings = partial(dataclass, eq=False, repr=False)
@@ -30,8 +28,7 @@ class LinearRegressor(RegressorMixin, BaseEstimator):  # type: ignore[misc]
         """Targets, shape (n_samples,), of samples of shape (n_samples, n_features)."""
         check_is_fitted(self)
         features: Floats = validate_data(self, X, reset=False, dtype=np.float64)
-        prediction: Floats = features @ self.coef_ + self.intercept_
-        return prediction
+        return features @ self.coef_ + self.intercept_
 
 
 def validated(estimator: Any, X: ArrayLike, y: ArrayLike) -> tuple[Floats, Floats]:

@@ -5,25 +5,22 @@ decomposition of the centred and scaled features, X = U S V', gives the coeffici
 V diag(s / (s^2 + 1/C)) U' y, at a cost of O(n m^2) instead of the O(n^3) of the dual system.
 """
 
-from __future__ import annotations
-
 from itertools import combinations_with_replacement
 from math import factorial, prod
 from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.linalg import cho_factor, cho_solve
-from sklearn.metrics.pairwise import pairwise_kernels
+from sklearn.kernel_ridge import KernelRidge
 from sklearn.utils.validation import check_is_fitted, validate_data
 
 from identification.estimators.decomposition import Decomposition, centre_and_scale, decompose
 from identification.estimators.l_curve import corner_rank, gcv_rank, l_curve, variance_rank
 from identification.estimators.linear import LinearRegressor, check_weight, settings, validated
 from identification.estimators.robust import fit_weighted
+from shipgym import InputError
 from shipgym.arrays import Floats
 from shipgym.checks import check_choice, check_whole
-from shipgym.errors import InputError
 
 KERNELS = ("linear", "rbf", "poly")
 SELECTIONS = ("l-curve", "gcv", "explained-variance", "full")
@@ -108,25 +105,16 @@ class LSSVM(LinearRegressor):
             raise InputError(f"C: {self.C} found, expected a finite number with kernel {self.kernel!r}")
         self.centre_, self.scale_ = centre_and_scale(X, self.scale, self.fit_intercept)
         self.support_ = (X - self.centre_) / self.scale_
-        ridge = 1.0 / (self.C * (np.ones(len(y)) if weights is None else weights))
-        kernel = self._kernel(self.support_)
-        factor = cho_factor(kernel + np.diag(ridge))
-        if self.fit_intercept:  # two solves eliminate b from the bordered system
-            eta, nu = cho_solve(factor, np.column_stack([np.ones(len(y)), y])).T
-            self.intercept_ = float(nu.sum() / eta.sum())
-            self.dual_coef_ = nu - self.intercept_ * eta
-        else:
-            self.intercept_ = 0.0
-            self.dual_coef_ = cho_solve(factor, y)
-        residual: Floats = y - kernel @ self.dual_coef_ - self.intercept_
+        self.ridge_ = KernelRidge(
+            alpha=1.0 / self.C, kernel=self.kernel, gamma=self.gamma, degree=self.degree, coef0=self.coef0
+        )
+        # the free b takes so much of the ones that the multipliers sum to zero
+        targets = np.column_stack([y, np.ones(len(y))])
+        of_targets, of_ones = self.ridge_.fit(self.support_, targets, weights).dual_coef_.T
+        self.intercept_ = float(of_targets.sum() / of_ones.sum()) if self.fit_intercept else 0.0
+        self.dual_coef_ = self.ridge_.dual_coef_ = of_targets - self.intercept_ * of_ones
+        residual: Floats = y - self.ridge_.predict(self.support_) - self.intercept_
         return residual
-
-    def _kernel(self, X: Floats) -> Floats:
-        options: dict[str, Any] = {"gamma": self.gamma}
-        if self.kernel == "poly":
-            options |= {"degree": self.degree, "coef0": self.coef0}
-        kernel: Floats = pairwise_kernels(X, self.support_, metric=self.kernel, **options)
-        return kernel
 
     def predict(self, X: ArrayLike) -> Floats:
         """Targets, shape (n_samples,), of samples of shape (n_samples, n_features)."""
@@ -134,7 +122,7 @@ class LSSVM(LinearRegressor):
             return super().predict(X)
         check_is_fitted(self)
         features: Floats = validate_data(self, X, reset=False, dtype=np.float64)
-        prediction: Floats = self._kernel((features - self.centre_) / self.scale_) @ self.dual_coef_
+        prediction: Floats = self.ridge_.predict((features - self.centre_) / self.scale_)
         return prediction + self.intercept_
 
 

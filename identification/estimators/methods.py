@@ -1,7 +1,5 @@
 """Methods of identification: which estimator is fitted to the regression of each equation."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
@@ -22,9 +20,9 @@ from identification.estimators.recursive import (
 from identification.estimators.rm_svm import RMSVM, fit_rm_svm
 from identification.estimators.tuned import TunedLSSVM, fit_tuned
 from identification.regression.samples import Samples
+from shipgym import InputError
 from shipgym.arrays import Floats
 from shipgym.checks import check_choice, check_number, quoted
-from shipgym.errors import InputError
 
 
 def fit_all(estimator: Callable[[], Estimator], samples: Samples) -> Estimators:
@@ -32,8 +30,13 @@ def fit_all(estimator: Callable[[], Estimator], samples: Samples) -> Estimators:
     return {q: estimator().fit(X, samples.targets[q]) for q, X in samples.features.items()}
 
 
-def each_equation(make: Callable[[], Estimator], task: FitTask) -> Estimators:
-    """Fit one estimator to each equation by itself."""
+def fit_equations(make: Callable[[], Estimator], task: FitTask) -> Estimators:
+    """Fit one estimator to each equation by itself, or those that use more than its samples together."""
+    kind = type(make())
+    if issubclass(kind, TunedLSSVM):
+        return fit_tuned(make, task)
+    if issubclass(kind, RMSVM):
+        return fit_rm_svm(make, task)
     return fit_all(make, task.samples)
 
 
@@ -45,7 +48,7 @@ class Method:
     estimator: Callable[..., Estimator]  # makes an unfitted estimator from settings
     regularised: bool = True  # whether the guard against models that run away may penalise it
     #: fits estimators, made by its first argument, to the task that is its second
-    fit: Callable[[Callable[[], Estimator], FitTask], Estimators] = each_equation
+    fit: Callable[[Callable[[], Estimator], FitTask], Estimators] = fit_equations
     refined: bool = False  # whether what was fitted is the start of a refinement by simulation (`refine`)
 
     def fitted(self, settings: Mapping[str, Any], task: FitTask) -> Estimators:
@@ -90,10 +93,10 @@ METHODS = {
         Method("ridge", _ridge),
         Method("ls-svm", partial(LSSVM, fit_intercept=False)),
         Method("tls-svm", _TLS_SVM),
-        Method("cv-lssvr", partial(_TUNED, optimiser="grid"), fit=fit_tuned),
-        Method("pso-lssvr", partial(_TUNED, optimiser="pso"), fit=fit_tuned),
-        Method("abc-lssvr", partial(_TUNED, optimiser="abc"), fit=fit_tuned),
-        Method("de-lssvr", partial(_TUNED, optimiser="de"), fit=fit_tuned),
+        Method("cv-lssvr", partial(_TUNED, optimiser="grid")),
+        Method("pso-lssvr", partial(_TUNED, optimiser="pso")),
+        Method("abc-lssvr", partial(_TUNED, optimiser="abc")),
+        Method("de-lssvr", partial(_TUNED, optimiser="de")),
         Method("svr", partial(LinearSupportVectorMachine, fit_intercept=False)),
         Method("rls", RecursiveLeastSquares, regularised=False),
         Method("sg", StochasticGradient, regularised=False),
@@ -101,12 +104,9 @@ METHODS = {
         Method("mils", partial(MultiInnovationLeastSquares, inverse_free=False), regularised=False),
         Method("tmils", MultiInnovationLeastSquares, regularised=False),
         Method("output-error", _TLS_SVM, refined=True),
-        Method("rm-svm", RMSVM, fit=fit_rm_svm),
+        Method("rm-svm", RMSVM),
     )
 }
-
-#: Estimators that use more than the samples of one equation.
-FITTED_TOGETHER: Mapping[type, Callable[..., Estimators]] = {TunedLSSVM: fit_tuned, RMSVM: fit_rm_svm}
 
 
 def get_method(method: str | Any) -> Method:
@@ -126,8 +126,7 @@ def get_method(method: str | Any) -> Method:
             f"method: LSSVM with kernel {method.kernel!r} found, which has no coefficient for each term; "
             "write identify(..., kernel='rbf') for a ship with a kernel"
         )
-    fit = next((fit for kind, fit in FITTED_TOGETHER.items() if isinstance(method, kind)), each_equation)
-    return Method(type(method).__name__, lambda: without_constant(method), regularised=False, fit=fit)
+    return Method(type(method).__name__, lambda: without_constant(method), regularised=False)
 
 
 def fit_held(samples: Samples, sizes: dict[str, Floats], strength: float) -> Estimators:
@@ -177,8 +176,7 @@ class Adapted:
 
     def predict(self, X: ArrayLike) -> Floats:
         """Targets, shape (n_samples,)."""
-        prediction: Floats = np.asarray(X, dtype=float) @ self.coef_
-        return prediction
+        return np.asarray(X, dtype=float) @ self.coef_
 
 
 def without_constant(estimator: Any) -> Estimator:
@@ -188,5 +186,4 @@ def without_constant(estimator: Any) -> Estimator:
         copied.set_params(fit_intercept=False)
     # our own estimators know their moment; that of others is estimated
     known = type(copied).__module__.partition(".")[0] == "identification"
-    adapted: Estimator = copied if known else Adapted(copied)
-    return adapted
+    return copied if known else Adapted(copied)

@@ -10,8 +10,6 @@ which makes the correction even in e: an error of either sign would push the sam
 tanh(omega e) / omega everywhere, odd and of slope 1 at 0, with e in units of the targets' root mean square.
 """
 
-from __future__ import annotations
-
 from abc import abstractmethod
 from typing import Any, Self
 
@@ -22,9 +20,9 @@ from sklearn.utils.validation import check_is_fitted
 from identification.estimators.decomposition import scales_of
 from identification.estimators.linear import LinearRegressor, settings, validated
 from identification.estimators.lssvm import LSSVM
+from shipgym import InputError
 from shipgym.arrays import Floats
 from shipgym.checks import check_number, check_whole
-from shipgym.errors import InputError
 
 
 @settings()
@@ -124,8 +122,7 @@ class Recursion(LinearRegressor):
     def theta(self) -> Floats:
         """Estimate after the last sample, shape (n_features,) or (n_signals, n_features)."""
         check_is_fitted(self, "coef_")
-        estimate: Floats = self.coef_
-        return estimate
+        return self.coef_
 
     @property
     def covariance(self) -> Floats | None:

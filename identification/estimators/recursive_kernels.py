@@ -1,7 +1,5 @@
 """Compiled recursions: one pass over samples in time order, for any number of signals side by side."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from math import tanh
 from typing import Any, TypeVar

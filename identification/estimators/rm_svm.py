@@ -5,14 +5,12 @@ minor rudder. The Lagrangian printed there (9) is that of LS-SVM, but insensitiv
 the epsilon-SVR that is fitted here (Drucker et al. 1997, Support vector regression estimators).
 """
 
-from __future__ import annotations
-
 import warnings
 from collections.abc import Callable, Sequence
 from typing import Any, Self, TypeVar
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from sklearn.exceptions import ConvergenceWarning
 from sklearn.linear_model import Ridge
 from sklearn.svm import SVR, LinearSVR
@@ -23,11 +21,10 @@ from identification.search.pattern_search import pattern_search
 from identification.search.search import BAND, SearchResult
 from identification.validation.folds import FOLDS, TRIALS, held_out_rows
 from identification.validation.prediction import predict
-from shipgym.arrays import Floats
+from shipgym import InputError, ShipModel, Trial
+from shipgym.arrays import Flags, Floats
 from shipgym.checks import check_choice, check_number
-from shipgym.errors import InputError
-from shipgym.ships import GreyBox, ShipModel
-from shipgym.trials.trial import Trial
+from shipgym.ships import GreyBox
 
 OBJECTIVES = ("rmse", "correlation")
 REGRESSIONS = ("svr", "ls-svm")
@@ -201,7 +198,7 @@ class _Tuner:
         self.first_bands = [band] * len(task.samples.features)
         self._known: dict[tuple[Any, ...], RMSVM] = {}
 
-    def fitted(self, equation: str, weight: float, band: float, rows: NDArray[np.bool_]) -> RMSVM:
+    def fitted(self, equation: str, weight: float, band: float, rows: Flags) -> RMSVM:
         """The estimator of one equation for some of the rows."""
         key = (equation, weight, band, rows.tobytes())
         if key not in self._known:
@@ -213,7 +210,7 @@ class _Tuner:
             self._known[key] = RMSVM(**self.asked.get_params() | chosen).fit(X, y)
         return self._known[key]
 
-    def model(self, weight: float, bands: Sequence[float], rows: NDArray[np.bool_]) -> ShipModel:
+    def model(self, weight: float, bands: Sequence[float], rows: Flags) -> ShipModel:
         """The grey box with the corrections fitted to some of the rows."""
         equations = zip(self.samples.features, bands, strict=True)
         coefficients = {q: self.fitted(q, weight, band, rows).coef_ for q, band in equations}

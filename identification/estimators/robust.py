@@ -1,7 +1,5 @@
 """Weights that bound the influence of outliers: weighted LS-SVM."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np
@@ -26,8 +24,7 @@ def hampel_weights(residuals: Floats, largest: float) -> Floats:
     if scale <= ROUNDING * largest:
         return np.ones(len(residuals))
     ramp = (OUTER - np.abs(residuals) / scale) / (OUTER - INNER)
-    weights: Floats = np.clip(ramp, LEAST_WEIGHT, 1.0)
-    return weights
+    return np.clip(ramp, LEAST_WEIGHT, 1.0)
 
 
 def fit_weighted(fit: Callable[[Floats | None], Floats], y: Floats, robust: bool) -> Floats:

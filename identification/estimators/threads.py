@@ -1,7 +1,5 @@
 """One thread for linear algebra on tall, narrow matrices: sharing them out costs more than it saves."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import cache

@@ -1,7 +1,5 @@
 """LS-SVM that chooses its own weight of the errors."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Self
 
@@ -17,11 +15,9 @@ from identification.search import get_optimiser
 from identification.search.objectives import ErrorOfC, held_out_error, time_blocks, training_error
 from identification.search.search import Optimiser, SearchResult
 from identification.validation.prediction import predict
+from shipgym import InputError, ShipModel, Trial
 from shipgym.arrays import Floats
 from shipgym.checks import check_choice, check_whole
-from shipgym.errors import InputError
-from shipgym.ships import ShipModel
-from shipgym.trials.trial import Trial
 
 OBJECTIVES = ("k-fold", "training", "free-running")
 COMPARED = ("u", "v", "r")

@@ -7,18 +7,16 @@ with prior). So the current does not depend on the structure to be identified. I
 estimates with each trial, or each third of one, left out (jackknife): it holds what the equations miss.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
+from shipgym import Trial
 from shipgym.arrays import Floats
 from shipgym.ships.simulate import wind_accelerations
 from shipgym.trials.derivatives import time_derivative
-from shipgym.trials.trial import Trial
-from shipgym.trials.trial_import import rotate_to_body
+from shipgym.trials.navigation import rotate_to_body
 
 STEP, STEPS = 0.2, 5  # of the simulation, ship lengths at service speed; steps in a mean
 #: Mean and standard deviation of the coefficients of `_accelerations` before any trial, in units of L and U0.
@@ -104,10 +102,11 @@ class _Runs:
         for k, trial in enumerate(trials):
             wind = wind_accelerations(trial).T[:2] * travel / speed
             n = trial["n"] / shaft if shaft is not None else np.ones(len(trial))
-            ahead, aside = over_ground(trial)
-            c, s = np.cos(trial["psi"]), np.sin(trial["psi"])
-            north, east = ahead * c - aside * s, ahead * s + aside * c
-            logged = np.where("v" in trial.derived and "u" not in trial.derived, trial["u"], np.nan)
+            north, east = rotate_to_body(*over_ground(trial), -trial["psi"])
+            if "v" in trial.derived and "u" not in trial.derived:  # a speed log, through the water
+                logged = trial["u"]
+            else:
+                logged = np.full(len(trial), np.nan)
             seen_at = [row / speed for row in (north, east, logged)]
             rows = [trial["r"] * travel, trial["delta"], n, *wind, trial["psi"], *seen_at]
             times = (trial.t - trial.t[0]) / travel

@@ -5,28 +5,23 @@ of X, Y and N are stacked. Source: Xu, Hassani & Guedes Soares 2020, equations 1
 equations one after the other.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 from sklearn.metrics import r2_score
 
 from identification.estimators.estimator import Estimator
 from identification.estimators.lssvm import TruncatedLSSVM
 from identification.estimators.threads import single_threaded
-from shipgym.arrays import Floats
+from shipgym import InputError, Particulars, ShipModel, SteeringGear, Trial
+from shipgym.arrays import Floats, Integers
 from shipgym.checks import check_choice
-from shipgym.errors import InputError
-from shipgym.ships import ShipModel, get_structure
-from shipgym.ships.particulars import Particulars
+from shipgym.manoeuvres.towing_tank import rigid_body_forces
+from shipgym.ships import get_structure
 from shipgym.ships.shared_structure import ACCELERATIONS, AXES, SharedStructure
-from shipgym.ships.steering import SteeringGear
-from shipgym.trials.trial import Trial
 
 FORCES = ("X", "Y", "N")
 NEEDED = ("u", "v", "r", *FORCES)
@@ -37,14 +32,27 @@ METHODS = {"ls": "full", "tls-svm": "l-curve"}  # how each chooses the direction
 
 @dataclass(frozen=True, eq=False)
 class ForceRegression:
-    """Forces of captive tests as a linear function of the coefficients, prime system."""
+    """Forces of captive tests as a linear function of the coefficients, prime system.
 
-    #: share of each coefficient; rows of all X, then all Y, then all N, shape (n_rows, n_coefficients)
+    Attributes
+    ----------
+    features : array of shape (n_rows, n_coefficients)
+        The share of each coefficient; rows of all X, then all Y, then all N.
+    targets : array of shape (n_rows,)
+        Hydrodynamic force or moment.
+    names : tuple of str
+        Of the coefficients, in the order of the columns.
+    equation : array of shape (n_rows,)
+        0, 1, 2 for X, Y, N.
+    trial : array of shape (n_rows,)
+        Index of the trial.
+    """
+
     features: Floats
-    targets: Floats  # hydrodynamic force or moment, shape (n_rows,)
-    names: tuple[str, ...]  # of the coefficients, in the order of the columns
-    equation: NDArray[np.int64]  # 0, 1, 2 for X, Y, N, shape (n_rows,)
-    trial: NDArray[np.int64]  # index of the trial, shape (n_rows,)
+    targets: Floats
+    names: tuple[str, ...]
+    equation: Integers
+    trial: Integers
 
     def __len__(self) -> int:
         return len(self.targets)
@@ -136,7 +144,9 @@ def _one_piece(
     unit = 0.5 * ship.require("water_density") * length**2 * speed**2
     targets = np.array([trial[force][rows] / unit / (length if force == "N" else 1.0) for force in FORCES])
     if model_inertia:
-        targets += _rigid_body_forces(prime, ship)
+        inertia = ship.mass_prime, ship.mass_prime * ship.xg_prime, ship.inertia_prime
+        motion = ([prime[name] for name in names] for names in (AXES, ACCELERATIONS))
+        targets += rigid_body_forces(inertia, *motion)
     column = {name: i for i, name in enumerate(structure.coefficient_names)}
     features = np.zeros((len(AXES), len(t), len(column)))
     for own, axis in zip(features, AXES, strict=True):
@@ -144,14 +154,6 @@ def _one_piece(
             factors = [prime[symbol] ** float(power) for symbol, power in share.term.powers]
             own[:, column[share.coefficient]] += share.sign * np.prod(factors, axis=0)
     return features, targets
-
-
-def _rigid_body_forces(prime: dict[str, Floats], ship: Particulars) -> list[Floats]:
-    """Force and moment that accelerate the ship without water, about midship (Fossen 2011, 3.3), prime."""
-    m, static, yaw = ship.mass_prime, ship.mass_prime * ship.xg_prime, ship.inertia_prime
-    u, v, r, udot, vdot, rdot = (prime[name] for name in (*AXES, *ACCELERATIONS))
-    aside = vdot + u * r
-    return [m * (udot - v * r) - static * r * r, m * aside + static * rdot, yaw * rdot + static * aside]
 
 
 def fit_forces(regression: ForceRegression, estimator: Estimator) -> tuple[Floats, Floats]:
@@ -169,7 +171,7 @@ def fit_forces(regression: ForceRegression, estimator: Estimator) -> tuple[Float
     return estimator.coef_, 0.5 * (covariance + covariance.T)
 
 
-def force_variances(equation: NDArray[np.int64], residuals: Floats, leverages: Floats) -> Floats:
+def force_variances(equation: Integers, residuals: Floats, leverages: Floats) -> Floats:
     """Variances of the errors of X, Y and N, each by its residuals, shape (3, ...).
 
     `equation`: 0, 1, 2 for X, Y, N, shape (n_rows,); `residuals`: of the fit, shape (n_rows, ...);

@@ -1,6 +1,4 @@
-"""The regression of a grey box: what the converted reference ship leaves of the target's accelerations."""
-
-from __future__ import annotations
+"""Grey boxes: their reference ship, how well she alone predicts, and the regression of a model on itself."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -13,15 +11,13 @@ from identification.estimators.lssvm import TruncatedLSSVM
 from identification.regression.samples import Samples, build_samples
 from identification.simulation_error.similarity import AUTO, check_alike, select_reference
 from identification.validation.prediction import predict, trial_metrics
+from shipgym import InputError, Particulars, ShipModel, Trial
 from shipgym.arrays import Floats
-from shipgym.errors import InputError
-from shipgym.ships import GreyBox, ShipModel, Structure, grey_box
-from shipgym.ships.particulars import Particulars
-from shipgym.trials.trial import Trial
+from shipgym.ships import GreyBox, grey_box
 
 
-class _Widened:
-    """A grey box whose features have one more column: the reference ship's converted acceleration."""
+class _OwnAccelerations:
+    """A table of one term an equation: the acceleration of a grey box's reference ship."""
 
     def __init__(self, box: GreyBox) -> None:
         self._box = box
@@ -30,10 +26,8 @@ class _Widened:
         return getattr(self._box, name)
 
     def features(self, equation: str, channels: Any, particulars: Particulars, shaft_speed: float) -> Floats:
-        """As of the grey box, shape (n_samples, n_terms + 1)."""
-        known = self._box.converted_accelerations(channels, particulars, shaft_speed)[equation]
-        own = self._box.features(equation, channels, particulars, shaft_speed)
-        return np.column_stack([own, known])
+        """Shape (n_samples, 1)."""
+        return self._box.converted_accelerations(channels, particulars, shaft_speed)[equation][:, None]
 
 
 def chosen_box(
@@ -62,24 +56,6 @@ def chosen_box(
     return replace(box, shaft=box.shaft and "n" in recorded), found
 
 
-def structure_samples(
-    trials: Sequence[Trial], structure: Structure, particulars: Particulars, **sampling: Any
-) -> Samples:
-    """The regression of any structure, as `build_samples`.
-
-    Of a grey box it is that of what the reference ship's converted acceleration leaves of the changes.
-    """
-    if not isinstance(structure, GreyBox):
-        return build_samples(trials, structure, particulars, **sampling)
-    widened: Any = _Widened(structure)
-    built = build_samples(trials, widened, particulars, **sampling)
-    return replace(
-        built,
-        features={q: features[:, :-1] for q, features in built.features.items()},
-        targets={q: built.targets[q] - features[:, -1] for q, features in built.features.items()},
-    )
-
-
 def explained_samples(
     trials: Sequence[Trial], model: ShipModel, **sampling: Any
 ) -> tuple[Samples, dict[str, Estimator]]:
@@ -87,12 +63,8 @@ def explained_samples(
 
     For models that were not fitted by regression; `sampling` as in `build_samples`.
     """
-    box = grey_box(model, shaft=True)
-    widened: Any = _Widened(box)
-    built = build_samples(
-        trials, widened, model.particulars, shaft_speed=model.service_shaft_speed, **sampling
-    )
-    own = replace(built, features={q: features[:, -1:] for q, features in built.features.items()})
+    table: Any = _OwnAccelerations(grey_box(model, shaft=True))
+    own = build_samples(trials, table, model.particulars, shaft_speed=model.service_shaft_speed, **sampling)
     estimators: dict[str, Estimator] = {}
     for q, features in own.features.items():
         estimators[q] = TruncatedLSSVM(selection="full", fit_intercept=False).fit(features, own.targets[q])

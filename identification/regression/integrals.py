@@ -1,7 +1,5 @@
 """Integrals of the terms of a model over each step: Euler, trapezoid rule, Gauss on broken splines."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Mapping, Sequence
 
 import numpy as np

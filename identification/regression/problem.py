@@ -1,7 +1,5 @@
 """What is to be identified: the trials used, the structure, the ship, and the regression they make."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -9,24 +7,21 @@ from typing import Any
 import numpy as np
 
 from identification.options import Given, name_of, whole_call
-from identification.regression.grey_box import chosen_box, structure_samples
+from identification.regression.grey_box import chosen_box
 from identification.regression.preprocess import repaired
 from identification.regression.rudder import estimated_gear
-from identification.regression.samples import Samples
+from identification.regression.samples import Samples, build_samples
 from identification.regression.still_water import in_still_water
 from identification.regression.wind import constant_wind, with_constant_wind
 from identification.validation.diagnostics import check_samples, check_trials
+from shipgym import InputError, Particulars, ShipModel, SteeringGear, Trial
 from shipgym.checks import check_choice, check_number
-from shipgym.errors import InputError
-from shipgym.ships import Envelope, ShipModel, Structure, Term, get_structure
+from shipgym.ships import Envelope, Structure, Term, get_structure
 from shipgym.ships.grey_boxes import GREY_BOX
 from shipgym.ships.mmg import MMG
-from shipgym.ships.particulars import Particulars
-from shipgym.ships.steering import SteeringGear
 from shipgym.ships.structures import STRUCTURES, get_dynamics
 from shipgym.trials.identify_table import Options
 from shipgym.trials.scale import check_scale
-from shipgym.trials.trial import Trial
 
 ENVELOPE_CHANNELS = ("u", "v", "r", "delta")
 #: Stands for the MMG form where channels, excitation and particulars are checked.
@@ -72,13 +67,13 @@ def pose(
     shaft = _shaft_speed(options.service_shaft_speed, used, table)
     smooth = options.preprocessing or options.smooth
     sampling = dict[str, Any](samples=options.samples, window=options.window, gear=steering, smooth=smooth)
-    regression = structure_samples(used, table, ship, shaft_speed=shaft, **sampling)
+    regression = build_samples(used, table, ship, shaft_speed=shaft, **sampling)
     if options.wind == "constant":
         constants = constant_wind(used, regression, options.structure)
         used, everything = (
             [with_constant_wind(one, constants) for one in group] for group in (used, everything)
         )
-        regression = structure_samples(used, table, ship, shaft_speed=shaft, **sampling)
+        regression = build_samples(used, table, ship, shaft_speed=shaft, **sampling)
         sea["wind"] = {"option": "constant", "accelerations": constants}
     check_samples(regression, used, table)
     gear = steering or (estimated_gear(used) if table.has_rudder else SteeringGear())

@@ -5,23 +5,18 @@ polynomial misses both. The orders, the times at which they changed and, where n
 the lag of the gear are found from the samples of the rudder angle alone.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.optimize import brentq, minimize_scalar
 from scipy.special import lambertw
 
 from identification.regression.preprocess import is_noisy
-from shipgym.arrays import Floats
-from shipgym.ships.steering import SteeringGear
-from shipgym.trials.trial import Trial
-
-Flags = NDArray[np.bool_]
+from shipgym import SteeringGear, Trial
+from shipgym.arrays import Flags, Floats, Integers
 
 TOLERANCE = 1e-3  # of the rudder's range: orders closer than this are one order
 RAMP = 1e-4  # a rate within this part of the gear's rate is the gear's rate
@@ -52,18 +47,17 @@ class Rudder:
     corners: Floats  # times at which rate or acceleration of the rudder jump, s, shape (n_corners,)
     #: derivatives of the rudder that are continuous there: 0 where the rate jumps, 1 otherwise, shape
     #: (n_corners,)
-    smoothness: NDArray[np.int64]
+    smoothness: Integers
 
     def __call__(self, times: ArrayLike) -> Floats:
         """Rudder angle, rad, at times within the samples."""
         times = np.asarray(times, dtype=float)
         if not self.follows_gear:
-            between: Floats = np.interp(times, self.t, self.delta)
-            return between
+            return np.interp(times, self.t, self.delta)
         k = np.clip(np.searchsorted(self.t, times, side="right") - 1, 0, len(self.t) - 2)
         return self._within(k, times - self.t[k])
 
-    def _within(self, k: NDArray[np.int64], elapsed: Floats) -> Floats:
+    def _within(self, k: Integers, elapsed: Floats) -> Floats:
         """The angle some time after the start of intervals."""
         gear, first = (self.rate, self.time_constant), np.minimum(elapsed, self.switch[k])
         middle = _flow(self.delta[k], self.before[k], first, *gear)
@@ -132,8 +126,7 @@ def _flow(start: Any, order: Any, elapsed: Any, rate: float, lag: float) -> Floa
     ramping = np.minimum(elapsed, (distance - tail) / rate)
     decay = np.exp(-(elapsed - ramping) / lag) if lag > 0.0 else 1.0
     moved = rate * ramping + np.where(ramping < elapsed, tail * (1.0 - decay), 0.0)
-    flow: Floats = start + side * moved
-    return flow
+    return start + side * moved
 
 
 def _orders(t: Floats, delta: Floats, rate: float, lag: float) -> Floats:
@@ -156,8 +149,7 @@ def _continues(orders: Floats, delta: Floats, tolerance: float) -> Flags:
     ramped, ramps = np.isinf(before), np.isinf(now)
     same = np.abs(np.where(ramps, 0.0, now) - np.where(ramped, 0.0, before)) <= tolerance
     ahead = np.where(ramps, np.sign(now), np.sign(np.where(ramps, 0.0, now) - at)) * np.sign(before)
-    flags: Flags = np.where(ramped, np.where(ramps, now == before, ahead >= 0), ~ramps & same)
-    return flags
+    return np.where(ramped, np.where(ramps, now == before, ahead >= 0), ~ramps & same)
 
 
 def _explained(t: Floats, delta: Floats, rate: float, lag: float) -> float:

@@ -6,12 +6,10 @@ Cao 2015), the integral structure the trapezoid rule (ISSI of Cao 2015), the spl
 quadrature on splines through the samples, broken where the rudder has corners.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,13 +24,11 @@ from identification.regression.integrals import (
     twice_integrated,
 )
 from identification.regression.rudder import rebuild, straight
-from shipgym.arrays import Floats, integral
+from shipgym import InputError, Particulars, SteeringGear, Trial
+from shipgym.arrays import Floats, Integers, integral
 from shipgym.checks import check_whole
-from shipgym.errors import InputError
-from shipgym.ships.particulars import Particulars
-from shipgym.ships.steering import SteeringGear
+from shipgym.ships.grey_boxes import GreyBox
 from shipgym.ships.term_table import Structure
-from shipgym.trials.trial import Trial
 
 SAMPLE_STRUCTURES = ("euler", "integral", "spline")
 LONGEST_WINDOW = 1.0 / 3.0  # of the time to sail one ship length
@@ -44,19 +40,35 @@ FEWEST_SAMPLES = 10  # between gaps; fewer are left out
 
 @dataclass(frozen=True, eq=False)
 class Samples:
-    """A regression for each equation of motion (`u`, `v`, `r`, `p`), all with the same rows."""
+    """A regression for each equation of motion, all with the same rows.
 
-    features: dict[str, Floats]  # integrals of the terms over each row's window, shape (n_rows, n_terms)
-    targets: dict[str, Floats]  # change of the velocity there, less that by measured wind, shape (n_rows,)
-    start: Floats  # time at which the window begins, s, shape (n_rows,)
-    duration: Floats  # length of the window, s, shape (n_rows,)
-    trial: NDArray[np.int64]  # index of the trial, shape (n_rows,)
-    window: int  # steps per window of the longest-windowed trial
+    Attributes
+    ----------
+    features : dict of str to array of shape (n_rows, n_terms)
+        Integrals of the terms over each row's window, by equation (`u`, `v`, `r`, `p`).
+    targets : dict of str to array of shape (n_rows,)
+        Change of the velocity over the window, less that by measured wind.
+    start : array of shape (n_rows,)
+        Time at which the window begins, s.
+    duration : array of shape (n_rows,)
+        Length of the window, s.
+    trial : array of shape (n_rows,)
+        Index of the trial.
+    window : int
+        Steps per window of the longest-windowed trial.
+    """
+
+    features: dict[str, Floats]
+    targets: dict[str, Floats]
+    start: Floats
+    duration: Floats
+    trial: Integers
+    window: int
 
     def __len__(self) -> int:
         return len(self.start)
 
-    def select(self, rows: NDArray[Any]) -> Samples:
+    def select(self, rows: NDArray[Any]) -> Self:
         """Some of the rows, by mask or index."""
         return replace(
             self,
@@ -81,7 +93,7 @@ def build_samples(
     """Stack the regressions of all trials.
 
     A trial with gaps in time is taken for several (`between_gaps`): nothing is smoothed or integrated across
-    a gap.
+    a gap. Of a grey box the targets are what the reference ship's converted acceleration leaves.
 
     Parameters
     ----------
@@ -166,6 +178,9 @@ class _Sampling:
             if f"wind_{q}dot" in trial:
                 by_wind = integral(t, trial[f"wind_{q}dot"])
                 targets[q] -= by_wind[last] - by_wind[first]
+            if isinstance(self.structure, GreyBox):
+                features[q], by_reference = features[q][:, :-1], features[q][:, -1]
+                targets[q] -= by_reference
         part = Samples(features, targets, t[first], t[last] - t[first], np.full(len(first), index), window)
         return without_memory(part) if "q" in equations else part
 
@@ -179,7 +194,12 @@ class _Sampling:
         return spline_integrals(t, channels, equations, self._terms, rudder)
 
     def _terms(self, equation: str, channels: Channels) -> Floats:
-        return self.structure.features(equation, channels, self.particulars, self.shaft_speed)
+        """The terms of an equation, of a grey box followed by the reference ship's acceleration."""
+        terms = self.structure.features(equation, channels, self.particulars, self.shaft_speed)
+        if not isinstance(self.structure, GreyBox):
+            return terms
+        known = self.structure.converted_accelerations(channels, self.particulars, self.shaft_speed)
+        return np.column_stack([terms, known[equation]])
 
 
 def between_gaps(trial: Trial, particulars: Particulars, fewest: int = FEWEST_SAMPLES) -> list[Trial]:

@@ -1,7 +1,5 @@
 """Trials as they would have been in still water: current and wind taken out, and what is known of them."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import PurePath
 from typing import Any
@@ -11,13 +9,11 @@ from scipy.stats import chi2
 
 from identification.regression.current import estimate_current, over_ground
 from identification.regression.wind import measured_wind
+from shipgym import InputError, Particulars, Trial
 from shipgym.arrays import Floats, integral
 from shipgym.checks import check_choice, check_keys, check_number
-from shipgym.errors import InputError
-from shipgym.ships.particulars import Particulars
 from shipgym.trials.identify_table import OPTIONS, Options
-from shipgym.trials.trial import Trial
-from shipgym.trials.trial_import import rotate_to_body
+from shipgym.trials.navigation import rotate_to_body
 
 NEEDED = {"psi", "u", "v", "r", "delta"}
 COLUMNS = ("current_north", "current_east")

@@ -1,22 +1,18 @@
 """What the wind does to a ship in her trials: accelerations by measured wind, or constant ones by trial."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from identification.regression.samples import Samples
+from shipgym import InputError, Particulars, Trial
 from shipgym.checks import check_flag, check_keys
-from shipgym.errors import InputError
 from shipgym.sea.wind import AIR_DENSITY, WindTable, wind_curves
 from shipgym.ships.inertia import particulars_inertia
 from shipgym.ships.mmg import MMG
-from shipgym.ships.particulars import Particulars
 from shipgym.ships.simulate import WIND
-from shipgym.trials.trial import Trial
-from shipgym.trials.trial_import import rotate_to_body
+from shipgym.trials.navigation import rotate_to_body
 
 COLLINEAR = 1e-6  # share of a constant that no term explains, below which the structure has one itself
 

@@ -1,7 +1,5 @@
 """The page of a comparison of methods: ranking, errors of each trial, and the trials as predicted."""
 
-from __future__ import annotations
-
 from pathlib import PurePath
 
 import numpy as np

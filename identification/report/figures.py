@@ -1,7 +1,5 @@
 """Figures of a fit: regression, residuals, choice of rank and of C, and intervals of the coefficients."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The report of an identification: one self-contained HTML page."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from identification.fit import Fit

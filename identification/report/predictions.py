@@ -1,17 +1,15 @@
 """Figures of trials and what a model predicts of them."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from pathlib import PurePath
 from typing import Any
 
 import numpy as np
 
+from shipgym import Trial
 from shipgym.plots import AXES, MEASURED, MODEL, Panel, axis, line, panels
 from shipgym.plots.style import Figure
 from shipgym.trials.navigation import rotate_to_body
-from shipgym.trials.trial import Trial
 
 RUDDER = "#9aa5b1"
 

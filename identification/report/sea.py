@@ -1,7 +1,5 @@
 """What was taken out of the trials for current and wind: sentences, and tracks through the water."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from pathlib import PurePath
 from typing import Any
@@ -12,8 +10,8 @@ from identification.fit import Fit
 from identification.regression.still_water import SIGNIFICANT
 from shipgym.plots import LIMIT, MEASURED, MODEL, Panel, axis, line, panels
 from shipgym.plots.style import Figure
+from shipgym.trials.units import KNOT
 
-KNOT = 1852.0 / 3600.0
 NORMAL_95 = 1.96
 SOURCES = {"all trials": "one of all", "trial": "its own", "given": "as given", "columns": "of its columns"}
 

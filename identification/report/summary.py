@@ -1,7 +1,5 @@
 """The table of coefficients that `IdentificationResult.summary` prints."""
 
-from __future__ import annotations
-
 from math import degrees
 from typing import Any
 
@@ -11,7 +9,7 @@ from identification.fit import Fit
 from identification.report.sea import sea_sentences
 from identification.text import as_text, lined_table
 from identification.validation.warnings import EQUATIONS, exactly_collinear, undetermined
-from shipgym.ships import ShipModel
+from shipgym import ShipModel
 from shipgym.ships.particulars import ADDED_MASSES
 
 INERTIA = ("mass", "xg", "yaw_gyradius", "speed")

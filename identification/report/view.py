@@ -1,7 +1,5 @@
 """What the templates of reports show of a fit: rows of tables, and figures of its trials."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import PurePath
 from typing import Any
@@ -13,31 +11,13 @@ from identification.report.predictions import overview_figure, prediction_figure
 from identification.report.sea import sea_sentences, track_figure
 from identification.report.summary import PRIME, are_derivatives, kernel_text
 from identification.validation.warnings import EQUATIONS, heading_errors_deg, model_warnings
-from shipgym.ships import ShipModel
+from shipgym import ShipModel, Trial
+from shipgym.files import shipped_toml
 from shipgym.ships.particulars import ADDED_MASSES
-from shipgym.trials.trial import Trial
+from shipgym.trials.units import KNOT
 
-KNOT = 1852.0 / 3600.0
 SIGNIFICANT_T = 2.0  # a coefficient with a smaller |t| is not significantly different from zero
-FORCES = {"X": "Surge force X", "Y": "Sway force Y", "N": "Yaw moment N", "K": "Roll moment K"}
-INDICES = {
-    "overshoot_1_deg": ("1st overshoot", "deg"),
-    "overshoot_2_deg": ("2nd overshoot", "deg"),
-    "advance_lengths": ("advance", "L"),
-    "transfer_lengths": ("transfer", "L"),
-    "tactical_diameter_lengths": ("tactical diameter", "L"),
-}
-PARTICULARS = {
-    "length": ("length between perpendiculars", "m", 1.0),
-    "beam": ("beam", "m", 1.0),
-    "draught": ("draught", "m", 1.0),
-    "block_coefficient": ("block coefficient", "", 1.0),
-    "mass": ("mass", "t", 1e-3),
-    "xg": ("centre of gravity forward of midship", "m", 1.0),
-    "yaw_gyradius": ("yaw gyradius", "m", 1.0),
-    "speed": ("service speed", "m/s", 1.0),
-    "water_density": ("water density", "kg/m³", 1.0),
-}
+WORDS: dict[str, dict[str, Any]] = shipped_toml("identification.report", "words.toml")
 
 
 def fit_view(fit: Fit) -> dict[str, Any]:
@@ -106,7 +86,7 @@ def _errors(metrics: dict[str, Any]) -> dict[str, Any]:
     """A row of the table of errors, with the manoeuvre's indices by name and unit."""
     indices = [
         (text, metrics[name]["measured"], metrics[name]["predicted"], metrics[name].get("closed_loop"), unit)
-        for name, (text, unit) in INDICES.items()
+        for name, (text, unit) in WORDS["indices"].items()
         if metrics.get(name) is not None
     ]
     return {**metrics, "indices": indices}
@@ -143,7 +123,7 @@ def _particulars(model: ShipModel) -> list[tuple[str, bool, str, str]]:
     """Name, whether estimated, value and unit of the particulars that are known."""
     return [
         (text, name in model.particulars.estimated, f"{factor * float(model.particulars[name]):.5g}", unit)
-        for name, (text, unit, factor) in PARTICULARS.items()
+        for name, (text, unit, factor) in WORDS["particulars"].items()
         if model.particulars[name] is not None
     ]
 
@@ -151,7 +131,7 @@ def _particulars(model: ShipModel) -> list[tuple[str, bool, str, str]]:
 def _coefficients(fit: Fit) -> dict[str, list[dict[str, Any]]]:
     """Rows of coefficients by the title of their table: one for each force, or one for all."""
     tables: dict[str, list[dict[str, Any]]] = {}
-    forces = FORCES if are_derivatives(fit.model) else {}
+    forces = WORDS["forces"] if are_derivatives(fit.model) else {}
     for name, value in fit.coefficients.items():
         force, error = name.partition("_")[0], fit.standard_errors[name]
         t = value / error if error > 0.0 else None

@@ -1,7 +1,5 @@
 """Search for settings: optimisers behind one signature, by name."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from typing import Any, cast
 
@@ -14,8 +12,8 @@ from identification.search.optimisers import (
     ParticleSwarm,
 )
 from identification.search.search import Objective, Optimiser, SearchResult
+from shipgym import InputError
 from shipgym.checks import check_choice
-from shipgym.errors import InputError
 
 __all__ = [
     "OPTIMISERS", "ArtificialBeeColony", "DifferentialEvolution", "GridSearch", "Optimiser",
@@ -54,5 +52,15 @@ def minimise(
         The same seed gives the same search.
     optimiser : {"abc", "pso", "grid", "de"} or Optimiser
         By name with its usual settings, or one with your own.
+
+    Returns
+    -------
+    SearchResult
+        The best candidate, its value, and the course of the search.
+
+    Raises
+    ------
+    InputError
+        For bounds and settings that cannot be.
     """
     return get_optimiser(optimiser).minimise(objective, bounds, seed)

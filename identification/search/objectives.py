@@ -1,16 +1,14 @@
 """What a search for C minimises: the samples are read once, and a candidate costs the same for any number."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from identification.estimators.decomposition import Decomposition, decompose_triangle, stacked, triangle
-from shipgym.arrays import Floats
-from shipgym.errors import InputError
+from shipgym import InputError
+from shipgym.arrays import Floats, Integers
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,8 +24,7 @@ class ErrorOfC:
     def __call__(self, log_c: Floats) -> Floats:
         """Mean squared errors, shape (n_candidates,), of log10 C of shape (n_candidates, 1)."""
         error = self.offset - (1.0 / (self.squares + 10.0**-log_c)) @ self.gain
-        values: Floats = np.einsum("kij,kij->i", error, error) / self.n_samples
-        return values
+        return np.einsum("kij,kij->i", error, error) / self.n_samples
 
 
 def training_error(
@@ -47,7 +44,7 @@ def held_out_error(
     y: Floats,
     scale: bool | ArrayLike,
     fit_intercept: bool,
-    blocks: NDArray[np.int64],
+    blocks: Integers,
     weights: Floats | None = None,
 ) -> ErrorOfC:
     """Error on each block of samples, by their indices from 0, of the fit to all others."""
@@ -80,7 +77,7 @@ def _errors(
     return ErrorOfC(offset, gain, squares, n_samples)
 
 
-def time_blocks(n_samples: int, folds: int | str = 5, groups: ArrayLike | None = None) -> NDArray[np.int64]:
+def time_blocks(n_samples: int, folds: int | str = 5, groups: ArrayLike | None = None) -> Integers:
     """Index of each sample's block; blocks follow each other, never shuffled: neighbours in time are alike.
 
     `folds`: number of blocks, equally long but for one sample; "trials" makes a block of each trial, by

@@ -1,18 +1,13 @@
 """Optimisers: grid, particle swarm, differential evolution, artificial bee colony."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identification.search.search import MOST, Optimiser, Recorder
-from shipgym.arrays import Floats
+from shipgym.arrays import Floats, Integers
 from shipgym.checks import check_whole
-
-Integers = NDArray[np.int64]
 
 
 @dataclass(frozen=True)
@@ -71,12 +66,10 @@ class ParticleSwarm(Optimiser):
     def _search(self, record: Recorder, low: Floats, high: Floats, rng: np.random.Generator) -> None:
         n = check_whole(self.particles, "particles", at_least=1, at_most=MOST)
         check_whole(self.rounds, "rounds", at_least=1, at_most=MOST)
-        shape = (n, len(low))
-        place = low + (high - low) * rng.random(shape)
+        place, values = _start(record, n, low, high, rng)
+        shape = place.shape
         velocity = np.zeros(shape)
         best = place.copy()
-        values = record(place)
-        record.end_round()
         for _ in range(self.rounds):
             towards_own = self.own * rng.random(shape) * (best - place)
             towards_common = self.common * rng.random(shape) * (record.x - place)
@@ -150,9 +143,7 @@ class ArtificialBeeColony(Optimiser):
         n = check_whole(self.sources, "sources", at_least=2, at_most=MOST)
         check_whole(self.rounds, "rounds", at_least=1, at_most=MOST)
         check_whole(self.limit, "limit", at_least=1, at_most=MOST)
-        sources = low + (high - low) * rng.random((n, len(low)))
-        values = record(sources)
-        record.end_round()
+        sources, values = _start(record, n, low, high, rng)
         idle = np.zeros(n, dtype=np.int64)
         for _ in range(self.rounds):
             for onlookers in (False, True):
@@ -161,10 +152,25 @@ class ArtificialBeeColony(Optimiser):
                 _settle(sources, values, idle, chosen, moved, record(moved))
             left = np.flatnonzero(idle > self.limit)
             if left.size:
-                sources[left] = low + (high - low) * rng.random((left.size, len(low)))
+                sources[left] = _drawn(left.size, low, high, rng)
                 values[left] = record(sources[left])
                 idle[left] = 0
             record.end_round()
+
+
+def _drawn(count: int, low: Floats, high: Floats, rng: np.random.Generator) -> Floats:
+    """Candidates evenly distributed in the box, shape (count, n_dimensions)."""
+    return low + (high - low) * rng.random((count, len(low)))
+
+
+def _start(
+    record: Recorder, count: int, low: Floats, high: Floats, rng: np.random.Generator
+) -> tuple[Floats, Floats]:
+    """The first round: candidates drawn in the box, and their values."""
+    drawn = _drawn(count, low, high, rng)
+    values = record(drawn)
+    record.end_round()
+    return drawn, values
 
 
 def _moved(sources: Floats, chosen: Integers, rng: np.random.Generator) -> Floats:

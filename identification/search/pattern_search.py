@@ -4,8 +4,6 @@ Source: Torczon 1997, On the convergence of pattern search algorithms, SIAM J. O
 2019 for the insensitive bands of RM-SVM.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cache

@@ -1,16 +1,15 @@
 """What every optimiser has in common: its signature, its result, and the record of a search."""
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from shipgym import InputError
 from shipgym.arrays import Floats
-from shipgym.errors import InputError
 
 LOG_C, BAND = "log10 C", "insensitive band"  # what searches look for
 MOST = 100_000  # particles, rounds and the like of a search
@@ -21,18 +20,32 @@ Objective = Callable[[Floats], Floats]
 
 @dataclass(frozen=True, eq=False)
 class SearchResult:
-    """The outcome of a search."""
+    """The outcome of a search.
 
-    x: Floats  # the best candidate, shape (n_dimensions,)
-    value: float  # its objective
-    #: best objective after each round, first of the starting candidates, shape (n_rounds,), and the candidate
-    #: that has it, shape (n_rounds, n_dimensions)
+    Attributes
+    ----------
+    x : array of shape (n_dimensions,)
+        The best candidate.
+    value : float
+        Its objective.
+    history : array of shape (n_rounds,)
+        Best objective after each round; the first is that of the starting candidates.
+    course : array of shape (n_rounds, n_dimensions)
+        Best candidate after each round.
+    evaluations : int
+        Candidates evaluated.
+    variable : str
+        What a candidate holds: the logarithm of the weight C, or an insensitive band.
+    """
+
+    x: Floats
+    value: float
     history: Floats
     course: Floats
-    evaluations: int  # candidates evaluated
-    variable: str = LOG_C  # what a candidate holds: the logarithm of the weight C, or an insensitive band
+    evaluations: int
+    variable: str = LOG_C
 
-    def of(self, dimension: int, variable: str = LOG_C) -> SearchResult:
+    def of(self, dimension: int, variable: str = LOG_C) -> Self:
         """What was found of one dimension."""
         return replace(self, x=self.x[[dimension]], course=self.course[:, [dimension]], variable=variable)
 
@@ -81,9 +94,19 @@ class Optimiser(ABC):
     def minimise(self, objective: Objective, bounds: ArrayLike, seed: int = 0) -> SearchResult:
         """Minimise.
 
-        `objective`: values, shape (n_candidates,), of candidates of shape (n_candidates, n_dimensions);
-        `bounds`: lower and upper bound of each dimension, shape (n_dimensions, 2); `seed`: the same seed
-        gives the same search. Raises InputError for bounds and settings that cannot be.
+        Parameters
+        ----------
+        objective : callable
+            Values, shape (n_candidates,), of candidates of shape (n_candidates, n_dimensions).
+        bounds : array-like of shape (n_dimensions, 2)
+            Lower and upper bound of each dimension.
+        seed : int
+            The same seed gives the same search.
+
+        Raises
+        ------
+        InputError
+            For bounds and settings that cannot be.
         """
         record = Recorder(objective)
         self._search(record, *check_bounds(bounds), np.random.default_rng(seed))

@@ -6,17 +6,13 @@ manoeuvring performance of a ship with the parameter of loading condition, J. So
 Japan 168 (hull). Both about midship, even keel, prime system by rho L^2 U^2 / 2 and rho L^3 U^2 / 2.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
-from shipgym.arrays import Floats
-from shipgym.errors import InputError
-from shipgym.ships.particulars import Particulars
+from shipgym import InputError, Particulars
+from shipgym.arrays import Flags, Floats
 from shipgym.ships.term_table import Structure, inertia
 from shipgym.ships.terms import Term
 
@@ -79,7 +75,7 @@ FORMULAS: dict[str, Callable[[Particulars], dict[str, float]]] = {
 
 def formula_coefficients(
     formula: str, structure: Structure, particulars: Particulars
-) -> dict[str, tuple[Floats, NDArray[np.bool_]]]:
+) -> dict[str, tuple[Floats, Flags]]:
     """Coefficients of the SI features of a structure, as far as formulas give them.
 
     `formula`: which, one of `clarke`, `kijima`; `structure`: with sway and yaw, and terms in v, r and delta
@@ -121,8 +117,7 @@ def _accelerations(derivatives: dict[str, float], ship: Particulars) -> Floats:
     """Sway and yaw acceleration by v, r and delta, prime system, shape (2, 3)."""
     forces = np.array([[derivatives[f"{force}_{s}"] for s in LINEAR_SYMBOLS] for force in "YN"])
     forces[:, 1] -= [ship.mass_prime, ship.mass_prime * ship.xg_prime]  # turning with the body's axes
-    accelerations: Floats = np.linalg.solve(inertia(ship)[1:, 1:], forces)
-    return accelerations
+    return np.linalg.solve(inertia(ship)[1:, 1:], forces)
 
 
 def _linear_symbol(term: Term) -> str | None:

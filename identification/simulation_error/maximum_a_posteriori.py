@@ -5,30 +5,23 @@ by their own scatter, plus the squared distance from the prior (Maine & Iliff 19
 error with prior). How much narrower the prior is made, the trials decide, each predicted from the others.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from identification.options import Options, name_of
 from identification.regression.problem import Problem
 from identification.simulation_error.mmg_prior import YOSHIMURA, MMGPrior, mmg_prior
 from identification.simulation_error.segments import Segment, channel_units, compared_channels, cut, sailed
-from shipgym.arrays import Floats
+from shipgym import InputError, ShipModel, Trial
+from shipgym.arrays import Floats, Integers
 from shipgym.checks import check_number
 from shipgym.engine.motion import Ship
 from shipgym.engine.records import LANES
-from shipgym.errors import InputError
-from shipgym.ships import ShipModel
 from shipgym.ships.mmg import IDENTIFIED
-from shipgym.trials.trial import Trial
-
-Rows = NDArray[np.int64]
 
 MAP, DEFAULT_METHOD = "map", Options.method
 SEGMENT_LENGTHS, INTERVAL = 1.7, 0.067  # of segments, and between samples, ship lengths at service speed
@@ -135,14 +128,14 @@ class _Problem:
         values = dict(zip(IDENTIFIED, (self.mean + z * self.prior.deviation).tolist(), strict=True))
         return replace(self.blank, coefficients=self.prior.mean | values)
 
-    def at(self, z: Floats, which: Rows) -> tuple[Floats, Floats]:
+    def at(self, z: Floats, which: Integers) -> tuple[Floats, Floats]:
         """As `simulated`, which is not done twice in a row."""
         key = z.tobytes() + which.tobytes()
         if key not in self.kept:
             self.kept = {key: self.simulated(z, which)}
         return self.kept[key]
 
-    def rows(self, z: Floats, which: Rows, scales: Floats, strength: float) -> tuple[Floats, Floats]:
+    def rows(self, z: Floats, which: Integers, scales: Floats, strength: float) -> tuple[Floats, Floats]:
         """Errors of some segments in their scales, then those of the prior, and their slopes.
 
         Shapes (n_rows + 41,) and (n_rows + 41, 41).
@@ -154,7 +147,7 @@ class _Problem:
         own = strength * np.eye(len(z))
         return np.append(scaled, strength * z), np.vstack([steep.reshape(len(scaled), -1), own])
 
-    def simulated(self, z: Floats, which: Rows) -> tuple[Floats, Floats]:
+    def simulated(self, z: Floats, which: Integers) -> tuple[Floats, Floats]:
         """Errors of the simulated channels and their slopes, of some segments.
 
         Each times the root of the share that its step has of the time over which errors are one error;
@@ -176,16 +169,14 @@ class _Problem:
         lanes = sailed(self.blank, segment, ships, starts, np.zeros(LANES))
         lanes = lanes[1:, self.columns, : len(IDENTIFIED) + 1]
         share = np.sqrt(self._weight(segment) / len(lanes))
-        found: Floats = (lanes - segment.measured[1:, :, None]) * share
-        return found
+        return (lanes - segment.measured[1:, :, None]) * share
 
-    def scales(self, errors: Floats, which: Rows) -> Floats:
+    def scales(self, errors: Floats, which: Integers) -> Floats:
         """Root mean square of the errors by channel, not below the floors."""
         shares = sum(self._weight(self.segments[k]) for k in which)
         with np.errstate(invalid="ignore", over="ignore"):
             rms = np.sqrt(np.sum(errors**2, axis=0) / shares)
-        found: Floats = np.maximum(np.where(np.isfinite(rms), rms, 1e2 * self.floors), self.floors)
-        return found
+        return np.maximum(np.where(np.isfinite(rms), rms, 1e2 * self.floors), self.floors)
 
     def _weight(self, segment: Segment) -> float:
         return float(segment.inputs[-1, 0] - segment.times[0]) / (CORRELATED * self.blank.travel_time)
@@ -230,11 +221,10 @@ class _Problem:
 def _covariance(slopes: Floats) -> Floats:
     """Gauss-Newton covariance with the prior as it is: a stronger one chosen for the fit is no knowledge."""
     inverse = np.linalg.inv(slopes.T @ slopes + np.eye(slopes.shape[1]))
-    symmetric: Floats = 0.5 * (inverse + inverse.T)
-    return symmetric
+    return 0.5 * (inverse + inverse.T)
 
 
-def _groups(segments: Sequence[Segment]) -> Rows:
+def _groups(segments: Sequence[Segment]) -> Integers:
     """Which segments are held out together: of a trial, of every fifth one, or a third of a single one."""
     trial = np.array([segment.trial for segment in segments])
     if trial.max() == trial.min():

@@ -8,8 +8,6 @@ charts (added mass); Fujii & Tuda 1961 (rudder lift slope); Quadvlieg 2013 (a_H,
 1957 and Denny-Mumford (resistance); Wageningen B4-50 (thrust).
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -26,39 +24,24 @@ from identification.simulation_error.similarity import (
     select_reference,
     similarity_vector,
 )
+from shipgym import InputError, Particulars, ShipModel, load_model
 from shipgym.arrays import Floats
 from shipgym.checks import check_choice, quoted
-from shipgym.errors import InputError
-from shipgym.ships import ShipModel, load_model
+from shipgym.files import shipped_toml
 from shipgym.ships.catalogue import REFERENCE_SHIPS
 from shipgym.ships.mmg import IDENTIFIED, MMG, SHIP, dimensions, standard_form
-from shipgym.ships.particulars import ADDED_MASSES, Particulars
+from shipgym.ships.particulars import ADDED_MASSES
 
 YOSHIMURA, KIJIMA = "yoshimura", "kijima"
 HULL_FORMULAS = (YOSHIMURA, KIJIMA)
 UNLIKE = "reference ship {!r} is not like this one: similarity {:.2f}; compare with prior = 'yoshimura'"
-#: Main dimensions of the kinds of ships that the formulas were made for; read with caution, the databases
-#: behind them are not published whole.
-RANGES = {"block coefficient": (0.50, 0.86), "L/B": (3.5, 7.5), "B/T": (2.0, 4.5)}
 SPAN, DIAMETER, PITCH = 0.76, 0.6, 0.8  # of rudder and propeller by draught, pitch by diameter: usual ones
 VISCOSITY = 1.19e-6  # m^2/s, sea water at 15 deg
 LARGEST_DRIFT, LARGEST_TURN = 0.35, 0.8  # to which Kijima's squares are turned into cubes
 
-#: Standard deviations with a reference ship, with formulas, with Kijima's; where fewer, the last is the next.
-#: With formulas at least the root mean square of what published coefficients of ships differ by from them
-#: (`test_mmg.py`); sources do not agree on the signs in N_vrr.
-DEVIATIONS: dict[str, tuple[float, ...]] = {
-    "mx": (0.005, 0.0062), "my": (0.03, 0.04), "Jz": (0.002, 0.004), "R_0": (0.006,), "X_vv": (0.03, 0.06),
-    "X_vr": (0.04, 0.084), "X_rr": (0.02, 0.03), "X_vvvv": (0.4, 0.6), "Y_v": (0.04, 0.08, 0.13),
-    "Y_r": (0.03, 0.05), "Y_vvv": (0.6,), "Y_vvr": (0.4, 0.83), "Y_vrr": (0.3,), "Y_rrr": (0.05, 0.053),
-    "N_v": (0.02, 0.03), "N_r": (0.007, 0.016), "N_vvv": (0.1, 0.16, 0.31), "N_vvr": (0.1, 0.17, 0.26),
-    "N_vrr": (0.05, 0.23), "N_rrr": (0.01, 0.03),
-    "thrust": (0.25,), "w_P0": (0.1,), "C_1": (0.5,), "C_2": (0.25,), "C_2_side": (0.25,), "t_R": (0.05, 0.1),
-    "a_H": (0.1, 0.12), "x_H": (0.05,), "l_R": (0.1, 0.2), "gamma_R": (0.12, 0.15), "gamma_R_side": (0.12,),
-    "epsilon": (0.2,), "kappa": (0.12,), "f_alpha": (0.2, 0.47), "delta_0": (math.radians(1.0),),
-    "Y_0": (0.001,), "N_0": (0.0005,), "c_R": (0.5,), "speed_power": (0.5,), "N_absr": (0.003,),
-    "N_rr": (0.008,),
-}  # fmt: skip
+_NUMBERS = shipped_toml("identification.simulation_error", "mmg_prior.toml")
+RANGES: dict[str, tuple[float, float]] = _NUMBERS["ranges"]  # of main dimensions
+DEVIATIONS: dict[str, list[float]] = _NUMBERS["deviations"]
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,14 +9,11 @@ reference ship's zigzags and turns into the regression. Formulas (Clarke 1983, K
 and S is diagonal, each coefficient weighed by what its term contributes in a hard turn.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identification.estimators.estimator import Estimator, Estimators, FitTask
 from identification.estimators.lssvm import TruncatedLSSVM
@@ -26,12 +23,11 @@ from identification.simulation_error.formulas import FORMULAS, formula_coefficie
 from identification.simulation_error.similarity import AUTO, select_reference
 from identification.validation.folds import FOLDS, LARGEST_RUDDER, TRIALS, of_largest_rudder
 from identification.validation.guard import hard_turn_features, reasons_unstable, with_coefficients
-from shipgym.arrays import Floats
+from shipgym import InputError, ShipModel, Trial
+from shipgym.arrays import Flags, Floats
 from shipgym.checks import check_choice, check_number
-from shipgym.errors import InputError
 from shipgym.manoeuvres import turning_circle, zigzag
-from shipgym.ships import GreyBox, ShipModel, converted_model
-from shipgym.trials.trial import Trial
+from shipgym.ships import GreyBox, converted_model
 
 STRENGTHS = (0.0, *np.geomspace(1e-4, 10.0, 11).tolist(), np.inf)
 BLOCKS = 5  # of time, into which a single trial is cut
@@ -51,7 +47,7 @@ class Prior:
     #: (n_rows, n_terms)
     roots: dict[str, Floats]
     #: which coefficients the prior determines; the others are free, shape (n_terms,)
-    known: dict[str, NDArray[np.bool_]]
+    known: dict[str, Flags]
 
 
 def formula_prior(formula: str, blank: ShipModel) -> Prior:
@@ -221,9 +217,7 @@ def _toward(estimator: Estimator, samples: Samples, q: str, prior: Prior, streng
     return estimator
 
 
-def _held(
-    estimator: Estimator, X: Floats, rest: Floats, centre: Floats, known: NDArray[np.bool_]
-) -> Estimator:
+def _held(estimator: Estimator, X: Floats, rest: Floats, centre: Floats, known: Flags) -> Estimator:
     """The prior's own coefficients; those it leaves open are fitted."""
     free = np.flatnonzero(~known)
     estimator.fit(X[:, free] if free.size else X, rest)  # without free ones for its attributes alone

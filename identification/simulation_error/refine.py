@@ -5,8 +5,6 @@ compared. Whole trials would let a drift of heading leak into the coefficients, 
 (multiple shooting, Bock 1983; the output-error method of Maine & Iliff 1985, NASA RP-1138).
 """
 
-from __future__ import annotations
-
 import copy
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
@@ -30,11 +28,9 @@ from identification.simulation_error.segments import (
 )
 from identification.uncertainty.covariance import newey_west
 from identification.validation.guard import GuardedFit, reasons_unstable
+from shipgym import InputError, ShipModel, Trial
 from shipgym.arrays import Floats
 from shipgym.checks import check_choice, check_number
-from shipgym.errors import InputError
-from shipgym.ships import ShipModel
-from shipgym.trials.trial import Trial
 
 STARTS = ("free", "measured")
 ROUNDS = 3  # of fits, between which scales of the residuals and starts of the segments are renewed

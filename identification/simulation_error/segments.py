@@ -1,24 +1,19 @@
 """Stretches of trials that a model sails from a start of their own: multiple shooting."""
 
-from __future__ import annotations
-
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identification.regression import preprocess
 from identification.regression.rudder import Rudder, rebuild, straight
 from identification.regression.samples import between_gaps
-from shipgym.arrays import Floats
+from shipgym import ShipModel, Trial
+from shipgym.arrays import Floats, Integers
 from shipgym.engine.loops import ship_loop
 from shipgym.engine.records import LANES
-from shipgym.ships import ShipModel, Structure
+from shipgym.ships import Structure
 from shipgym.ships.simulate import LONGEST_STEP, wind_accelerations
-from shipgym.trials.trial import Trial
-
-Integers = NDArray[np.int64]
 
 STEP = 1e-5  # of finite differences, of parameters that are about 1
 BLOCK = 0.05  # time over which residuals are averaged, of that to sail one ship length
@@ -65,20 +60,19 @@ def cut(
     channels: Sequence[str],
     lengths: float,
     staggered: bool,
-    smooth: Callable[[Floats, Floats], Floats] = preprocess.smooth,
     interval: float = 0.0,
 ) -> list[Segment]:
     """Cut trials into segments, and, staggered, again into a set that begins half a segment later.
 
-    A gap in time ends a segment. A segment is the time to sail so many ship `lengths` at service speed;
-    `smooth` gives, of times and values, the state at its start. Compared are samples at least an `interval`
-    apart, in ship lengths; where it is 0, all.
+    A gap in time ends a segment. A segment is the time to sail so many ship `lengths` at service speed; it
+    starts from the smoothed state. Compared are samples at least an `interval` apart, in ship lengths; where
+    it is 0, all.
     """
     travel = model.travel_time
     segments = []
     for index, trial in enumerate(trials):
         for piece in between_gaps(trial, model.particulars):
-            states, rudder = _states(piece, model, smooth), _rudder(piece, model)
+            states, rudder = _states(piece, model), _rudder(piece, model)
             every = max(int(interval * travel / np.median(np.diff(piece.t)) + 1e-9), 1)
             for shift in (0.0, 0.5) if staggered else (0.0,):
                 edges = _edges(piece.t, lengths * travel, shift)
@@ -101,12 +95,13 @@ def _edges(t: Floats, duration: float, shift: float) -> Integers:
     return np.asarray(edges[apart] if len(t) > FEWEST_SAMPLES else edges[[0, -1]])
 
 
-def _states(trial: Trial, model: ShipModel, smooth: Callable[[Floats, Floats], Floats]) -> Floats:
+def _states(trial: Trial, model: ShipModel) -> Floats:
     """States along a trial, smoothed, shape (n_samples, n_state)."""
     states = np.zeros((len(trial), len(model.state_names)))
     for k, name in enumerate(model.state_names):
         if name in trial and name not in ("x", "y"):
-            states[:, k] = trial[name] if name in ("delta", "n") else smooth(trial.t, trial[name])
+            exact = name in ("delta", "n")
+            states[:, k] = trial[name] if exact else preprocess.smooth(trial.t, trial[name])
     return states
 
 

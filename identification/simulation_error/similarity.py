@@ -1,19 +1,15 @@
 """Which ship is most like another, by its main dimensions (Mei 2019, equations 3 to 6)."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Mapping
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from shipgym import InputError, Particulars, ShipModel, load_model
 from shipgym.arrays import Floats
 from shipgym.checks import quoted
-from shipgym.errors import InputError
-from shipgym.ships import ShipModel, load_model
 from shipgym.ships.catalogue import REFERENCE_SHIPS
-from shipgym.ships.particulars import Particulars
 
 GRAVITY = 9.81
 AUTO = "auto"

@@ -1,28 +1,23 @@
 """Covariance of coefficients by refits to blocks of the record drawn with replacement."""
 
-from __future__ import annotations
-
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 from sklearn.base import clone
 
-from identification.estimators.estimator import Estimator
+from identification.estimators.estimator import Estimator, Estimators
 from identification.estimators.lssvm import LSSVM, TruncatedLSSVM
 from identification.estimators.threads import single_threaded
 from identification.progress import counted
 from identification.regression.samples import Samples
 from identification.uncertainty.covariance import residuals
-from shipgym.arrays import Floats
-
-Rows = NDArray[np.int64]
+from shipgym.arrays import Floats, Integers
 
 DRAWS = 200
 
 
-def moving_blocks(groups: Sequence[Rows], lengths: Sequence[int], rng: np.random.Generator) -> Rows:
+def moving_blocks(groups: Sequence[Integers], lengths: Sequence[int], rng: np.random.Generator) -> Integers:
     """Rows drawn in blocks with replacement, as many as there are, each group by itself.
 
     Künsch 1989, Annals of Statistics 17(3): every stretch of the block's length is as likely. A group are
@@ -38,7 +33,7 @@ def moving_blocks(groups: Sequence[Rows], lengths: Sequence[int], rng: np.random
 
 @single_threaded()
 def bootstrap_covariance(
-    estimators: Mapping[str, Estimator], samples: Samples, memory: float, draws: int = DRAWS, seed: int = 0
+    estimators: Estimators, samples: Samples, memory: float, draws: int = DRAWS, seed: int = 0
 ) -> Floats:
     """Covariance of the coefficients of all equations by a block bootstrap over time.
 
@@ -81,7 +76,7 @@ def _rows_in(memory: float, start: Floats) -> int:
     return max(round(memory / spacing), 1) if spacing > 0.0 else 1
 
 
-def _again(estimator: Estimator, samples: Samples, equation: str, rows: Rows, errors: Floats) -> Floats:
+def _again(estimator: Estimator, samples: Samples, equation: str, rows: Integers, errors: Floats) -> Floats:
     """Coefficients from the drawn rows."""
     features, targets = samples.features[equation], samples.targets[equation]
     if isinstance(estimator, TruncatedLSSVM | LSSVM) and not hasattr(estimator, "search_"):

@@ -1,17 +1,11 @@
 """How certain the coefficients are, together: one covariance over all equations of motion."""
 
-from __future__ import annotations
-
-from collections.abc import Mapping
-
 import numpy as np
 
-from identification.estimators.estimator import Estimator, weights
+from identification.estimators.estimator import Estimator, Estimators, weights
 from identification.estimators.threads import single_threaded
 from identification.regression.samples import Samples
 from shipgym.arrays import Floats
-
-Estimators = Mapping[str, Estimator]
 
 
 def residuals(estimators: Estimators, samples: Samples) -> dict[str, Floats]:

@@ -6,10 +6,8 @@ others and by models drawn from its covariance; standard errors are scaled until
 one.
 """
 
-from __future__ import annotations
-
 import copy
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -17,17 +15,15 @@ import numpy as np
 from scipy.optimize import brentq
 from scipy.stats import t as student
 
-from identification.estimators.estimator import Estimator, weights
+from identification.estimators.estimator import Estimators, weights
 from identification.regression.preprocess import smoothed_channels
 from identification.regression.preprocess.noise import noise_level
 from identification.regression.samples import Samples
 from identification.uncertainty.covariance import residuals
 from identification.validation.closed_loop import closed_loop
 from identification.validation.prediction import COMPARED, ZIGZAG, index_reader, predict
-from shipgym.ships import ShipModel
-from shipgym.trials.trial import Trial
+from shipgym import ShipModel, Trial
 
-Estimators = dict[str, Estimator]
 Error = tuple[float, float, float]  # squared error, variance over the draws, variance of the measurement
 
 FEWEST_TRIALS = 3  # to leave one out and learn something from it
@@ -40,9 +36,7 @@ MEDIAN = 0.455  # median of a squared standard normal number
 INDICES = ("initial_turning_lengths", *ZIGZAG, "advance_lengths", "tactical_diameter_lengths")
 
 
-def without_trial(
-    estimators: Mapping[str, Estimator], samples: Samples, trial: int
-) -> tuple[Estimators, Samples]:
+def without_trial(estimators: Estimators, samples: Samples, trial: int) -> tuple[Estimators, Samples]:
     """Estimators as if fitted without a trial, and the rows of the others.
 
     Exact for linear estimators that keep their directions and penalty: the normal equations less the rows

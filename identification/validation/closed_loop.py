@@ -4,18 +4,14 @@ Open loop, a tenth of a degree of neutral helm moves the second overshoot of a 1
 because the rudder is reversed when the measured ship got there, not the simulated one.
 """
 
-from __future__ import annotations
-
 from itertools import pairwise
 
 import numpy as np
 
 from identification.validation.start import with_start
+from shipgym import ShipModel, Trial, UnstableModelError
 from shipgym.arrays import Floats
-from shipgym.errors import UnstableModelError
 from shipgym.manoeuvres.execution import reversals, rudder
-from shipgym.ships import ShipModel
-from shipgym.trials.trial import Trial
 
 STEP = 0.02  # of the time to sail one ship length
 LONGEST_LEG = 2.0  # times the measured one; a heading that is not reached by then is never reached

@@ -1,7 +1,5 @@
 """Structures and methods on the same trials, ranked by what they predict of trials not seen."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import fields
 from pathlib import Path
@@ -17,14 +15,13 @@ from identification.result import IdentificationResult
 from identification.simulation_error.refine import Refinement
 from identification.validation.ranking import Ranking, Standing, in_turn, named, standing
 from identification.validation.selection import RM_SVM, STRUCTURES, methods_of, reference_of
+from shipgym import InputError, Trial, list_structures
 from shipgym.checks import check_number
-from shipgym.errors import InputError
 from shipgym.files import write_json, write_text
-from shipgym.ships import Structure, list_structures
+from shipgym.ships import Structure
 from shipgym.ships.grey_boxes import GREY_BOX
 from shipgym.ships.mmg import MMG
 from shipgym.trials.identify_table import AUTO, OPTIONS, Options
-from shipgym.trials.trial import Trial
 
 #: Compared where none are named; for a grey box also RM-SVM.
 USUAL = ("ls", "ridge", "tls-svm", "cv-lssvr", "abc-lssvr", "svr", "tmils", "output-error")

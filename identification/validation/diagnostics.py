@@ -1,23 +1,19 @@
 """What the data can determine and what the fit left over: excitation, collinearity, residuals."""
 
-from __future__ import annotations
-
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.signal import correlate
 
-from identification.estimators.estimator import Estimator
+from identification.estimators.estimator import Estimators
 from identification.regression import preprocess
 from identification.regression.samples import Samples
 from identification.uncertainty.covariance import residuals
-from shipgym.arrays import Floats
-from shipgym.errors import InputError
+from shipgym import InputError, Trial
+from shipgym.arrays import Floats, Integers
 from shipgym.ships import Structure
-from shipgym.trials.trial import Trial
 
 LEAST_RUDDER = np.radians(0.5)  # a rudder that moves less than this excites nothing
 RUDDER_NOISE = 6.0  # neither does one that moves less than this many times its noise,
@@ -25,6 +21,7 @@ MOST_RUDDER = np.radians(3.0)  # unless it moves more than this
 SHORTEST_STEP = 1e-4  # of the median time step; a shorter one is a row written twice
 MEDIAN_WIDTH = 5  # samples; shorter excursions of a rudder are outliers
 COLLINEAR = 0.98  # correlation of two features
+JITTER = 1e-12  # of a correlation matrix, so that exact collinearity shows as a large inflation
 MOTIONS = {"u": "surge speed", "v": "sway speed", "r": "yaw rate", "p": "roll rate"}
 
 
@@ -123,7 +120,7 @@ def check_samples(samples: Samples, trials: Sequence[Trial], structure: Structur
 
 
 def diagnose(
-    estimators: Mapping[str, Estimator], samples: Samples, structure: Structure
+    estimators: Estimators, samples: Samples, structure: Structure
 ) -> dict[str, EquationDiagnostics]:
     """Diagnostics of each equation, of estimators fitted to the samples."""
     errors = residuals(estimators, samples)
@@ -166,7 +163,7 @@ def autocorrelation(values: Floats, lags: int) -> tuple[float, ...]:
     return tuple(float(centred[k:] @ centred[:-k]) / power for k in range(1, min(lags + 1, len(values))))
 
 
-def cross_correlation(first: Floats, second: Floats, lags: NDArray[np.int64]) -> Floats:
+def cross_correlation(first: Floats, second: Floats, lags: Integers) -> Floats:
     """Correlation, shape (n_lags,), of one series with another at the same times that is shifted.
 
     Lags are samples by which the first comes after the second. 0 for a constant or shorter series.
@@ -180,14 +177,13 @@ def cross_correlation(first: Floats, second: Floats, lags: NDArray[np.int64]) ->
 def variance_inflation(scaled: Floats) -> Floats:
     """Factor by which the other features increase the variance of each coefficient.
 
-    Features have a root mean square of 1.
+    Features have a root mean square of 1; of exactly collinear ones it is large, up to 1e12.
     """
     moment = scaled.T @ scaled / len(scaled)
-    factors: Floats = np.diag(np.linalg.pinv(moment, rcond=1e-14)) * np.diag(moment)
-    return factors
+    return np.diag(np.linalg.inv(moment + JITTER * np.eye(len(moment)))) * np.diag(moment)
 
 
-def without_overlap(samples: Samples) -> NDArray[np.int64]:
+def without_overlap(samples: Samples) -> Integers:
     """Rows whose windows do not overlap."""
     step = 1 if samples.window == 1 else int(np.ceil(samples.window / max(samples.window // 2, 1)))
     return np.arange(0, len(samples), step)

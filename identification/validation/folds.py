@@ -1,17 +1,14 @@
 """Which trials a choice is validated on: each held out in turn, or those of the largest rudder."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identification.regression.samples import Samples
+from shipgym import InputError, Trial
+from shipgym.arrays import Flags
 from shipgym.checks import check_choice
-from shipgym.errors import InputError
-from shipgym.trials.trial import Trial
 
 TRIALS, LARGEST_RUDDER = "trials", "largest-rudder"
 FOLDS = (TRIALS, LARGEST_RUDDER)
@@ -19,14 +16,14 @@ LEAST_RUDDER_SHARE = 0.9  # of the largest rudder; from there on a rudder counts
 PIECES = 3  # into which a single trial is cut
 
 
-def of_largest_rudder(trials: Sequence[Trial], where: str) -> NDArray[np.bool_]:
+def of_largest_rudder(trials: Sequence[Trial], where: str) -> Flags:
     """The trials with the largest rudder: what is learnt from the others is extrapolated to them.
 
     The hard turn is in no zigzag. How well small rudders predict larger ones is the closest substitute in the
     data. `where`: the argument that asks for it. Raises InputError if all of them have the same rudder.
     """
     rudders = np.array([np.abs(trial["delta"]).max() for trial in trials], dtype=float)
-    largest: NDArray[np.bool_] = rudders > LEAST_RUDDER_SHARE * rudders.max()
+    largest: Flags = rudders > LEAST_RUDDER_SHARE * rudders.max()
     if largest.all():
         raise InputError(
             f"{where}: {LARGEST_RUDDER!r} found, but all trials to fit ({len(trials)}) reach "
@@ -36,9 +33,7 @@ def of_largest_rudder(trials: Sequence[Trial], where: str) -> NDArray[np.bool_]:
     return largest
 
 
-def held_out_rows(
-    trials: Sequence[Trial], samples: Samples, folds: str
-) -> Iterator[tuple[NDArray[np.bool_], Trial]]:
+def held_out_rows(trials: Sequence[Trial], samples: Samples, folds: str) -> Iterator[tuple[Flags, Trial]]:
     """Rows to fit, and the trial or the piece of the only trial that is held out, by a choice of `FOLDS`."""
     if check_choice(folds, FOLDS, "folds") == LARGEST_RUDDER:
         largest = of_largest_rudder(trials, "folds")

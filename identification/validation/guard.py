@@ -3,8 +3,6 @@
 A fit of zigzags extrapolates in hard turns, where terms that hardly mattered in the data take over.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -14,14 +12,12 @@ import numpy as np
 
 from identification.estimators.estimator import Estimators, FitTask
 from identification.estimators.methods import Method, fit_held
+from shipgym import Particulars, ShipModel, Trial, UnstableModelError
 from shipgym.arrays import Floats
-from shipgym.errors import UnstableModelError
 from shipgym.manoeuvres import turning_circle
 from shipgym.manoeuvres.registry import FASTEST, QUICKEST_TURN
-from shipgym.ships import ShipModel, Structure
-from shipgym.ships.particulars import Particulars
+from shipgym.ships import Structure
 from shipgym.ships.simulate import open_loop
-from shipgym.trials.trial import Trial
 
 RUDDERS_DEG = (35.0, 10.0)  # of the trial manoeuvres; the first is cut to the rudder's limit
 REVERSALS = (2.5, 5.0, 10.0, 20.0)  # ship lengths sailed at service speed between those of the rudder

@@ -1,7 +1,5 @@
 """How well a model predicts recorded trials, open loop from the measured rudder."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 
@@ -9,11 +7,9 @@ import numpy as np
 
 from identification.validation.closed_loop import closed_loop
 from identification.validation.start import with_start
-from shipgym.errors import InputError, UnstableModelError
+from shipgym import InputError, ShipModel, Trial, UnstableModelError
 from shipgym.manoeuvres import switch_heading_deg, turning_indices, zigzag_indices
-from shipgym.ships import ShipModel
 from shipgym.ships.simulate import open_loop
-from shipgym.trials.trial import Trial
 
 COMPARED = ("u", "v", "r", "psi")
 ZIGZAG = ("overshoot_1_deg", "overshoot_2_deg")

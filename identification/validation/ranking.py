@@ -1,7 +1,5 @@
 """Structures and methods on the same trials, ranked by how well they predict trials held out."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
@@ -10,7 +8,7 @@ import numpy as np
 
 from identification.result import IdentificationResult
 from identification.validation.prediction import COMPARED
-from shipgym.trials.trial import Trial
+from shipgym import Trial
 
 
 @dataclass(frozen=True)

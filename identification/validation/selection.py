@@ -1,7 +1,5 @@
 """Which structure and which method predict trials held out best, for `structure = "auto"`."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, replace
 from typing import Any
@@ -15,10 +13,9 @@ from identification.simulation_error.maximum_a_posteriori import MAP
 from identification.simulation_error.similarity import AUTO
 from identification.validation.folds import pieces
 from identification.validation.ranking import Standing, in_turn, named, standing
-from shipgym.errors import InputError
+from shipgym import InputError, Trial
 from shipgym.ships.grey_boxes import GREY_BOX
 from shipgym.ships.mmg import MMG
-from shipgym.trials.trial import Trial
 
 TABLES = (
     "nomoto", "norrbin", "nomoto2", "linear-steering", "steering7", "abkowitz", "abkowitz-full", "cubic",

@@ -1,14 +1,10 @@
 """The state at which a prediction starts, where the record has velocities only as derivatives."""
 
-from __future__ import annotations
-
 import numpy as np
 
+from shipgym import ShipModel, Trial, UnstableModelError
 from shipgym.arrays import Floats
-from shipgym.errors import UnstableModelError
-from shipgym.ships import ShipModel
 from shipgym.ships.simulate import open_loop
-from shipgym.trials.trial import Trial
 
 WINDOW = 1.5  # time over which the start is estimated, of that to sail one ship length
 ROUNDS = 3  # of Gauss-Newton; what is simulated is nearly linear in its start

@@ -1,7 +1,5 @@
 """What speaks against an identified model: why it must not be used, and what to know before using it."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from pathlib import PurePath
 from typing import Any
@@ -9,8 +7,7 @@ from typing import Any
 import numpy as np
 
 from identification.fit import Fit
-from shipgym.errors import InputError
-from shipgym.ships import ShipModel
+from shipgym import InputError, ShipModel
 from shipgym.ships.linear import is_course_stable, steering_state_space
 
 LOST_HEADING_DEG = 10.0  # rms error beyond which a prediction says nothing

@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 
 from identification.estimators.methods import fit_all, get_method
 from identification.pipeline import identify
-from identification.regression.grey_box import structure_samples
 from identification.regression.samples import build_samples
 from identification.result import IdentificationResult
 from identification.simulation_error.similarity import select_reference
@@ -21,7 +20,7 @@ from identification.validation.folds import LARGEST_RUDDER, TRIALS
 from identification.validation.guard import with_coefficients
 from shipgym.errors import UnstableModelError
 from shipgym.manoeuvres import turning_circle, turning_indices, zigzag, zigzag_indices
-from shipgym.ships import GreyBox, ShipModel, converted_model, load_model
+from shipgym.ships import GreyBox, ShipModel, converted_model, get_structure, load_model
 from shipgym.trials.trial import Trial
 
 Floats = NDArray[np.float64]
@@ -194,7 +193,7 @@ def taught_the_turns(rudder_deg: float) -> ShipModel:
         for rudder in (rudder_deg, -rudder_deg)
     ]
     blank = target.bare(TANKER)
-    samples = structure_samples(
+    samples = build_samples(
         [*target.trials, *turns], blank.table, ship, gear=gear, shaft_speed=blank.service_shaft_speed
     )
     return with_coefficients(blank, fit_all(get_method("ls").estimator, samples))
@@ -217,8 +216,9 @@ def acceleration_correlations(target: Target, model: ShipModel) -> dict[str, flo
     """
     box, gear, shaft = model.table, model.steering, model.service_shaft_speed
     assert isinstance(box, GreyBox)
-    changes = build_samples(target.trials, box, model.particulars, gear=gear, shaft_speed=shaft)
-    left = structure_samples(target.trials, box, model.particulars, gear=gear, shaft_speed=shaft)
+    any_table = get_structure("linear")  # the changes are those of the trials
+    changes = build_samples(target.trials, any_table, model.particulars, gear=gear)
+    left = build_samples(target.trials, box, model.particulars, gear=gear, shaft_speed=shaft)
     theta = np.split(
         box.acceleration_matrix(model.particulars, shaft) @ np.array(list(model.coefficients.values())),
         np.cumsum([len(box.terms(q)) for q in changes.targets])[:-1],

@@ -5,15 +5,12 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from shipgym.arrays import Floats
+from shipgym.arrays import Flags, Floats
 from shipgym.checks import check_choice, check_number
 from shipgym.errors import InputError, ManoeuvreError, UnstableModelError
 from shipgym.manoeuvres.standard import standard_manoeuvres
 from shipgym.ships.ship_model import ShipModel
-
-Bools = NDArray[np.bool_]
 
 LEVELS = (0.025, 0.975)  # of the 95 % interval
 
@@ -27,7 +24,7 @@ class IndexInterval:
 
     value: float | None  # of the model itself; None where its manoeuvre never got so far
     values: Floats  # shape (n_draws,); of the draws; NaN where one ran away or its manoeuvre never got so far
-    ran_away: Bools  # shape (n_draws,); draws that ran away in the manoeuvre
+    ran_away: Flags  # shape (n_draws,); draws that ran away in the manoeuvre
 
     @property
     def interval(self) -> tuple[float, float] | None:

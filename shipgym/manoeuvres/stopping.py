@@ -15,6 +15,7 @@ from shipgym.sea.conditions import Weather
 from shipgym.ships.equations import ShipEquations
 from shipgym.ships.ship_model import ShipModel
 from shipgym.ships.simulate import Conditions, Seed
+from shipgym.trials.navigation import rotate_to_body
 from shipgym.trials.trial import Trial
 
 LONGEST = 300.0  # of a stopping trial, L / U0
@@ -149,11 +150,11 @@ def stopping_indices(
         float(np.interp(end, trial.t, values - values[0]))
         for values in (trial["x"], trial["y"], trial["psi"], distance_sailed(trial))
     )
-    course = trial["psi"][0]
+    ahead, aside = rotate_to_body(x, y, trial["psi"][0])
     return StoppingIndices(
         track_reach_lengths=sailed / lpp,
-        head_reach_lengths=float(x * np.cos(course) + y * np.sin(course)) / lpp,
-        side_reach_lengths=float(y * np.cos(course) - x * np.sin(course)) / lpp,
+        head_reach_lengths=float(ahead) / lpp,
+        side_reach_lengths=float(aside) / lpp,
         heading_change_deg=float(np.degrees(psi)),
         time_s=end - float(trial.t[0]),
     )

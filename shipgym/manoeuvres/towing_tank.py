@@ -15,6 +15,7 @@ from shipgym.checks import check_number
 from shipgym.errors import InputError
 from shipgym.ships.inertia import inertia, rigid_inertia
 from shipgym.ships.ship_model import ShipModel
+from shipgym.trials.navigation import rotate_to_body
 from shipgym.trials.trial import Trial
 
 __all__ = [
@@ -177,12 +178,13 @@ def _tow(model: ShipModel, tank: Tank, motion: _Motion, name: str) -> Trial:
     own[:, :3] -= motion.acceleration
     forces = own @ inertia(model, tank.water_depth).T
     if not tank.model_inertia:
-        forces += _ship_s_own(model, motion)
+        forces += rigid_body_forces(rigid_inertia(model), motion.velocity.T, motion.acceleration.T).T
     noise = tank.noise * np.sqrt((forces**2).mean(axis=0))
     forces += noise * np.random.default_rng(tank.seed).standard_normal(forces.shape)
+    north, east = rotate_to_body(columns["u"], columns["v"], -psi)
     channels = {
-        "x": integral(motion.t, columns["u"] * np.cos(psi) - columns["v"] * np.sin(psi)),
-        "y": integral(motion.t, columns["u"] * np.sin(psi) + columns["v"] * np.cos(psi)),
+        "x": integral(motion.t, north),
+        "y": integral(motion.t, east),
         **{key: columns[key] for key in ("psi", "u", "v", "r", "delta")},
         **({"n": columns["n"]} if "n" in model.command_names else {}),
         **dict(zip(FORCES, forces.T, strict=True)),
@@ -191,12 +193,19 @@ def _tow(model: ShipModel, tank: Tank, motion: _Motion, name: str) -> Trial:
     return Trial(motion.t, channels, name=title, kind="captive", length=model.particulars["length"])
 
 
-def _ship_s_own(model: ShipModel, motion: _Motion) -> Floats:
-    """Force and moment that accelerate the ship without water, about midship (Fossen 2011, 3.3)."""
-    mass, static, yaw = rigid_inertia(model)
-    u, v, r = motion.velocity.T
-    udot, vdot, rdot = motion.acceleration.T
-    ahead = mass * (udot - v * r) - static * r * r
-    aside = mass * (vdot + u * r) + static * rdot
-    turning = yaw * rdot + static * (vdot + u * r)
-    return np.stack([ahead, aside, turning], axis=-1)
+def rigid_body_forces(
+    inertia: Sequence[float], velocity: Sequence[Floats] | Floats, acceleration: Sequence[Floats] | Floats
+) -> Floats:
+    """Forces X, Y and moment N that accelerate a ship without water, about midship (Fossen 2011, 3.3).
+
+    Mass, its static moment and the yaw inertia; velocities and accelerations in surge, sway and yaw, each of
+    shape (3, n_samples), as what is returned; all in SI units or all in the prime system.
+    """
+    mass, static, yaw = inertia
+    u, v, r = velocity
+    udot, vdot, rdot = acceleration
+    aside = vdot + u * r
+    ahead = udot - v * r
+    return np.array(
+        [mass * ahead - static * r * r, mass * aside + static * rdot, yaw * rdot + static * aside]
+    )

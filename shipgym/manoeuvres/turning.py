@@ -4,9 +4,8 @@ from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
-from shipgym.arrays import Floats
+from shipgym.arrays import Flags, Floats
 from shipgym.manoeuvres.execution import (
     execute_time,
     number_of_steps,
@@ -19,6 +18,7 @@ from shipgym.manoeuvres.registry import SIDES, Manoeuvre, standard_time
 from shipgym.sea.conditions import Weather
 from shipgym.ships.ship_model import ShipModel
 from shipgym.ships.simulate import Seed, orders, simulate
+from shipgym.trials.navigation import rotate_to_body
 from shipgym.trials.trial import Trial
 
 TURN_DEG = 35.0  # of the standard circle, or the rudder's limit where that is less
@@ -93,14 +93,11 @@ def track_from_order(trial: Trial, length: float) -> tuple[Floats, Floats, Float
     """Way ahead and to starboard in ship lengths, and turn in rad, from where the rudder was ordered."""
     start = execute_time(trial)
     x0, y0, psi0 = (float(np.interp(start, trial.t, trial[name])) for name in ("x", "y", "psi"))
-    x, y = trial["x"] - x0, trial["y"] - y0
-    ahead, aside = x * np.cos(psi0) + y * np.sin(psi0), y * np.cos(psi0) - x * np.sin(psi0)
+    ahead, aside = rotate_to_body(trial["x"] - x0, trial["y"] - y0, psi0)
     return ahead / length, aside / length, trial["psi"] - psi0
 
 
-def _steady(
-    trial: Trial, after: NDArray[np.bool_], steady: NDArray[np.bool_], side: float, lpp: float
-) -> tuple[float, float, float]:
+def _steady(trial: Trial, after: Flags, steady: Flags, side: float, lpp: float) -> tuple[float, float, float]:
     """Speed ratio, drift angle in degrees and diameter in ship lengths of the steady turn."""
     u, v, r = (trial[name][after] for name in ("u", "v", "r"))
     speed = np.hypot(u, v)

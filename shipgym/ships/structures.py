@@ -1,7 +1,7 @@
 """The printed structures by name (`structures.toml`), and those that users register."""
 
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, TypeVar
 
 from shipgym.checks import check_choice, check_keys, check_table, placed
 from shipgym.errors import InputError
@@ -13,6 +13,7 @@ from shipgym.ships.term_table import Structure
 from shipgym.ships.terms import Term, read_terms, short_terms
 
 WITH_REFERENCE = "grey-box"  # a table that stands on a reference ship, which only a user can name
+Read = TypeVar("Read")
 USUAL = {"source": "own", "normalisation": "si", "quantity": "acceleration"}  # where a table does not say
 
 
@@ -23,14 +24,20 @@ def _printed() -> dict[str, Structure]:
 
 
 def _read_printed(name: str, table: dict[str, Any], papers: Mapping[str, str]) -> Structure:
+    """A structure of `structures.toml`, whose terms are formulas, letters or shares of coefficients."""
     source = table.pop("source").format(**papers)
-    readers = {"equations": read_terms, "letters": short_terms, "shares": read_shares}
-    (kind,) = readers.keys() & table.keys()
-    read: Any = readers[kind]
-    terms = {q: read(text) for axes, text in table.pop(kind).items() for q in axes.split()}
-    return (
-        shared_structure(name, source, terms) if kind == "shares" else Structure(name, source, terms, **table)
-    )
+    if "shares" in table:
+        return shared_structure(name, source, _by_axis(table["shares"], read_shares))
+    if "letters" in table:
+        terms = _by_axis(table.pop("letters"), short_terms)
+    else:
+        terms = _by_axis(table.pop("equations"), read_terms)
+    return Structure(name, source, terms, **table)
+
+
+def _by_axis(texts: Mapping[str, str], read: Callable[[str], Read]) -> dict[str, Read]:
+    """What is read of each text, for each of the axes in its key, such as "v r"."""
+    return {axis: read(text) for axes, text in texts.items() for axis in axes.split()}
 
 
 STRUCTURES = _printed()

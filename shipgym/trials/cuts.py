@@ -1,7 +1,5 @@
 """Parts of a log that are trials: stretches by the clock, or between quiet rudders."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -5,12 +5,10 @@ options of `shipgym identify` and the tables of `docs/identification.md`: all ar
 `identify_table.toml`, which says of each field what it sets and which values it may have.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from numbers import Real
-from typing import Any
+from typing import Any, Self
 
 from shipgym.checks import (
     check_choice,
@@ -128,7 +126,7 @@ class Options:
                 raise InputError(f"{name}: {found!r} found without a prior; name one, or leave it out")
 
     @classmethod
-    def of(cls, given: Mapping[str, Any]) -> Options:
+    def of(cls, given: Mapping[str, Any]) -> Self:
         """Options by name; InputError for an unknown name."""
         for name in given:
             if name not in OPTIONS:
@@ -156,14 +154,18 @@ def _is(value: Any, *kinds: type) -> bool:
     return isinstance(value, kinds) and not (isinstance(value, str) and not value.strip())
 
 
+def _is_number(value: Any) -> bool:
+    return _is(value, Real)
+
+
 #: How each kind of value is recognised in a file; the words stand in messages.
 KINDS: dict[str, Callable[[Any], bool]] = {
     TEXT: lambda value: _is(value, str),
     FLAG: lambda value: _is(value, bool),
-    NUMBER: lambda value: _is(value, Real),
+    NUMBER: _is_number,
     WHOLE: lambda value: _is(value, int),
     TEXTS: lambda value: isinstance(value, list) and all(_is(one, str) for one in value),
-    TWO_NUMBERS: lambda value: isinstance(value, list) and [_is(one, Real) for one in value] == [True] * 2,
+    TWO_NUMBERS: lambda value: isinstance(value, list) and len(value) == 2 and all(map(_is_number, value)),
     WHOLE_OR_TEXT: lambda value: _is(value, int, str),
     TEXT_OR_TABLE: lambda value: _is(value, str, Mapping),
 }

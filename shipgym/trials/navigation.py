@@ -8,18 +8,17 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import numpy.typing as npt
 
-from shipgym.arrays import Floats
-from shipgym.checks import check_choice, check_keys, check_number, check_table
+from shipgym.arrays import Flags, Floats
+from shipgym.checks import check_choice, check_number, check_table
 from shipgym.errors import InputError
 from shipgym.trials.derivatives import time_derivative
 from shipgym.trials.resampling import Log
+from shipgym.trials.units import DEGREE
 
 if TYPE_CHECKING:
     from shipgym.ships.particulars import Particulars
 
-DEGREE = math.pi / 180.0
 #: A straight part lasts this long, s, with heading and rudder within this range, rad.
 STRAIGHT_S, STRAIGHT_RANGE = 20.0, 2.0 * DEGREE
 #: Courses this far apart tell an offset of the heading, and a current across, from each other.
@@ -42,27 +41,35 @@ class Instruments:
     @classmethod
     def from_mapping(cls, table: Any, where: str, ship: Particulars | None = None) -> Instruments:
         """Check the table ``[sensors]`` of a ship file; InputError also for an antenna outside the ship."""
-        check_keys(check_table(table, where), ("gnss_antenna", *_OFFSETS, "clock_offsets"), where)
-        antenna = check_table(table.get("gnss_antenna", {}), place := f"{where} gnss_antenna")
-        check_keys(antenna, ("forward", "starboard"), place)
-        at = {key: check_number(antenna.get(key, 0.0), f"{place}.{key}") for key in ("forward", "starboard")}
-        for key, size in (("forward", "length"), ("starboard", "beam")):
-            limit = 0.6 * float((ship and (ship.get(size) or ship.length)) or np.inf)
-            if ship is not None and abs(at[key]) > limit:
-                raise InputError(
-                    f"{place}.{key}: {at[key]:g} m found, outside the ship of {ship.length:g} m, expected at "
-                    f"most {limit:.4g} m from midship; measured from the aft perpendicular take off "
-                    f"{ship.length / 2:g}"
-                )
-        offsets = [
-            value
-            if (value := table.get(key, 0.0)) == _ESTIMATE
-            else DEGREE * check_number(value, f"{where} {key}", at_least=-180.0, hint=f'or "{_ESTIMATE}"')
-            for key in _OFFSETS
-        ]
-        if (clocks := table.get("clock_offsets")) is not None:
+        check_table(table, where, ("gnss_antenna", *_OFFSETS, "clock_offsets"))
+        place = f"{where} gnss_antenna"
+        antenna = check_table(table.get("gnss_antenna", {}), place, ("forward", "starboard"))
+        forward = check_number(antenna.get("forward", 0.0), f"{place}.forward")
+        starboard = check_number(antenna.get("starboard", 0.0), f"{place}.starboard")
+        if ship is not None:
+            _check_aboard(forward, ship.length, ship, f"{place}.forward")
+            _check_aboard(starboard, ship.beam or ship.length, ship, f"{place}.starboard")
+        heading, rudder = (_offset(table.get(key, 0.0), f"{where} {key}") for key in _OFFSETS)
+        clocks = table.get("clock_offsets")
+        if clocks is not None:
             check_choice(clocks, ("correct", "keep"), f"{where} clock_offsets")
-        return cls(at["forward"], at["starboard"], offsets[0], offsets[1], clocks)
+        return cls(forward, starboard, heading, rudder, clocks)
+
+
+def _check_aboard(distance: float, size: float, ship: Particulars, where: str) -> None:
+    limit = 0.6 * size
+    if abs(distance) > limit:
+        raise InputError(
+            f"{where}: {distance:g} m found, outside the ship of {ship.length:g} m, expected at most "
+            f"{limit:.4g} m from midship; measured from the aft perpendicular take off {ship.length / 2:g}"
+        )
+
+
+def _offset(value: Any, where: str) -> float | str:
+    """An offset in rad, of one in degrees, or that it is to be estimated."""
+    if value == _ESTIMATE:
+        return _ESTIMATE
+    return DEGREE * check_number(value, where, at_least=-180.0, hint=f'or "{_ESTIMATE}"')
 
 
 NO_OFFSETS = Instruments()
@@ -81,13 +88,16 @@ def local_metres(lat: Floats, lon: Floats, origin: tuple[float, float]) -> tuple
     return meridian * (lat - origin[0]) * DEGREE, parallel * east * DEGREE
 
 
-def rotate_to_body(north: Floats, east: Floats, psi: Floats) -> tuple[Floats, Floats]:
-    """Surge and sway from north and east velocity, m/s, and heading, rad; all of shape (n_samples,)."""
+def rotate_to_body(north: Any, east: Any, psi: Any) -> tuple[Any, Any]:
+    """Surge and sway from north and east velocity, m/s, or way, m, and heading, rad; back by -psi.
+
+    Numbers, or arrays of shape (n_samples,).
+    """
     c, s = np.cos(psi), np.sin(psi)
     return north * c + east * s, east * c - north * s
 
 
-def straight_parts(t: Floats, channels: Mapping[str, Floats]) -> npt.NDArray[np.bool_]:
+def straight_parts(t: Floats, channels: Mapping[str, Floats]) -> Flags:
     """Which samples lie amid a straight steady part, where heading and rudder hardly change."""
     from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
@@ -123,9 +133,7 @@ def correct_offsets(log: Log, tools: Instruments) -> None:
         channels[name] = channels[name] - offset if offset else channels[name]
 
 
-def heading_offset(
-    channels: Mapping[str, Floats], straight: npt.NDArray[np.bool_]
-) -> tuple[float, float] | None:
+def heading_offset(channels: Mapping[str, Floats], straight: Flags) -> tuple[float, float] | None:
     """What the heading shows too much by the course over ground, with its standard error, rad.
 
     An offset turns with the ship, a current does not: None without straight parts on several courses.
@@ -195,6 +203,6 @@ def set_and_drift(psi: Floats, water: Floats, ground: tuple[Floats, Floats]) -> 
     size, toward = float(np.hypot(*current)), math.degrees(math.atan2(current[1], current[0])) % 360.0
     return current, (
         f"set and drift by the speed log against the ground: {size:.2f} m/s ({size * 3.6 / 1.852:.2f} kn) "
-        "toward "
-        f"{toward:03.0f} deg, {np.std(values - rows @ current):.2f} m/s unexplained; taken out of the sway"
+        f"toward {toward:03.0f} deg, {np.std(values - rows @ current):.2f} m/s unexplained; "
+        "taken out of the sway"
     )

@@ -16,20 +16,9 @@ from shipgym.arrays import Floats, integral
 from shipgym.errors import InputError
 from shipgym.trials.columns import Source
 from shipgym.trials.derivatives import time_derivative
-from shipgym.trials.navigation import DEGREE, Instruments, heading_offset, straight_parts
+from shipgym.trials.navigation import Instruments, heading_offset, straight_parts
 from shipgym.trials.resampling import Log, Series
-from shipgym.trials.units import QUANTITIES, UNITS, si_factor
-
-#: Largest magnitude of each channel that can be a ship's, or a small model's; SI units.
-LIMITS: dict[str, float] = {
-    "psi": 100.0, "r": 60.0 * DEGREE, "p": 360.0 * DEGREE, "phi": 180.0 * DEGREE, "delta": 90.0 * DEGREE,
-    "delta_command": 90.0 * DEGREE, "u": 50.0, "v": 50.0, "n": 200.0, "n_command": 200.0,
-    "t": 1e10, "x": 1e8, "y": 1e8, "X": 1e10, "Y": 1e10, "N": 1e13, "psi_wave": 100.0,
-    "r_wave": 60.0 * DEGREE, "phi_wave": 180.0 * DEGREE, "p_wave": 360.0 * DEGREE,
-    "current_north": 50.0, "current_east": 50.0, "wind_speed": 200.0, "wind_from": 100.0,
-    "lat": 90.0, "lon": 360.0, "sog": 50.0, "cog": 100.0, "stw": 50.0,
-    "wind_udot": 10.0, "wind_vdot": 10.0, "wind_rdot": 60.0 * DEGREE,
-}  # fmt: skip
+from shipgym.trials.units import DEGREE, LIMITS, QUANTITIES, UNITS, si_factor
 
 _FASTEST_TURN = 60.0 * DEGREE
 _LARGEST_JUMP = 30.0 * DEGREE
@@ -193,16 +182,16 @@ def _unit_remedy(channel: str, excess: float, source: Source) -> str:
 
 def _angle_remedy(gain: float, source: Source) -> str:
     """Name the unit of heading or yaw rate that would bring the two together."""
-    psi_unit, r_unit = source.columns["psi"].unit, source.columns["r"].unit
-    options = {
-        source.declare(channel, unit): abs(math.log(gain * change) if gain * change > 0.0 else math.inf)
-        for channel, own, sign in (("psi", psi_unit, 1.0), ("r", r_unit, -1.0))
-        for unit in UNITS[QUANTITIES[channel]]
-        if unit != own
-        for change in ((si_factor(channel, unit) / si_factor(channel, own)) ** sign,)
-    }
-    nearest = min(options.values())
-    return "declare " + " or ".join(text for text, distance in options.items() if distance < nearest + 0.01)
+    distances = {}  # of the gain from 1, by declaration
+    for channel, sign in (("psi", 1.0), ("r", -1.0)):
+        own = source.columns[channel].unit
+        for unit, factor in UNITS[QUANTITIES[channel]].items():
+            if unit != own:
+                changed = gain * (factor / si_factor(channel, own)) ** sign
+                distance = abs(math.log(changed)) if changed > 0.0 else math.inf
+                distances[source.declare(channel, unit)] = distance
+    nearest = min(distances.values())
+    return "declare " + " or ".join(text for text, distance in distances.items() if distance < nearest + 0.01)
 
 
 def find_outliers(
@@ -294,8 +283,8 @@ def _check_course(psi: Floats, course: Floats, tools: Instruments, source: Sourc
     if turned > _TURNED and np.sqrt(np.mean(np.angle(apart) ** 2)) < _SAME:
         raise InputError(
             f"{head}is the course over ground, from which it differs by less than 0.3 deg in a turn of "
-            f"{turned / DEGREE:.0f} deg, where a ship drifts; name the gyro's column: psi = "
-            f'{{ column = "..." }}'
+            f"{turned / DEGREE:.0f} deg, where a ship drifts; name the gyro's column: "
+            'psi = { column = "..." }'
         )
     if turned > _TURNED and abs(mirrored.mean()) > max(0.95, abs(apart.mean()) + 0.02):
         raise InputError(
@@ -305,6 +294,6 @@ def _check_course(psi: Floats, course: Floats, tools: Instruments, source: Sourc
     if abs(mean) > _CONTRADICTION and abs(apart.mean()) > 0.7 and not tools.heading_offset:
         raise InputError(
             f"{head}contradicts the course over ground by {-mean / DEGREE:.0f} deg, expected it clockwise "
-            "from "
-            f"north; name the right column, or write heading_offset_deg = {-mean / DEGREE:.0f} in [sensors]"
+            "from north; name the right column, or write "
+            f"heading_offset_deg = {-mean / DEGREE:.0f} in [sensors]"
         )

@@ -3,9 +3,8 @@
 from dataclasses import dataclass, field
 
 import numpy as np
-import numpy.typing as npt
 
-from shipgym.arrays import Floats
+from shipgym.arrays import Flags, Floats
 from shipgym.errors import InputError
 from shipgym.trials.columns import Source
 
@@ -37,7 +36,7 @@ class Log:
         self.derived.add(channel)
 
 
-def have_own_clocks(present: npt.NDArray[np.bool_]) -> bool:
+def have_own_clocks(present: Flags) -> bool:
     """Whether blanks, shape (n_rows, n_columns), are those of channels at different rates.
 
     Then every row has some value, and the values of some channel stand two rows or more apart as a rule.

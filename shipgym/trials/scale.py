@@ -7,9 +7,7 @@ import numpy as np
 from shipgym.errors import InputError
 from shipgym.ships.particulars import Particulars
 from shipgym.trials.trial import Trial
-from shipgym.trials.units import UNITS
-
-KNOT = UNITS["speed"]["kn"]
+from shipgym.trials.units import KNOT
 
 _MOST = 0.95  # share of the samples that count: the others may be outliers
 _FASTEST_TURN_PRIME = 3.0  # |r| L / U; a ship in its tightest turn stays below about 1

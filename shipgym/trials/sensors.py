@@ -5,16 +5,14 @@ from dataclasses import dataclass, field, fields
 from types import MappingProxyType
 
 import numpy as np
-from numpy.typing import NDArray
 
-from shipgym.arrays import Floats
+from shipgym.arrays import Flags, Floats
 from shipgym.checks import check_number, check_whole
 from shipgym.engine.passages import SEA_CHANNELS
 from shipgym.errors import InputError
 from shipgym.trials.trial import Trial
-from shipgym.trials.units import CHANNELS, check_channel
+from shipgym.trials.units import CHANNELS, DEGREE, check_channel
 
-DEGREE = float(np.pi / 180.0)
 FEWEST_SAMPLES = 3  # of a trial
 
 
@@ -143,7 +141,7 @@ class Sensors:
             )
         return np.asarray(trial.t[0] + self.sampling_s * np.arange(count))
 
-    def _logged(self, count: int, rng: np.random.Generator) -> NDArray[np.bool_]:
+    def _logged(self, count: int, rng: np.random.Generator) -> Flags:
         """Which samples are not in a gap."""
         logged = np.ones(count, dtype=bool)
         starts = np.flatnonzero(rng.random(count) < self.dropout_probability)

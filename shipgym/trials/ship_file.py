@@ -1,12 +1,10 @@
 """The ship file: one TOML file with a ship's particulars, its data's conventions and its trials."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, Self, TypeVar
 
 from shipgym.checks import check_choice, check_keys, check_table, check_text, data_only, placed
 from shipgym.errors import InputError
@@ -59,7 +57,7 @@ class ShipFile:
     structure: Structure | None = None  # the table of terms in ``[structure]``
 
     @classmethod
-    def load(cls, path: str | Path) -> ShipFile:
+    def load(cls, path: str | Path) -> Self:
         """Read and check a ship file; the trials' CSV files must exist and are read by :meth:`trials`.
 
         Paths in the file are relative to its folder, or absolute. Raises InputError for a missing file,

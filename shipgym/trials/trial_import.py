@@ -1,13 +1,12 @@
 """From the columns of a file to channels in SI units with the project's signs, frame and origin."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
-from shipgym.arrays import Floats
+from shipgym.arrays import Flags, Floats
 from shipgym.checks import check_choice, check_number, quoted
 from shipgym.errors import InputError
 from shipgym.trials import plausibility
@@ -16,8 +15,14 @@ from shipgym.trials.clock_texts import read_angles, read_clock, zone_seconds
 from shipgym.trials.columns import Column, Source, choose_columns
 from shipgym.trials.csv_reader import Table, is_number
 from shipgym.trials.derivatives import time_derivative
-from shipgym.trials.navigation import NO_OFFSETS, Instruments, correct_offsets, local_metres, to_midship
-from shipgym.trials.navigation import rotate_to_body as rotate_to_body
+from shipgym.trials.navigation import (
+    NO_OFFSETS,
+    Instruments,
+    correct_offsets,
+    local_metres,
+    rotate_to_body,
+    to_midship,
+)
 from shipgym.trials.resampling import Log, Series, have_own_clocks, on_one_clock, own_clock
 from shipgym.trials.units import QUANTITIES, si_factor
 
@@ -115,12 +120,15 @@ def _recorded(table: Table, chosen: dict[str, Column], repair: str | None) -> _R
             )
     t, start = _read_times(table, chosen)
     numbers = {c: table.numbers(column.name) for c, column in chosen.items() if c not in ("t", "lat", "lon")}
+    filled: dict[str, int] = {}
     if "lat" in chosen:
-        numbers |= _local_positions(table, chosen, t, repair)
+        positions, outliers = _local_positions(table, chosen, t, repair)
+        numbers |= positions
+        filled = dict.fromkeys(positions, outliers)
         chosen |= {new: replace(chosen.pop(old), unit="m") for new, old in (("x", "lat"), ("y", "lon"))}
     values = np.column_stack([t, *numbers.values()])
     source = Source(table, {name: chosen[name] for name in ("t", *numbers)}, np.arange(len(values)))
-    present, filled = np.isfinite(values), {}
+    present = np.isfinite(values)
     own_clocks = bool(present[:, 0].all()) and have_own_clocks(present[:, 1:])
     if not own_clocks:
         values, source = _repaired(values, source, repair)
@@ -200,12 +208,12 @@ def _read_position(table: Table, column: Column) -> Floats:
 
 def _local_positions(
     table: Table, chosen: dict[str, Column], t: Floats, repair: str | None
-) -> dict[str, Floats]:
-    """North and east of the first position, m, nan where there is none."""
+) -> tuple[dict[str, Floats], int]:
+    """North and east of the first position, m, nan where there is none, and the number of outliers."""
     lat, lon = (_read_position(table, chosen[name]) for name in ("lat", "lon"))
     source = Source(table, chosen, np.arange(t.size))
     here = np.flatnonzero(np.isfinite(lat) & np.isfinite(lon) & np.isfinite(t))
-    local = np.full((2, t.size), np.nan)
+    local, far = np.full((2, t.size), np.nan), here[:0]
     if here.size:
         plausibility.check_ranges({"lat": lat, "lon": lon}, source)
         local[:, here] = local_metres(lat[here], lon[here], (lat[here[0]], lon[here[0]]))
@@ -220,7 +228,7 @@ def _local_positions(
                 'such rows to be filled with repair = "interpolate"'
             )
         local[:, far] = np.nan
-    return dict(zip(("x", "y"), local, strict=True))
+    return dict(zip(("x", "y"), local, strict=True)), far.size
 
 
 def _joined(recorded: Sequence[_Recorded]) -> Series:
@@ -279,26 +287,22 @@ def _earth_to_body(log: Log) -> None:
     channels["u"], channels["v"] = rotate_to_body(channels["u"], channels["v"], channels["psi"])
 
 
-#: What moves from the centre of gravity, `xg` forward of midship, to midship: by xg times a function of
-#: another channel.
-_LEVERS: dict[str, tuple[str, Callable[[Floats], Floats]]] = {
-    "v": ("r", np.negative),
-    "x": ("psi", lambda psi: -np.cos(psi)),
-    "y": ("psi", lambda psi: -np.sin(psi)),
-    "N": ("Y", np.positive),
-}
-
-
 def _cg_to_midship(log: Log, xg: float) -> None:
-    """Move position, sway and yaw moment from the centre of gravity to midship: v = v_cg - xg r."""
-    for name, (other, lever) in _LEVERS.items():
-        if name not in log.channels:
-            continue
-        if other not in log.channels:
+    """Move position, sway and yaw moment from the centre of gravity, `xg` forward of midship, to midship."""
+    channels = log.channels
+    for name, other in (("v", "r"), ("x", "psi"), ("y", "psi"), ("N", "Y")):
+        if name in channels and other not in channels:
             raise InputError(
                 f'{log.where}: origin = "cg" needs {other} to move {name} to midship; name its column'
             )
-        log.channels[name] = log.channels[name] + xg * lever(log.channels[other])
+    if "v" in channels:
+        channels["v"] = channels["v"] - xg * channels["r"]
+    if "x" in channels:
+        channels["x"] = channels["x"] - xg * np.cos(channels["psi"])
+    if "y" in channels:
+        channels["y"] = channels["y"] - xg * np.sin(channels["psi"])
+    if "N" in channels:
+        channels["N"] = channels["N"] + xg * channels["Y"]
 
 
 def _antiderivative(t: Floats, values: Floats) -> Floats:
@@ -345,7 +349,7 @@ def _repaired(values: Floats, source: Source, repair: str | None) -> tuple[Float
     return filled, repaired
 
 
-def _check_holes(t: Floats, missing: npt.NDArray[np.bool_], channel: str, source: Source) -> None:
+def _check_holes(t: Floats, missing: Flags, channel: str, source: Source) -> None:
     """Refuse to fill a hole of many rows; the first and the last row are whole."""
     edges = np.flatnonzero(np.diff(missing))
     first, after = edges[::2] + 1, edges[1::2] + 1

@@ -4,41 +4,42 @@ import math
 
 from shipgym.checks import did_you_mean, quoted
 from shipgym.errors import InputError
+from shipgym.files import shipped_toml
 
-_DEGREE = math.pi / 180.0
+DEGREE, KNOT = math.pi / 180.0, 1852.0 / 3600.0
 
 #: Factor from each unit to SI, by the quantity measured. The first unit of each is the SI one.
 UNITS: dict[str, dict[str, float]] = {
     "time": {"s": 1.0, "ms": 1e-3, "min": 60.0, "h": 3600.0, "unix": 1.0, "unix ms": 1e-3},
     "length": {"m": 1.0, "km": 1000.0, "ft": 0.3048, "nm": 1852.0},
-    "angle": {"rad": 1.0, "deg": _DEGREE},
-    "angular rate": {"rad/s": 1.0, "deg/s": _DEGREE, "deg/min": _DEGREE / 60.0},
-    "speed": {"m/s": 1.0, "knots": 1852.0 / 3600.0, "kn": 1852.0 / 3600.0, "km/h": 1.0 / 3.6},
+    "angle": {"rad": 1.0, "deg": DEGREE},
+    "angular rate": {"rad/s": 1.0, "deg/s": DEGREE, "deg/min": DEGREE / 60.0},
+    "speed": {"m/s": 1.0, "knots": KNOT, "kn": KNOT, "km/h": 1.0 / 3.6},
     "shaft speed": {"rps": 1.0, "rpm": 1.0 / 60.0},
     "force": {"N": 1.0, "kN": 1000.0},
     "moment": {"N m": 1.0, "kN m": 1000.0},
     "latitude or longitude": {"deg": 1.0, "ddmm.mm": 1.0},  # the second, as in NMEA 0183, by `read_angles`
     "acceleration": {"m/s^2": 1.0},
-    "angular acceleration": {"rad/s^2": 1.0, "deg/s^2": _DEGREE},
+    "angular acceleration": {"rad/s^2": 1.0, "deg/s^2": DEGREE},
 }
 
+_CHANNELS = shipped_toml("shipgym.trials", "channels.toml")
+
 #: The quantity that each channel measures.
-QUANTITIES: dict[str, str] = {
-    "t": "time", "x": "length", "y": "length", "psi": "angle", "u": "speed", "v": "speed",
-    "r": "angular rate", "p": "angular rate", "phi": "angle", "delta": "angle", "n": "shaft speed",
-    "delta_command": "angle", "n_command": "shaft speed", "X": "force", "Y": "force", "N": "moment",
-    "psi_wave": "angle", "r_wave": "angular rate", "phi_wave": "angle", "p_wave": "angular rate",
-    "current_north": "speed", "current_east": "speed", "wind_speed": "speed", "wind_from": "angle",
-    "lat": "latitude or longitude", "lon": "latitude or longitude", "sog": "speed", "cog": "angle",
-    "stw": "speed",
-    "wind_udot": "acceleration", "wind_vdot": "acceleration", "wind_rdot": "angular acceleration",
-}  # fmt: skip
+QUANTITIES: dict[str, str] = {name: row["quantity"] for name, row in _CHANNELS.items()}
 
 #: What a file may hold and a trial does not: position, speed and course over ground, speed through the water.
-INPUTS = ("lat", "lon", "sog", "cog", "stw")
+INPUTS = tuple(name for name, row in _CHANNELS.items() if "log_only" in row)
 
 #: Names of the channels of a trial, without time.
 CHANNELS: tuple[str, ...] = tuple(name for name in QUANTITIES if name not in ("t", *INPUTS))
+
+
+#: Largest magnitude of each channel that can be a ship's, or a small model's; SI units.
+LIMITS: dict[str, float] = {
+    name: row["largest"] * (UNITS[row["quantity"]][row["unit"]] if "unit" in row else 1.0)
+    for name, row in _CHANNELS.items()
+}
 
 
 def check_channel(name: str, where: str, *, time: bool = True) -> str:

@@ -26,6 +26,9 @@ def test_variance_inflation_of_two_correlated_features() -> None:
     correlated = 0.8 * a + 0.6 * b
     factors = variance_inflation(np.column_stack([a, correlated, c]))
     np.testing.assert_allclose(factors, [1 / (1 - 0.64), 1 / (1 - 0.64), 1.0], rtol=1e-9)
+    twice, alone = variance_inflation(np.column_stack([a, -a, c]))[[0, 2]]
+    assert twice > 1e10
+    assert alone == pytest.approx(1.0)
 
 
 def test_autocorrelation_of_a_moving_average() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -18,7 +19,7 @@ from identification.design.experiment import (
 )
 from shipgym import InputError, Particulars, ShipModel, SteeringGear, Trial, UnstableModelError
 from shipgym.manoeuvres import turning_circle, zigzag
-from shipgym.ships import get_structure
+from shipgym.ships import converted_model, get_structure
 
 PARTICULARS = Particulars(length=160.93, speed=7.7175)
 COEFFICIENTS = {"c_r": -1 / 30.0, "c_r3": -4000.0 / 30.0, "c_d": 0.05 / 30.0}
@@ -120,6 +121,17 @@ def test_advice_for_an_identified_mariner_of_forty_coefficients() -> None:
     assert "zigzag 5/5" not in advice.chosen
     assert advice.trials[0].condition_number["r"] > 30.0
     assert set(advice.steps[0]) == set(standard_candidates(mariner))
+
+
+def test_a_grey_box_that_explains_her_trials_is_certain_of_her_coefficients() -> None:
+    """What her reference ship does is no noise."""
+    mariner = shipgym.load_model("mariner")
+    blank = converted_model("mariner", mariner.particulars, mariner.steering)
+    coefficients = {name: -0.1 if name in ("a_du", "b_v", "c_r") else 0.01 for name in blank.coefficients}
+    box = replace(blank, coefficients=coefficients)
+    run = zigzag(box, 20, 20, duration=600, dt=0.5)
+    trial = Trial(run.t, {c: run[c] for c in ("x", "y", "psi", "u", "v", "r", "delta")}, name="20/20")
+    assert max(advise(box, [trial], {"same": gentle}).before.values()) < 0.1
 
 
 def test_what_cannot_be_advised_is_named(ship: ShipModel) -> None:

@@ -10,6 +10,7 @@ from identification import identify
 from identification.regression.preprocess import (
     median,
     noise_level,
+    outliers,
     repaired,
     savitzky_golay,
     smooth,
@@ -85,6 +86,27 @@ def test_outliers_and_short_dropouts_are_repaired_and_told(noisy_trials: list[Tr
     np.testing.assert_allclose(mended.t, trial.t)
     assert np.abs(mended["u"] - trial["u"]).max() < 0.2
     assert repaired(mended)["u"].max() < 9.0
+
+
+def test_the_first_and_the_last_sample_may_be_outliers() -> None:
+    t = np.arange(200.0)
+    u = np.sin(0.05 * t) + 1e-3 * np.random.default_rng(0).standard_normal(200)
+    u[[0, -1]] += 0.5
+    assert np.flatnonzero(outliers(t, u, may_step=False)).tolist() == [0, 199]
+    found = repaired(Trial(t, {"u": u, "delta": u}, name="ends"))
+    assert found.repaired == {"u": 2}
+    assert found["u"][[0, -1]] == pytest.approx(u[[1, -2]])
+    for clean in (0.1 * t, np.sin(0.05 * t), np.abs(t - 196.0), np.minimum(t, 5.0), np.exp(-0.3 * t)):
+        assert not outliers(t, clean, may_step=False).any()
+    gap = np.append(t[:-40], t[-1])
+    assert not outliers(gap, 0.1 * gap, may_step=False).any()
+
+
+def test_a_rudder_put_over_at_the_first_or_the_last_sample_is_no_outlier() -> None:
+    t = np.arange(0.0, 600.0, 10.0)
+    for angles in ([0.0, 23.0, *[35.0] * 58], [*[10.0] * 59, 20.0]):
+        delta = np.radians(angles)
+        assert repaired(Trial(t, {"delta": delta}, name="rudder"))["delta"].tolist() == delta.tolist()
 
 
 def test_clean_trials_are_left_alone(cao_zigzag: Trial) -> None:

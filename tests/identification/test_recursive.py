@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -17,6 +18,7 @@ from identification.estimators.recursive import (
 )
 from shipgym import InputError, Particulars, ShipModel, SteeringGear, Trial
 from shipgym.manoeuvres import zigzag
+from shipgym.ships import converted_model, load_model
 
 Floats = np.ndarray[Any, np.dtype[np.float64]]
 TRUTH = np.array([3.0, -0.02, 500.0, 1.0])
@@ -185,6 +187,23 @@ def test_k_and_t_of_hual_trooper_within_one_per_cent(method: str) -> None:
     assert -1.0 / found["c_r"] == pytest.approx(T, rel=0.01)
     assert -found["c_d"] / found["c_r"] == pytest.approx(K, rel=0.01)
     assert np.ptp(course["c_r"][-200:]) < 1e-3 / T
+
+
+def test_coefficients_of_a_grey_box_are_those_beside_the_reference_ship() -> None:
+    mariner = load_model("mariner")
+    blank = converted_model("mariner", mariner.particulars, mariner.steering)
+    ship = replace(blank, coefficients=blank.coefficients | {"b_v": -0.1, "c_r": -0.2, "c_d": 0.1})
+    run = zigzag(ship, 20, 20, duration=600, dt=0.5)
+    trial = Trial(run.t, {name: run[name] for name in ("x", "y", "psi", "u", "v", "r", "delta")})
+    found = coefficient_history(trial, ship.table, mariner.particulars).last
+    assert found == pytest.approx(ship.coefficients, abs=2e-3)
+
+
+def test_coefficients_of_a_ship_with_a_memory_of_yaw() -> None:
+    T1, T2, T3 = 60.0, 8.0, 15.0
+    truth = {"c_r": -1 / T1 - 1 / T2, "c_d": K * T3 / (T1 * T2), "e_r": -1 / (T1 * T2), "e_d": K / (T1 * T2)}
+    found = coefficient_history(hual_trooper("nomoto2", truth), "nomoto2", PARTICULARS).last
+    assert found == pytest.approx(truth, rel=0.02)
 
 
 @pytest.mark.parametrize("method", ["rls", "tmils"])

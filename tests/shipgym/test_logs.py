@@ -384,6 +384,7 @@ def test_an_outlier_of_the_position_is_named_and_left_out_on_demand(tmp_path):
     assert "line 62 (data row 61), column 'Breite': position 58.6" in refusal(path)
     trial = Trial.from_csv(path, COLUMNS, "port", repair="interpolate", sensors=ANTENNA)
     assert np.abs(np.diff(trial["x"]) / np.diff(trial.t)).max() < 8.0
+    assert trial.repaired == {"x": 1, "y": 1}
 
 
 def test_two_ships_in_one_log_are_named(tmp_path):

@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 
 from shipgym.errors import InputError
 from shipgym.trials import plausibility
+from shipgym.trials.navigation import rotate_to_body
 from shipgym.trials.trial import Trial
-from shipgym.trials.trial_import import rotate_to_body
 from shipgym.trials.units import QUANTITIES, UNITS, si_factor
 
 T = np.linspace(0.0, 60.0, 301)

@@ -1,16 +1,14 @@
 """From a noisy record to channels that can be differentiated: noise, filters, smoothers, repair."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 
 from identification.regression.preprocess.filters import median, savitzky_golay, smooth
 from identification.regression.preprocess.kinematics import smooth_kinematics
 from identification.regression.preprocess.noise import NOISY, is_noisy, noise_level, noise_ratio
 from identification.regression.preprocess.repair import outliers, repaired
+from shipgym import Trial
 from shipgym.arrays import Floats
 from shipgym.checks import check_choice
-from shipgym.trials.trial import Trial
 
 #: Filters of single channels by name.
 FILTERS: dict[str, Callable[[Floats, Floats], Floats]] = {

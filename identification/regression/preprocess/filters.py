@@ -1,7 +1,5 @@
 """Filters of single channels: running median, Savitzky-Golay and smoothing splines."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.linalg import solveh_banded
@@ -21,8 +19,7 @@ STIFFNESSES = tuple(float(stiffness) for stiffness in np.arange(-2.0, 8.01, 0.25
 
 def median(t: ArrayLike, values: ArrayLike, width: int = MEDIAN_WIDTH) -> Floats:
     """Running median of `width` samples, odd; takes away spikes of up to half its width and keeps steps."""
-    found: Floats = median_filter(np.asarray(values, dtype=float), width, mode="nearest")
-    return found
+    return median_filter(np.asarray(values, dtype=float), width, mode="nearest")
 
 
 def savitzky_golay(t: ArrayLike, values: ArrayLike, width: int | None = None) -> Floats:
@@ -105,5 +102,4 @@ class Reinsch:
         pull[:-2] += self.left * forces
         pull[1:-1] += self.middle * forces
         pull[2:] += self.right * forces
-        smoothed: Floats = values - stiffness * pull
-        return smoothed
+        return values - stiffness * pull

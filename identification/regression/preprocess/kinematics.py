@@ -1,7 +1,5 @@
 """Positions, heading and velocities smoothed together, so that each is the derivative of the other."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -9,9 +7,8 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 
 from identification.regression.preprocess.noise import is_noisy, noise_level
+from shipgym import InputError, Trial
 from shipgym.arrays import Floats
-from shipgym.errors import InputError
-from shipgym.trials.trial import Trial
 
 HEADING = ("psi", "r")
 PLANE = ("x", "y", "u", "v")

@@ -1,7 +1,5 @@
 """How noisy a record is."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 
 import numpy as np

@@ -1,32 +1,31 @@
 """Outliers and dropouts of a record: found, filled from their neighbours, and counted."""
 
-from __future__ import annotations
-
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.interpolate import PchipInterpolator
 from scipy.ndimage import median_filter
 
 from identification.regression.preprocess.noise import noise_level
-from shipgym.arrays import Floats
+from shipgym import InputError, Trial
+from shipgym.arrays import Flags, Floats
 from shipgym.checks import check_number
-from shipgym.errors import InputError
-from shipgym.trials.trial import Trial
-
-Flags = NDArray[np.bool_]
 
 WIDTH = 7  # samples of the running median
 OUTLYING = 6.0  # times the noise
 LONGEST_HOLE = 10.0  # usual time steps; longer ones stay gaps
 MOST_OUTLIERS = 0.1  # of a channel
+FEWEST_FOR_ENDS = 3 * WIDTH  # samples of a record whose ends are compared with what it moves inside
 MEASURED = ("x", "y", "psi", "u", "v", "r", "p", "phi", "delta", "n")
+STEPPING = ("delta", "n")  # without the inertia of a ship
 
 
-def outliers(t: ArrayLike, values: ArrayLike, threshold: float = OUTLYING) -> Flags:
+def outliers(t: ArrayLike, values: ArrayLike, threshold: float = OUTLYING, may_step: bool = True) -> Flags:
     """Samples away from the running median by several times the noise (Hampel 1974, JASA 69), as flags.
 
     What the signal itself moves from sample to sample is allowed for by the running median's own steps, so
-    that corners of a clean signal are no outliers. The threshold is in standard deviations of the noise.
+    that corners of a clean signal are no outliers. The first and the last sample are compared with the next
+    one, unless the signal `may_step`, as a rudder does, which may have just moved there. The threshold is in
+    standard deviations of the noise.
     """
     t, values = np.asarray(t, dtype=float), np.asarray(values, dtype=float)
     if len(values) < WIDTH:
@@ -34,8 +33,12 @@ def outliers(t: ArrayLike, values: ArrayLike, threshold: float = OUTLYING) -> Fl
     middle = median_filter(values, WIDTH, mode="nearest")
     steps = np.abs(np.diff(middle, append=middle[-1]))
     moves = median_filter(np.maximum(steps, np.roll(steps, 1)), WIDTH, mode="nearest")
-    allowed = threshold * noise_level(t, values) + 0.5 * WIDTH * moves + 1e-9 * np.ptp(middle)
-    found: Flags = np.abs(values - middle) > allowed
+    least = threshold * noise_level(t, values) + 1e-9 * np.ptp(middle)
+    found: Flags = np.abs(values - middle) > least + 0.5 * WIDTH * moves
+    if not may_step and len(values) >= FEWEST_FOR_ENDS:
+        ends, inside = np.array([0, -1]), np.abs(np.diff(middle[WIDTH // 2 : -(WIDTH // 2)]))
+        longer = np.maximum(np.diff(t)[ends] / np.median(np.diff(t)), 1.0)  # beside a gap it moves further
+        found[ends] = np.abs(np.diff(values))[ends] > (least + WIDTH * inside.max()) * longer
     return found
 
 
@@ -52,7 +55,9 @@ def repaired(trial: Trial, threshold: float = OUTLYING) -> Trial:
     kept = np.isin(times, trial.t)
     channels, counts = {}, {}
     for name, values in trial.channels.items():
-        wrong = outliers(trial.t, values, threshold) if name in MEASURED else np.zeros(len(trial), dtype=bool)
+        wrong = np.zeros(len(trial), dtype=bool)
+        if name in MEASURED:
+            wrong = outliers(trial.t, values, threshold, may_step=name in STEPPING)
         if wrong.mean() > MOST_OUTLIERS:
             raise InputError(
                 f"trial {trial.name!r}: {wrong.sum()} of {len(trial)} samples of {name} would be outliers, "
