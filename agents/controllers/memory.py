@@ -67,9 +67,10 @@ def begun(memory: Any, starts: Any, shape: tuple[int, ...], size: int) -> tuple[
     """
     if memory is None:
         return np.zeros((*shape, size)), np.ones(shape, dtype=np.bool_)
-    kept = checked_memory(memory, (*shape, size))
+    kept = np.array(checked_memory(memory, (*shape, size)), dtype=np.float64, order="C")
     begins = checked_starts(starts, shape)
-    return np.where(begins[..., None], 0.0, kept), begins
+    kept[begins] = 0.0
+    return kept, begins
 
 
 def heading_error(seen: dict[str, Floats]) -> Floats:
