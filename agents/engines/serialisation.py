@@ -91,9 +91,17 @@ def unpack(value: Any) -> Any:
 class KeptResults:
     """A folder with one file for each job that is done, named by a hash of the job.
 
-    It is made with the first result, so that nothing is left of a call that does none. Results of another
-    `function` than the one given, or of another version of shipgym, are not taken. Raises InputError if there
-    is a file of the folder's name.
+    Parameters
+    ----------
+    folder : str or Path
+        Made with the first result where it does not exist, so that nothing is left of a call that does none.
+    function : callable
+        That does the jobs: results of another function, or of another version of shipgym, are not taken.
+
+    Raises
+    ------
+    InputError
+        If there is a file of that name.
     """
 
     def __init__(self, folder: str | Path, function: Callable[[dict[str, Any]], Any]) -> None:
