@@ -86,8 +86,12 @@ def benchmark(
         )  # fmt: skip
         pairs = zip(jobs, found, strict=True)
         done = {(job["contestant"], job["task"]): checked_part(one, job) for job, one in pairs}
-        for one in (one for one in who if not one.is_text):  # an object steers in this process
-            done |= {(one.name, task.name): results_of(one, task, suite, episodes) for task in chosen}
+        objects = [one for one in who if not one.is_text]  # which steer in this process
+        done |= {
+            (one.name, task.name): results_of(one, task, suite, episodes)
+            for one in objects
+            for task in chosen
+        }
         return gathered(suite, chosen, who, done, episodes).save(folder)
 
 
