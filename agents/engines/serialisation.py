@@ -11,7 +11,7 @@ import hashlib
 import json
 import math
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -120,6 +120,11 @@ class KeptResults:
         same = all(content.get(name) == value for name, value in self._key(text).items())
         result: dict[str, Any] = content["result"]
         return result if same else None
+
+    def load_all(self, texts: Iterable[str]) -> dict[str, dict[str, Any]]:
+        """The packed results that are there, by job."""
+        there = {text: self.load(text) for text in texts}
+        return {text: packed for text, packed in there.items() if packed is not None}
 
     def save(self, text: str, packed: dict[str, Any]) -> None:
         """Keep the packed result of a job; the file is written whole or not at all.
