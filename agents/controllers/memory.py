@@ -90,7 +90,7 @@ def on_course(seen: NDArray[Any], error: Floats, integral: Floats, reach: float)
     return shown
 
 
-def gathered(integral: Floats, error: Floats, begins: Any, dt: float, reach: float) -> Floats:
+def gathered(integral: Floats | float, error: Floats | float, begins: Any, dt: float, reach: float) -> Floats:
     """Integral of the heading error, rad s, an interval later, as environments have it."""
     more = np.where((np.abs(error) > INTEGRAL_ZONE) | begins, 0.0, error * dt)
     return np.clip(integral + more, -reach, reach)
