@@ -46,10 +46,16 @@ def identification_settings(ship: ShipFile, given: Mapping[str, Any], unnamed: s
 
 
 def trials_of(ship: ShipFile, settings: Mapping[str, Any]) -> tuple[list[Trial], dict[str, Any]]:
-    """The trials of a ship file, and the settings with the extra trials read, which are left out of them."""
+    """The trials of a ship file, and the settings with what else it says.
+
+    That is its particulars and steering gear, and the extra trials read, which are left out of the others.
+    """
     extra = settings.get("extra_trials", [])
     trials = [trial for trial in ship.trials() if trial.name not in extra]
-    return trials, {**settings, **({"extra_trials": [ship.trial(file) for file in extra]} if extra else {})}
+    arguments = {"particulars": ship.particulars, "steering": ship.steering, **settings}
+    if extra:
+        arguments["extra_trials"] = [ship.trial(file) for file in extra]
+    return trials, arguments
 
 
 def identify_ship(ship: ShipFile, settings: Mapping[str, Any]) -> IdentificationResult:
@@ -66,7 +72,7 @@ def identify_trials(
 ) -> IdentificationResult:
     """`identify_ship` for trials that are read already, both from `trials_of`."""
     with placed(str(ship.path)):
-        return identify(trials, particulars=ship.particulars, steering=ship.steering, **arguments)
+        return identify(trials, **arguments)
 
 
 def compare_ship(
@@ -85,9 +91,8 @@ def compare_ship(
     if wanted:
         arguments.pop("structure", None)
     names = list(METHODS) if methods == "all" else methods and [n.strip() for n in methods.split(",")]
-    own = {"particulars": ship.particulars, "steering": ship.steering, **arguments}
     with placed(str(ship.path)):
-        return compare_methods(trials, names or None, wanted or None, **own)
+        return compare_methods(trials, names or None, wanted or None, **arguments)
 
 
 def reduce_ship(
@@ -96,6 +101,4 @@ def reduce_ship(
     """`identify_reduced` on a ship file."""
     trials, arguments = trials_of(ship, settings)
     with placed(str(ship.path)):
-        return identify_reduced(
-            trials, direction, tolerance, particulars=ship.particulars, steering=ship.steering, **arguments
-        )
+        return identify_reduced(trials, direction, tolerance, **arguments)

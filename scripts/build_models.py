@@ -299,8 +299,8 @@ def main() -> int:
     if given.candidates:
         candidates()
         return 0
-    again = [name for name in MODELS if given.check or given.tables or name not in KEPT]
-    names, differ = given.names or again, []
+    usual = [name for name in MODELS if given.check or given.tables or name not in KEPT]
+    names, differ = given.names or usual, []
     for name in names if not given.tables else ():
         result, path = MODELS[name].identify(name), LIBRARY / f"{name}.json"
         if not given.check:

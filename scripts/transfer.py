@@ -105,8 +105,8 @@ def base_of(task: BenchmarkTask) -> str:
 
 def tuned_on(task: BenchmarkTask, kind: str) -> Controller:
     """A controller with the suite's search budget on a task; guidance leads the LQ found first."""
-    kept = read_json(suite_file(SUITE, "tuned"), "tuned settings", "take another copy")
-    budget = kept["evaluations"], kept["episodes"]
+    found = read_json(suite_file(SUITE, "tuned"), "tuned settings", "take another copy")
+    budget = found["evaluations"], found["episodes"]
     lq = tune("lq", task, None, *budget).settings
     return design(kind, task, tune(kind, task, {"lq": lq}, *budget).settings)
 

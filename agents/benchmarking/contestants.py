@@ -76,7 +76,7 @@ class Contestant:
         made = tuple(_made(self.source, handed, suite))
         for policy in made:
             check_fits(policy, handed.task, handed.ship, where)
-            if task.behind and getattr(policy, "model_sha256", "") == model_hash(task.sailed[0]):
+            if task.behind and model_hash(task.sailed[0]) in _models(policy):
                 raise InputError(
                     f"{where}: was designed on the ship, '{task.behind}', expected on the model that it is "
                     f"handed, '{task.model}'"
@@ -88,6 +88,12 @@ class Contestant:
         if not self.is_text:
             return {}
         return {str(path): file_hash(path) for path in _files(self.source, task)}
+
+
+def _models(policy: Any) -> set[str]:
+    """Hashes of the models that a policy, and what it is made of, were made for."""
+    parts = (getattr(policy, name, None) for name in ("policy", "fallback", "base", "autopilot"))
+    return {getattr(policy, "model_sha256", "")}.union(*(_models(part) for part in parts if part is not None))
 
 
 def remade(

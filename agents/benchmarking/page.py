@@ -60,13 +60,27 @@ def write_page(
     workers: int | None = 1,
     progress: Progress | None = None,
 ) -> None:
-    """Write the page of a benchmark, one HTML file that loads nothing; the worst episodes are run again.
+    """Write the page of a benchmark. The worst episodes are run again for it.
 
-    `result`: of `benchmark` or `load_results`. `path`: the file; one that exists is replaced. `controllers`:
-    as `benchmark` was given them; needed to replay those given as objects. `worst`: how many episodes of each
-    contestant in each task may be replayed; fewer if they are too many. `workers`: processes that run them;
-    None for as many as there are cores. `progress`: told the stage of the work, what is done and the total.
-    Raises InputError if plotly is not installed or the page cannot be written; nothing is written then.
+    Parameters
+    ----------
+    result : BenchmarkResult
+        Of `benchmark` or `load_results`.
+    path : str or Path
+        The HTML file; one that exists is replaced. It loads nothing.
+    controllers : optional
+        As `benchmark` was given them; needed to replay contestants that were given as objects.
+    worst : int
+        How many episodes of each contestant in each task may be replayed; fewer if they are too many.
+    workers : int or None
+        Processes that run them; None for as many as there are cores.
+    progress : callable, optional
+        Told the stage of the work, what is done and the total.
+
+    Raises
+    ------
+    InputError
+        If plotly is not installed or the page cannot be written; nothing is written then.
     """
     target = Path(path)
     check_page(target)

@@ -97,8 +97,12 @@ class BenchmarkResult:
     def save(self, folder: str | Path | None) -> BenchmarkResult:
         """Write `episodes.parquet` and then `results.json`, each whole or not at all; None: nowhere.
 
-        Returns the result with the hash of `episodes.parquet` in its summary. Raises InputError if pyarrow is
-        missing or the folder cannot be written.
+        Returns the result with the hash of `episodes.parquet` in its summary.
+
+        Raises
+        ------
+        InputError
+            If pyarrow is missing or the folder cannot be written.
         """
         if folder is None:
             return self
@@ -223,7 +227,10 @@ def load_results(path: str | Path) -> BenchmarkResult:
             f"{where}: kind {content.get('kind')!r} found, expected '{KIND}': not benchmark results"
         )
     check_format(content, FORMAT, str(where))
-    check_keys(content, FIELDS, str(where), required=FIELDS)
+    check_keys(content, FIELDS, str(where))
+    for name in FIELDS:
+        if name not in content:
+            raise InputError(f"{where}: field '{name}' is missing; {REMEDY}")
     check_summary(content, str(where))
     table = where.with_name(EPISODES)
     if content["episodes"]["sha256"] != file_hash(table):
@@ -238,15 +245,16 @@ def load_results(path: str | Path) -> BenchmarkResult:
 def _check_agree(result: BenchmarkResult, where: str) -> None:
     """The rows must be those of the contestants, tasks and seeds that the summary names."""
     count, episodes = result.summary["seeds"]["count"], result.episodes
-    rows = Counter(zip(episodes["contestant"].tolist(), episodes["task"].tolist(), strict=True))
     told = {
         (one, task): found["runs"]
         for task, by_name in result.summary["tasks"].items()
         for one, found in by_name.items()
     }
-    for pair in rows.keys() | told.keys():
-        if rows[pair] != (runs := told.get(pair, 0)) * count:
+    rows = Counter(zip(episodes["contestant"].tolist(), episodes["task"].tolist(), strict=True))
+    for one, task in [*told, *rows]:  # in the order of the summary, then of the table
+        runs = told.get((one, task), 0)
+        if rows[one, task] != runs * count:
             raise InputError(
-                f"{where}: {rows[pair]} episodes of '{pair[0]}' on '{pair[1]}' found in {EPISODES}, expected "
+                f"{where}: {rows[one, task]} episodes of '{one}' on '{task}' found in {EPISODES}, expected "
                 f"{runs} runs of {count}; {REMEDY}"
             )

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from contextlib import nullcontext
 from functools import partial
+from itertools import product
 from pathlib import Path
 from types import NoneType
 from typing import Any
@@ -86,8 +87,8 @@ def benchmark(
         )  # fmt: skip
         pairs = zip(jobs, found, strict=True)
         done = {(job["contestant"], job["task"]): checked_part(one, job) for job, one in pairs}
-        for one in (one for one in who if not one.is_text):  # an object steers in this process
-            done |= {(one.name, task.name): results_of(one, task, suite, episodes) for task in chosen}
+        own = product((one for one in who if not one.is_text), chosen)  # objects steer in this process
+        done |= {(one.name, task.name): results_of(one, task, suite, episodes) for one, task in own}
         return gathered(suite, chosen, who, done, episodes).save(folder)
 
 

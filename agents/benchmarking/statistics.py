@@ -56,7 +56,15 @@ def interquartile_mean(values: ArrayLike, axis: int | None = None) -> Floats:
 
 
 class Draws:
-    """Bootstrap draws of the episodes of each task, the same for every contestant, by `seed`."""
+    """Bootstrap draws of the episodes of each task, the same for every contestant.
+
+    Parameters
+    ----------
+    n_tasks, n_episodes : int
+    seed : int
+        Of the draws.
+    n_draws : int
+    """
 
     def __init__(self, n_tasks: int, n_episodes: int, seed: int = 0, n_draws: int = N_DRAWS) -> None:
         random = np.random.default_rng([seed, 0])

@@ -34,7 +34,7 @@ class StandardTrials:
     @property
     def water(self) -> str:
         """Where they were sailed, in words."""
-        return water_in_words(self.water_depth)
+        return "deep water" if np.isinf(self.water_depth) else f"water of {self.water_depth:g} m"
 
     def to_dict(self) -> dict[str, Any]:
         """As `--json` prints it."""
@@ -85,8 +85,3 @@ def standard_trials(
     found = intervals_of(own, drawn, evaluated, progress)
     criteria = imo_criteria(model, found) if np.isinf(water_depth) else {}
     return StandardTrials(families, sailed, found, criteria, refused, len(drawn), water_depth)
-
-
-def water_in_words(water_depth: float) -> str:
-    """Say that the water is deep, or how deep it is."""
-    return "deep water" if np.isinf(water_depth) else f"water of {water_depth:g} m"

@@ -86,50 +86,8 @@ class Policy(Protocol):
         """
 
 
-class Agent:
-    """What classical and learned autopilots have in common."""
-
-    def reset(self) -> None:
-        """The state with which an episode begins: None, whatever the number of ships.
-
-        What there is to remember is in the state that `predict` returns, so one agent may steer any number of
-        episodes side by side.
-        """
-
-    @property
-    def made_for(self) -> str:
-        """What is said where it is shown something else; {} stands for its own scale."""
-        raise NotImplementedError
-
-    def check_fits(self, names: Sequence[str], scales: Sequence[float], where: str = "observations") -> None:
-        """Refuse to steer what shows other quantities first, or in other scales, than those made for.
-
-        Parameters
-        ----------
-        names : sequence of str
-            `observation_names` of an environment; it may show more than what is steered by.
-        scales : sequence of float
-            Its `observation_scales`.
-        where : str
-            Start of the message.
-
-        Raises
-        ------
-        InputError
-            Naming the first difference.
-        """
-        agent: Any = self
-        n, learned = len(agent.observation_names), getattr(agent, "env_id", None)
-        named = where if learned is None else f"{where}: not those that the agent learned with in {learned}"
-        check_names(names[:n], agent.observation_names, named)
-        for name, one, other in zip(names, scales, agent.observation_scales, strict=False):
-            if abs(one - other) > SCALE_TOLERANCE * abs(other):
-                said = self.made_for.replace("{}", f"{other:g}")
-                raise InputError(f"{where}: the scale of '{name}' is {one:g}, but {said}")
-
-
 @dataclass(frozen=True, eq=False)
-class Controller(Agent):
+class Controller:
     """Feedback of deviations from straight running to the commanded rudder.
 
     Attributes
@@ -262,6 +220,13 @@ class Controller(Agent):
         """
         return self._margins(sample_ship(model, self.design["dt"]), model)
 
+    def reset(self) -> None:
+        """The state with which an episode begins: None, whatever the number of ships.
+
+        What there is to remember is in the state that `predict` returns, so one controller may steer any
+        number of episodes side by side.
+        """
+
     @property
     def name(self) -> str:
         """Short name: `pid`, `lq`."""
@@ -315,13 +280,29 @@ class Controller(Agent):
         rows = np.broadcast_to(self.row.T, found.shape)  # the same for all ships, or one for each
         return self.neutral_rudder + np.einsum("ij,ij->i", found, rows), memory
 
-    @property
-    def made_for(self) -> str:
-        """See `Agent.made_for`."""
-        return (
+    def check_fits(self, names: Sequence[str], scales: Sequence[float], where: str = "observations") -> None:
+        """Refuse to steer what shows other quantities first, or in other scales, than those designed for.
+
+        Parameters
+        ----------
+        names : sequence of str
+            `observation_names` of an environment; it may show more than what is steered by.
+        scales : sequence of float
+            Its `observation_scales`.
+        where : str
+            Start of the message.
+
+        Raises
+        ------
+        InputError
+            Naming the first difference.
+        """
+        meant = (
             f"controller '{self.name}' was designed for {{}} (model '{self.model_name}'): another ship or "
             f"rudder limit; design a controller on this model with {type(self).__name__}.from_model"
         )
+        check_names(names[: len(self.observation_names)], self.observation_names, where)
+        check_scales(names, scales, self.observation_scales, where, meant)
 
     def check_fits_model(self, model: ShipModel) -> None:
         """Refuse a ship with other observation scales (length, service speed, rudder limit)."""
@@ -371,6 +352,16 @@ def check_names(found: Sequence[str], expected: Sequence[str], where: str) -> No
             f"{where}: {len(found)} observations found, expected {len(expected)}; "
             f"in one and not in the other: {', '.join(difference)}"
         )
+
+
+def check_scales(
+    names: Sequence[str], scales: Sequence[float], own: Sequence[float], where: str, meant: str
+) -> None:
+    """Refuse observations in other scales than an agent's own; `meant` says more, with {} for its scale."""
+    for name, one, other in zip(names, scales, own, strict=False):
+        if abs(one - other) > SCALE_TOLERANCE * abs(other):
+            said = meant.replace("{}", f"{other:g}")
+            raise InputError(f"{where}: the scale of '{name}' is {one:g}, but {said}")
 
 
 def model_hash(model: ShipModel) -> str:

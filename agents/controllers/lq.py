@@ -137,9 +137,8 @@ def lq_gain(
     """
     import control  # here, because it takes a second to import
 
-    C, D = (
-        one[0] for one in _outputs(ship.A[None], ship.B.T, ship.dt, rate_weight, integral_time, rudder_weight)
-    )
+    outputs = _outputs(ship.A[None], ship.B.T, ship.dt, rate_weight, integral_time, rudder_weight)
+    C, D = outputs[0][0], outputs[1][0]
     plant = control.ss(ship.A, ship.B, np.eye(len(SIGNALS)), 0.0, ship.dt)
     gain, _, _ = control.lqr(plant, C.T @ C, D.T @ D, C.T @ D)
     row: Floats = np.asarray(gain, dtype=np.float64)[0]

@@ -67,9 +67,10 @@ def begun(memory: Any, starts: Any, shape: tuple[int, ...], size: int) -> tuple[
     """
     if memory is None:
         return np.zeros((*shape, size)), np.ones(shape, dtype=np.bool_)
-    kept = checked_memory(memory, (*shape, size))
+    kept = np.array(checked_memory(memory, (*shape, size)), dtype=np.float64, order="C")
     begins = checked_starts(starts, shape)
-    return np.where(begins[..., None], 0.0, kept), begins
+    kept[begins] = 0.0
+    return kept, begins
 
 
 def heading_error(seen: dict[str, Floats]) -> Floats:
@@ -89,7 +90,7 @@ def on_course(seen: NDArray[Any], error: Floats, integral: Floats, reach: float)
     return shown
 
 
-def gathered(integral: Floats, error: Floats, begins: Any, dt: float, reach: float) -> Floats:
+def gathered(integral: Floats | float, error: Floats | float, begins: Any, dt: float, reach: float) -> Floats:
     """Integral of the heading error, rad s, an interval later, as environments have it."""
     more = np.where((np.abs(error) > INTEGRAL_ZONE) | begins, 0.0, error * dt)
     return np.clip(integral + more, -reach, reach)

@@ -11,13 +11,14 @@ import numpy as np
 
 from agents.controllers.controller import Controller
 from agents.controllers.los_autopilot import Guided
+from agents.controllers.memory import gathered
 from shipgym.engine.records import field_types
 from shipgym.errors import InputError
 from shipgym.files import read_toml
 from shipgym.tasks import path_following, path_following_v0
 from shipgym.tasks.contract import Seen
 from shipgym.tasks.guidance import wrapped
-from shipgym.tasks.steering import INTEGRAL_ZONE, Extras, Helm
+from shipgym.tasks.steering import Extras, Helm
 from shipgym.tasks.task import rounded_interval
 
 #: Unit and meaning of variables by name, of ships and autopilots.
@@ -95,8 +96,7 @@ class Autopilot:
         if isinstance(self.agent, Guided):
             error = self._led(given, error)
         reach = self.scales["heading_error_integral"]
-        gathered = 0.0 if self.begins or abs(error) > INTEGRAL_ZONE else float(error) * self.dt
-        self.integral = min(max(self.integral + gathered, -reach), reach)
+        self.integral = float(gathered(self.integral, error, self.begins, self.dt, reach))
         own = (float(np.sin(error)), float(np.cos(error)), self.last_command, self.integral)
         off = given["set_point"] - given.get("course", 0.0)
         courses = dict(zip(COURSE_ERROR, (np.sin(off), np.cos(off)), strict=True))

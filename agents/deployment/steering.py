@@ -58,11 +58,9 @@ class Limits:
             return radians(self.disagreement_deg) * (0.1 if quantity == "yaw_rate" else 1.0)
         if quantity in PLACES:
             return self.position_m / EARTH_M
-        return (
-            inf
-            if quantity in ("cross_track", "waypoint_distance")
-            else self.disagreement_kn * 1852.0 / 3600.0
-        )
+        if quantity in ("cross_track", "waypoint_distance"):
+            return inf
+        return self.disagreement_kn * 1852.0 / 3600.0
 
 
 @dataclass

@@ -89,7 +89,7 @@ def run_jobs(
     texts = [serialised(job, f"jobs[{k}]") for k, job in enumerate(jobs)]
     kept = None if keep is None else KeptResults(keep, function)
     copies = Counter(texts)
-    found = {text: done for text in copies if kept is not None and (done := kept.load(text)) is not None}
+    found = {} if kept is None else kept.load_all(copies)
     tell = progress or (lambda done, total: None)
     tell(sum(copies[text] for text in found), len(texts))
     pending = [text for text in copies if text not in found]

@@ -11,7 +11,7 @@ import hashlib
 import json
 import math
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -91,9 +91,17 @@ def unpack(value: Any) -> Any:
 class KeptResults:
     """A folder with one file for each job that is done, named by a hash of the job.
 
-    It is made with the first result, so that nothing is left of a call that does none. Results of another
-    `function` than the one given, or of another version of shipgym, are not taken. Raises InputError if there
-    is a file of the folder's name.
+    Parameters
+    ----------
+    folder : str or Path
+        Made with the first result where it does not exist, so that nothing is left of a call that does none.
+    function : callable
+        That does the jobs: results of another function, or of another version of shipgym, are not taken.
+
+    Raises
+    ------
+    InputError
+        If there is a file of that name.
     """
 
     def __init__(self, folder: str | Path, function: Callable[[dict[str, Any]], Any]) -> None:
@@ -112,6 +120,11 @@ class KeptResults:
         same = all(content.get(name) == value for name, value in self._key(text).items())
         result: dict[str, Any] = content["result"]
         return result if same else None
+
+    def load_all(self, texts: Iterable[str]) -> dict[str, dict[str, Any]]:
+        """The packed results that are there, by job."""
+        there = {text: self.load(text) for text in texts}
+        return {text: packed for text, packed in there.items() if packed is not None}
 
     def save(self, text: str, packed: dict[str, Any]) -> None:
         """Keep the packed result of a job; the file is written whole or not at all.

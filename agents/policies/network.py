@@ -72,7 +72,8 @@ def _check_layer(weight: Any, bias: Any, where: str) -> None:
         if not known or array.ndim != ndim or array.size == 0:
             found = getattr(array, "dtype", type(array).__name__), getattr(array, "shape", ())
             raise InputError(
-                f"{where}.{name}: {found[0]} of shape {found[1]} found, expected float32 with {ndim} axes"
+                f"{where}.{name}: {found[0]} of shape {found[1]} found, expected float32 with {ndim} axes, "
+                f"none of them empty"
             )
         if not np.isfinite(array).all():
             wrong = tuple(np.argwhere(~np.isfinite(array))[0].tolist())

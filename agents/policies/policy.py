@@ -13,7 +13,7 @@ al. 2019, Residual reinforcement learning for robot control, ICRA.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple, Self
@@ -21,7 +21,7 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from agents.controllers.controller import FORMAT, Action, Agent, Controller
+from agents.controllers.controller import FORMAT, Action, Controller, check_names, check_scales
 from agents.controllers.memory import checked_memory, checked_observation, checked_starts
 from agents.policies.network import Network
 from agents.policies.policy_extraction import sb3_fields, task_showing
@@ -56,7 +56,7 @@ class Memory(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class LearnedPolicy(Agent):
+class LearnedPolicy:
     """A learned autopilot in the signature of `Controller.predict`; steers without torch.
 
     Attributes
@@ -146,6 +146,9 @@ class LearnedPolicy(Agent):
         """Short name: the algorithm, or `learned`."""
         return str(self.training.get("algorithm", "learned"))
 
+    def reset(self) -> None:
+        """The state with which an episode begins: None, whatever the number of ships."""
+
     def predict(
         self, observation: ArrayLike, state: Any = None, episode_start: Any = None, deterministic: bool = True
     ) -> tuple[Action, Any]:
@@ -213,13 +216,18 @@ class LearnedPolicy(Agent):
         held = np.where(flags[:, None], nothing, np.reshape(held, nothing.shape))
         return np.where(flags[:, None, None], present, np.reshape(seen, expected)), inner, held
 
-    @property
-    def made_for(self) -> str:
-        """See `Agent.made_for`."""
-        return (
+    def check_fits(self, names: Sequence[str], scales: Sequence[float], where: str = "observations") -> None:
+        """Refuse what shows other quantities first, or in other scales, than those it learned with.
+
+        Arguments and errors as in `Controller.check_fits`.
+        """
+        meant = (
             f"policy '{self.name}' learned with {{}} (model '{self.model_name}', {self.env_id}): another "
             f"ship or task; train one in this environment"
         )
+        named = f"{where}: not those that the agent learned with in {self.env_id}"
+        check_names(names[: len(self.observation_names)], self.observation_names, named)
+        check_scales(names, scales, self.observation_scales, where, meant)
 
     def check_fits_model(self, model: ShipModel) -> None:
         """Refuse a ship with other observation scales in the environment that it learned in."""

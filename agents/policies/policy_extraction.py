@@ -95,8 +95,10 @@ def _residual(stack: Sequence[Any]) -> dict[str, Any]:
         if all(name in vars(wrapper) for name in RESIDUAL):
             base = wrapper.base
             if base is not None and not isinstance(base, Controller):
-                kind = type(base).__name__
-                raise InputError(f"base: {kind} found, expected a controller of shipgym, for its file")
+                raise InputError(
+                    f"base: {type(base).__name__} found, expected a controller of shipgym, which a file can "
+                    "hold"
+                )
             whole = {name: int(getattr(wrapper, name)) for name in ("frame_stack", "action_repeat")}
             parts = {name: float(getattr(wrapper, name)) for name in ("authority", "rate_limit")}
             return {"base": base, **whole, **parts}

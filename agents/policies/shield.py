@@ -15,7 +15,7 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from agents.controllers.controller import FORMAT, Action, Agent, Controller, Policy
+from agents.controllers.controller import FORMAT, Action, Controller, Policy
 from agents.controllers.lq import LQ
 from agents.controllers.memory import Flags, Floats, Records, begun, heading_error, records, size_of
 from agents.policies.policy import LearnedPolicy
@@ -89,7 +89,7 @@ def interventions(state: ShieldState) -> Interventions:
 
 
 @dataclass(frozen=True, eq=False)
-class Shielded(Agent):
+class Shielded:
     """A policy under a safety shield.
 
     Attributes
@@ -175,6 +175,9 @@ class Shielded(Agent):
         """Physical value of each observation of 1, SI units."""
         return tuple(getattr(self.policy, "observation_scales", self.fallback.observation_scales))
 
+    def reset(self) -> None:
+        """The state with which an episode begins: None, whatever the number of ships."""
+
     def predict(
         self, observation: ArrayLike, state: Any = None, episode_start: Any = None, deterministic: bool = True
     ) -> tuple[Action, ShieldState]:
@@ -235,7 +238,10 @@ class Shielded(Agent):
         return max(1.0, lengths * length_time / self.dt)
 
     def check_fits(self, names: Sequence[str], scales: Sequence[float], where: str = "observations") -> None:
-        """Refuse what policy or fallback was not made for, see `Agent.check_fits`."""
+        """Refuse what shows other quantities first, or in other scales, than policy and fallback know.
+
+        Arguments and errors as in `Controller.check_fits`.
+        """
         for one in (self.policy, self.fallback):
             if (check := getattr(one, "check_fits", None)) is not None:
                 check(names, scales, where)

@@ -55,14 +55,23 @@ def _on_path(task: Task) -> bool:
 
 
 def metrics(run: Rollout) -> dict[str, Floats]:
-    """Figures of each episode by name, each of shape (n,); docs/benchmark.md says what they are.
+    """Figures of each episode by name.
 
-    `run`: that recorded `recorded_for_metrics`. An episode in which the policy failed is charged as if it had
-    lost control then.
+    Parameters
+    ----------
+    run : Rollout
+        That recorded `recorded_for_metrics`.
+
+    Returns
+    -------
+    dict of str to array of shape (n,)
+        docs/benchmark.md says what they are. An episode in which the policy failed is charged as if it had
+        lost control then; success is on a path whether its end was reached, else whether control was kept.
     """
     shielded = run.shielded & run.sailing
     kept = (~(run.terminated | run.failed)).astype(np.float64)
     own = path_following(run) if _on_path(run.task) else {**course_changes(run), "success": kept}
+    lost = run.terminated & ~(own["success"] > 0.0)
     return {
         **costs(run),
         **steering(run),
@@ -72,7 +81,7 @@ def metrics(run: Rollout) -> dict[str, Floats]:
         "extrapolating": mean(run, run.infos["extrapolating"]),
         "shielded": ratio(total(shielded), run.steps),
         "interventions": total(shielded[1:] & ~shielded[:-1]) + total(shielded[:1]),
-        "terminated": (run.terminated & ~(_on_path(run.task) & (own["success"] > 0.0))).astype(np.float64),
+        "terminated": lost.astype(np.float64),
         "failed": run.failed.astype(np.float64),
         "duration_s": run.steps * run.dt,
     }

@@ -55,16 +55,13 @@ def put_back(agent: Any, memory: Memory) -> None:
     """Let an agent made alike go on from what `take` gave, by `learn(..., reset_num_timesteps=False)`.
 
     Raises ValueError, naming the first difference, if that has other names, kinds or shapes than the agent's
-    own.
+    own, or an infinite number, or none, where the agent's own is finite.
     """
     memory = _with_own_settings(agent, memory)
     check_like(memory, _own(agent), "agent")
     _check_weights(memory["parameters"])
     if not all(map(agent.observation_space.contains, memory["counters"]["_last_obs"])):
         raise ValueError("counters._last_obs: expected numbers within the bounds of the observations")
-    for number, kept in enumerate(memory["ships"]):
-        if not np.isfinite(kept.get("states", 0.0)).all():  # positions, velocities, orders and what is asked
-            raise ValueError(f"agent.ships[{number}].states: expected finite numbers")
     agent.set_parameters(memory["parameters"], exact_match=True, device="cpu")
     for name, value in memory["variables"].items():
         recursive_getattr(agent, name).data.copy_(value)

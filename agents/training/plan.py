@@ -120,10 +120,23 @@ class Given:
 
 
 def make_plan(given: Given, stored: Plan | None = None) -> Plan:
-    """The run that a user asks for; what is not given is as in `stored`, the run that is resumed.
+    """The run that a user asks for.
 
-    Raises InputError for an unknown algorithm, environment, task, model, option or setting, with the nearest
-    known one, or a value out of its range.
+    Parameters
+    ----------
+    given : Given
+    stored : Plan, optional
+        The run that is resumed: what is not given is as it was.
+
+    Returns
+    -------
+    Plan
+
+    Raises
+    ------
+    InputError
+        For an unknown algorithm, environment, task, model, option or setting, with the nearest known one,
+        or a value out of its range.
     """
     check_choice(given.algorithm, ALGORITHMS, "algorithm")
     task = _task(given, stored)
@@ -134,7 +147,7 @@ def make_plan(given: Given, stored: Plan | None = None) -> Plan:
     else:
         settings = changed(stored.settings, own)
     kept = {} if stored is None else {name: getattr(stored, name) for name in RUN}
-    asked = {name: value for name in RUN if (value := getattr(given, name)) is not None}
+    asked = {name: getattr(given, name) for name in RUN if getattr(given, name) is not None}
     return Plan(given.algorithm, task, settings, **kept | asked)
 
 
@@ -185,11 +198,10 @@ def training_options(plan: Plan) -> dict[str, Any]:
     if not plan.randomise:
         return options
     options.setdefault("speed_range", SPEED_RANGE)
-    names = {sea.name for sea in task.seas}
-    current = task.weather.current
+    own = {sea.name for sea in task.seas}
+    others = [as_weather(name, "sea", None) for name in SEAS if name not in own]
     options["sea"] = [*task.seas]
-    for name in (name for name in SEAS if name not in names):
-        sea = replace(as_weather(name, "sea", None), current=current)
+    for sea in (replace(other, current=task.weather.current) for other in others):
         with suppress(InputError):
             weather_column(ship, sea, task.substep(ship), task.water_depth)
             options["sea"].append(sea)

@@ -109,7 +109,10 @@ def _content(folder: Path) -> Mapping[str, Any]:
     if not path.is_file():
         raise InputError(f"{folder}: no run of training is there; leave --resume out to begin one")
     content = read_json(path, "run file", REMEDY)
-    check_keys(content, FIELDS, str(path), FIELDS)
+    check_keys(content, FIELDS, str(path))
+    for name in FIELDS:
+        if name not in content:
+            raise InputError(f"{path}: field '{name}' is missing; {REMEDY}")
     check_format(content, FORMAT, str(path))
     configuration = dict(check_table(content["configuration"], f"{path}: configuration"))
     if isinstance(settings := configuration.get("settings"), Mapping):

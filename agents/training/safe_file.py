@@ -69,8 +69,9 @@ def _hash(content: str, arrays: Arrays) -> str:
 def check_like(found: Any, own: Any, where: str) -> None:
     """Raise ValueError, naming the first place, unless one value is like another.
 
-    The same names and texts, lists of one length, arrays and tensors of the same type and shape, numbers of a
-    kind: finite, whole ones not negative. A function in `own` is asked what is expected, of what is found.
+    The same names and texts, lists of one length, arrays and tensors of the same type and shape, finite where
+    the other is, numbers of a kind: finite, whole ones not negative. A function in `own` is asked what is
+    expected, of what is found.
     """
     own = own(found) if callable(own) else own
     told, expected = _kind(found), _kind(own)
@@ -85,6 +86,26 @@ def check_like(found: Any, own: Any, where: str) -> None:
     elif isinstance(own, list | tuple):
         for number, one in enumerate(own):
             check_like(found[number], one, f"{where}[{number}]")
+    elif _is_array(own):
+        _check_finite(_as_array(found), _as_array(own), where)
+
+
+def _check_finite(found: Any, own: Any, where: str) -> None:
+    """Raise ValueError for the first number that is infinite, or none, where its own is finite."""
+    wrong = np.argwhere(np.isfinite(own) & ~np.isfinite(found))
+    if len(wrong):
+        at = tuple(wrong[0].tolist())
+        raise ValueError(f"{where}: {found[at]} found at {list(at)}, expected a finite number")
+
+
+def _is_array(value: Any) -> bool:
+    """Whether it is an array with axes, or a tensor of torch."""
+    return np.ndim(value) > 0 or hasattr(value, "detach")
+
+
+def _as_array(value: Any) -> Any:
+    """An array itself, a tensor's numbers."""
+    return value.detach().cpu().numpy() if hasattr(value, "detach") else value
 
 
 def _kind(value: Any) -> str:
@@ -93,7 +114,7 @@ def _kind(value: Any) -> str:
         return f"a table of {len(value)}"
     if isinstance(value, list | tuple):
         return f"{type(value).__name__} of {len(value)}"
-    if np.ndim(value) or hasattr(value, "detach"):
+    if _is_array(value):
         return f"{type(value).__name__} of {value.dtype}, shape {tuple(value.shape)}"
     number = value.item() if isinstance(value, np.ndarray | np.generic) else value
     whole = isinstance(number, int) and number >= 0
@@ -119,7 +140,7 @@ def _packed(value: Any, name: str, arrays: Arrays) -> Any:
         items = [_packed(one, f"{name}.{i}", arrays) for i, one in enumerate(value)]
         return {"tuple" if isinstance(value, tuple) else "list": items}
     if hasattr(value, "detach"):
-        arrays[name] = np.array(value.detach().cpu().numpy(), order="C")
+        arrays[name] = np.array(_as_array(value), order="C")
         return {"tensor": name}
     raise TypeError(f"{name}: {type(value).__name__} cannot be written")
 

@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import MISSING, Field, asdict, dataclass, field, fields, replace
 from importlib.resources import files
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 from agents.controllers.registry import controller_kinds
 from agents.suites.suite import ENVIRONMENTS, suite_of
@@ -21,62 +21,47 @@ from shipgym.files import named_values, parse_toml, read_toml
 from shipgym.tasks.task import ACTIONS
 
 RENAMED = {"history": "frame_stack", "hold": "action_repeat"}  # older names that are still taken
-RUNNING, LEARNED, AUTO = "running", "learned", "auto"
+RUNNING, LEARNED = "running", "learned"  # words in the place of numbers
 NUMBER_OR_WORD, WIDTHS = "float | str", "tuple[int, ...]"  # types of settings
 
 
-def setting(default: Any = MISSING, **allowed: Any) -> Any:
-    """A setting and what is allowed: bounds of `check_number`, a `word` for a number, or `options`.
+def hyperparameters(name: str) -> dict[str, Any]:
+    """The content of a file of `hyperparameters/`."""
+    file = files("agents.training").joinpath("hyperparameters", f"{name}.toml")
+    return parse_toml(file.read_text("utf-8"), f"{file}:")
 
-    `default`: of one that older runs and files of settings do not have.
-    """
-    return field(metadata=allowed, default=default, kw_only=default is not MISSING)
+
+#: What is known of each setting, by `Settings.section` and name.
+KNOWN = hyperparameters("settings")
 
 
 @dataclass(frozen=True)
 class Settings:
     """What all algorithms have; a decision lasts `action_repeat` control intervals."""
 
-    #: Decisions to learn from, of all ships together.
-    total_steps: int = setting(at_least=1)
-    #: Decisions between evaluations.
-    evaluate_every: int = setting(at_least=1)
-    #: Ships that sail at once.
-    ships: int = setting(at_least=1)
-    #: Samples of one gradient step.
-    batch_size: int = setting(at_least=1)
-    #: Learning rate of Adam at the beginning.
-    learning_rate: float = setting(above=0.0, at_most=1.0)
-    #: How the learning rate goes on; linear falls to 0 at the end of the training.
-    schedule: str = setting(options=("constant", "linear"))
-    #: Discount of a decision.
-    gamma: float = setting(at_least=0.0, at_most=1.0)
-    #: Widths of the hidden layers of the policy, and of PPO's value.
-    net_arch: tuple[int, ...] = setting(at_least=1)
-    #: Function between the layers.
-    activation: str = setting(options=("relu", "tanh"))
-    #: Observations that the policy sees, the newest last.
-    frame_stack: int = setting(at_least=1)
-    #: Control intervals of a decision; a base goes on with its feedback in each of them.
-    action_repeat: int = setting(at_least=1)
-    #: Classical controller that the policy adds to: a kind, a controller's file that ends in .json, "none",
-    #: or "tuned", the best of those tuned for the suite's task (but `designs.NO_BASES`).
-    base: str = setting()
-    #: Share of the action's range by which it may differ from the base; 1 without a base.
-    authority: float = setting(above=0.0, at_most=2.0)
-    #: Largest change of the output in force in a control interval, so that the rudder does not jump where a
-    #: decision gives way to the next; 2 does not limit it.
-    rate_limit: float = setting(above=0.0, at_most=2.0, default=2.0)
-    #: Whether the ships that learn are drawn from the model's covariance; evaluation is on the model itself.
-    #: Unlike `--randomise` it leaves seas and speeds as the task has them.
-    model_uncertainty: str = setting(options=("none", "covariance"), default="none")
-    #: What rewards are divided by before they are limited to [-10, 10]; "running" is the standard deviation
-    #: of their discounted sum so far.
-    reward_scale: float | str = setting(above=0.0, word=RUNNING)
+    section: ClassVar[str] = "all"  # of `hyperparameters/settings.toml`, which says what each setting is
+
+    total_steps: int
+    evaluate_every: int
+    ships: int
+    batch_size: int
+    learning_rate: float
+    schedule: str
+    gamma: float
+    net_arch: tuple[int, ...]
+    activation: str
+    frame_stack: int
+    action_repeat: int
+    base: str
+    authority: float
+    rate_limit: float = field(default=2.0, kw_only=True)
+    model_uncertainty: str = field(default="none", kw_only=True)
+    reward_scale: float | str
 
     def __post_init__(self) -> None:
         for one in fields(self):
-            object.__setattr__(self, one.name, _checked(getattr(self, one.name), one))
+            value = _checked(getattr(self, one.name), one, self.allowed(one.name))
+            object.__setattr__(self, one.name, value)
         if not check_text(self.base, "base").endswith(".json"):
             check_choice(self.base, ("none", "tuned", *controller_kinds()), "base")
         if self.base == "none" and self.authority != 1.0:
@@ -85,6 +70,13 @@ class Settings:
 
     def _check_together(self) -> None:
         """Refuse settings that do not fit each other."""
+
+    @classmethod
+    def allowed(cls, name: str) -> dict[str, Any]:
+        """What is allowed for a setting beside its type, as in `hyperparameters/settings.toml`."""
+        tables = (KNOWN[kind.section] for kind in cls.__mro__ if issubclass(kind, Settings))
+        known = next(table[name] for table in tables if name in table)
+        return {key: value for key, value in known.items() if key != "meaning"}
 
     def to_dict(self) -> dict[str, Any]:
         """The settings by name, ready for JSON."""
@@ -96,25 +88,17 @@ class Settings:
 class PPOSettings(Settings):
     """Proximal policy optimisation (Schulman et al. 2017, arXiv:1707.06347)."""
 
-    #: Decisions of each ship in a rollout.
-    n_steps: int = setting(at_least=1)
-    #: How often each sample of a rollout is used.
-    n_epochs: int = setting(at_least=1)
-    #: Decay of the generalised advantage estimate.
-    gae_lambda: float = setting(at_least=0.0, at_most=1.0)
-    #: Largest change of the ratio of probabilities.
-    clip_range: float = setting(above=0.0)
-    #: Weight of the entropy.
-    ent_coef: float = setting(at_least=0.0)
-    #: Weight of the value's error.
-    vf_coef: float = setting(above=0.0)
-    #: Longest gradient.
-    max_grad_norm: float = setting(above=0.0)
-    #: Logarithm of the action's standard deviation at the beginning.
-    log_std_init: float = setting(at_least=-10.0, at_most=3.0)
-    #: To what it falls evenly over the training. A rudder that chatters costs more than steering does, and
-    #: the policy that is best while it explores is not the one that is best without.
-    log_std_end: float | str = setting(at_least=-10.0, at_most=3.0, word=LEARNED)
+    section: ClassVar[str] = "ppo"
+
+    n_steps: int
+    n_epochs: int
+    gae_lambda: float
+    clip_range: float
+    ent_coef: float
+    vf_coef: float
+    max_grad_norm: float
+    log_std_init: float
+    log_std_end: float | str
 
     def _check_together(self) -> None:
         samples = self.ships * self.n_steps
@@ -129,18 +113,14 @@ class PPOSettings(Settings):
 class OffPolicySettings(Settings):
     """What the algorithms have that learn from a replay buffer."""
 
-    #: Decisions that are remembered.
-    buffer_size: int = setting(at_least=1)
-    #: Decisions of all ships under random actions before learning begins.
-    learning_starts: int = setting(at_least=0)
-    #: Decisions of all ships between updates.
-    train_freq: int = setting(at_least=1)
-    #: Gradient steps of an update.
-    gradient_steps: int = setting(at_least=1)
-    #: Share by which the target network approaches the critic in an update.
-    tau: float = setting(above=0.0, at_most=1.0)
-    #: Widths of the hidden layers of the critics.
-    critic_arch: tuple[int, ...] = setting(at_least=1)
+    section: ClassVar[str] = "off-policy"
+
+    buffer_size: int
+    learning_starts: int
+    train_freq: int
+    gradient_steps: int
+    tau: float
+    critic_arch: tuple[int, ...]
 
     def _check_together(self) -> None:
         if self.buffer_size < self.ships:
@@ -153,37 +133,33 @@ class OffPolicySettings(Settings):
 class SACSettings(OffPolicySettings):
     """Soft actor-critic (Haarnoja et al. 2018, arXiv:1812.05905)."""
 
-    #: Weight of the entropy; "auto" or "auto_0.1" adapts it, from that value.
-    ent_coef: float | str = setting(at_least=0.0, word="auto_")
-    #: Entropy that it is adapted to; "auto" is -1 for each command. One command has the standard deviation
-    #: 0.09 with -1, 0.24 with 0.
-    target_entropy: float | str = setting(at_most=1.0, word=AUTO)
+    section: ClassVar[str] = "sac"
+
+    ent_coef: float | str
+    target_entropy: float | str
 
 
 @dataclass(frozen=True)
 class TD3Settings(OffPolicySettings):
     """Twin delayed deep deterministic policy gradient (Fujimoto et al. 2018, arXiv:1802.09477)."""
 
-    #: Standard deviation of what is added to actions to explore.
-    action_noise: float = setting(above=0.0)
-    #: Updates of the critics for one of the policy.
-    policy_delay: int = setting(at_least=1)
-    #: Standard deviation of what is added to the target's actions.
-    target_policy_noise: float = setting(at_least=0.0)
-    #: Largest value of it.
-    target_noise_clip: float = setting(at_least=0.0)
+    section: ClassVar[str] = "td3"
+
+    action_noise: float
+    policy_delay: int
+    target_policy_noise: float
+    target_noise_clip: float
 
 
 @dataclass(frozen=True)
 class TQCSettings(SACSettings):
     """Truncated quantile critics (Kuznetsov et al. 2020, arXiv:2005.04269)."""
 
-    #: Critics.
-    n_critics: int = setting(at_least=1)
-    #: Quantiles of each.
-    n_quantiles: int = setting(at_least=1)
-    #: Quantiles of each critic that are dropped, the largest.
-    top_quantiles_to_drop: int = setting(at_least=0)
+    section: ClassVar[str] = "tqc"
+
+    n_critics: int
+    n_quantiles: int
+    top_quantiles_to_drop: int
 
     def _check_together(self) -> None:
         super()._check_together()
@@ -200,9 +176,9 @@ ALGORITHMS: Mapping[str, type[Settings]] = {
 }  # fmt: skip
 
 
-def _checked(value: Any, one: Field[Any]) -> Any:
+def _checked(value: Any, one: Field[Any], allowed: dict[str, Any]) -> Any:
     """The value of a setting, if its type and bounds allow it."""
-    allowed, name = dict(one.metadata), one.name
+    name = one.name
     if one.type == "int":
         return check_whole(value, name, **allowed)
     if one.type == "float":
@@ -239,14 +215,26 @@ def load_settings(
     given: Mapping[str, Any] | None = None,
     action: str = "rudder",
 ) -> Settings:
-    """The tuned settings of an algorithm, with those that are given, by name, in their place.
+    """The tuned settings of an algorithm, with those that are given in their place.
 
-    `environment`: "course-keeping" or "path-following"; `task`: name of a suite's task; one without settings
-    of its own has those of its environment; `action`: what is commanded. With other actions than the rudder,
-    or `base` given as "none", a policy learns from scratch. Raises InputError for an unknown algorithm or
-    setting, with the nearest known one, or a value out of its range.
+    Parameters
+    ----------
+    algorithm : {"ppo", "sac", "td3", "tqc"}
+    environment : {"course-keeping", "path-following"}
+    task : str
+        Name of a suite's task; one without settings of its own has those of its environment.
+    given : mapping of str to Any, optional
+        Settings by name that go before the tuned ones.
+    action : {"rudder", "rudder-discrete", "rudder-shaft"}
+        What is commanded. With others than the rudder, or `base` given as "none", a policy learns from
+        scratch.
+
+    Raises
+    ------
+    InputError
+        For an unknown algorithm or setting, with the nearest known one, or a value out of its range.
     """
-    settings_of(algorithm)
+    check_choice(algorithm, ALGORITHMS, "algorithm")
     check_choice(environment, ENVIRONMENTS, "environment")
     check_choice(action, ACTIONS, "action")
     content = hyperparameters(algorithm)
@@ -256,12 +244,6 @@ def load_settings(
         for table, name in (("residual", followed), ("suites", suite_of(task)), ("tasks", task)):
             chosen |= content.get(table, {}).get(name, {})
     return make_settings(algorithm, chosen | dict(given or {}))
-
-
-def hyperparameters(name: str) -> dict[str, Any]:
-    """The content of a file of `hyperparameters/`."""
-    file = files("agents.training").joinpath("hyperparameters", f"{name}.toml")
-    return parse_toml(file.read_text("utf-8"), f"{file}:")
 
 
 def settings_of(algorithm: str) -> type[Settings]:

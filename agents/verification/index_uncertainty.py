@@ -84,7 +84,8 @@ def uncertainty_of(
     }
     criteria = {name: one for name, one in imo_criteria(model, found).items() if one.drawn is not None}
     unstable = np.any([c.drawn.ran_away for c in criteria.values() if c.drawn is not None], axis=0)
-    unstable |= (lost := np.concatenate([part["lost"] for part in parts]))
+    lost = np.concatenate([part["lost"] for part in parts])
+    unstable |= lost
     headings, paths = ([one for part in parts for one in part[name]] for name in ("headings", "paths"))
     stable = ~unstable[~lost]  # of those that were kept
     return ManoeuvreUncertainty(

@@ -52,11 +52,27 @@ def monte_carlo(
 ) -> MonteCarlo:
     """Sail the standard manoeuvres and an episode of course keeping with models drawn from the covariance.
 
-    `controllers`: each steers every draw; draw i with seed + i, the same episodes for all. `model`: with a
-    covariance. `draws`: at least 2. `seed`: of the draws and of the episodes. `where`: in this process, in
-    several, or on a ray cluster; the results are the same, bit for bit. `progress`: told the number of draws
-    done. Raises InputError if the model has no covariance, or a controller is for another ship;
-    UnstableModelError if the model itself runs away.
+    Parameters
+    ----------
+    controllers : sequence of Controller
+        Each steers every draw; draw i with seed + i, the same episodes for all.
+    model : ShipModel
+        With a covariance.
+    draws : int
+        Models drawn, at least 2.
+    seed : int
+        Of the draws and of the episodes.
+    where : JobEngine
+        In this process, in several, or on a ray cluster; the results are the same, bit for bit.
+    progress : callable, optional
+        Told the number of draws done.
+
+    Raises
+    ------
+    InputError
+        If the model has no covariance, or a controller is for another ship.
+    UnstableModelError
+        If the model itself runs away.
     """
     check_whole(draws, "draws", at_least=2)
     check_whole(seed, "seed", at_least=0)
@@ -87,16 +103,13 @@ def draw_jobs(
         "model": replace(model, covariance=None).to_dict(),
         "controllers": [controller.to_dict() for controller in controllers],
     }
-    return [
-        {
-            **common,
-            "coefficients": [list(draw.coefficients.values()) for draw in some],
-            "names": [draw.name for draw in some],
-            "first_seed": seed + first,
-        }
-        for first in range(0, len(drawn), DRAWS_A_JOB)
-        for some in [drawn[first : first + DRAWS_A_JOB]]
-    ]
+    jobs = []
+    for first in range(0, len(drawn), DRAWS_A_JOB):
+        some = drawn[first : first + DRAWS_A_JOB]
+        coefficients = [list(draw.coefficients.values()) for draw in some]
+        names = [draw.name for draw in some]
+        jobs.append({**common, "coefficients": coefficients, "names": names, "first_seed": seed + first})
+    return jobs
 
 
 def do_draws(job: dict[str, Any]) -> dict[str, Any]:

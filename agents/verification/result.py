@@ -134,11 +134,11 @@ def track_metrics(track: Track) -> dict[str, Any]:
 def pilot_metrics(pilot: Pilot) -> dict[str, Any]:
     """Gains and margins of one autopilot, null if it is learned, and its episodes over the models drawn."""
     episodes, design = pilot.episodes, pilot.design
+    gains = None if design is None else {name: float(value) for name, value in design.gains.items()}
+    margins = None if design is None else {k: _finite(value) for k, value in asdict(design.margins).items()}
     return {
-        "gains": None if design is None else {name: float(value) for name, value in design.gains.items()},
-        "margins": None
-        if design is None
-        else {k: _finite(value) for k, value in asdict(design.margins).items()},
+        "gains": gains,
+        "margins": margins,
         "cost_mean": float(np.mean(episodes.cost)),
         "cost_quantile_95": float(np.quantile(episodes.cost, 0.95)),
         "heading_rmse_deg_mean": float(np.mean(episodes.heading_rmse_deg)),

@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from agents import LQ, PID, benchmark, load_results
+from agents import LQ, PID, WheelOver, benchmark, load_results
+from agents.agent_file import PRETRAINED
 from agents.benchmarking.contestants import Contestant, contestants, pretrained
 from agents.benchmarking.replays import EpisodeId, rerun
-from agents.benchmarking.results import check_new
+from agents.benchmarking.results import BenchmarkResult, check_new
 from agents.benchmarking.run import _chosen, _run, checked_part, results_of
 from agents.benchmarking.verification import verify
 from agents.cli import app
@@ -131,6 +132,29 @@ def test_one_that_cannot_take_part_is_said_and_the_rest_go_on():
     assert result.figures("other", "mariner-calm").size == 0
 
 
+def test_an_agent_that_observes_what_no_task_shows_is_refused_before_anything_is_run(tmp_path):
+    guide = WheelOver.from_model(load_model("mariner"))
+    guide.save(tmp_path / "guide.json")
+    with pytest.raises(InputError) as error:
+        benchmark(str(tmp_path / "guide.json"), tasks=TASKS, out=tmp_path / "out", episodes=2)
+    assert str(error.value) == (
+        f"controllers: 'guide' fits no task asked for: '{tmp_path / 'guide.json'}' on task 'mariner-calm': 8 "
+        "observations found, expected 13; in one and not in the other: cross_track, course_error_sin, "
+        "course_error_cos, turn_distance, turn_angle"
+    )
+    assert not (tmp_path / "out").exists()
+    refused = benchmark({"guide": guide, "pid": "pid"}, tasks=TASKS, episodes=2).summary["contestants"]
+    assert refused["guide"]["refused"]["mariner-calm"].startswith("'guide' on task 'mariner-calm': 8 observ")
+
+
+def test_an_agent_of_the_first_suite_is_told_that_paths_of_the_second_show_more():
+    said = "that the agent learned with in shipgym/PathFollowing-v0: observation 11 is 'next_turn_distance'"
+    with pytest.raises(InputError, match=rf"fits no task asked for: .*: not those {said}"):
+        benchmark(
+            str(PRETRAINED / "container-path-ppo.json"), "shipgym-v2", tasks=["sharp-turns"], episodes=2
+        )
+
+
 def test_training_runs_of_one_contestant(tmp_path):
     ship = load_model("mariner")
     for run, frequency in enumerate((0.05, 0.08)):
@@ -249,8 +273,6 @@ def test_what_the_results_say_is_true(folder):
 
 def _rewritten(copy, change):
     """Results whose table was changed, with hashes that fit."""
-    from agents.benchmarking.results import BenchmarkResult
-
     result = load_results(copy)
     columns = {name: values.copy() for name, values in result.episodes.items()}
     change(columns)
@@ -354,12 +376,16 @@ def test_results_that_do_not_agree_with_their_episodes_are_refused(copy):
 
     summary = json.loads((copy / "results.json").read_text())
     _rewritten(copy, one_more)
-    with pytest.raises(
-        InputError, match=r"episodes of '(lq|pid)' on 'mariner-calm' found in episodes.parquet, expected"
-    ):
+    with pytest.raises(InputError) as error:
         load_results(copy)
+    assert str(error.value) == (
+        f"{copy / 'results.json'}: 5 episodes of 'pid' on 'mariner-calm' found in episodes.parquet, expected "
+        "1 runs of 4; run `shipgym benchmark` again"
+    )
     (copy / "results.json").write_text(json.dumps({k: v for k, v in summary.items() if k != "seeds"}))
-    with pytest.raises(InputError, match="seeds"):
+    with pytest.raises(
+        InputError, match=r"results.json: field 'seeds' is missing; run `shipgym benchmark` again$"
+    ):
         load_results(copy)
     (copy / "results.json").write_text(json.dumps(summary | {"kind": "model"}))
     with pytest.raises(InputError, match=r"kind 'model' found, expected .*: not benchmark results"):
@@ -371,10 +397,17 @@ def test_contestants_of_the_file_and_of_the_table_are_the_same(copy):
         columns["contestant"][columns["contestant"] == "lq"] = "los"
 
     _rewritten(copy, exchange)
-    with pytest.raises(
-        InputError,
-        match=r"4 episodes of 'los' .* expected 0 runs of 4|0 episodes of 'lq' .* expected 1 runs of 4",
-    ):
+    with pytest.raises(InputError, match=r"0 episodes of 'lq' on 'mariner-calm' .* expected 1 runs of 4"):
+        load_results(copy)
+
+
+def test_rows_of_nobody_in_the_summary_are_refused(copy):
+    result = load_results(copy)
+    columns = {name: np.append(values, values[:1]) for name, values in result.episodes.items()}
+    columns["contestant"][-1] = "los"
+    summary = result.summary | {"episodes": result.summary["episodes"] | {"rows": 2 * N + 1}}
+    BenchmarkResult(summary, columns).save(copy)
+    with pytest.raises(InputError, match=r"1 episodes of 'los' on 'mariner-calm' .* expected 0 runs of 4"):
         load_results(copy)
 
 

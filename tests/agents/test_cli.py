@@ -18,6 +18,7 @@ from agents.cli import app, doctor, training
 from agents.cli.command import LONGEST_NAME, told_failure
 from agents.cli.warm import _jobs, _names
 from agents.training.plan import Given
+from agents.training.run_folder import CHECKPOINT
 from shipgym import InputError, load_model
 
 ROOT = Path(__file__).parents[2]
@@ -296,7 +297,6 @@ def test_warm_compiles_into_the_cache_and_writes_nothing_else(tmp_path):
     assert not list(here.iterdir())
 
 
-@pytest.mark.skipif(os.name == "nt", reason="Windows has other permissions")
 def test_warm_takes_what_is_named_or_all_there_is():
     everything = _names(None, True)
     assert {"shipgym/CourseKeeping-v0", "shipgym/PathFollowingRoll-v1", "mariner", "kvlcc2-mmg"} <= set(
@@ -371,6 +371,7 @@ def test_doctor_names_what_is_missing_and_packages_of_one_name(monkeypatch):
     assert doctor.name_finding("nowhere_1").detail.startswith("leads to None, expected ")
 
 
+@pytest.mark.skipif(os.name == "nt", reason="Windows has other permissions")
 def test_warm_fills_no_cache_that_would_not_be_used(tmp_path):
     tmp_path.chmod(0o777)
     answer = subprocess.run(
@@ -444,11 +445,15 @@ def test_what_a_training_found_is_told(capsys):
 
 
 def test_a_training_that_is_interrupted_says_whether_it_can_go_on(tmp_path, monkeypatch, capsys):
-    def interrupted(*arguments, **settings):
+    def interrupted(plan, out, **settings):
+        if out.name == "kept":
+            out.mkdir()
+            (out / CHECKPOINT).touch()
         raise KeyboardInterrupt
 
     monkeypatch.setattr("agents.training.training.train", interrupted)
-    given, run = Given("ppo", None, None, None, None, {}, None, {}, None, False, None), tmp_path / "run"
-    with pytest.raises(typer.Exit) as left:
-        training._train(given, run, False, None)
-    assert (left.value.exit_code, capsys.readouterr().err) == (130, "error: interrupted\n")
+    told = {"none": "interrupted", "kept": f"interrupted; go on with --resume --out {tmp_path / 'kept'}"}
+    for name, said in told.items():
+        with pytest.raises(typer.Exit) as left:
+            training._train(Given("ppo"), tmp_path / name, False, None)
+        assert (left.value.exit_code, capsys.readouterr().err) == (130, f"error: {said}\n")

@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from agents import LQ, WheelOver, benchmark, load_results
+from agents import LQ, Shielded, WheelOver, benchmark, load_results
 from agents.benchmarking import results, run, submission
 from agents.benchmarking.contestants import Contestant
 from agents.benchmarking.submission import submit
@@ -64,8 +64,16 @@ def test_contestants_are_handed_the_model_only():
     assert (handed[0].name, handed[0].behind, handed[0].far) == ("turns", "", {})
     assert handed[0].ship.name == handed[0].sailed[0].name == "mariner-tls-svm"
     cheat = Contestant("cheat", lambda handed: WheelOver.from_model(task.sailed[0], task=handed.task))
-    with pytest.raises(InputError, match="'cheat' on task 'turns-far': was designed on the ship, 'mariner'"):
+    said = (
+        "'cheat' on task 'turns-far': was designed on the ship, 'mariner', expected on the model that it is "
+        "handed, 'mariner-tls-svm'"
+    )
+    with pytest.raises(InputError, match=said):
         cheat.policies(task, "small")
+    rescue = LQ.from_model(task.sailed[0])
+    hidden = Contestant("cheat", lambda handed: Shielded(LQ.from_model(handed.ship), rescue, 1.0))
+    with pytest.raises(InputError, match=said):
+        hidden.policies(task, "small")
 
 
 def test_a_submission_is_verified(tmp_path):
@@ -117,7 +125,9 @@ def test_a_folder_of_another_suite_and_results_of_the_first_format_are_refused(t
         benchmark("lq", suite="other", out=tmp_path / "out", resume=True, episodes=N)
     file = tmp_path / "out" / results.RESULTS
     file.write_text(json.dumps(json.loads(file.read_text()) | {"format": 1}))
-    with pytest.raises(InputError, match="format"):
+    with pytest.raises(
+        InputError, match=r"results.json: format 1 found, this version of shipgym reads format 2"
+    ):
         load_results(tmp_path / "out")
 
 

@@ -200,6 +200,18 @@ def test_what_was_run_again_is_the_same_close_or_differs():
     ]  # fmt: skip
 
 
+def test_a_bar_has_a_share_only_where_the_total_is_known(monkeypatch):
+    printed = StringIO()
+    monkeypatch.setattr(terminal, "err", Console(file=printed, force_terminal=True, width=110))
+    with terminal.progress_bars() as tell:
+        tell("identifying", 0, 0)
+        tell("models drawn", 1, 4)
+    last = printed.getvalue().replace("\r", "\n").splitlines()
+    unknown, known = (next(line for line in last[::-1] if what in line) for what in ("identi", "models"))
+    assert "%" not in unknown
+    assert "25%" in known
+
+
 def state():
     return terminal.AS_JSON.get(), terminal.out.quiet, terminal.err.quiet
 
