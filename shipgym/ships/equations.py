@@ -168,9 +168,10 @@ def read_ship_equations(path: str | Path) -> ShipEquations:
     Raises InputError for a file that is not there, cannot be run, or defines no `SHIP`.
     """
     path = Path(path).resolve()
-    ship = getattr(load_file(path), "SHIP", None)
+    written = "SHIP = ShipEquations(...)"
+    ship = getattr(load_file(path, f"a Python file that defines {written}"), "SHIP", None)
     if not isinstance(ship, ShipEquations):
-        raise InputError(f"{path}: SHIP = {ship!r} found, expected SHIP = ShipEquations(...)")
+        raise InputError(f"{path}: SHIP = {ship!r} found, expected {written}")
     object.__setattr__(ship, "path", path)
     return ship
 
