@@ -26,7 +26,7 @@ from shipgym.engine.places import (
     store_outcome, store_ran_away, store_reward, store_sea, store_state, table_at, task_begin, task_step,
     total_reward, view_at, words_at, worst_cost,
 )  # fmt: skip
-from shipgym.engine.random import DRAW, stream, uniform
+from shipgym.engine.random import BEGIN_WORDS, EVOLVE_WORDS, stream, uniform
 from shipgym.engine.records import LANES
 from shipgym.tasks.contract import Interval, Random
 
@@ -41,7 +41,6 @@ ANSWERED: Any = np.bool_(False)  # all rows but what `step` answers
 # Lanes are sailed in whole vectors, whose arithmetic may be contracted otherwise than that of a single lane,
 # so that results do not depend on the number of ships.
 GROUP = 16
-BEGIN_WORDS, EVOLVE_WORDS = DRAW[15], DRAW[8]  # by which the random numbers of the sea go on
 
 
 class Course(NamedTuple):

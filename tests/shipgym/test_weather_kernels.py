@@ -340,7 +340,7 @@ def test_a_sea_begins_and_goes_on_as_it_always_was():
         for key in range(n):
             word = random.stream(np.uint64(key), np.uint64(0))
             begun.append(open_sea.begin_sea(motion, word, p))
-            later.append(open_sea.evolve(motion, 2.0, begun[-1], word + open_sea.BEGIN_WORDS, p))
+            later.append(open_sea.evolve(motion, 2.0, begun[-1], word + random.BEGIN_WORDS, p))
     first, second = np.array(begun), np.array(later)
     expected = {
         "current_north": (0.8 * np.cos(2.0), 0.3), "current_east": (0.8 * np.sin(2.0), 0.3),
