@@ -40,10 +40,7 @@ def to_mss(model: ShipModel) -> dict[str, float]:
             f"model '{model.name}': structure '{model.structure}' found, expected abkowitz or container, the "
             "ships of MSS that are sets of parameters"
         )
-    mass = p.require("mass") / (0.5 * p.require("water_density") * p.length**3)
-    xg = p.require("xg") / p.length
-    inertia = mass * ((p.require("yaw_gyradius") / p.length) ** 2 + xg**2)
-    found |= {"U0": p.require("speed"), "m": mass, "xG": xg, "Iz": inertia}
+    found |= {"U0": p.require("speed"), "m": p.mass_prime, "xG": p.xg_prime, "Iz": p.inertia_prime}
     found |= {name.replace("_", ""): p.require(name) for name in ADDED_MASSES}
     return found | {_name(name): _port(name) * value for name, value in model.coefficients.items()}
 

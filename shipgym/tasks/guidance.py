@@ -12,12 +12,12 @@ from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from shipgym.arrays import Floats
 from shipgym.checks import check_number, check_whole
 from shipgym.errors import InputError
 
-Floats = NDArray[np.float64]
 NO_TURN = 1e-6  # rad, below which a waypoint only divides a leg
 SHARPEST_TURN = np.radians(150.0)  # beyond it a path doubles back
 ARC_POINTS = np.radians(5.0)  # between points of a turn that is drawn
