@@ -3,7 +3,7 @@
 Numba makes machine code of every function that a loop calls, nested ones again in each that calls them, and
 then of the loop, into which their code is inlined. Here the functions with the loop's tag are translated only
 as far as LLVM's intermediate code and linked once, into the loop; and passes over them that find nothing in
-functions on numbers and records are left out. The loop's code is the same.
+functions on numbers and records are left out. The loop's code is the same, but for the length of its vectors.
 """
 
 from __future__ import annotations
@@ -32,7 +32,10 @@ IDLE = (
 INSIDE = {
     codegen.JITCodeLibrary: ("_optimize_functions", "finalize", "_finalize_dynamic_globals"),
     codegen.JITCPUCodegen: ("set_env",),
+    codegen.CPUCodeLibrary: ("add_ir_module",),
 }
+# LLVM halves the vectors of processors that slow down when a few long ones are used; loops use nothing else
+LONG_VECTORS = '"prefer-vector-width"="512"'
 CLOSURES = ("inline_closure_likes", "make_function_op_code_to_jit_function")
 
 
@@ -45,6 +48,7 @@ def lean(tag: str, loop: str) -> Iterator[None]:
     with _replaced() as replace:
         if all(hasattr(owner, name) for owner, names in INSIDE.items() for name in names):
             _link_once(replace, tag, loop)
+            _use_long_vectors(replace, tag)
             _refresh_seldom(replace)
         yield
 
@@ -120,6 +124,19 @@ def _link_once(replace: Replace, tag: str, loop: str) -> None:
     replace(library, "_optimize_functions", optimise_functions)
     replace(library, "finalize", finalize)
     replace(machine, "set_env", set_environment)
+
+
+def _use_long_vectors(replace: Replace, tag: str) -> None:
+    add_module = codegen.CPUCodeLibrary.add_ir_module
+
+    def add_with_long_vectors(self: Any, module: Any) -> None:
+        if self.name.endswith(tag):
+            for function in module.functions:
+                if not function.is_declaration:
+                    set.add(function.attributes, LONG_VECTORS)  # its own `add` knows no attributes of targets
+        add_module(self, module)
+
+    replace(codegen.CPUCodeLibrary, "add_ir_module", add_with_long_vectors)
 
 
 def _beneath(library: Any, is_inner: Callable[[str], bool], found: dict[Any, None]) -> dict[Any, None]:

@@ -9,7 +9,7 @@ function of the Cephes library (`atan.c`, Moshier 1995).
 
 from __future__ import annotations
 
-from math import copysign, fabs, pi, sqrt
+from math import copysign, fabs, pi
 
 import numpy as np
 
@@ -86,8 +86,8 @@ def turn_sin_cos(x: float) -> tuple[float, float]:
 
     The error is below 2e-16 for |x| < 0.6, 2e-14 for |x| < pi/4, 1e-9 for |x| < pi/2.
     """
-    s = sine_polynomial(x, x * x)
-    return s, sqrt(1.0 - s * s)
+    z = x * x
+    return sine_polynomial(x, z), cosine_polynomial(z)
 
 
 def small_cosine(x: float) -> float:

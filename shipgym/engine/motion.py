@@ -5,7 +5,7 @@ Equations: Fossen 2011, Handbook of Marine Craft Hydrodynamics and Motion Contro
 
 from __future__ import annotations
 
-from math import fabs, sqrt
+from math import fabs
 from typing import Any, NamedTuple
 
 from shipgym.engine.mathematics import clip, sin_cos, small_cosine, turn_sin_cos
@@ -214,7 +214,7 @@ def arrival(
 ) -> Motion:  # fmt: skip
     """State after a step from what its stages sum up to: rates, and the way made from the state `one`."""
     sixth = h / 6.0
-    end = along(one, k, sixth, rudder_after(one.delta, k.delta / 6.0, order, h, ship))
+    end = along(one, k, sixth, rudder_after(one.delta, k.delta * (1.0 / 6.0), order, h, ship))
     ahead, aside = sixth * ahead, sixth * aside
     sine, cosine = sin_cos(motion.psi)
     x, y = motion.x + (ahead * cosine - aside * sine), motion.y + (ahead * sine + aside * cosine)
@@ -225,7 +225,8 @@ def arrival(
 
 def lost(motion: Motion, ship: Ship) -> bool:
     """Whether the ship has run away or capsized: her velocities are beyond any ship's, or not numbers."""
-    slow = sqrt(motion.u * motion.u + motion.v * motion.v) < RUNAWAY_SPEED * ship.speed
+    limit = RUNAWAY_SPEED * ship.speed
+    slow = motion.u * motion.u + motion.v * motion.v < limit * limit
     steady = fabs(motion.r) * ship.length < RUNAWAY_YAW_RATE * ship.speed
     if HAS_ROLL:
         return not (slow & steady & (fabs(motion.phi) < CAPSIZED))

@@ -22,7 +22,7 @@ QUICK = {
     "ships": 64, "n_steps": 64, "batch_size": 512, "n_epochs": 10, "learning_rate": 2e-3, "gamma": 0.95,
     "net_arch": [32], "activation": "tanh",
 }  # fmt: skip
-COARSE = {"ships": 16, "learning_rate": 2e-3, "schedule": "constant", "gamma": 0.95, "net_arch": [32, 32]}
+COARSE = {"ships": 16, "learning_rate": 1e-3, "schedule": "linear", "gamma": 0.9, "net_arch": [32, 32]}
 
 
 @pytest.fixture(autouse=True)
@@ -59,7 +59,7 @@ def test_ppo_learns(name):
 
 
 def test_sac_learns():
-    agent = learned(SAC, COURSE, 2560, load_settings("sac", given={"base": "none", **COARSE}))
+    agent = learned(SAC, COURSE, 5120, load_settings("sac", given={"base": "none", **COARSE}))
     assert mean_return(agent, COURSE) > 0.5 * mean_return(Nothing(), COURSE)
 
 

@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
+from llvmlite.binding import get_host_cpu_features
 
 import shipgym
 from shipgym.engine import mathematics, specialise
@@ -57,6 +58,20 @@ def run(code: str, **environment: str) -> str:
 def test_without_compiling_the_numbers_are_the_same():
     compiled_run, plain_run = eval(run(SAIL)), eval(run(SAIL, NUMBA_DISABLE_JIT="1"))
     np.testing.assert_allclose(plain_run, compiled_run, rtol=1e-9, atol=1e-12)
+
+
+def test_loops_ask_for_the_longest_vectors(tmp_path):
+    code = """
+import shipgym
+from shipgym.engine.loops import ship_loop
+loop = ship_loop(shipgym.load_model("mariner").vessel, "alike")
+(text,) = loop.inspect_llvm().values()
+print('"prefer-vector-width"="512"' in text, "<8 x double>" in text)
+"""
+    long, eight = run(code, SHIPGYM_CACHE=str(tmp_path)).split()
+    assert long == "True"
+    features = get_host_cpu_features()
+    assert eight == str(features.get("avx512f", False))
 
 
 def test_another_ship_or_an_edited_function_has_a_file_of_its_own(monkeypatch):
