@@ -284,7 +284,9 @@ def check_content(value: Any, where: str, infinite: bool = False, depth: int = 1
             raise InputError(
                 f"{where}: key {shown(key)} found, expected a text of at most {LONGEST_KEY} characters"
             )
-        if not (nested := isinstance(item, dict | list)) and not (fault := _fault(key, item, infinite)):
+        nested = isinstance(item, dict | list)
+        fault = "" if nested else _fault(key, item, infinite)
+        if not nested and not fault:
             continue
         place = f"{where}[{key}]" if isinstance(key, int) else f"{where}{' ' if depth == 1 else '.'}{key}"
         if not nested:

@@ -57,14 +57,16 @@ def from_mss(parameters: Mapping[str, Any], name: str = "mss", water_density: fl
     if "Xphiphi" in given:
         ship = load_model("container")
         names = {_roll_name(own): own for own in ship.coefficients}
-        check_keys(given, known := ("L", *GEAR, *names), where, known)
+        known = ("L", *GEAR, *names)
+        check_keys(given, known, where, known)
         if given["L"] != ship.particulars.length:
             raise InputError(f"{where}: L: {given['L']:g} found, expected {ship.particulars.length:g}")
         values = {own: given[key] for key, own in names.items()}
         return replace(ship, name=name, steering=replace(ship.steering, **gear), coefficients=values)
     names = {_name(own): own for own in get_structure("abkowitz").coefficient_names}
     masses = {own.replace("_", ""): own for own in ADDED_MASSES}
-    check_keys(given, known := ("L", "U0", *GEAR, "m", "xG", "Iz", *masses, *names), where, known)
+    known = ("L", "U0", *GEAR, "m", "xG", "Iz", *masses, *names)
+    check_keys(given, known, where, known)
     m, L, xg = given["m"], given["L"], given["xG"]
     particulars = Particulars(
         L, name, mass=m * 0.5 * water_density * L**3, xg=xg * L, speed=given["U0"],
