@@ -25,22 +25,42 @@ FURTHEST = 1e8  # m, of a waypoint from the origin: more than the way round the 
 
 
 class PathPosition(NamedTuple):
-    """Where ships stand on a leg of a path, arrays of one shape."""
+    """Where ships stand on a leg of a path, arrays of one shape.
 
-    along: Floats  # m, run since the leg's first waypoint
-    cross_track: Floats  # m, from the leg, positive to starboard of it
-    course: Floats  # rad, direction of the leg
-    to_go: Floats  # m, along the leg to its last waypoint
+    Attributes
+    ----------
+    along : array
+        Distance run since the leg's first waypoint, m.
+    cross_track : array
+        Distance from the leg, m, positive to starboard of it.
+    course : array
+        Direction of the leg, rad.
+    to_go : array
+        Distance left to the leg's last waypoint, along the leg, m.
+    """
+
+    along: Floats
+    cross_track: Floats
+    course: Floats
+    to_go: Floats
 
 
 @dataclass(frozen=True, eq=False)
 class Path:
     """Straight legs from waypoint to waypoint.
 
-    Raises InputError for fewer than two waypoints, one that is not finite, or repeats the one before it.
+    Attributes
+    ----------
+    waypoints : array of shape (n_waypoints, 2)
+        North and east, m.
+
+    Raises
+    ------
+    InputError
+        For fewer than two waypoints, one that is not finite, or one that repeats the one before it.
     """
 
-    waypoints: Floats  # north and east, m, shape (n_waypoints, 2)
+    waypoints: Floats
 
     def __post_init__(self) -> None:
         points = _waypoints(self.waypoints)
