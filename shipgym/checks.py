@@ -129,11 +129,11 @@ def check_text(value: Any, where: str) -> str:
     return value
 
 
-def check_choice(value: Any, options: Collection[str], where: str) -> str:
-    """Return `value`, which must be one of the words in `options`."""
+def check_choice(value: Any, options: Collection[str], where: str, also: str = "") -> str:
+    """Return `value`, which must be one of the words in `options`; `also` ends the list in the message."""
     if not isinstance(value, str) or value not in options:
         hint = did_you_mean(value, options) if isinstance(value, str) else ""
-        raise InputError(f"{where}: {shown(value)} found, expected one of {quoted(options)}.{hint}")
+        raise InputError(f"{where}: {shown(value)} found, expected one of {quoted(options)}{also}.{hint}")
     return value
 
 

@@ -235,11 +235,6 @@ def read_toml(path: Path, what: str) -> dict[str, Any]:
     return parse_toml(read_text(path, f"{what} (TOML)", LARGEST_TOML), f"{path}:")
 
 
-def packaged_toml(package: str, name: str) -> dict[str, Any]:
-    """The tables of a TOML file that comes with a package."""
-    return tomllib.loads(resources.files(package).joinpath(name).read_text("utf-8"))
-
-
 def parse_toml(text: str, where: str) -> dict[str, Any]:
     """The tables of a TOML text within the limits of `check_content`; `where` begins messages: "a.toml:"."""
     if _LONG_KEY.search(text):
@@ -251,7 +246,7 @@ def parse_toml(text: str, where: str) -> dict[str, Any]:
 
 
 def shipped_toml(package: str, name: str) -> dict[str, Any]:
-    """A table of numbers or words that is part of a package."""
+    """The tables of a TOML file that comes with a package."""
     return tomllib.loads(resources.files(package).joinpath(name).read_text("utf-8"))
 
 
@@ -289,7 +284,9 @@ def check_content(value: Any, where: str, infinite: bool = False, depth: int = 1
             raise InputError(
                 f"{where}: key {shown(key)} found, expected a text of at most {LONGEST_KEY} characters"
             )
-        if not (nested := isinstance(item, dict | list)) and not (fault := _fault(key, item, infinite)):
+        nested = isinstance(item, dict | list)
+        fault = "" if nested else _fault(key, item, infinite)
+        if not nested and not fault:
             continue
         place = f"{where}[{key}]" if isinstance(key, int) else f"{where}{' ' if depth == 1 else '.'}{key}"
         if not nested:

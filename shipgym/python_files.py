@@ -10,8 +10,10 @@ from types import ModuleType
 from shipgym.errors import InputError
 
 
-def load_file(path: Path) -> ModuleType:
+def load_file(path: Path, expected: str = "a Python file") -> ModuleType:
     """A Python file as a module, executed once however often it is asked for while it stays the same.
+
+    `expected` says what the file is to be, for the message where there is none.
 
     Raises
     ------
@@ -19,7 +21,7 @@ def load_file(path: Path) -> ModuleType:
         If there is none, or it cannot be executed.
     """
     if not path.is_file():
-        raise InputError(f"{path}: no such file, expected a Python file")
+        raise InputError(f"{path}: no such file, expected {expected}")
     resolved = path.resolve()
     content = hashlib.sha256(str(resolved).encode() + b"\0" + resolved.read_bytes())
     name = f"shipgym_user_{content.hexdigest()[:16]}"
@@ -29,8 +31,10 @@ def load_file(path: Path) -> ModuleType:
     module.__file__ = str(resolved)
     sys.modules[name] = module
     try:
-        # compiled here, because Python's own cache takes a file changed within a second for the same
-        exec(compile(resolved.read_bytes(), str(resolved), "exec"), vars(module))
+        # compiled here, because Python's own cache takes a file changed within a second for the same; without
+        # what this file imports from __future__
+        code = compile(resolved.read_bytes(), str(resolved), "exec", dont_inherit=True)
+        exec(code, vars(module))
     except Exception as error:
         del sys.modules[name]
         if isinstance(error, InputError):

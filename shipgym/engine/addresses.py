@@ -23,6 +23,14 @@ def addresses(arrays: Sequence[NDArray[Any]]) -> list[int]:
     return words
 
 
+def _kind(dtype: Any, dimensions: int, order: Literal["A", "C"]) -> Any:
+    """Numba's type of an array."""
+    from numba.core import types
+    from numba.np.numpy_support import from_dtype
+
+    return types.Array(from_dtype(np.dtype(dtype)), dimensions, order)
+
+
 def array_at(dtype: Any, dimensions: int) -> Part:
     """`at(world, k)`: the contiguous array whose address and shape stand in `world` from entry k on."""
 
@@ -50,6 +58,16 @@ def array_at(dtype: Any, dimensions: int) -> Part:
     return Part(at, code=partial(intrinsic, generate, 2, kind), key=("at", np.dtype(dtype).str, dimensions))
 
 
+#: Arrays of a loop's world by kind and dimensions; parts, which a loop calls as functions.
+words_at: Any = array_at(np.uint64, 3)
+numbers_at: Any = array_at(np.float64, 1)
+table_at: Any = array_at(np.float64, 2)
+rows_at: Any = array_at(np.int64, 1)
+flags_at: Any = array_at(np.bool_, 1)
+flag_table_at: Any = array_at(np.bool_, 2)
+single_table_at: Any = array_at(np.float32, 2)
+
+
 def plan_at(first: int) -> Part:
     """`plan_of(state, lane)`: the rows of a lane from one on, as an array that writes into the tile."""
 
@@ -66,11 +84,3 @@ def plan_at(first: int) -> Part:
         return new_array(context, builder, kind(), pointer, [length], [word(8 * LANES)])
 
     return Part(plan_of, code=partial(intrinsic, generate, 2, kind), key=("plan", first))
-
-
-def _kind(dtype: Any, dimensions: int, order: Literal["A", "C"]) -> Any:
-    """Numba's type of an array."""
-    from numba.core import types
-    from numba.np.numpy_support import from_dtype
-
-    return types.Array(from_dtype(np.dtype(dtype)), dimensions, order)

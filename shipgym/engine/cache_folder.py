@@ -9,10 +9,9 @@ from __future__ import annotations
 
 import os
 import stat
-import tempfile
 import warnings
 from collections.abc import Iterator
-from contextlib import contextmanager, nullcontext, suppress
+from contextlib import contextmanager, suppress
 from errno import ENOENT
 from functools import cache
 from hashlib import sha256
@@ -20,8 +19,10 @@ from pathlib import Path
 
 from platformdirs import user_cache_path
 
+from shipgym.files import atomic_path
+
 CACHE_VARIABLE = "SHIPGYM_CACHE"
-LOOP, DRAFT = ".loop", ".new"
+LOOP = ".loop"
 DIGEST = 32  # bytes of a SHA-256, at the beginning of a file
 
 
@@ -101,34 +102,18 @@ def loop_fault(path: Path) -> str:
 
 
 def write_loop(content: bytes, path: Path) -> None:
-    """Write a loop's file, whole or not at all; drafts of processes that were killed are removed.
+    """Write a loop's file, whole or not at all; the caller holds its lock.
 
-    The caller holds its lock. Raises OSError if it cannot be written.
+    Raises InputError if it cannot be written.
     """
-    _remove_drafts(path)
-    number, name = tempfile.mkstemp(dir=path.parent, prefix=f"{path.stem}-", suffix=DRAFT)
-    try:
-        with os.fdopen(number, "wb") as file:
-            file.write(sha256(content).digest() + content)
-        Path(name).chmod(0o644)  # others may use it
-        Path(name).replace(path)
-    finally:
-        Path(name).unlink(missing_ok=True)
+    with atomic_path(path) as draft:
+        draft.write_bytes(sha256(content).digest() + content)
+        draft.chmod(0o644)  # others may use it
 
 
 def lock_of(path: Path) -> Path:
-    """The lock under which a loop's file, or a draft of it, is written: its name begins with a hash."""
+    """The lock under which a loop's file is written: its name begins with a hash."""
     return path.with_name(path.name.partition("-")[0] + ".lock")
-
-
-def _remove_drafts(path: Path) -> None:
-    """Remove drafts that nobody writes any longer: whoever does holds their lock."""
-    from filelock import FileLock
-
-    for draft in path.parent.glob(f"*{DRAFT}"):
-        own = lock_of(draft) == lock_of(path)
-        with suppress(OSError, NotImplementedError), nullcontext() if own else FileLock(lock_of(draft), 0):
-            draft.unlink()
 
 
 @contextmanager
@@ -148,10 +133,11 @@ def locked(path: Path) -> Iterator[None]:
         lock.release()
 
 
-def warn_of(folder: Path, error: OSError) -> None:
-    """Say that nothing can be kept, and what to do."""
+def warn_of(folder: Path, error: BaseException | None) -> None:
+    """Say that nothing can be kept, because of an OSError, and what to do."""
+    reason = getattr(error, "strerror", error)
     tell(
-        f"{folder}: cannot be written ({error.strerror}), so ships are compiled anew in each process. "
+        f"{folder}: cannot be written ({reason}), so ships are compiled anew in each process. "
         f"Set {CACHE_VARIABLE} to a folder that can."
     )
 

@@ -12,6 +12,7 @@ from numba.core.compiler import CompileResult
 from numba.core.serialize import dumps
 
 from shipgym.engine.cache_folder import LOOP, read_loop, tell, warn_of, write_loop
+from shipgym.errors import InputError
 
 
 class DiskCache(NullCache):  # type: ignore[misc]
@@ -54,5 +55,5 @@ class DiskCache(NullCache):  # type: ignore[misc]
             return
         try:
             write_loop(dumps(data._reduce()), self.path)
-        except OSError as error:
-            warn_of(self.path.parent, error)
+        except InputError as error:
+            warn_of(self.path.parent, error.__cause__)

@@ -14,19 +14,21 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from shipgym.engine.addresses import (
+    flag_table_at, flags_at, numbers_at, rows_at, single_table_at, table_at, words_at,
+)  # fmt: skip
 from shipgym.engine.envelope import envelope_distance, outside_range
 from shipgym.engine.mathematics import clip, pick
 from shipgym.engine.motion import HAS_SEA, lost, sail
 from shipgym.engine.places import (
     begin_sea, choose_memory, choose_motion, choose_reward, choose_sea, choose_state, common_sea,
-    common_ship, common_view, due, encounter_frequency, evolve, flag_table_at, flags_at, load_course,
-    load_memory, load_motion, load_outcome, load_sea, load_state, measure, no_reward, numbers_at, observe,
-    on_event, plan_of, push, read_rules, read_sensor, read_settings, readings, rows_at, sea_at, ship_at,
-    single_table_at, store_course, store_ended, store_memory, store_motion, store_observation,
-    store_outcome, store_ran_away, store_reward, store_sea, store_state, table_at, task_begin, task_step,
-    total_reward, view_at, words_at, worst_cost,
+    common_ship, common_view, due, encounter_frequency, evolve, load_course, load_memory, load_motion,
+    load_outcome, load_sea, load_state, measure, no_reward, observe, on_event, plan_of, push, read_rules,
+    read_sensor, read_settings, readings, sea_at, ship_at, store_course, store_ended, store_memory,
+    store_motion, store_observation, store_outcome, store_ran_away, store_reward, store_sea, store_state,
+    task_begin, task_step, total_reward, view_at, worst_cost,
 )  # fmt: skip
-from shipgym.engine.random import DRAW, stream, uniform
+from shipgym.engine.random import BEGIN_WORDS, EVOLVE_WORDS, stream, uniform
 from shipgym.engine.records import LANES
 from shipgym.tasks.contract import Interval, Random
 
@@ -41,7 +43,6 @@ ANSWERED: Any = np.bool_(False)  # all rows but what `step` answers
 # Lanes are sailed in whole vectors, whose arithmetic may be contracted otherwise than that of a single lane,
 # so that results do not depend on the number of ships.
 GROUP = 16
-BEGIN_WORDS, EVOLVE_WORDS = DRAW[15], DRAW[8]  # by which the random numbers of the sea go on
 
 
 class Course(NamedTuple):

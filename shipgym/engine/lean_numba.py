@@ -16,10 +16,9 @@ from typing import Any
 
 import numba.np.linalg
 from llvmlite.binding.newpassmanagers import create_new_function_pass_manager
-from numba.core import base, codegen
+from numba.core import codegen
 from numba.core.compiler import Compiler
 from numba.core.compiler_machinery import PassManager
-from numba.core.typing import context as typing
 
 Replace = Callable[[Any, str, Any], None]
 
@@ -49,7 +48,6 @@ def lean(tag: str, loop: str) -> Iterator[None]:
         if all(hasattr(owner, name) for owner, names in INSIDE.items() for name in names):
             _link_once(replace, tag, loop)
             _use_long_vectors(replace, tag)
-            _refresh_seldom(replace)
         yield
 
 
@@ -149,35 +147,6 @@ def _beneath(library: Any, is_inner: Callable[[str], bool], found: dict[Any, Non
     return found
 
 
-def _refresh_seldom(replace: Replace) -> None:
-    """Numba looks a thousand times for new declarations, mostly in vain; the lengths of its lists tell."""
-
-    def seldom(refresh: Callable[[Any], None]) -> Callable[[Any], None]:
-        seen: dict[int, int] = {}
-
-        def refresh_if_new(self: Any) -> None:
-            registries = [*self._registries, *getattr(self, "typing_context", self)._registries]
-            length = sum(len(each) for one in registries for each in vars(one).values() if type(each) is list)
-            if length != seen.get(id(self._registries)):
-                seen[id(self._registries)] = length  # as it was before: what it finds may declare more
-                refresh(self)
-
-        return refresh_if_new
-
-    for owner in (base.BaseContext, typing.BaseContext):
-        replace(owner, "refresh", seldom(owner.refresh))
-
-
-class _Passes(PassManager):  # type: ignore[misc]
-    """Passes without a record of each."""
-
-    def _runPass(self, index: int, pass_: Any, state: Any) -> None:  # noqa: N802
-        pass_.analysis = self._analysis
-        pass_.run_initialization(state)
-        pass_.run_pass(state)
-        pass_.run_finalizer(state)
-
-
 class LeanCompiler(Compiler):  # type: ignore[misc]
     """Numba's compiler for functions on numbers and records."""
 
@@ -186,7 +155,7 @@ class LeanCompiler(Compiler):  # type: ignore[misc]
         (default,) = super().define_pipelines()
         code = self.state.func_id.code
         idle = IDLE if any(isinstance(c, CodeType) for c in code.co_consts) else IDLE + CLOSURES
-        passes = _Passes(default.pipeline_name)
+        passes = PassManager(default.pipeline_name)
         passes.passes = [found for found in default.passes if found[0].name() not in idle]
         passes.finalize()
         return [passes]

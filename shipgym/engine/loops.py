@@ -12,7 +12,7 @@ from shipgym.engine.compiling import compiled
 from shipgym.engine.parts import Part
 from shipgym.engine.records import LANES
 from shipgym.engine.vessel import Vessel
-from shipgym.sea.open_sea import BEGIN_WORDS, EVOLVE_WORDS, sea_parts
+from shipgym.sea.open_sea import sea_parts
 
 SEA = "float64[::1], uint64[::1], float64[::1]"  # state, random numbers, parameters
 
@@ -71,7 +71,6 @@ LOOPS = {
 def ship_loop(vessel: Vessel, name: str, windy: bool = False) -> Any:
     """A loop of `LOOPS` for a ship in calm water or in the open sea; see `compiled`."""
     loop = LOOPS[name]
-    sea = {**sea_parts(windy, loop.lanes), "BEGIN_WORDS": BEGIN_WORDS, "EVOLVE_WORDS": EVOLVE_WORDS}
-    parts = {**vessel.parts(loop.lanes, loop.shared), **sea, **loop.parts}
+    parts = {**vessel.parts(loop.lanes, loop.shared), **sea_parts(windy, loop.lanes), **loop.parts}
     where = "in the open sea" if windy else "in calm water"
     return compiled(loop.function, loop.signature, parts, f"{vessel.name} {where}: {name}")

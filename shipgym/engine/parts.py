@@ -12,10 +12,8 @@ class Part:
     """How a function that is put in a place is compiled."""
 
     function: Callable[..., Any]  # a plain Python function on numbers and records
-    inline: bool = (
-        True  # whether it becomes part of the loop; if not, it is called, as befits what comes seldom
-    )
-    code: Callable[[], Any] | None = (
-        None  # makes what stands for it in compiled code, one of Numba's intrinsics
-    )
-    key: object = None  # what `code` makes depends on this alone
+    # whether it becomes part of the loop; if not, it is called, as befits what comes seldom
+    inline: bool = True
+    # makes what stands for it in compiled code, one of Numba's intrinsics, which depends on `key` alone
+    code: Callable[[], Any] | None = None
+    key: object = None

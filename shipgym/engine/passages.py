@@ -14,13 +14,13 @@ from shipgym.engine.motion import HAS_SEA, Motion, Push, Ship, sail
 from shipgym.engine.places import (
     begin_sea, evolve, load_motion, load_sea, load_sea_parameters, push, store_motion, store_sea,
 )  # fmt: skip
+from shipgym.engine.random import BEGIN_WORDS, EVOLVE_WORDS
 
 #: What is recorded of the sea beside the state: first-order motion, current, wind.
 SEA_CHANNELS = (
     "psi_wave", "r_wave", "phi_wave", "p_wave", "current_north", "current_east", "wind_speed", "wind_from",
 )  # fmt: skip
 NO_LIMIT = 1e300
-BEGIN_WORDS = EVOLVE_WORDS = 0  # parts: steps of the random numbers' state
 
 
 def with_gear(ship: Ship, limit: float, rate: float) -> Ship:
@@ -48,10 +48,8 @@ def advanced(
 
 def felt(motion: Motion, sea: Any, parameters: Any) -> Push:
     """What the sea does to the ship now."""
-    if HAS_SEA:
-        pushed: Push = push(motion, load_sea(sea, 0), load_sea_parameters(parameters, 0))
-        return pushed
-    return Push(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    pushed: Push = push(motion, load_sea(sea, 0), load_sea_parameters(parameters, 0))
+    return pushed
 
 
 def record(out: Any, row: int, columns: int, sea: Any, parameters: Any) -> None:

@@ -17,11 +17,7 @@ PLACES = {
         "choose_reward", "no_reward", "total_reward", "store_observation", "read_rules", "read_sensor",
         "read_settings", "load_ship", "load_coefficients", "load_sea_parameters", "load_envelope",
         "load_scale", "row_of", "load_point", "store_point", "load_sums", "store_sums", "load_slope",
-        "store_slope", "load_passed", "store_passed",
-    ),
-    "arrays": (
-        "words_at", "numbers_at", "table_at", "rows_at", "flags_at", "flag_table_at", "single_table_at",
-        "plan_of",
+        "store_slope", "load_passed", "store_passed", "plan_of",
     ),
     "numbers of the ships": ("common_ship", "ship_at", "common_sea", "sea_at", "common_view", "view_at"),
     "a ship with a sum over a table": ("point_of", "row_sums", "sum_accelerations"),

@@ -15,6 +15,7 @@ TO_UNIT = 1.0 / 9007199254740992.0  # 2**-53
 WEATHER_STREAM = np.uint64(0xA0761D6478BD642F)  # apart from the draws of an episode's task
 #: Steps from a state of the generator to each number drawn at it, and to the next state.
 DRAW = tuple(np.uint64((k * 0x9E3779B97F4A7C15) % 2**64) for k in range(16))
+BEGIN_WORDS, EVOLVE_WORDS = DRAW[15], DRAW[8]  # steps where weather begins, and where it goes on
 S16, S32 = np.uint64(16), np.uint64(32)
 QUARTERS, LOW_32 = np.uint64(0x0000FFFF0000FFFF), np.uint64(0xFFFFFFFF)
 

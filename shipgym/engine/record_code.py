@@ -17,6 +17,7 @@ Path = tuple[int, ...]
 #: LLVM instructions of a function: of Numba's context, a builder, types and values of the arguments.
 Generate = Callable[[Any, Any, Any, Any], Any]
 Answer = Callable[[], Any] | None  # Numba's type of what a function returns
+Number = Callable[[str, Any], Any]  # what is made of a number, of its path and kind
 
 
 def loader(rows: Rows, lanes: int = LANES) -> Part:
@@ -207,24 +208,27 @@ def _constant(context: Any, number: float) -> Any:
     return context.get_constant(_double(), number)
 
 
-def _shape(record: Record) -> tuple[Any, ...]:
-    """Names in a record and in those within it."""
-    kinds = field_types(record)
-    shapes = {
-        name: kind.rows if is_table(kind) else _shape(kind) if is_record(kind) else is_list(kind)
-        for name, kind in kinds.items()
-    }
-    return (record.__name__, *shapes.items())
+def _fold(record: Record, number: Number, made: Callable[[Record, list[Any]], Any], prefix: str = "") -> Any:
+    """What `made` makes of a record: of what `number` makes of its numbers, and of the records within it."""
+    items = [
+        _fold(kind, number, made, f"{prefix}{name}.") if is_record(kind) else number(prefix + name, kind)
+        for name, kind in field_types(record).items()
+    ]
+    return made(record, items)
 
 
-def _made(record: Record, number: Callable[[str, Any], Any], prefix: str = "") -> Any:
-    """A record of its numbers by their paths."""
-    return record(
-        *(
-            _made(kind, number, f"{prefix}{name}.") if is_record(kind) else number(prefix + name, kind)
-            for name, kind in field_types(record).items()
-        )
-    )
+def _shape(record: Record) -> Any:
+    """Names in a record and in those within it, and which are lists and tables."""
+
+    def kind_of(path: str, kind: Any) -> object:
+        return kind.rows if is_table(kind) else is_list(kind)
+
+    return _fold(record, kind_of, lambda one, kinds: (one.__name__, *field_types(one), *kinds))
+
+
+def _made(record: Record, number: Number) -> Any:
+    """A record of its numbers."""
+    return _fold(record, number, lambda one, items: one(*items))
 
 
 def _number(record: Any, path: str) -> Any:
@@ -235,26 +239,17 @@ def _type(record: Record) -> Any:
     """Numba's type of a record whose numbers are floats."""
     from numba.core import types
 
-    def typed(kind: Any) -> Any:
+    def typed(path: str, kind: Any) -> Any:
         if is_table(kind):
             return types.CPointer(types.float64)  # type: ignore[attr-defined]
-        return _type(kind) if is_record(kind) else types.float64[::1] if is_list(kind) else types.float64
+        return types.float64[::1] if is_list(kind) else types.float64
 
-    kinds = [typed(kind) for kind in field_types(record).values()]
-    return types.Tuple.from_types(kinds, record)  # type: ignore[attr-defined]
+    return _fold(record, typed, lambda one, kinds: types.Tuple.from_types(kinds, one))  # type: ignore[attr-defined]
 
 
-def _coded(
-    context: Any, builder: Any, record: Record, number: Callable[[str, Any], Any], prefix: str = ""
-) -> Any:
+def _coded(context: Any, builder: Any, record: Record, number: Number) -> Any:
     """A record of the values of its numbers."""
-    items = [
-        _coded(context, builder, kind, number, f"{prefix}{name}.")
-        if is_record(kind)
-        else number(prefix + name, kind)
-        for name, kind in field_types(record).items()
-    ]
-    return context.make_tuple(builder, _type(record), items)
+    return _fold(record, number, lambda one, items: context.make_tuple(builder, _type(one), items))
 
 
 def _places(record: Record, prefix: str = "", at: Path = ()) -> Iterator[tuple[str, Path]]:

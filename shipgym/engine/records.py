@@ -67,11 +67,6 @@ class Rows:
     first: int  # row of its first number
     present: tuple[str, ...]  # paths of the numbers that have a row; the others are 0 and not stored
 
-    @property
-    def end(self) -> int:
-        """The row behind its last number."""
-        return self.first + len(self.present)
-
     def row(self, path: str) -> int:
         """Row of one number."""
         return self.first + self.present.index(path)

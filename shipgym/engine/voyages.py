@@ -6,13 +6,11 @@ from dataclasses import dataclass
 from functools import cache, cached_property
 from typing import Any
 
-import numpy as np
-
 from shipgym.engine import episodes, stages
-from shipgym.engine.addresses import array_at, plan_at
+from shipgym.engine.addresses import plan_at
 from shipgym.engine.compiling import compiled, plain_python
 from shipgym.engine.envelope import Envelope
-from shipgym.engine.motion import Motion
+from shipgym.engine.motion import Motion, Ship
 from shipgym.engine.parts import Part
 from shipgym.engine.places import load_envelope, load_scale, load_sea_parameters
 from shipgym.engine.record_code import bounded_storer, chooser, loader, number_storer, storer, summer, zero
@@ -60,7 +58,7 @@ class Voyages:
     def ship(self) -> Layout:
         """Rows of the numbers of a ship."""
         return Layout(
-            ship=self.vessel.layout["ship"].record,
+            ship=Ship,
             coefficients=self.vessel.coefficients,
             envelope=Envelope,
             sea=open_sea.sea_records(self.windy)[1],
@@ -121,8 +119,6 @@ class Voyages:
         load = {name: loader(place, lanes) for name, place in self.ship.rows.items()}
         return {
             **self.vessel.parts(shared=self.shared),
-            "load_ship": load["ship"],
-            "load_coefficients": load["coefficients"],
             "load_envelope": load["envelope"],
             "load_sea_parameters": load["sea"],
             "load_scale": load["scale"],
@@ -136,15 +132,6 @@ class Voyages:
         task, sensors = self.task, self.sensors
         called = {name: Part(getattr(episodes, name), inline=False) for name in CALLED}
         return called | {
-            "step": Part(episodes.step),
-            "reset": Part(episodes.reset),
-            "words_at": array_at(np.uint64, 3),
-            "numbers_at": array_at(np.float64, 1),
-            "table_at": array_at(np.float64, 2),
-            "rows_at": array_at(np.int64, 1),
-            "flags_at": array_at(np.bool_, 1),
-            "flag_table_at": array_at(np.bool_, 2),
-            "single_table_at": array_at(np.float32, 2),
             **open_sea.sea_functions(self.windy),
             "GROUP": 1 if plain_python() else episodes.GROUP,
             "HAS_NOISE": self.sensors.noise,

@@ -14,6 +14,7 @@ from gymnasium.envs.registration import EnvSpec
 from numpy.typing import NDArray
 
 from shipgym.checks import check_choice, check_keys, check_table, did_you_mean, quoted, shown
+from shipgym.envs.artist import Artist
 from shipgym.envs.engine import Engine, as_array, episode_key
 from shipgym.envs.randomisation import Randomisation
 from shipgym.errors import InputError
@@ -119,11 +120,11 @@ class ShipsEnv:
         num_envs, threads = given.get("num_envs", 1), given.get("threads", 1)
         self.render_mode = given["render_mode"]
         if self.render_mode is not None:
-            check_choice(self.render_mode, render_modes, "render_mode")
+            check_choice(self.render_mode, render_modes, "render_mode", also=", or None")
         self.model, self.task, randomisation = read_options(given["task"], given["model"], options, taken)
         engine = Engine(self.model, num_envs, self.task, randomisation, given["allow_unstable"], threads)
         self._own_engine, self._asked = engine, dict[str, Any]()
-        self._artists: list[Any] = _artists(self.render_mode, num_envs)
+        self._artists = [Artist(self.render_mode, row) for row in range(num_envs) if self.render_mode]
         observed = self.task.observed(self.model)
         self.observation_names = tuple(quantity.name for quantity in observed)
         self.observation_scales = np.array([quantity.scale for quantity in observed])
@@ -251,12 +252,3 @@ def remade(kind: Any, arguments: dict[str, Any], state: Any, attributes: dict[st
 def refuse_step() -> NoReturn:
     """The step of an environment that was not reset yet, or is closed: raises InputError."""
     raise InputError("step: no episode has begun, or the environment was closed; call reset first")
-
-
-def _artists(render_mode: str | None, num_envs: int) -> list[Any]:
-    """Who draws each row, if anyone does."""
-    if render_mode is None:
-        return []
-    from shipgym.envs.artist import Artist
-
-    return [Artist(render_mode, lane) for lane in range(num_envs)]

@@ -119,7 +119,11 @@ class Episode:
             if getattr(self, name) is not None or name != "success":
                 check_flag(getattr(self, name), name)
         self._set_series()
-        self._set_waypoints()
+        if self.waypoints is not None:
+            path = PlannedPath(self.waypoints)
+            self._set("waypoints", path.waypoints)
+            if self.turn_radius is not None:
+                path.check_turns(self.turn_radius)
 
     def _set_series(self) -> None:
         rewards = series(self.rewards, "rewards", None)
@@ -143,18 +147,6 @@ class Episode:
         missing = [name for name in REQUIRED_STATES if name not in self.states]
         if missing:
             raise InputError(f"states: {quoted(missing)} missing, found {quoted(self.states)}")
-
-    def _set_waypoints(self) -> None:
-        if self.waypoints is None:
-            return
-        points = check_finite(self.waypoints, "waypoints")
-        if points.ndim != 2 or points.shape[1] != 2 or len(points) < 2:
-            raise InputError(
-                f"waypoints: shape {points.shape} found, expected (n, 2), north and east of two or more"
-            )
-        self._set("waypoints", points)
-        if self.turn_radius is not None:
-            PlannedPath(points).check_turns(self.turn_radius)
 
     def _set(self, name: str, value: Any) -> None:
         object.__setattr__(self, name, value)

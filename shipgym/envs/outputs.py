@@ -15,24 +15,14 @@ STEP_FLAGS = 2  # terminated, truncated come before the flags in `info`
 class Outputs:
     """One step's arrays, in one block of memory."""
 
-    __slots__ = ("flags", "observations", "outcomes", "words")
+    __slots__ = ("flags", "observations", "outcomes", "terminated", "truncated", "words")
 
     observations: NDArray[np.float32]  # (num_envs, n_observed)
     outcomes: NDArray[np.float64]  # (n_outcomes, num_envs): reward, terminated, truncated, then `info`
     flags: NDArray[np.bool_]  # (n_flags, num_envs): terminated, truncated, then those of `info`
+    terminated: NDArray[np.bool_]  # (num_envs,): the first of the flags, and the second
+    truncated: NDArray[np.bool_]
     words: NDArray[np.int64]  # (9,): addresses and shapes of the three, by turns
-
-    @property
-    def terminated(self) -> NDArray[np.bool_]:
-        """Whether episodes have come to an end."""
-        row: NDArray[np.bool_] = self.flags[0]
-        return row
-
-    @property
-    def truncated(self) -> NDArray[np.bool_]:
-        """Whether episodes have run out of time."""
-        row: NDArray[np.bool_] = self.flags[1]
-        return row
 
     def take(self, other: Outputs) -> None:
         """Copy what others hold."""
@@ -63,6 +53,7 @@ class OutputPool:
         outputs.outcomes = np.ndarray(outcomes, np.float64, block)
         outputs.observations = np.ndarray(seen, np.float32, block, self._seen)
         outputs.flags = np.ndarray(flags, np.bool_, block, self._flags)
+        outputs.terminated, outputs.truncated = outputs.flags[0], outputs.flags[1]
         outputs.words = given[1]
         return outputs
 

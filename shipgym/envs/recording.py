@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Callable, Mapping
 from glob import escape
@@ -16,6 +15,7 @@ from shipgym.arrays import Floats
 from shipgym.checks import check_text
 from shipgym.envs.episode import Episode
 from shipgym.errors import InputError
+from shipgym.files import make_folder
 from shipgym.ships import ShipModel
 
 Observation = TypeVar("Observation")
@@ -127,8 +127,9 @@ class _Recorded:
         self._actions: list[Floats] = []
         self.rewards: list[float] = []
         self._states: list[dict[str, float]] = [ship.physical_state()]
-        self._infos = [dict(info)]
-        self._ended = (False, False)
+        self._parts: list[dict[str, float]] = []
+        self._numbers = [_numbers(info)]
+        self._outcome: dict[str, Any] = {}
         waypoints, spec = getattr(ship, "waypoints", None), env.spec
         self._facts: dict[str, Any] = {
             "environment": type(ship).__name__ if spec is None else spec.id,
@@ -152,25 +153,23 @@ class _Recorded:
         self._actions.append(np.array(action, dtype=float).reshape(-1))
         self.rewards.append(reward)
         self._states.append(self._ship.physical_state())
-        self._infos.append(dict(info))
-        self._ended = bool(terminated), bool(truncated)
+        self._parts.append({key: float(info[key]) for key in info if key.startswith(REWARD)})
+        self._numbers.append(_numbers(info))
+        success = next((bool(info[key]) for key in SUCCESS if info.get(key) is not None), None)
+        self._outcome = {"terminated": bool(terminated), "truncated": bool(truncated), "success": success}
 
     def episode(self) -> Episode:
         """All of it."""
-        orders, infos = self._model.command_names, self._infos
-        success = next((infos[-1][key] for key in SUCCESS if key in infos[-1]), None)
-        terminated, truncated = self._ended
+        orders = self._model.command_names
         return Episode(
             states=_columns(self._states),
             actions=np.array(self._actions),
             rewards=np.array(self.rewards),
             commands={name: np.array([s[f"{name}_command"] for s in self._states[1:]]) for name in orders},
-            reward_parts=_columns(infos[1:], lambda name: name.startswith(REWARD)),
-            info=_columns([_numbers(info) for info in infos]),
-            terminated=terminated,
-            truncated=truncated,
-            success=None if success is None else bool(success),
+            reward_parts=_columns(self._parts),
+            info=_columns(self._numbers),
             **self._facts,
+            **self._outcome,
         )
 
 
@@ -186,11 +185,9 @@ def _numbers(info: Mapping[str, Any]) -> dict[str, float]:
     }
 
 
-def _columns(
-    rows: list[dict[str, Any]], chosen: Callable[[str], bool] = lambda name: True
-) -> dict[str, Floats]:
+def _columns(rows: list[dict[str, float]]) -> dict[str, Floats]:
     """Values over time by name; a name that some step lacks is left out."""
-    names = [name for name in rows[-1] if chosen(name) and all(name in row for row in rows)]
+    names = [name for name in rows[-1] if all(name in row for row in rows)]
     return {name: np.array([row[name] for row in rows], dtype=float) for name in names}
 
 
@@ -211,10 +208,7 @@ def _check_environment(env: Any) -> None:
 def _folder(folder: Path, prefix: str, overwrite: bool) -> Path:
     if Path(check_text(prefix, "name_prefix")).name != prefix:
         raise InputError(f"name_prefix: {prefix!r} found, expected the beginning of a file's name")
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(f"folder: {folder} cannot be made ({error.strerror})") from None
+    make_folder(folder)
     there = next(iter(sorted(folder.glob(f"{escape(prefix)}-[0-9]*.json"))), None)
     if there is not None and not overwrite:
         raise InputError(
@@ -226,14 +220,16 @@ def _folder(folder: Path, prefix: str, overwrite: bool) -> Path:
 
 def plain(value: Any) -> Any:
     """An argument of an environment as JSON can hold it: a model by its name, a weather by its fields."""
-    return json.loads(json.dumps(value, default=_told), parse_constant=lambda text: repr(float(text)))
-
-
-def _told(value: Any) -> Any:
     if isinstance(value, ShipModel):
         return value.name
     if isinstance(value, np.generic | np.ndarray):
-        return value.tolist()
+        return plain(value.tolist())
     if isinstance(value, Mapping):
-        return dict(value)
-    return value.to_dict() if hasattr(value, "to_dict") else str(value)
+        return {str(key): plain(entry) for key, entry in value.items()}
+    if isinstance(value, list | tuple):
+        return [plain(entry) for entry in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return repr(value)
+    if value is None or isinstance(value, bool | int | float | str):
+        return value
+    return plain(value.to_dict()) if hasattr(value, "to_dict") else str(value)

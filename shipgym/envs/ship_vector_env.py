@@ -12,6 +12,7 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
+from shipgym.arrays import Floats
 from shipgym.checks import check_keys, quoted
 from shipgym.envs.engine import episode_keys
 from shipgym.envs.environment import (
@@ -26,7 +27,6 @@ from shipgym.envs.outputs import named_rows
 from shipgym.errors import InputError
 from shipgym.ships import ShipModel
 
-Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 Observation = NDArray[np.float32]
 Infos = dict[str, Any]

@@ -18,6 +18,7 @@ from shipgym.engine.records import flat, leaves
 from shipgym.envs.engine import Engine
 from shipgym.envs.environment import DEFAULT_MODEL, read_options
 from shipgym.errors import InputError
+from shipgym.tasks.task import Task
 
 STEPS, PLAIN_STEPS = 400, 40
 LANES, PLAIN_LANES = 70, 3  # more than a tile
@@ -43,7 +44,8 @@ def check_task(task: Any, **options: Any) -> TaskCheck:
     try:
         model, asked, randomisation = read_options(task, options.pop("model", DEFAULT_MODEL), options)
         name = asked.name
-        few, plain, beyond = _plain_engine(Engine(model, PLAIN_LANES, asked, randomisation))
+        few = Engine(model, PLAIN_LANES, asked, randomisation)
+        plain, seen = _plain_engine(few)
         many = Engine(model, LANES, asked, randomisation)
         one = Engine(model, 1, asked, randomisation)
     except InputError as error:
@@ -57,37 +59,27 @@ def check_task(task: Any, **options: Any) -> TaskCheck:
             *_differ(few, plain, slice(None), PLAIN_STEPS, AGREEMENT, ("compiled", "in plain Python")),
             *_differ(many, one, slice(-1, None), STEPS // 4, 0.0, ("among many ships", "alone")),
         ]
-    return TaskCheck(name, tuple(problems), tuple(_beyond_bounds(beyond)))
+    return TaskCheck(name, tuple(problems), tuple(_often_clipped(asked, seen)))
 
 
-class _Beyond(dict[str, list[float]]):
-    """Observations beyond their bounds, by name; and how many were looked at."""
-
-    looked_at = 0
-    bounds: dict[str, tuple[float, float]]
-
-
-def _plain_engine(engine: Engine) -> tuple[Engine, Engine, _Beyond]:
-    """An engine, and one alike whose loop is plain Python and that notes observations beyond their bounds."""
+def _plain_engine(engine: Engine) -> tuple[Engine, dict[str, list[float]]]:
+    """An engine alike whose loop is plain Python, and all that it observes, before it is clipped, by path."""
     plain = Engine(engine.model, engine.num_envs, engine.task)
     made = plain._voyages
-    store, beyond = made.parts["store_observation"].function, _Beyond()
-    beyond.bounds = {path: (seen.low, seen.high) for path, seen in engine.task.definition.seen.items()}
-    shown = {quantity.path for quantity in engine.task.observed(engine.model)}
+    store = made.parts["store_observation"].function
+    seen: dict[str, list[float]] = {quantity.path: [] for quantity in engine.task.observed(engine.model)}
     paths = leaves(engine.task.definition.Observation)
 
     def noted(tile: Any, lane: int, record: Any, scale: Any) -> None:
         if lane < plain.num_envs:
-            beyond.looked_at += 1
             for path, value, per_scale in zip(paths, flat(record), flat(scale), strict=True):
-                low, high = beyond.bounds[path]
-                if path in shown and not low - BEYOND <= value * per_scale <= high + BEYOND:
-                    beyond.setdefault(path, []).append(value * per_scale)
+                if path in seen:
+                    seen[path].append(value * per_scale)
         store(tile, lane, record, scale)
 
     parts = {**made.parts, "store_observation": Part(noted, code=lambda: None, key="noted")}
     plain._run = plain_loop(episodes.run, parts)
-    return engine, plain, beyond
+    return plain, seen
 
 
 def _orders(engine: Engine, step: int) -> Floats:
@@ -167,12 +159,14 @@ def _differ(
         expected, due, *_ = other.step(orders[lanes])
 
 
-def _beyond_bounds(beyond: _Beyond) -> Iterator[str]:
-    """Observations that are clipped often."""
-    for path, values in beyond.items():
-        part, furthest = len(values) / beyond.looked_at, max(values, key=abs)
+def _often_clipped(task: Task, seen: dict[str, list[float]]) -> Iterator[str]:
+    """Observations that are often beyond their bounds."""
+    for path, values in seen.items():
+        low, high = task.definition.seen[path].low, task.definition.seen[path].high
+        beyond = [value for value in values if not low - BEYOND <= value <= high + BEYOND]
+        part = len(beyond) / len(values)
         if part > OFTEN:
-            low, high = beyond.bounds[path]
+            furthest = max(beyond, key=abs)
             yield (
                 f"Observation.{path}: {furthest:.3g} found in units of its scale, beyond its bounds {low:g} "
                 f"to {high:g} in {100.0 * part:.0f} % of the steps, and clipped; give it wider bounds "

@@ -40,10 +40,7 @@ def to_mss(model: ShipModel) -> dict[str, float]:
             f"model '{model.name}': structure '{model.structure}' found, expected abkowitz or container, the "
             "ships of MSS that are sets of parameters"
         )
-    mass = p.require("mass") / (0.5 * p.require("water_density") * p.length**3)
-    xg = p.require("xg") / p.length
-    inertia = mass * ((p.require("yaw_gyradius") / p.length) ** 2 + xg**2)
-    found |= {"U0": p.require("speed"), "m": mass, "xG": xg, "Iz": inertia}
+    found |= {"U0": p.require("speed"), "m": p.mass_prime, "xG": p.xg_prime, "Iz": p.inertia_prime}
     found |= {name.replace("_", ""): p.require(name) for name in ADDED_MASSES}
     return found | {_name(name): _port(name) * value for name, value in model.coefficients.items()}
 
@@ -60,14 +57,16 @@ def from_mss(parameters: Mapping[str, Any], name: str = "mss", water_density: fl
     if "Xphiphi" in given:
         ship = load_model("container")
         names = {_roll_name(own): own for own in ship.coefficients}
-        check_keys(given, known := ("L", *GEAR, *names), where, known)
+        known = ("L", *GEAR, *names)
+        check_keys(given, known, where, known)
         if given["L"] != ship.particulars.length:
             raise InputError(f"{where}: L: {given['L']:g} found, expected {ship.particulars.length:g}")
         values = {own: given[key] for key, own in names.items()}
         return replace(ship, name=name, steering=replace(ship.steering, **gear), coefficients=values)
     names = {_name(own): own for own in get_structure("abkowitz").coefficient_names}
     masses = {own.replace("_", ""): own for own in ADDED_MASSES}
-    check_keys(given, known := ("L", "U0", *GEAR, "m", "xG", "Iz", *masses, *names), where, known)
+    known = ("L", "U0", *GEAR, "m", "xG", "Iz", *masses, *names)
+    check_keys(given, known, where, known)
     m, L, xg = given["m"], given["L"], given["xG"]
     particulars = Particulars(
         L, name, mass=m * 0.5 * water_density * L**3, xg=xg * L, speed=given["U0"],

@@ -4,14 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from importlib import import_module
-from typing import Any, NamedTuple, TypeAlias
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from shipgym.errors import InputError
 
-Figure: TypeAlias = Any  # plotly.graph_objects.Figure
+if TYPE_CHECKING:
+    from plotly.graph_objects import Figure as Figure
+else:
+    Figure = Any  # plotly is imported when the first figure is made
+
 Axis: TypeAlias = "str | dict[str, Any]"  # a title, or an `axis` with more than that
 
 INK, MUTED, GRID = "#1f2a37", "#64748b", "#e5e9ef"

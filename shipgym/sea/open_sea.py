@@ -15,7 +15,7 @@ from math import fabs, pi, sqrt
 from typing import Any, NamedTuple
 
 from shipgym.engine.mathematics import sin_cos
-from shipgym.engine.motion import HAS_ROLL, Motion, Push
+from shipgym.engine.motion import HAS_ROLL, HAS_SEA, Motion, Push
 from shipgym.engine.parts import Part
 from shipgym.engine.random import DRAW, S11, TO_UNIT, mix, normal
 from shipgym.engine.record_code import loader, storer
@@ -23,7 +23,6 @@ from shipgym.engine.records import LANES, Layout
 
 SLOWEST_ENCOUNTER = 0.1  # of the wave frequency: in a following sea the filter keeps turning
 LEAST = 1e-12
-BEGIN_WORDS, EVOLVE_WORDS = DRAW[15], DRAW[8]  # by which the state of the random numbers goes on
 
 
 class Sines(NamedTuple):
@@ -135,7 +134,9 @@ def cosine_series(cosine: float, a: Cosines) -> float:
 
 
 def push(motion: Motion, sea: Sea, p: SeaParameters) -> Push:
-    """Accelerations by wind and waves now, and the current."""
+    """Accelerations by wind and waves now, and the current; none in calm water."""
+    if not HAS_SEA:
+        return Push(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     u, v = motion.u, motion.v
     sine, cosine = sin_cos(motion.psi)
     speed = p.wind_speed + sea.gust
@@ -178,7 +179,9 @@ def encounter(bow: float, beam: float, u: float, v: float, p: SeaParameters) -> 
 
 
 def encounter_frequency(motion: Motion, sea: Sea, p: SeaParameters) -> float:
-    """Frequency at which a ship meets the waves, rad/s."""
+    """Frequency at which a ship meets the waves, rad/s; 0 in calm water."""
+    if not HAS_SEA:
+        return 0.0
     sine, cosine = sin_cos(motion.psi)
     bow, beam = from_bow(sine, cosine, sea)
     return encounter(bow, beam, motion.u, motion.v, p)
@@ -297,56 +300,19 @@ def begin_sea(motion: Motion, word: Any, p: SeaParameters) -> Sea:
     return with_waves(bow, beam, encounter(bow, beam, motion.u, motion.v, p), sea, p)
 
 
-class CalmSea(NamedTuple):
-    """What is read of a sea where there is none."""
-
-    current_north: float
-    current_east: float
-    psi_wave: float
-    r_wave: float
-    phi_wave: float
-    p_wave: float
-
-
-class CalmParameters(NamedTuple):
-    """Of calm water."""
-
-    unused: float
-
-
-def no_push(motion: Motion, sea: CalmSea, p: Any) -> Push:
-    """Of calm water."""
-    return Push(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-
-
-def no_encounter(motion: Motion, sea: CalmSea, p: Any) -> float:
-    """Of calm water."""
-    return 0.0
-
-
-def still(motion: Motion, h: float, sea: CalmSea, word: Any, p: Any) -> CalmSea:
-    """Calm water stays so."""
-    return sea
-
-
-def begin_calm(motion: Motion, word: Any, p: Any) -> CalmSea:
-    """Calm water from the beginning."""
-    return CalmSea(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-
-
 def sea_records(windy: bool) -> tuple[Any, Any]:
-    """State and parameters of the sea for a `Layout`; calm water takes no rows."""
-    return (Sea, SeaParameters) if windy else ((CalmSea, ()), (CalmParameters, ()))
+    """State and parameters of the sea for a `Layout`; calm water takes no rows, and is read as zeros."""
+    return (Sea, SeaParameters) if windy else ((Sea, ()), (SeaParameters, ()))
 
 
 def sea_functions(windy: bool) -> dict[str, Any]:
     """What takes the place of the functions that loops name for the sea."""
     return {
         "HAS_SEA": windy,
-        "push": Part(push if windy else no_push),
-        "evolve": Part(evolve if windy else still),
-        "begin_sea": Part(begin_sea, inline=False) if windy else Part(begin_calm),
-        "encounter_frequency": Part(encounter_frequency if windy else no_encounter),
+        "push": Part(push),
+        "evolve": Part(evolve),
+        "begin_sea": Part(begin_sea, inline=False),
+        "encounter_frequency": Part(encounter_frequency),
     }
 
 

@@ -55,9 +55,8 @@ class ShipEquations:
     # from (n, command, coefficients, ship) to the acceleration of the shaft, 1/s^2: then its speed is a
     # state. Without it the shaft turns as commanded
     shaft_acceleration: Callable[[float, float, Any, Any], float] | None = None
-    service_shaft_speed: float = (
-        0.0  # 1/s; 0 without a propeller of her own, her only command then the rudder
-    )
+    # 1/s; 0 without a propeller of her own, her only command then the rudder
+    service_shaft_speed: float = 0.0
     rolls: bool = False  # whether roll rate and heel are among her states
     shallow_water: bool = False  # whether the equations know the depth of the water
     astern: bool = False  # whether the propeller holds for a shaft that turns astern
@@ -168,9 +167,10 @@ def read_ship_equations(path: str | Path) -> ShipEquations:
     Raises InputError for a file that is not there, cannot be run, or defines no `SHIP`.
     """
     path = Path(path).resolve()
-    ship = getattr(load_file(path), "SHIP", None)
+    written = "SHIP = ShipEquations(...)"
+    ship = getattr(load_file(path, f"a Python file that defines {written}"), "SHIP", None)
     if not isinstance(ship, ShipEquations):
-        raise InputError(f"{path}: SHIP = {ship!r} found, expected SHIP = ShipEquations(...)")
+        raise InputError(f"{path}: SHIP = {ship!r} found, expected {written}")
     object.__setattr__(ship, "path", path)
     return ship
 

@@ -320,16 +320,18 @@ class Structure:
         scaled = self.normalisation == "service" and "n" in self.command_names
         return scaled or "dn" in self.symbols
 
-    def _from_forces(self, inertia: Floats) -> Floats:
-        """From the coefficients of forces to those of accelerations, by an inertia of shape (3, 3)."""
+    def _from_forces(self, mass: Floats) -> Floats:
+        """From the coefficients of forces to those of accelerations, by mass and added mass, shape (3, 3)."""
         axes = [list(FORCE_OF_EQUATION).index(equation) for equation in self.equations]
-        mobility = np.linalg.inv(inertia[np.ix_(axes, axes)])
+        mobility = np.linalg.inv(mass[np.ix_(axes, axes)])
         counts = [len(terms) for terms in self.equations.values()]
-        starts = np.cumsum([0, *counts])
-        matrix = np.zeros((starts[-1],) * 2)
-        for i, j in np.argwhere(mobility != 0.0):
-            rows, columns = (slice(starts[k], starts[k + 1]) for k in (i, j))
-            matrix[rows, columns] = mobility[i, j] * np.eye(counts[i])
+        ends = np.cumsum(counts).tolist()
+        blocks = [slice(end - count, end) for end, count in zip(ends, counts, strict=True)]
+        matrix = np.zeros((ends[-1], ends[-1]))
+        for i, rows in enumerate(blocks):
+            for j, columns in enumerate(blocks):
+                if mobility[i, j] != 0.0:  # only equations of the same terms are coupled
+                    matrix[rows, columns] = mobility[i, j] * np.eye(counts[i])
         return matrix
 
     def to_dict(self) -> dict[str, Any]:

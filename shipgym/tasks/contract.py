@@ -99,24 +99,46 @@ class Readings(NamedTuple):
 
 @dataclass(frozen=True)
 class Seen:
-    """How a quantity is observed."""
+    """How a quantity is observed.
 
-    low: float  # bounds of the observation
+    Attributes
+    ----------
+    low, high : float
+        Bounds of the observation.
+    unit : str
+        Of the quantity.
+    scale : float or callable
+        Physical value of an observation of 1, or `(ship, settings) -> float`.
+    option : str
+        Which shows it: `roll`, `shaft` or `shaft speed`; by default it is always shown.
+    """
+
+    low: float
     high: float
-    unit: str = "-"  # of the quantity
-    scale: Scale = 1.0  # physical value of an observation of 1, or `(ship, settings) -> float`
-    option: str = ""  # which shows it: `roll`, `shaft`, `shaft speed`; by default it is always shown
+    unit: str = "-"
+    scale: Scale = 1.0
+    option: str = ""
 
 
 @dataclass(frozen=True)
 class Setting:
-    """Bounds of a setting."""
+    """Bounds of a setting.
 
-    about: str  # what it is, a sentence
+    Attributes
+    ----------
+    about : str
+        What it is, a sentence.
+    at_least, at_most, above : float or None
+        Its bounds.
+    whole : bool
+        Whether it is a whole number.
+    """
+
+    about: str
     at_least: float | None = None
     at_most: float | None = None
     above: float | None = None
-    whole: bool = False  # whether it is a whole number
+    whole: bool = False
 
 
 def at_service_speed(x: float, y: float, psi: float, ship: Ship) -> Motion:

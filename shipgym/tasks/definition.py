@@ -54,14 +54,39 @@ def no_event(motion: Any, state: Any, interval: Any, ship: Any, settings: Any, r
     return state
 
 
-def nothing(settings: Any) -> float:
-    """Of a task in which a lost ship costs nothing more, or that remembers its state alone."""
+def no_worst_cost(settings: Any) -> float:
+    """Of a task in which a lost ship costs nothing more."""
     return 0.0
+
+
+def no_plan(settings: Any) -> int:
+    """Of a task that remembers its state alone."""
+    return 0
+
+
+def any_settings(settings: Any, model: Any) -> None:
+    """Of a task whose settings fit in any combination."""
 
 
 @dataclass(frozen=True)
 class TaskDefinition(Configurable):
-    """Records and functions of a task, by their names in its file (`shipgym.tasks.contract`)."""
+    """Records and functions of a task, by their names in its file (`shipgym.tasks.contract`).
+
+    Attributes
+    ----------
+    name : str
+        Of the task.
+    source : str
+        Where it was read from, for messages.
+    Settings, State, Reward, Observation : type
+        Its records.
+    begin, step, observe, due, on_event, worst_cost, plan_length, check, listed : callable
+        Its functions.
+    reported : tuple of str
+        Fields of the state that `info` has.
+    episode_steps : int
+        Control intervals after which an episode is truncated, by default.
+    """
 
     State: Record
     Reward: Record
@@ -71,12 +96,12 @@ class TaskDefinition(Configurable):
     observe: Callable[..., Any]
     due: Callable[..., Any] = never_due
     on_event: Callable[..., Any] = no_event
-    worst_cost: Callable[..., Any] = nothing
-    plan_length: Callable[[Any], float] = nothing
-    check: Callable[[Any, Any], None] | None = None
+    worst_cost: Callable[..., Any] = no_worst_cost
+    plan_length: Callable[[Any], int] = no_plan
+    check: Callable[[Any, Any], None] = any_settings
     listed: Callable[[Any], Any] = np.asarray
-    reported: tuple[str, ...] = ()  # fields of the state that `info` has
-    episode_steps: int = 600  # control intervals after which an episode is truncated, by default
+    reported: tuple[str, ...] = ()
+    episode_steps: int = 600
 
     @cached_property
     def seen(self) -> dict[str, Seen]:
@@ -107,13 +132,8 @@ class TaskDefinition(Configurable):
     def make_settings(self, options: Mapping[str, Any]) -> Any:
         """Settings by keywords; InputError for an unknown one, or a value that does not fit."""
         settings = super().make_settings(options)
-        self.check_fits(settings)
+        self.check(settings, None)
         return settings
-
-    def check_fits(self, settings: Any, model: Any = None) -> None:
-        """Refuse settings that do not fit together, or the model; InputError names them."""
-        if self.check is not None:
-            self.check(settings, model)
 
 
 def _seen(record: Record, prefix: str = "") -> dict[str, Any]:
@@ -166,7 +186,8 @@ def _named(source: Any) -> tuple[Any, str]:
 
 
 def _definition(namespace: Any, where: str) -> TaskDefinition:
-    found = check_namespace(namespace, where, RECORDS, FUNCTIONS, [*{*FUNCTIONS} - {*NEEDED}])
+    optional = [name for name in FUNCTIONS if name not in NEEDED]
+    found = check_namespace(namespace, where, RECORDS, FUNCTIONS, optional)
     definition = TaskDefinition(
         name=getattr(namespace, "NAME", None) or Path(where).stem,
         source=where,

@@ -12,12 +12,12 @@ from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from shipgym.arrays import Floats
 from shipgym.checks import check_number, check_whole
 from shipgym.errors import InputError
 
-Floats = NDArray[np.float64]
 NO_TURN = 1e-6  # rad, below which a waypoint only divides a leg
 SHARPEST_TURN = np.radians(150.0)  # beyond it a path doubles back
 ARC_POINTS = np.radians(5.0)  # between points of a turn that is drawn
@@ -25,22 +25,42 @@ FURTHEST = 1e8  # m, of a waypoint from the origin: more than the way round the 
 
 
 class PathPosition(NamedTuple):
-    """Where ships stand on a leg of a path, arrays of one shape."""
+    """Where ships stand on a leg of a path, arrays of one shape.
 
-    along: Floats  # m, run since the leg's first waypoint
-    cross_track: Floats  # m, from the leg, positive to starboard of it
-    course: Floats  # rad, direction of the leg
-    to_go: Floats  # m, along the leg to its last waypoint
+    Attributes
+    ----------
+    along : array
+        Distance run since the leg's first waypoint, m.
+    cross_track : array
+        Distance from the leg, m, positive to starboard of it.
+    course : array
+        Direction of the leg, rad.
+    to_go : array
+        Distance left to the leg's last waypoint, along the leg, m.
+    """
+
+    along: Floats
+    cross_track: Floats
+    course: Floats
+    to_go: Floats
 
 
 @dataclass(frozen=True, eq=False)
 class Path:
     """Straight legs from waypoint to waypoint.
 
-    Raises InputError for fewer than two waypoints, one that is not finite, or repeats the one before it.
+    Attributes
+    ----------
+    waypoints : array of shape (n_waypoints, 2)
+        North and east, m.
+
+    Raises
+    ------
+    InputError
+        For fewer than two waypoints, one that is not finite, or one that repeats the one before it.
     """
 
-    waypoints: Floats  # north and east, m, shape (n_waypoints, 2)
+    waypoints: Floats
 
     def __post_init__(self) -> None:
         points = _waypoints(self.waypoints)

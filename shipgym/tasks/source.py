@@ -106,7 +106,8 @@ def annotated(record: Record, kind: type) -> Iterator[tuple[str, Any, Any]]:
     """Name and type of each field of a record, and what of a kind it is annotated with, if it is."""
     for name, hint in field_types(record, notes=True).items():
         notes = [note for note in getattr(hint, "__metadata__", ()) if isinstance(note, kind)]
-        yield name, getattr(hint, "__origin__", hint) if notes else hint, notes[0] if notes else None
+        own = hint.__origin__ if hasattr(hint, "__metadata__") else hint
+        yield name, own, notes[0] if notes else None
 
 
 def keywords(record: Record) -> Iterator[tuple[str, Setting, Any]]:

@@ -8,8 +8,8 @@ from functools import cached_property
 from typing import Any, NamedTuple, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
+from shipgym.arrays import Floats
 from shipgym.checks import check_choice, check_keys, check_number, check_whole
 from shipgym.engine.motion import Ship
 from shipgym.errors import InputError
@@ -21,7 +21,6 @@ from shipgym.ships.manoeuvring_model import ship_of
 from shipgym.tasks.definition import TaskDefinition, read_definition
 from shipgym.tasks.steering import Helm
 
-Floats = NDArray[np.float64]
 Sea = str | Weather
 
 LONGEST_INTERVAL = 5.0  # ship lengths at service speed
@@ -203,7 +202,7 @@ class Task:
             )
         if self.action == "rudder-shaft" and not model.service_shaft_speed > 0.0:
             raise InputError(f"action: 'rudder-shaft' found, but {model.name!r} knows no shaft speed")
-        self.definition.check_fits(self.settings, model)
+        self.definition.check(self.settings, model)
 
     def observed(self, model: ShipModel) -> tuple[Observed, ...]:
         """What is observed of a ship, in order."""

@@ -8,14 +8,14 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from shipgym.errors import InputError
-from shipgym.files import packaged_toml
+from shipgym.files import shipped_toml
 from shipgym.trials.csv_reader import Table
 from shipgym.trials.tables import read_log
 from shipgym.trials.trial import Trial, read_trials
 from shipgym.trials.trial_import import RUDDER_SIGNS, Conventions
 from shipgym.trials.units import QUANTITIES, UNITS
 
-WORDS: dict[str, dict[str, Any]] = packaged_toml("shipgym.trials", "guesses.toml")
+WORDS: dict[str, dict[str, Any]] = shipped_toml("shipgym.trials", "guesses.toml")
 
 
 class Guess(NamedTuple):

@@ -20,7 +20,7 @@ from shipgym.checks import (
     quoted,
 )
 from shipgym.errors import InputError
-from shipgym.files import packaged_toml
+from shipgym.files import shipped_toml
 
 AUTO = "auto"  # the structure where a ship file names none: ranked by trials held out
 TEXT, FLAG, NUMBER, WHOLE = "a text", "true or false", "a number", "a whole number"
@@ -43,7 +43,7 @@ class Option:
 
 #: Every option by name.
 OPTIONS: dict[str, Option] = {
-    name: Option(**entry) for name, entry in packaged_toml("shipgym.trials", "identify_table.toml").items()
+    name: Option(**entry) for name, entry in shipped_toml("shipgym.trials", "identify_table.toml").items()
 }
 
 

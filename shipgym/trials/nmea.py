@@ -15,7 +15,7 @@ import numpy as np
 from shipgym.arrays import Floats
 from shipgym.checks import quoted
 from shipgym.errors import InputError
-from shipgym.files import LARGEST_CSV, packaged_toml, read_bytes, read_text
+from shipgym.files import LARGEST_CSV, read_bytes, read_text, shipped_toml
 from shipgym.trials.clock_texts import DAY
 from shipgym.trials.csv_reader import MOST_LINES, Table, column_table
 from shipgym.trials.units import si_factor
@@ -23,7 +23,7 @@ from shipgym.trials.units import si_factor
 #: Share of damaged sentences from which a log is refused.
 MOST_DAMAGED = 0.1
 
-SENTENCES: dict[str, dict[str, list[str]]] = packaged_toml("shipgym.trials", "sentences.toml")
+SENTENCES: dict[str, dict[str, list[str]]] = shipped_toml("shipgym.trials", "sentences.toml")
 _SPEEDS = {"N": "knots", "K": "km/h", "M": "m/s"}
 #: The better sources: of heading true ones, of the speed through the water the log with two axes.
 _BETTER = {"HDT": 3, "THS": 2, "VHW": 1, "VBW": 1}

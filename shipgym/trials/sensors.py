@@ -21,17 +21,38 @@ class Sensor:
     """One sensor, in the SI unit of its channel. The default is a perfect one.
 
     The reading at time t is the signal at t - latency_s, plus drift and white noise, now and then an outlier,
-    rounded to the resolution. Raises InputError for a negative or infinite number, a probability above 1, or
-    a drift without correlation time.
+    rounded to the resolution.
+
+    Attributes
+    ----------
+    noise : float
+        Standard deviation of the white noise.
+    resolution : float
+        Step of the readings; 0 for none.
+    drift : float
+        Standard deviation of a first-order Gauss-Markov process.
+    drift_time_s : float
+        Its correlation time, s.
+    outlier_probability : float
+        Of each reading.
+    outlier_size : float
+        Standard deviation of what an outlier adds.
+    latency_s : float
+        Age of the signal at the time its reading is logged, s.
+
+    Raises
+    ------
+    InputError
+        For a negative or infinite number, a probability above 1, or a drift without correlation time.
     """
 
-    noise: float = 0.0  # standard deviation of the white noise
-    resolution: float = 0.0  # step of the readings; 0 for none
-    drift: float = 0.0  # standard deviation of a first-order Gauss-Markov process
-    drift_time_s: float = 300.0  # its correlation time
-    outlier_probability: float = 0.0  # of each reading
-    outlier_size: float = 0.0  # standard deviation of what an outlier adds
-    latency_s: float = 0.0  # age of the signal at the time its reading is logged
+    noise: float = 0.0
+    resolution: float = 0.0
+    drift: float = 0.0
+    drift_time_s: float = 300.0
+    outlier_probability: float = 0.0
+    outlier_size: float = 0.0
+    latency_s: float = 0.0
 
     def __post_init__(self) -> None:
         for item in fields(self):
@@ -81,14 +102,30 @@ SEA_TRIAL: Mapping[str, Sensor] = MappingProxyType(
 
 @dataclass(frozen=True)
 class Sensors:
-    """The sensors of a ship and her logger; InputError for an unknown channel or a number out of range."""
+    """The sensors of a ship and her logger.
 
-    #: channels without a sensor are logged as they are
+    Attributes
+    ----------
+    by_channel : mapping of str to Sensor
+        Channels without a sensor are logged as they are. By default those of a sea trial (`SEA_TRIAL`).
+    sampling_s : float or None
+        Time between logged samples, s, which lie on straight lines between those of the trial; None: as in
+        the trial.
+    dropout_probability : float
+        Of each sample to begin a gap in the log.
+    dropout_samples : float
+        Mean length of a gap, samples. A gap leaves the samples out of the measured trial.
+
+    Raises
+    ------
+    InputError
+        For an unknown channel, or a number out of range.
+    """
+
     by_channel: Mapping[str, Sensor] = field(default_factory=lambda: SEA_TRIAL)
-    #: time between logged samples, which lie on straight lines between those of the trial; None: as there
     sampling_s: float | None = None
-    dropout_probability: float = 0.0  # of each sample to begin a gap in the log
-    dropout_samples: float = 3.0  # mean length of a gap, whose samples are left out
+    dropout_probability: float = 0.0
+    dropout_samples: float = 3.0
 
     def __post_init__(self) -> None:
         for channel, sensor in self.by_channel.items():

@@ -14,12 +14,12 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
-from filelock import FileLock
 
 import shipgym
 from shipgym.engine import cache_folder, compiling
 from shipgym.engine.disk_cache import DiskCache
 from shipgym.engine.voyages import Voyages
+from shipgym.files import draft_name
 from shipgym.instruments.sensor_set import shipped_sensors
 from shipgym.tasks.definition import read_definition
 
@@ -91,7 +91,7 @@ def test_of_processes_that_start_at_once_one_compiles(tmp_path):
     answers = [worker.communicate()[0].split() for worker in workers]
     assert sorted(answers) == [["compiles", "done"]] + [["done"]] * 3
     assert len(list(tmp_path.glob("*.loop"))) == 1
-    assert not list(tmp_path.glob("*.new"))
+    assert not list(tmp_path.glob("*.draft"))
 
 
 @pytest.mark.skipif(os.name == "nt", reason="there is no such signal")
@@ -260,12 +260,18 @@ def test_what_cannot_be_loaded_is_said_and_compiled_anew(folder):
 
 
 def test_drafts_of_killed_processes_are_removed_by_the_next_one(folder):
-    for name in ("tag-short-1.new", "other-short-2.new", "busy-short-3.new", "tmpold.new"):
-        (folder / name).touch()
-    with FileLock(folder / "busy.lock"):
-        cache_folder.write_loop(b"content", folder / "tag-short.loop")
-    assert {path.name for path in folder.glob("*.new")} == {"busy-short-3.new"}
-    assert cache_folder.read_loop(folder / "tag-short.loop") == b"content"
+    loop = folder / "tag-short.loop"
+    killed = subprocess.Popen([sys.executable, "-c", ""])
+    killed.wait()
+    own = draft_name(loop).name
+    dead, living = (
+        folder / own.replace(f"-{os.getpid()}.", f"-{process}.") for process in (killed.pid, os.getppid())
+    )
+    dead.touch()
+    living.touch()
+    cache_folder.write_loop(b"content", loop)
+    assert sorted(folder.iterdir()) == sorted([loop, living])
+    assert cache_folder.read_loop(loop) == b"content"
 
 
 @posix

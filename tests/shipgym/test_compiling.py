@@ -172,8 +172,8 @@ class Sounding(NamedTuple):
 
 
 def test_a_table_in_a_record_is_the_lane_s_column_of_its_tile():
-    rows = Layout(before=Sounding, found=Sounding)["found"]
-    tile = np.arange(64.0 * rows.end)
+    layout = Layout(before=Sounding, found=Sounding)
+    rows, tile = layout["found"], np.arange(64.0 * layout.n_rows)
     depth, shares = loader(rows).function(tile, 5)
     assert depth == 64 * 4 + 5
     assert shares[:3].tolist() == [64 * 5 + 5, 64 * 6 + 5, 64 * 7 + 5]

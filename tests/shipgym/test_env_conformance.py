@@ -204,7 +204,7 @@ def test_wrong_actions_of_rudder_and_shaft():
         ({"speed_range": (0.9, 0.5)}, "speed_range: the largest: 0.5 found"),
         ({"speed_range": (0.0, 0.5)}, "speed_range: the least: 0 found"),
         ({"model": "kvlcc2", "loading_range": (0.8, 1.0)}, "loading_range: the equations of 'kvlcc2'"),
-        ({"render_mode": "ansi"}, "render_mode: 'ansi' found"),
+        ({"render_mode": "ansi"}, r"render_mode: 'ansi' found, expected one of .*'rgb_array', or None\."),
     ],
 )
 @pytest.mark.filterwarnings("ignore:.*render_mode='ansi'")

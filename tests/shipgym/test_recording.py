@@ -3,6 +3,7 @@ import numpy as np
 import pytest
 
 from shipgym import Current, Episode, InputError, RecordEpisode, Weather, Wind, load_model
+from shipgym.envs.recording import plain
 
 COURSE_KEEPING = "shipgym/CourseKeeping-v0"
 PATH = np.array([[0.0, 0.0], [2000.0, 500.0]])
@@ -159,6 +160,11 @@ def test_weather_and_models_given_as_objects_are_told_in_words(tmp_path):
     assert episode.states["current_east"] == pytest.approx(0.5)
 
 
+def test_arguments_are_told_with_texts_as_keys():
+    given = {1: np.float32(0.5), None: (np.inf, None), ("a", 2): {True: np.arange(2)}}
+    assert plain(given) == {"1": 0.5, "None": ["inf", None], "('a', 2)": {"True": [0, 1]}}
+
+
 def test_recordings_are_not_mixed_with_earlier_ones(tmp_path):
     sail(RecordEpisode(course_keeping(), tmp_path))
     with pytest.raises(InputError, match=r"holds 'episode-00000\.json' of an earlier recording"):
@@ -178,7 +184,7 @@ def test_what_cannot_be_recorded_is_refused_at_once(tmp_path):
     with pytest.raises(InputError, match="expected the beginning of a file's name"):
         RecordEpisode(course_keeping(), tmp_path, name_prefix="a/b")
     (tmp_path / "file").write_text("")
-    with pytest.raises(InputError, match="cannot be made"):
+    with pytest.raises(InputError, match="no folder can be made there"):
         RecordEpisode(course_keeping(), tmp_path / "file")
 
 

@@ -106,5 +106,8 @@ def test_what_is_wrong_with_her_is_said(tug: Path, wrong: str, right: str, messa
 
 
 def test_a_file_that_is_not_there(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=r"barge\.py: no such file"):
+    with pytest.raises(
+        InputError,
+        match=r"barge\.py: no such file, expected a Python file that defines SHIP = ShipEquations\(\.\.\.\)",
+    ):
         load_model(tmp_path / "barge.py")

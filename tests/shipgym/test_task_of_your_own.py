@@ -2,6 +2,7 @@
 
 import re
 from pathlib import Path
+from typing import Annotated, NamedTuple
 
 import gymnasium
 import numpy as np
@@ -13,7 +14,8 @@ from stable_baselines3 import PPO
 import shipgym
 from shipgym import InputError, ShipVecEnv, check_task, check_vector_env, register_task
 from shipgym.envs.engine import Engine
-from shipgym.tasks.source import check_namespace, read_source
+from shipgym.tasks.contract import Setting
+from shipgym.tasks.source import annotated, check_namespace, keywords, make_settings, read_source
 from shipgym.tasks.task import Task
 
 ROOT = Path(__file__).parents[2]
@@ -196,6 +198,7 @@ def test_what_is_wrong_is_named_and_nothing_is_registered(tmp_path, old, new, me
         assert "harbour/Wrong-v0" not in gymnasium.registry
 
 
+AS_TEXT = "from __future__ import annotations\n"
 RECORD = "from typing import NamedTuple\n\n\nclass Settings(NamedTuple):\n    weight: float = 1.0\n\n\n"
 
 
@@ -204,7 +207,8 @@ RECORD = "from typing import NamedTuple\n\n\nclass Settings(NamedTuple):\n    we
     [
         ("", r"own.py: no 'Settings' found, expected a NamedTuple 'Settings' of floats"),
         ("Settings = 3\n", "Settings is no NamedTuple, expected a NamedTuple 'Settings' of floats"),
-        (RECORD.replace("float", "flaot"), "Settings: an annotation cannot be read: name 'flaot'"),
+        (RECORD.replace("float", "flaot"), "own.py, line 5: cannot be executed: NameError: name 'flaot'"),
+        (AS_TEXT + RECORD.replace("float", "flaot"), "Settings: an annotation cannot be read: name 'flaot'"),
         ("from collections import namedtuple\nSettings = namedtuple('Settings', '')\n", "no fields found"),
         (RECORD.replace(" = 1.0", ""), "Settings.weight: no default found, expected one"),
         (
@@ -231,6 +235,35 @@ def test_a_file_lacks_nothing_that_is_asked_of_it(text, message, tmp_path):
     else:
         with pytest.raises(InputError, match=message):
             check()
+
+
+@pytest.mark.parametrize(("before", "annotation"), [("", float), (AS_TEXT, "float")])
+def test_annotations_are_texts_only_where_a_file_asks_for_it(tmp_path, before, annotation):
+    file, _ = read_source(written(tmp_path, "own.py", f"{before}def scale(x: float): ...\n"))
+    assert file.scale.__annotations__ == {"x": annotation}
+
+
+@pytest.mark.parametrize("before", ["", AS_TEXT])
+def test_a_task_is_sound_however_its_annotations_are_read(tmp_path, before):
+    text = FAIRWAY.replace(AS_TEXT, "")
+    head, end, rest = text.partition('"""\n\n')
+    path = written(tmp_path, "fairway.py", f"{head}{end}{before}{rest}")
+    assert str(check_task(path, **SHIP)) == "fairway: sound"
+
+
+def test_a_record_with_a_note_of_its_own_is_a_record_all_the_same():
+    class Inner(NamedTuple):
+        weight: Annotated[float, Setting("The weight.", above=0.0)] = 2.0
+
+    class Outer(NamedTuple):
+        inner: Annotated[Inner, "what a user notes"] = Inner()
+        plain: Annotated[float, "likewise"] = 3.0
+
+    assert [(name, kind) for name, kind, _ in annotated(Outer, Setting)] == [
+        ("inner", Inner), ("plain", float),
+    ]  # fmt: skip
+    assert [name for name, *_ in keywords(Outer)] == ["weight", "plain"]
+    assert make_settings(Outer, {"weight": 5.0}, np.asarray) == Outer(Inner(5.0), 3.0)
 
 
 def test_a_file_that_is_not_there_is_named(tmp_path):

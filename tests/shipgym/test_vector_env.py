@@ -114,7 +114,7 @@ def test_a_vector_environment_says_what_is_wrong(mariner):
         ({"sae": "calm"}, "Did you mean 'sea'"),
         ({"autoreset_mode": "later"}, "autoreset_mode: 'later' found"),
         ({"threads": 0}, "threads: 0 found"),
-        ({"render_mode": "human"}, "render_mode: 'human' found"),
+        ({"render_mode": "human"}, "render_mode: 'human' found, expected one of 'rgb_array', or None"),
         ({"ensemble": ["container"]}, "ensemble: 'container' has other equations"),
         ({"model_uncertainty": "posterior"}, "'mariner' has no covariance"),
         ({"speed_range": 0.5}, "speed_range: 0.5 found"),

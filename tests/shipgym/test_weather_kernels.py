@@ -17,6 +17,7 @@ import shipgym
 from shipgym import InputError, manoeuvres
 from shipgym.engine import random
 from shipgym.engine.motion import Motion
+from shipgym.engine.records import Layout
 from shipgym.envs.engine import Engine
 from shipgym.instruments import bridge
 from shipgym.sea import (
@@ -340,7 +341,7 @@ def test_a_sea_begins_and_goes_on_as_it_always_was():
         for key in range(n):
             word = random.stream(np.uint64(key), np.uint64(0))
             begun.append(open_sea.begin_sea(motion, word, p))
-            later.append(open_sea.evolve(motion, 2.0, begun[-1], word + open_sea.BEGIN_WORDS, p))
+            later.append(open_sea.evolve(motion, 2.0, begun[-1], word + random.BEGIN_WORDS, p))
     first, second = np.array(begun), np.array(later)
     expected = {
         "current_north": (0.8 * np.cos(2.0), 0.3), "current_east": (0.8 * np.sin(2.0), 0.3),
@@ -530,3 +531,10 @@ def test_wrong_weather(mariner):
         course_keeping_task(sea=7)
     with pytest.raises(InputError, match="seed: -1 found"):
         ahead(mariner, "rough", 2, seed=-1)
+
+
+def test_calm_water_is_a_sea_of_zeros_that_takes_no_rows():
+    state, parameters = (Layout(sea=kind) for kind in open_sea.sea_records(windy=False))
+    assert state.n_rows == parameters.n_rows == 0
+    calm = open_sea.sea_parts(windy=False, lanes=1)
+    assert calm["load_sea"].function(np.zeros(0), 0) == Sea(*[0.0] * len(Sea._fields))
