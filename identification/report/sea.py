@@ -15,7 +15,7 @@ from shipgym.plots.style import Figure
 
 KNOT = 1852.0 / 3600.0
 NORMAL_95 = 1.96
-SOURCES = {"all trials": "one of all", "trial": "its own", "given": "as given", "columns": "of its columns"}
+SOURCES = {"all trials": "one for all", "trial": "its own", "given": "as given", "columns": "from columns"}
 
 
 def sea_sentences(provenance: Mapping[str, Any]) -> list[str]:
