@@ -60,7 +60,7 @@ def _help(name: str) -> str:
     text = option.meaning[0].upper() + option.meaning[1:]
     if option.choices:
         *others, last = option.choices
-        text += f": {', '.join(others)} or {last}"
+        text += f": {', '.join(others)} or {last}" if others else f": {last}"
     default = AUTO if name == "structure" else getattr(Options, name)
     if isinstance(default, str):
         text += f"; default: the ship file's, else {default}"

@@ -22,10 +22,10 @@ def new_ship_command(
     ],
     out: Annotated[Path, typer.Option(metavar="FILE", help="The ship file to write.")] = Path("ship.toml"),
     length: Annotated[
-        float | None, typer.Option(min=0.01, help="Length between perpendiculars, m; else to be filled in.")
+        float | None, typer.Option(min=0.01, help="Length between perpendiculars, m; or fill it in later.")
     ] = None,
 ) -> None:
-    """Write a ship file for recorded trials, guessing columns, units and signs, and say what was guessed."""
+    """Write a ship file for recorded trials. Guesses columns, units and signs, and reports the guesses."""
     import numpy as np
 
     from agents.cli.terminal import answer, say, warn
@@ -67,7 +67,7 @@ def look_command(
     log: Annotated[Path, typer.Argument(metavar="LOG|SHIP.TOML", help="A log, or a ship file with trials.")],
     out: Annotated[Path, typer.Option(metavar="FILE", help="The page to write.")] = Path("look.html"),
 ) -> None:
-    """Draw the trials of a ship file, or a log: track, channels, and what was repaired or found amiss."""
+    """Draw the trials of a ship file, or a log. Shows track, channels, repairs and problems found."""
     from agents.cli.terminal import answer, say, warn
     from agents.cli.trials_page import check_page
     from shipgym.files import write_text
