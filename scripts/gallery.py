@@ -253,7 +253,8 @@ def home() -> None:
     titles = ("1  recorded trials", "2  a model, with its uncertainty", "3  autopilots")
     for panel, title in zip(panels, titles, strict=True):
         panel.set_title(title, loc="left", fontweight="bold")
-        panel.legend(fontsize=7, ncols=1 if panel is panels[2] else 3, columnspacing=1.0, loc="upper right")
+        columns, spacing = 1 if panel is panels[2] else 3, {"columnspacing": 0.6, "handlelength": 1.2}
+        panel.legend(fontsize=7, ncols=columns, **spacing, handletextpad=0.4, loc="upper right")
 
 
 def main(names: list[str]) -> None:

@@ -110,7 +110,7 @@ def benchmark_command(
                 except InputError as error:  # the results are there even without plotly
                     warn(f"there is no {PAGE}: {error}")
     except KeyboardInterrupt:
-        fail(f"interrupted; what was done is kept in {out}: go on with --resume", INTERRUPTED)
+        fail(f"interrupted; what was done is kept in {out}: continue with --resume", INTERRUPTED)
         return
     _print_result(result, out)
 

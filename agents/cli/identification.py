@@ -114,7 +114,7 @@ def _compare(
         warn(f"{name} has no setting of these names and was fitted without them: {', '.join(left)}")
     first = found.standings[0]
     if not first.stable or first.error is None:
-        fail("no method gives a model that stays stable on every trial held out", FAILED)
+        fail("no method gives a model that stays stable on every held-out trial", FAILED)
 
 
 @answered

@@ -55,7 +55,7 @@ def new_ship_command(
     answer({"written": str(out), "columns": columns, "rudder_positive": side, "notes": list(trial.notes)})
     told = [f"{one.channel}: column '{one.column}' in {one.unit}, unit {one.reason}" for one in guesses]
     told += [] if guesses else [f"channels: {', '.join(trial.channels)}"]
-    told += [f"a positive rudder steers to {side}, by the yaw that follows it"] if "delta" in trial else []
+    told += [f"a positive rudder steers to {side}, by the yaw that follows"] if "delta" in trial else []
     told.append(f"written: {out}{'' if length else ', fill in the length'}; next: shipgym look {out}")
     say("\n".join(told))
     for note in trial.notes:

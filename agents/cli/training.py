@@ -103,7 +103,7 @@ def _train(given: Given, out: Path, resume: bool, max_seconds: float | None) -> 
             return train(plan, out, resume=resume, max_seconds=max_seconds, tell=tell, command=command)
     except KeyboardInterrupt:
         kept = (out / run_folder.CHECKPOINT).is_file()
-        fail(f"interrupted; go on with --resume --out {out}" if kept else "interrupted", INTERRUPTED)
+        fail(f"interrupted; continue with --resume --out {out}" if kept else "interrupted", INTERRUPTED)
         raise  # not reached: `fail` leaves
 
 
@@ -122,5 +122,5 @@ def _print_result(result: TrainingResult, out: Path) -> None:
         console.print(f"LQ's cost reached at step {reached['steps']:,}, after {reached['seconds']:.0f} s")
     if not result.finished:
         total = result.plan.settings.total_steps
-        say(f"stopped at step {result.steps:,} of {total:,}: go on with --resume --out {out}")
+        say(f"stopped at step {result.steps:,} of {total:,}: continue with --resume --out {out}")
     say(f"written: {out / 'agent.json'}")

@@ -38,7 +38,7 @@ def usable_folder() -> Path | None:
     except OSError as error:
         warn_of(cache_folder(), error)
     except ValueError as error:
-        tell(f"{error}. Until then ships are compiled anew in each process.")
+        tell(f"{error}. Until then ships are compiled again in each process.")
     return None
 
 
@@ -151,7 +151,7 @@ def locked(path: Path) -> Iterator[None]:
 def warn_of(folder: Path, error: OSError) -> None:
     """Say that nothing can be kept, and what to do."""
     tell(
-        f"{folder}: cannot be written ({error.strerror}), so ships are compiled anew in each process. "
+        f"{folder}: cannot be written ({error.strerror}), so ships are compiled again in each process. "
         f"Set {CACHE_VARIABLE} to a folder that can."
     )
 
