@@ -187,7 +187,7 @@ def current_table(names: Sequence[str], seeds: range) -> str:
         )
     together = [np.concatenate(part) for part in zip(*every, strict=True)]
     rows.append(["all", *_current_cells(*together), ""])
-    head = ["ship", "error, m/s rms", "largest", "below 0.05 m/s", "inside the 95 % interval", "taken out"]
+    head = ["ship", "error, m/s rms", "largest", "below 0.05 m/s", "inside the 95 % interval", "removed"]
     return table(head, rows)
 
 
@@ -249,7 +249,7 @@ def wind_table(recipes: Sequence[str]) -> str:
                 result = identify(trials, wind=wind, **known, **ESSO_OSAKA[title])
                 error = result.metrics["trials"][held.name]["rmse"]["psi"]
                 errors.append(float("nan") if error is None else float(np.degrees(error)))
-            told = {"none": "left in", "auto": "of columns", "constant": "constant"}[wind]
+            told = {"none": "left in", "auto": "from columns", "constant": "constant"}[wind]
             rows.append([title, told, *(f"{e:.1f}" for e in errors), f"{np.mean(errors):.1f}"])
     return table(["recipe", "wind", *(run.name[-8:] for run in runs), "mean"], rows)
 

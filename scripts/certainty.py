@@ -152,7 +152,7 @@ def table(rows: Sequence[dict[str, object]]) -> str:
     groups["**all**"] = list(rows)
     lines = [
         "| ship, trials | models | factor | noise only, % | with model error, % | "
-        "of these zigzags, turns, % | half-width, % | draws run away, % |",
+        "of which zigzags, turns, % | half-width, % | draws that run away, % |",
         "| --- | --- | --- | --- | --- | --- | --- | --- |",
     ]
     for name, group in groups.items():

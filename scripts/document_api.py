@@ -19,7 +19,7 @@ PACKAGES = {
     "shipgym.ships": "Ship models, structures and their terms.",
     "shipgym.manoeuvres": "Standard manoeuvres, their indices and criteria.",
     "shipgym.sea": "Current, wind and waves.",
-    "shipgym.tasks": "What an environment asks of an autopilot.",
+    "shipgym.tasks": "Tasks: what an autopilot has to do in an environment.",
     "shipgym.plots": "Figures, made with plotly.",
     "shipgym.interchange": "To and from pandas, xarray, Minari, python-control, MSS and shipmmg.",
     "identification": "From trials to a ship model.",
@@ -58,7 +58,7 @@ def pages() -> dict[str, str]:
                 blocks.append(f"::: {package}.{name}")
         written[f"{package}.md"] = "\n\n".join(blocks) + "\n"
     further = [f"::: {module}.{name}" for module, name in imported() if module not in PACKAGES]
-    purpose = "What pages and examples import from modules, beside the names of the packages."
+    purpose = "What pages and examples import from modules, in addition to the names in the packages."
     written[MODULES] = "\n\n".join(["# Modules", purpose, *further]) + "\n"
     return written
 

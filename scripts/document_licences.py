@@ -17,9 +17,10 @@ PAGE = ROOT / "docs" / "licences.md"
 LONGEST = 60  # characters of a licence that is a name and not its text
 HEAD = """# Licences
 
-shipgym is under the MIT licence (`LICENSE`). Its wheel holds plotly.js too, the bundle of Cartesian charts,
-under the MIT licence (`shipgym/pages/plotly/LICENSE`). What it needs is installed beside it, under these
-licences, as the packages themselves declare them. Written by `scripts/document_licences.py`.
+shipgym is under the MIT licence (`LICENSE`). Its wheel also contains plotly.js, the bundle of Cartesian
+charts, under the MIT licence (`shipgym/pages/plotly/LICENSE`). Its dependencies are installed separately,
+under these licences, as declared by the packages themselves. This page is written by
+`scripts/document_licences.py`.
 
 | package | needed for | licence |
 | --- | --- | --- |

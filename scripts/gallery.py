@@ -39,7 +39,8 @@ STYLE = {
 INTRODUCTION = """\
 # Gallery
 
-Each picture with the lines that draw it. `python scripts/gallery.py` draws them again, after these imports:
+Each picture is shown with the code that draws it, after these imports. `python scripts/gallery.py` draws all
+of them again.
 
 ```python
 {imports}
@@ -74,7 +75,7 @@ def measured_and_identified() -> None:
 
 @topic("Trials and models")
 def uncertainty_band() -> None:
-    """The same manoeuvre by 60 models drawn from the covariance of an identified one."""
+    """A 20/20 zigzag of an identified model, and of 60 models drawn from its covariance."""
     model = shipgym.load_model("kvlcc2-tanker-rm-svm")
     runs = [zigzag(one, 20, 20, duration=900) for one in model.sample(60, seed=0)]
     headings = np.degrees([run["psi"] for run in runs])
@@ -89,7 +90,7 @@ def uncertainty_band() -> None:
 
 @topic("Trials and models")
 def recursive_estimates() -> None:
-    """Coefficients that settle while a log is read, sample by sample."""
+    """Coefficients that converge as a log is read sample by sample."""
     mariner = shipgym.load_model("mariner")
     trial = zigzag(mariner, 20, 20, duration=400, dt=0.5)
     found = coefficient_history(trial, "linear-steering", mariner.particulars, "mils")
@@ -128,7 +129,7 @@ def spiral() -> None:
 
 @topic("Manoeuvres")
 def shallow_water() -> None:
-    """The same tanker turns in deep and in shallow water."""
+    """The same tanker turning in deep and in shallow water."""
     tanker = shipgym.load_model("tanker")
     for label, depth in {"deep": np.inf, "45 m": 45, "25 m": 25}.items():
         trial = manoeuvres.turning_circle(tanker, 35, duration=1800, water_depth=depth)
@@ -138,7 +139,7 @@ def shallow_water() -> None:
 
 @topic("Weather")
 def drifting_circle() -> None:
-    """A turning circle in a current of one knot that sets to the east, and in calm water."""
+    """A turning circle in a current of one knot setting east, and in calm water."""
     mariner = shipgym.load_model("mariner")
     for label, sea in {"calm": None, "current": Weather(current=Current(0.514, towards_deg=90))}.items():
         trial = manoeuvres.turning_circle(mariner, 20, duration=1500, weather=sea)
@@ -163,19 +164,17 @@ def course_in_waves() -> None:
 
 @topic("Weather")
 def wave_spectra() -> None:
-    """Wave spectra of the same height, more or less peaked."""
+    """Wave spectra with the same significant height and different peak enhancement."""
     frequency = np.linspace(0.3, 1.8, 200)
     for peak in (1.0, 3.3, 7.0):
         waves = Waves(2.5, 9.0, peak_enhancement=peak)
-        plt.plot(
-            frequency, shipgym.weather.wave_spectrum(waves, frequency), label=f"peak enhancement {peak:g}"
-        )
+        plt.plot(frequency, shipgym.sea.wave_spectrum(waves, frequency), label=f"peak enhancement {peak:g}")
     plt.xlabel("frequency, rad/s"), plt.ylabel("m² s"), plt.legend()
 
 
 @topic("Autopilots")
 def heading_change() -> None:
-    """A change of heading by 20 degrees: PID and LQ on 20 models that two zigzags allow."""
+    """A change of heading by 20 degrees: PID and LQ on 20 models that fit the same two zigzags."""
     model = shipgym.load_model("container-two-zigzags")
     for k, design in enumerate((PID, LQ)):
         found = step_response(design.from_model(model), model.sample(20, seed=0), 20)
@@ -186,7 +185,7 @@ def heading_change() -> None:
 
 @topic("Autopilots")
 def around_the_corners() -> None:
-    """A path with sharp turns: line of sight, and wheel-over, which begins turns where the ship needs it."""
+    """A path with sharp turns: line of sight, and wheel-over, which begins turns in good time."""
     kvlcc2 = shipgym.load_model("kvlcc2")
     waypoints = [[0, 0], [3500, 0], [5500, 3000], [2500, 5500], [2500, 9000]]
     env = gym.make("shipgym/PathFollowing-v0", model=kvlcc2, waypoints=waypoints).unwrapped
@@ -231,7 +230,7 @@ def many_ships() -> None:
 
 @topic("Environments")
 def learning_curve() -> None:
-    """PPO learns to keep a course: cost of an episode while it trains, and that of LQ."""
+    """PPO learns to keep a course: cost of an episode during training, and that of LQ."""
     with tempfile.TemporaryDirectory() as folder:
         plan = make_plan(
             Given("ppo", environment="course-keeping", settings={"total_steps": 200_000, "base": "none"})
@@ -254,7 +253,8 @@ def home() -> None:
     titles = ("1  recorded trials", "2  a model, with its uncertainty", "3  autopilots")
     for panel, title in zip(panels, titles, strict=True):
         panel.set_title(title, loc="left", fontweight="bold")
-        panel.legend(fontsize=7, ncols=1 if panel is panels[2] else 3, columnspacing=1.0, loc="upper right")
+        columns, spacing = 1 if panel is panels[2] else 3, {"columnspacing": 0.6, "handlelength": 1.2}
+        panel.legend(fontsize=7, ncols=columns, **spacing, handletextpad=0.4, loc="upper right")
 
 
 def main(names: list[str]) -> None:

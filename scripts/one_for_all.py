@@ -239,7 +239,7 @@ def kinds(ship: Any) -> dict[str, dict[str, Any]]:
     current = Current(0.2 * speed, variation=0.05 * speed, time_constant=20.0 * time_of_length)
     sharp = {"max_turn_deg": 120.0, "turn_radius": 3.0, "leg_lengths": [12.0, 18.0], "ground": 8.0}
     return {
-        "as it comes": {},
+        "default": {},
         "sharp turns": sharp,
         "current": {"sea": Weather(current=current), "ground": 6.0},
         "narrow": {"corridor": 0.25, "ground": 1.0, "max_turn_deg": 45.0},
@@ -283,7 +283,7 @@ def tuned(task: BenchmarkTask) -> Any:
 def table(rows: dict[str, Any]) -> str:
     """In Markdown: mean costs, and the agent's over those of the baselines with 95 % intervals."""
     random, lines = np.random.default_rng(0), [
-        "| ship, path | wheel-over | tuned | one for all | over tuned | over wheel-over |",
+        "| ship, path | wheel-over | tuned | one for all | relative to tuned | relative to wheel-over |",
         "| --- | --- | --- | --- | --- | --- |",
     ]  # fmt: skip
     ratios = []

@@ -139,7 +139,7 @@ def table(tasks: Sequence[BenchmarkTask], results: Sequence[BenchmarkResult], al
     """Costs of the best baseline and of every training seed, the gain, and whether the aim is met."""
     lines = [
         "| task | best baseline | its cost | agents, by training seed | gain on the ship, % | on the model "
-        "| far from the design | lost far: agents, baseline | gain over the best but MPC | aim |",
+        "| far from the design | lost far: agents, baseline | gain over the best other than MPC | aim |",
         "| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |",
     ]
     for number, task in enumerate(tasks):
@@ -199,7 +199,7 @@ def paired(
 def shield_table(tasks: Sequence[BenchmarkTask], algorithm: str, episodes: int) -> str:
     """What the agents of the first training seed cost with a shield and without, and how often it steers."""
     lines = [
-        "| task | without | with shield | with / without | time it steers |",
+        "| task | without | with shield | with / without | time the fallback steers |",
         "| --- | --- | --- | --- | --- |",
     ]
     for task in tasks:

@@ -55,9 +55,9 @@ TASKS = (
 )  # fmt: skip
 KINDS = ("on_model", "on_ship", "knowing")
 HEAD = (
-    "task", "model", "off: turns, %; overshoots, deg", "factor", "contestant",
-    "made on the model: on the model",
-    "on the ship", "made on the ship: on the ship", "lost, %",
+    "task", "model", "error: turns, %; overshoots, deg", "factor", "contestant",
+    "made on the model: cost on the model",
+    "cost on the ship", "made on the ship: cost on the ship", "loss, %",
 )  # fmt: skip
 
 

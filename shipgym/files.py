@@ -316,7 +316,7 @@ def _parsed(parse: Callable[[str], Any], text: str, where: str, broken: str, inf
     except RecursionError:
         raise InputError(f"{where} lists or tables nest deeper than {DEEPEST}; take another copy") from None
     except KeyError as error:
-        raise InputError(f"{where} key {shown(error.args[0])} stands twice, expected each once") from None
+        raise InputError(f"{where} key {shown(error.args[0])} appears twice, expected each once") from None
     except (json.JSONDecodeError, tomllib.TOMLDecodeError) as error:
         raise InputError(f"{where} {broken.format(error)}") from None
     except ValueError:  # Python's limit to the digits of a whole number
@@ -326,7 +326,7 @@ def _parsed(parse: Callable[[str], Any], text: str, where: str, broken: str, inf
 
 
 def _unrepeated(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    """A table of pairs; KeyError for a key that stands twice."""
+    """A table of pairs; KeyError for a key that appears twice."""
     table = dict(pairs)
     if len(table) < len(pairs):
         raise KeyError(Counter(key for key, _ in pairs).most_common(1)[0][0])

@@ -130,7 +130,7 @@ def check_new(folder: Path, resume: bool, suite: str) -> Path:
     ours = any(name in (RESULTS, EPISODES, PARTS) for name in found)
     if ours and not resume:
         raise InputError(
-            f"{folder}: holds results already; go on there with --resume (resume=True), or take another"
+            f"{folder}: already contains results; continue with --resume (resume=True), or choose another"
         )
     if ours and (folder / RESULTS).is_file() and load_results(folder).summary["suite"]["name"] != suite:
         raise InputError(f"{folder}: holds results of another suite than '{suite}'; choose a new folder")

@@ -82,14 +82,14 @@ def trials_command(
     draws: Annotated[
         int, typer.Option(min=0, help="Models drawn from an identified model's covariance.")
     ] = 100,
-    seed: Annotated[int, typer.Option(min=0, help="Of the draws.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, help="Random seed of the draws.")] = 0,
     depth: Annotated[
-        float | None, typer.Option(metavar="M", help="Depth of the water, m; default: deep water.")
+        float | None, typer.Option(metavar="M", help="Depth of water, m; default: deep water.")
     ] = None,
 ) -> None:
-    """Simulate the standard manoeuvres of a model and assess them by the IMO criteria.
+    """Simulate the standard manoeuvres of a model. Assesses them by the IMO criteria.
 
-    Zigzags, turning circles, spirals, pull-outs, and stops and an acceleration of a ship with a shaft. The
+    Zigzags, turning circles, spirals, pull-outs, and, with a shaft, stops and an acceleration. The
     indices of an identified model come with their 95 % intervals.
     """
     from agents.cli.standard_trials import standard_trials
@@ -133,7 +133,7 @@ def autopilot_command(
     ship: ShipFileArgument,
     out: Annotated[Path, typer.Option(metavar="FOLDER", help="Folder for the report, model and autopilots.")],
     draws: Annotated[int, typer.Option(min=2, help="Models drawn from the coefficient covariance.")] = 200,
-    seed: Annotated[int, typer.Option(min=0, help="Of the draws and of the episodes.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, help="Random seed of draws and episodes.")] = 0,
     *,
     options: IdentifyOptions,
     agents: Annotated[
@@ -141,29 +141,27 @@ def autopilot_command(
         typer.Option(
             "--agent",
             metavar="AGENT",
-            help="Run this autopilot too: a file, or the name of a pretrained one. May be repeated.",
+            help="Also run this autopilot: a file, or the name of a pretrained one; repeatable.",
         ),
     ] = None,
     autopilots: Annotated[
         str | None,
         typer.Option(
             metavar="NAMES",
-            help="To design; default: pid,lq,lq-scheduled,turn-rate,wheel-over. Others: preview-mpc, lqg.",
+            help="Designs; default: pid,lq,lq-scheduled,turn-rate,wheel-over. Others: preview-mpc, lqg.",
         ),
     ] = None,
     standards: Annotated[
         bool,
-        typer.Option(
-            "--standards", help="Simulate topics of ISO 11674 and IEC 62065, with limits of our own."
-        ),
+        typer.Option("--standards", help="Simulate topics of ISO 11674 and IEC 62065, with our own limits."),
     ] = False,
     engine: EngineName = "local",
     workers: Workers = 1,
     address: Address = None,
 ) -> None:
-    """The whole chain: identify, predict, design autopilots, run them on drawn models, write a report.
+    """Go from trials to a report on autopilots. Identifies, predicts, designs, runs them on drawn models.
 
-    Options not given here are those of the ship file's table [identify]. Exits with 1 if the identified
+    Options not given here are taken from the ship file's table [identify]. Exits with 1 if the identified
     model is unstable, or no autopilot designed on it can be trusted; the report then says why.
     """
     from agents.cli.terminal import progress_bars
@@ -230,7 +228,7 @@ def replay_command(
     ],
     out: Annotated[Path, typer.Option(metavar="REPLAY.HTML", help="The page to write.")],
 ) -> None:
-    """Replay recorded episodes in one HTML page: chart, time slider, histories; several over each other."""
+    """Replay recorded episodes in one HTML page. Chart, time slider, time histories; several overlaid."""
     from agents.cli.terminal import answer, say
     from agents.rollouts.replay_page import write_replay
 
@@ -241,7 +239,7 @@ def replay_command(
 
 @answered
 def doctor_command() -> None:
-    """Check the installation: versions, cache, optional packages, the import name agents.
+    """Check the installation. Versions, cache, optional packages, the import name agents.
 
     Exits with 1 if something does not work.
     """

@@ -24,21 +24,18 @@ Out = Annotated[
     Path | None,
     typer.Option(metavar="FOLDER", help="Folder for results.json, episodes.parquet and index.html."),
 ]
-Workers = Annotated[int | None, typer.Option(min=1, help="Processes; default: as many as there are cores.")]
+Workers = Annotated[int | None, typer.Option(min=1, help="Number of processes; default: one per core.")]
 Episodes = Annotated[
-    int, typer.Option(min=1, max=100, help="How many of each task, from the first on: for a quick look.")
+    int, typer.Option(min=1, max=100, help="Number of episodes of each task, for a quick look.")
 ]
-Resume = Annotated[
-    bool, typer.Option("--resume", help="Go on in a folder that holds results, or parts of them.")
-]
+Resume = Annotated[bool, typer.Option("--resume", help="Continue in a folder with results or parts of them.")]
 Page = Annotated[
     bool, typer.Option("--page/--no-page", help="Write index.html, with the worst episodes to replay.")
 ]
 Results = Annotated[
     Path | None,
     typer.Option(
-        metavar="RESULTS",
-        help="Instead, run a sample of these results, or of a submission, again and compare.",
+        metavar="RESULTS", help="Instead, repeat a sample of these results, or of a submission, and compare."
     ),
 ]
 Submit = Annotated[
@@ -49,13 +46,11 @@ Submit = Annotated[
 ]
 Tolerance = Annotated[
     float | None,
-    typer.Option(min=0.0, help="Relative difference of costs that --verify allows; default: see docs."),
+    typer.Option(min=0.0, help="Relative difference in cost that --verify allows; default: see docs."),
 ]
 AllowCode = Annotated[
     list[str] | None,
-    typer.Option(
-        metavar="MODULE:FUNCTION", help="Code that --verify may run where the results name it; repeatable."
-    ),
+    typer.Option(metavar="MODULE:FUNCTION", help="Code named in results that --verify may run; repeatable."),
 ]
 
 
@@ -63,8 +58,8 @@ AllowCode = Annotated[
 def benchmark_command(
     controllers: Controllers = None,
     out: Out = None,
-    suite: Annotated[str, typer.Option(help="Tasks by the name of their suite.")] = "shipgym-v1",
-    tasks: Annotated[str | None, typer.Option(help="Only these tasks of it, separated by commas.")] = None,
+    suite: Annotated[str, typer.Option(help="Name of the suite of tasks.")] = "shipgym-v1",
+    tasks: Annotated[str | None, typer.Option(help="Only these tasks, separated by commas.")] = None,
     workers: Workers = None,
     engine: EngineName = "local",
     address: Address = None,
@@ -77,9 +72,9 @@ def benchmark_command(
     tolerance: Tolerance = None,
     allow_code: AllowCode = None,
 ) -> None:
-    """Run controllers through the tasks of a suite, in the same episodes, and rank them.
+    """Rank controllers on the tasks of a suite. All run the same episodes.
 
-    With --verify: exits with 1 if what is run again differs from the file.
+    With --verify, exits with 1 if the repeated results differ from the file.
     """
     if verify is not None:
         _verify(verify, sample, tolerance, workers, allow_code or [])
@@ -115,7 +110,7 @@ def benchmark_command(
                 except InputError as error:  # the results are there even without plotly
                     warn(f"there is no {PAGE}: {error}")
     except KeyboardInterrupt:
-        fail(f"interrupted; what was done is kept in {out}: go on with --resume", INTERRUPTED)
+        fail(f"interrupted; what was done is kept in {out}: continue with --resume", INTERRUPTED)
         return
     _print_result(result, out)
 

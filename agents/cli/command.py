@@ -29,23 +29,19 @@ Model = Annotated[
     str | None, typer.Option(help="A model file, or the name of a shipped model; default: mariner.")
 ]
 Sea = Annotated[str | None, typer.Option(help="calm (default), slight, moderate or rough.")]
-TaskName = Annotated[
-    str | None, typer.Option(help="A task of the suite, in place of --env, --model and --sea.")
-]
+TaskName = Annotated[str | None, typer.Option(help="A benchmark task, instead of --env, --model and --sea.")]
 EnvironmentOptions = Annotated[
     list[str] | None,
-    typer.Option("--option", metavar="NAME=VALUE", help="Any other keyword of the environment; repeatable."),
+    typer.Option("--option", metavar="NAME=VALUE", help="Any other argument of the environment; repeatable."),
 ]
-EngineName = Annotated[
-    str, typer.Option("--engine", help="Where jobs are done: local (this computer) or ray.")
-]
-Workers = Annotated[int, typer.Option(min=1, help="Jobs done at once; the results do not depend on it.")]
+EngineName = Annotated[str, typer.Option("--engine", help="Where jobs run: local (this computer) or ray.")]
+Workers = Annotated[int, typer.Option(min=1, help="Jobs at a time; the results do not depend on it.")]
 Address = Annotated[
-    str | None, typer.Option(metavar="HOST:PORT", help="Of a ray cluster; default: ray on this computer.")
+    str | None, typer.Option(metavar="HOST:PORT", help="Ray cluster; default: start Ray on this computer.")
 ]
 IdentifyOptions = Annotated[dict[str, Any], typer.Option(parser=dict, hidden=True)]  # see IdentifyCommand
 Json = Annotated[bool, typer.Option("--json", help="Print JSON for programs instead of tables.")]
-Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print errors alone, and the result with --json.")]
+Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print only errors, and the result with --json.")]
 SHARED = {"as_json": Json, "quiet": Quiet}  # options of every command
 
 

@@ -94,7 +94,7 @@ def cache_finding() -> Finding:
         kept = f"{folder}, {len(files)} files, {sum(path.stat().st_size for path in files) / 1e6:.1f} MB"
         if wrong := [f"{path.name} {why}" for path in files if (why := loop_fault(path))]:
             told = f"{kept}, {len(wrong)} of them not usable: {wrong[0]}; delete what is not, or wait until"
-            return Finding("cache", "wrong", f"{told} it is compiled anew")
+            return Finding("cache", "wrong", f"{told} it is compiled again")
         with tempfile.NamedTemporaryFile(dir=folder):
             pass
     except ValueError as error:

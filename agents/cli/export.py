@@ -18,7 +18,7 @@ def export_command(
     what: Annotated[
         str,
         typer.Argument(
-            metavar="AGENT|MODEL", help="A controller's, policy's or model's file, or a shipped name."
+            metavar="AGENT|MODEL", help="File of a controller, policy or model, or a shipped name."
         ),
     ],
     onnx: Annotated[
@@ -31,12 +31,12 @@ def export_command(
         Path | None, typer.Option(metavar="OUT.FMU", help="Write an FMU for co-simulation.")
     ] = None,
     fmi: Annotated[str, typer.Option(help="Version of the FMU: 3.0 or 2.0.")] = "3.0",
-    name: Annotated[str | None, typer.Option(help="In C and FMU; default: that of the file.")] = None,
+    name: Annotated[str | None, typer.Option(help="Name in C and FMU; default: as the file.")] = None,
     depth: Annotated[
-        float, typer.Option(metavar="M", help="Of a model: depth of the water, m; default: deep.")
+        float, typer.Option(metavar="M", help="For a model: depth of water, m; default: deep.")
     ] = float("inf"),
 ) -> None:
-    """Write an autopilot or a ship model as C99, as an FMU or, of a learned policy, as ONNX."""
+    """Write an autopilot or a ship model as C99 or FMU. Learned policies also as ONNX."""
     from agents.agent_file import load_agent
     from agents.cli.terminal import answer, say, warn
     from agents.deployment.fmu import write_fmu

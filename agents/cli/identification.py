@@ -23,21 +23,20 @@ def identify_command(
     *,
     options: IdentifyOptions,
     compare: Annotated[
-        bool,
-        typer.Option("--compare", help="Fit structures and methods and rank them on the trials held out."),
+        bool, typer.Option("--compare", help="Fit structures and methods and rank them on held-out trials.")
     ] = False,
     methods: Annotated[
-        str | None, typer.Option(metavar="NAMES", help="Those to compare, with commas between, or all.")
+        str | None, typer.Option(metavar="NAMES", help="Methods to compare, separated by commas, or all.")
     ] = None,
     structures: Annotated[
-        str | None, typer.Option(metavar="NAMES", help="Those to compare, with commas between, or auto.")
+        str | None, typer.Option(metavar="NAMES", help="Structures to compare, by commas, or auto.")
     ] = None,
 ) -> None:
-    """Identify a manoeuvring model from recorded trials; write model, metrics, settings and report.
+    """Identify a manoeuvring model from recorded trials. Writes model, metrics, settings and report.
 
-    Options not given here are those of the ship file's table [identify]; where neither names a structure,
-    structure and method are those that predict trials held out best. With --compare structures and methods
-    are ranked on the trials held out, and comparison and models are written instead.
+    Options not given here are taken from the ship file's table [identify]; if neither names a structure, the
+    structure and method that best predict held-out trials are chosen. With --compare, structures and methods
+    are ranked on the held-out trials, and comparison and models are written instead.
 
     Exits with 1 if the identified model is unstable.
     """
@@ -115,27 +114,27 @@ def _compare(
         warn(f"{name} has no setting of these names and was fitted without them: {', '.join(left)}")
     first = found.standings[0]
     if not first.stable or first.error is None:
-        fail("no method gives a model that stays stable on every trial held out", FAILED)
+        fail("no method gives a model that stays stable on every held-out trial", FAILED)
 
 
 @answered
 def advise_command(
     ship: ShipFileArgument,
     criterion: Annotated[
-        str, typer.Option(help="What to shrink: c (one coefficient), D (volume) or E (longest axis).")
+        str, typer.Option(help="What to reduce: c (one coefficient), D (volume) or E (longest axis).")
     ] = "c",
     coefficient: Annotated[
-        str | None, typer.Option(help="Of the criterion c; default: the least certain one.")
+        str | None, typer.Option(help="Coefficient for criterion c; default: the least certain.")
     ] = None,
-    number: Annotated[int, typer.Option(min=1, help="Manoeuvres to choose.")] = 3,
+    number: Annotated[int, typer.Option(min=1, help="Number of manoeuvres.")] = 3,
     *,
     options: IdentifyOptions,
 ) -> None:
-    """Show how much the trials say about each coefficient, and which manoeuvres to run next.
+    """Show what the trials determine and what to run next.
 
-    Condition number, variance inflation and Fisher information of each trial; then zigzags, turning circles
-    and binary rudder sequences, simulated on the model identified so far, by how much each would shrink what
-    is least certain.
+    Prints condition number, variance inflation and Fisher information of each trial; then by how much
+    zigzags, turning circles and binary rudder sequences, simulated on the model identified so far, would each
+    reduce what is least certain.
     """
     from agents.cli.terminal import answer, identifying, say
     from agents.identifying import identify_ship
@@ -158,14 +157,14 @@ def reduce_command(
         str, typer.Option(help="backward (drop terms one by one) or forward (add them).")
     ] = "backward",
     tolerance: Annotated[
-        float, typer.Option(min=0.0, help="By how much the R2 of stretches held out may fall.")
+        float, typer.Option(min=0.0, help="By how much R2 on held-out stretches may fall.")
     ] = 1e-3,
     *,
     options: IdentifyOptions,
 ) -> None:
-    """Drop the terms that the trials do not need, and identify with those that are left.
+    """Drop the terms that the trials do not support. Identifies the model with the remaining ones.
 
-    Writes the reduced model's files and reduction.json, with the whole path. Exits with 1 if the reduced
+    Writes the reduced model's files and reduction.json, with all steps. Exits with 1 if the reduced
     model is unstable.
     """
     from agents.cli.terminal import answer, console, identifying, prediction_table, say

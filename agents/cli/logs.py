@@ -22,10 +22,10 @@ def new_ship_command(
     ],
     out: Annotated[Path, typer.Option(metavar="FILE", help="The ship file to write.")] = Path("ship.toml"),
     length: Annotated[
-        float | None, typer.Option(min=0.01, help="Length between perpendiculars, m; else to be filled in.")
+        float | None, typer.Option(min=0.01, help="Length between perpendiculars, m; or fill it in later.")
     ] = None,
 ) -> None:
-    """Write a ship file for recorded trials, guessing columns, units and signs, and say what was guessed."""
+    """Write a ship file for recorded trials. Guesses columns, units and signs, and reports the guesses."""
     import numpy as np
 
     from agents.cli.terminal import answer, say, warn
@@ -55,7 +55,7 @@ def new_ship_command(
     answer({"written": str(out), "columns": columns, "rudder_positive": side, "notes": list(trial.notes)})
     told = [f"{one.channel}: column '{one.column}' in {one.unit}, unit {one.reason}" for one in guesses]
     told += [] if guesses else [f"channels: {', '.join(trial.channels)}"]
-    told += [f"a positive rudder steers to {side}, by the yaw that follows it"] if "delta" in trial else []
+    told += [f"a positive rudder steers to {side}, by the yaw that follows"] if "delta" in trial else []
     told.append(f"written: {out}{'' if length else ', fill in the length'}; next: shipgym look {out}")
     say("\n".join(told))
     for note in trial.notes:
@@ -67,7 +67,7 @@ def look_command(
     log: Annotated[Path, typer.Argument(metavar="LOG|SHIP.TOML", help="A log, or a ship file with trials.")],
     out: Annotated[Path, typer.Option(metavar="FILE", help="The page to write.")] = Path("look.html"),
 ) -> None:
-    """Draw the trials of a ship file, or a log: track, channels, and what was repaired or found amiss."""
+    """Draw the trials of a ship file, or a log. Shows track, channels, repairs and problems found."""
     from agents.cli.terminal import answer, say, warn
     from agents.cli.trials_page import check_page
     from shipgym.files import write_text

@@ -28,7 +28,7 @@ def reproduce_command(
     ] = None,
     as_json: Json = False,
 ) -> None:
-    """Run the papers' tables again: printed, ours their way, ours at its best, and whether the aim is met.
+    """Reproduce the papers' tables. Shows printed, ours as the paper, ours at best, and if the aim is met.
 
     Needs a checkout of the project. Exits with 1 if an aim is missed.
     """

@@ -14,15 +14,14 @@ from agents.cli.command import FAILED, answered, fail
 Address = Annotated[
     str, typer.Option("--nmea", help="tcp:HOST:PORT, udp:HOST:PORT, serial:DEVICE or serial:DEVICE@BAUD.")
 ]
-Duration = Annotated[float, typer.Option(min=0.0, help="Seconds after which it ends; default: never.")]
-SpeedUp = Annotated[float, typer.Option(min=0.01, help="Seconds that pass in one; the same at both ends.")]
+Duration = Annotated[float, typer.Option(min=0.0, help="Seconds after which to stop; default: never.")]
+SpeedUp = Annotated[float, typer.Option(min=0.01, help="Times faster than real time; same at both ends.")]
 
 
 @answered
 def steer_command(
     agent: Annotated[
-        str,
-        typer.Argument(metavar="AGENT", help="A file of a controller, or the name of a pretrained agent."),
+        str, typer.Argument(metavar="AGENT", help="A controller's file, or the name of a pretrained agent.")
     ],
     nmea: Address,
     heading: Annotated[
@@ -31,25 +30,27 @@ def steer_command(
     rate: Annotated[
         float | None,
         typer.Option(
-            "--rate-of-turn", metavar="DEG", help="Degrees per minute, of turn-rate; with --heading: at most."
+            "--rate-of-turn",
+            metavar="DEG",
+            help="Degrees per minute, for turn-rate; with --heading the limit.",
         ),
     ] = None,
     route: Annotated[
         Path | None,
-        typer.Option(metavar="CSV", help="Track of wheel-over: columns latitude and longitude, degrees."),
+        typer.Option(metavar="CSV", help="Route for wheel-over: columns latitude, longitude, degrees."),
     ] = None,
     limit: Annotated[
         list[str] | None,
-        typer.Option(metavar="NAME=VALUE", help="When it hands over: silence_s=3, rudder_deg=5; repeatable."),
+        typer.Option(metavar="NAME=VALUE", help="When to hand over: silence_s=3, rudder_deg=5; repeatable."),
     ] = None,
     duration: Duration = inf,
     speed_up: SpeedUp = 1.0,
 ) -> None:
-    """Steer over NMEA 0183: HDT or THS, ROT, RSA, VBW, VTG or RMC, APB, XTE, BWC and BWR in, ROR and HTD out.
+    """Steer over NMEA 0183. Reads HDT, THS, ROT, RSA, VBW, VTG, RMC, APB, XTE, BWC, BWR; writes ROR, HTD.
 
-    It begins when all that the autopilot reads is there. When a sensor falls silent, two disagree, the rudder
-    does not follow or the computer is late, it raises the alarm (ALR), marks its order invalid and steers no
-    more. Not certified: read docs/deployment.md first. Exits with 1 after an alarm.
+    It begins when everything that the autopilot reads is available. If a sensor falls silent, two disagree,
+    the rudder does not follow or the computer is late, it raises the alarm (ALR), marks its order invalid and
+    stops steering. Not certified: read docs/deployment.md first. Exits with 1 after an alarm.
     """
     from agents.agent_file import load_agent
     from agents.cli.terminal import answer, say
@@ -82,21 +83,19 @@ def simulate_command(
         str, typer.Argument(metavar="MODEL", help="A model file, or the name of a shipped model.")
     ],
     nmea: Address,
-    leg: Annotated[float, typer.Option(metavar="DEG", help="Leg that her plotter tells of.")] = 0.0,
+    leg: Annotated[float, typer.Option(metavar="DEG", help="Leg that her plotter sends.")] = 0.0,
     sea: Annotated[str, typer.Option(help="calm, slight, moderate or rough.")] = "calm",
-    seed: Annotated[int, typer.Option(min=0, help="Of the sea.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the sea.")] = 0,
     drop: Annotated[
         list[str] | None,
-        typer.Option(
-            metavar="HDT=60", help="Sentence that falls silent, and after how many seconds; repeatable."
-        ),
+        typer.Option(metavar="HDT=60", help="Sentence that falls silent after so many seconds; repeatable."),
     ] = None,
     duration: Duration = inf,
     speed_up: SpeedUp = 1.0,
 ) -> None:
-    """Sail a ship model as the other end of `shipgym steer`: instruments out, rudder orders in.
+    """Simulate a ship for `shipgym steer`. Sends instrument readings and receives rudder orders.
 
-    Over TCP it waits to be connected to, by the autopilot and a chart plotter at once.
+    Over TCP it waits for connections; the autopilot and a chart plotter may connect at once.
     """
     from agents.cli.terminal import answer
     from agents.deployment.simulated import STEP, SimulatedShip, simulate_ship

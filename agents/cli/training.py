@@ -36,10 +36,10 @@ def train_command(
     task: TaskName = None,
     environment_options: EnvironmentOptions = None,
     total_steps: Annotated[
-        int | None, typer.Option(min=1, help="Decisions to learn from; default: those of the settings.")
+        int | None, typer.Option(min=1, help="Decisions to learn from; default: as in the settings.")
     ] = None,
     settings: Annotated[
-        Path | None, typer.Option(metavar="FILE.TOML", help="Settings that go before the tuned ones.")
+        Path | None, typer.Option(metavar="FILE.TOML", help="Settings that override the tuned ones.")
     ] = None,
     set_: Annotated[
         list[str] | None,
@@ -48,23 +48,23 @@ def train_command(
     from_nothing: Annotated[
         bool, typer.Option("--from-nothing", help="Learn without a base: --set base=none.")
     ] = False,
-    seed: Annotated[int | None, typer.Option(min=0, max=799, help="Of everything drawn; default: 0.")] = None,
+    seed: Annotated[int | None, typer.Option(min=0, max=799, help="Random seed; default: 0.")] = None,
     randomise: Annotated[
         bool | None,
         typer.Option(
             "--randomise", help="Domain randomisation: ships drawn from the covariance, all seas, all speeds."
         ),
     ] = None,
-    threads: Annotated[int | None, typer.Option(min=1, help="Of torch and the ships; default: 1.")] = None,
+    threads: Annotated[int | None, typer.Option(min=1, help="For torch and the ships; default: 1.")] = None,
     max_seconds: Annotated[
-        float | None, typer.Option(min=0.0, help="Stop after this time; --resume goes on.")
+        float | None, typer.Option(min=0.0, help="Stop after this time; --resume continues.")
     ] = None,
-    resume: Annotated[bool, typer.Option("--resume", help="Go on with the run in the folder.")] = False,
+    resume: Annotated[bool, typer.Option("--resume", help="Continue the run in the folder.")] = False,
 ) -> None:
-    """Train an autopilot by reinforcement learning; write its policy, learning curve and checkpoints.
+    """Train an autopilot by reinforcement learning. Writes policy, learning curve and checkpoints.
 
-    Killed at any moment, the run goes on with --resume at its last checkpoint, at most a minute old, and ends
-    as if it had never stopped. With --resume what is not given is as it was, and what is given must be.
+    A run killed at any moment resumes with --resume from its last checkpoint, at most a minute old, and ends
+    as if it had never stopped. With --resume, options not given keep their values; others must be the same.
     """
     from agents.training.plan import Given
     from agents.training.settings import parsed_settings
@@ -103,7 +103,7 @@ def _train(given: Given, out: Path, resume: bool, max_seconds: float | None) -> 
             return train(plan, out, resume=resume, max_seconds=max_seconds, tell=tell, command=command)
     except KeyboardInterrupt:
         kept = (out / run_folder.CHECKPOINT).is_file()
-        fail(f"interrupted; go on with --resume --out {out}" if kept else "interrupted", INTERRUPTED)
+        fail(f"interrupted; continue with --resume --out {out}" if kept else "interrupted", INTERRUPTED)
         raise  # not reached: `fail` leaves
 
 
@@ -122,5 +122,5 @@ def _print_result(result: TrainingResult, out: Path) -> None:
         console.print(f"LQ's cost reached at step {reached['steps']:,}, after {reached['seconds']:.0f} s")
     if not result.finished:
         total = result.plan.settings.total_steps
-        say(f"stopped at step {result.steps:,} of {total:,}: go on with --resume --out {out}")
+        say(f"stopped at step {result.steps:,} of {total:,}: continue with --resume --out {out}")
     say(f"written: {out / 'agent.json'}")

@@ -27,24 +27,24 @@ if TYPE_CHECKING:
 @answered
 def tune_command(
     algorithm: Algorithm,
-    out: Annotated[Path, typer.Option(metavar="FOLDER", help="Folder of the study; one there goes on.")],
+    out: Annotated[Path, typer.Option(metavar="FOLDER", help="Folder of the study; resumed if it exists.")],
     env: Environment = None,
     model: Model = None,
     sea: Sea = None,
     task: TaskName = None,
     environment_options: EnvironmentOptions = None,
-    trials: Annotated[int, typer.Option(min=1, help="In all, those done before among them.")] = 20,
+    trials: Annotated[int, typer.Option(min=1, help="Trials in all, with those already done.")] = 20,
     total_steps: Annotated[
-        int | None, typer.Option(min=1, help="Of each trial; default: those of the settings.")
+        int | None, typer.Option(min=1, help="For each trial; default: as in the settings.")
     ] = None,
     settings: Annotated[
-        Path | None, typer.Option(metavar="FILE.TOML", help="Settings to begin from; they are varied too.")
+        Path | None, typer.Option(metavar="FILE.TOML", help="Settings to start from; they are varied too.")
     ] = None,
     set_: Annotated[
         list[str] | None,
         typer.Option("--set", metavar="SETTING=VALUE", help="A setting that is not varied; repeatable."),
     ] = None,
-    seed: Annotated[int, typer.Option(min=0, max=799, help="Of the trainings and of the search.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, max=799, help="Random seed of trainings and search.")] = 0,
     randomise: Annotated[
         bool,
         typer.Option(
@@ -55,10 +55,10 @@ def tune_command(
     workers: Workers = 1,
     address: Address = None,
 ) -> None:
-    """Search the settings with which an agent learns best (Optuna), and write them for `train --settings`.
+    """Search the settings with which an agent learns best. Uses Optuna; writes them for `train --settings`.
 
-    Four trials are proposed at a time, so more than four workers are of no use. Killed at any moment, the
-    same command goes on with the trials that were not done.
+    Four trials are proposed at a time, so more than four workers are of no use. If it is killed, the same
+    command continues with the trials that are not done.
     """
     from agents.cli.terminal import progress_bars
     from agents.engines.jobs import JobEngine

@@ -13,7 +13,7 @@ from agents.cli.command import answered
 
 Wanted = Annotated[
     list[str] | None,
-    typer.Argument(metavar="[ID|MODEL]...", help="Environments' ids, names of models, model files."),
+    typer.Argument(metavar="[ID|MODEL]...", help="Environment ids, names of models, model files."),
 ]
 All = Annotated[
     bool, typer.Option("--all", help="All environments, calm and in a sea, and all shipped models.")
@@ -23,10 +23,10 @@ SEAS = (None, "rough")  # every sea but the calm one shares what is compiled
 
 @answered
 def warm_command(wanted: Wanted = None, everything: All = False) -> None:
-    """Compile ships beforehand; without arguments, both tasks and the Mariner.
+    """Compile ships in advance. Without arguments, both tasks with the Mariner.
 
     An environment stands for its default ship in calm water and in a sea, a model for its manoeuvres and
-    simulations in calm water. Writes nothing but the cache (SHIPGYM_CACHE, else the user's cache folder).
+    simulations in calm water. Writes only to the cache (SHIPGYM_CACHE or the user's cache folder).
     """
     from agents.cli.terminal import answer, say
     from shipgym.engine.cache_folder import usable_folder

@@ -129,8 +129,8 @@ def autopilot_source(agent: Any, name: str | None = None) -> Source:
     fault = pilot if pilot is not None and not linear and law not in LAWS else None
     if fault := guide if guide is not None and guide.kind not in GUIDES else fault:
         raise InputError(
-            f"controller '{getattr(fault, 'name', type(fault).__name__)}' found, which is no closed law that "
-            f"could be C. Export 'pid', 'lq', {', '.join(map(repr, LAWS))}, {', '.join(map(repr, GUIDES))} "
+            f"controller '{getattr(fault, 'name', type(fault).__name__)}' found, which is not a closed law "
+            f"for C. Export 'pid', 'lq', {', '.join(map(repr, LAWS))}, {', '.join(map(repr, GUIDES))} "
             "over one of these, or a learned policy"
         )
     bridge = Autopilot(agent)

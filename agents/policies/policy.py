@@ -121,7 +121,7 @@ class LearnedPolicy:
             )
         if self.base is not None:
             if self.action != "rudder":
-                raise InputError(f"action: '{self.action}' found beside a base, expected 'rudder'")
+                raise InputError(f"action: '{self.action}' found together with a base, expected 'rudder'")
             self.base.check_fits(self.observation_names, self.observation_scales, "base")
         n_in = self.frame_stack * n + (self.base is not None)
         n_out, has = OUTPUTS[self.action], self.network.sizes

@@ -67,9 +67,7 @@ def read_policy(content: Mapping[str, Any], path: Path) -> LearnedPolicy | Shiel
     with placed(where):
         agent: LearnedPolicy | Shielded | OneForAll = READERS[content["kind"]](content, tensors, "")
     if tensors:
-        raise InputError(
-            f"{weights_path(path)}: unknown {quoted(tensors)} found beside the weights; {REMEDY}"
-        )
+        raise InputError(f"{weights_path(path)}: unknown {quoted(tensors)} found with the weights; {REMEDY}")
     return agent
 
 

@@ -158,7 +158,9 @@ def _task(given: Given, stored: Plan | None) -> BenchmarkTask:
     beside += ["--option"] * bool(given.options)
     if given.task is not None:
         if beside:
-            raise InputError(f"--task: found beside {beside[0]}, which the task says; leave one of them out")
+            raise InputError(
+                f"--task: found together with {beside[0]}, which the task sets; leave one of them out"
+            )
         return find_task(given.task)
     if stored is not None and not beside:
         return stored.task

@@ -33,7 +33,7 @@ CONFIGURATION: Shape = {
     "settings": {}, "seed": (int,), "randomise": (bool,),
 }  # fmt: skip
 PACKAGES = ("shipgym", "numpy", "numba", "gymnasium", "torch", "stable-baselines3", "sb3-contrib")
-REMEDY = "begin the run anew in another folder"
+REMEDY = "start a new run in another folder"
 
 
 def versions() -> dict[str, str]:

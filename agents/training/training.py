@@ -326,7 +326,7 @@ class _Training:
             self.seconds_before = own["seconds"]
         except (KeyError, TypeError, ValueError, RuntimeError, AttributeError) as error:
             why = str(error).partition("\n")[0].rstrip(" :")  # torch lists every network's layer after it
-            raise InputError(f"{checkpoint}: does not fit this run ({why}); begin the run anew") from None
+            raise InputError(f"{checkpoint}: does not fit this run ({why}); start a new run") from None
         self.resumed_from = self.agent.num_timesteps
 
 

@@ -85,7 +85,7 @@ def identify_reduced(
     table = full.model.table
     if isinstance(table, GreyBox):
         raise InputError(
-            f"structure: {table.name!r} found, whose table stands beside a reference ship, expected one of "
+            f"structure: {table.name!r} found, whose table adds to a reference ship, expected one of "
             "its own to reduce, such as 'abkowitz'"
         )
     reductions = reduce(full.samples, table, direction, tolerance)

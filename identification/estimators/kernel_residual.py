@@ -91,7 +91,7 @@ def stabilised(model: ShipModel) -> ShipModel:
             break
     else:
         raise InputError(
-            "kernel: no damping steadies the linear ship beneath it; check rudder and yaw rate, "
+            "kernel: no damping stabilises the linear ship beneath it; check rudder and yaw rate, "
             "or name a reference_model"
         )
     c |= {"b_v": c["b_v"] - shift, "c_r": c["c_r"] - shift}
@@ -122,7 +122,7 @@ def fit_kernel(
     remarks = []
     if "kernel" in errors and not errors["kernel"] < errors["reference"]:
         remarks.append(
-            "on trials held out the kernel predicts the heading no better than its reference ship alone "
+            "on held-out trials the kernel predicts the heading no better than its reference ship alone "
             f"({np.degrees(errors['kernel']):.2g} and {np.degrees(errors['reference']):.2g} deg rms)"
         )
     kernel = kernels[length]

@@ -66,7 +66,7 @@ def _with_wind(
     except InputError as error:
         if option != "auto":
             raise
-        remarks.append(f"the wind that was logged is not taken out: {error}")
+        remarks.append(f"the logged wind is not removed: {error}")
         return dict(trials)
     if option != "auto" and not any("wind_udot" in trial for trial in found.values()):
         raise InputError(
@@ -101,7 +101,7 @@ def _take_out_current(
             doubt = f"{np.hypot(*mean):.2g} m/s found, expected less than the ship's speed of {speed:.3g} m/s"
         if doubt and (option != "auto" or covariance is None):
             remedy = "give it in m/s, towards north and east" if covariance is None else REMEDY
-            raise InputError(f"trial {trial.name!r}: no current can be taken out: {doubt}; {remedy}")
+            raise InputError(f"trial {trial.name!r}: no current can be removed: {doubt}; {remedy}")
         if doubt:
             doubts.setdefault(doubt, []).append(PurePath(trial.name).name)
         if doubt or (option == "auto" and row.get("probability", 0.0) > SIGNIFICANT):
@@ -110,7 +110,7 @@ def _take_out_current(
             found[trial.name] = through_water(trial, *current)
         rows[trial.name] = row
     remarks += [
-        f"{', '.join(names)}: no current is taken out: {text}; {REMEDY}" for text, names in doubts.items()
+        f"{', '.join(names)}: no current is removed: {text}; {REMEDY}" for text, names in doubts.items()
     ]
     return rows
 

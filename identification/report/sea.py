@@ -13,7 +13,7 @@ from shipgym.plots.style import Figure
 from shipgym.trials.units import KNOT
 
 NORMAL_95 = 1.96
-SOURCES = {"all trials": "one of all", "trial": "its own", "given": "as given", "columns": "of its columns"}
+SOURCES = {"all trials": "one for all", "trial": "its own", "given": "as given", "columns": "from columns"}
 
 
 def sea_sentences(provenance: Mapping[str, Any]) -> list[str]:
@@ -25,14 +25,12 @@ def sea_sentences(provenance: Mapping[str, Any]) -> list[str]:
     wind = provenance.get("wind", {})
     if "mean_speeds" in wind:
         speeds = wind["mean_speeds"].values()
-        found.append(
-            f"wind of {min(speeds):.2g} to {max(speeds):.2g} m/s on average: its forces are taken out"
-        )
+        found.append(f"wind of {min(speeds):.2g} to {max(speeds):.2g} m/s on average: its forces are removed")
     for name, row in wind.get("accelerations", {}).items():
         parts = [
             f"{axis[5]}dot {value:.2g} {'m' if axis[5] == 'v' else 'rad'}/s²" for axis, value in row.items()
         ]
-        found.append(f"{PurePath(name).name}: constant acceleration taken out, {', '.join(parts)}")
+        found.append(f"{PurePath(name).name}: constant acceleration removed, {', '.join(parts)}")
     return found
 
 
@@ -45,7 +43,7 @@ def _current(row: Mapping[str, Any]) -> str:
         text += f", which {'differs' if row['probability'] < SIGNIFICANT else 'does not differ'} from zero"
     elif row["source"] in ("trial", "all trials"):
         text += ", a guess without an interval, as the trials keep to one heading"
-    return text + ("; taken out" if row["taken_out"] else "; left in")
+    return text + ("; removed" if row["taken_out"] else "; left in")
 
 
 def _set_and_drift(row: Mapping[str, Any]) -> str:

@@ -52,7 +52,7 @@ def are_derivatives(model: ShipModel) -> bool:
 
 def _coefficients(fit: Fit) -> Table:
     structure = fit.model.dynamics
-    title, unit = f"Coefficients of {structure.quantity}s, {structure.normalisation}", 1.0
+    title, unit = f"Coefficients of {structure.quantity}s, {structure.normalisation} units", 1.0
     if are_derivatives(fit.model):
         title, unit = "Hydrodynamic derivatives, prime system, 1e-5", PRIME
     table = lined_table(title, "name", ">value", ">standard error", ">t")

@@ -62,7 +62,7 @@ def checked_mmg(options: Options) -> Options:
         )
     if options.prior is not None and options.reference_model is not None:
         raise InputError(
-            f"reference_model: {name_of(options.reference_model)!r} found beside prior "
+            f"reference_model: {name_of(options.reference_model)!r} found together with prior "
             f"{name_of(options.prior)!r}, expected one of them: the coefficients of structure 'mmg' are "
             "pulled to one reference ship, or to formulas"
         )

@@ -96,7 +96,7 @@ def held_out_error(fit: Fit) -> str:
         words = {"overshoot 1": "first overshoot", "overshoot 2": "second overshoot"}.get(words, words)
         told.append(f"{words} {100.0 * error:.2g} % ({PurePath(name).name})")
     return (
-        f"Worst errors on trials held out: {', '.join(told)}." if told else "No trial held out has a heading."
+        f"Worst errors on held-out trials: {', '.join(told)}." if told else "No held-out trial has a heading."
     )
 
 

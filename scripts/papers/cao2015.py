@@ -261,7 +261,7 @@ CONCLUSIONS = (
         "the printed table itself has 156 %",
     ),
     Conclusion(
-        "A derivative that does little to the motion is badly found",
+        "A derivative with little effect on the motion is poorly identified",
         tuple(_summary(structure, RANKS) for structure in STRUCTURES.values()),
         lambda *found: all(row.as_paper < -0.5 for row in found),
         "rank correlation below -0.5",

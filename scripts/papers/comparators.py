@@ -307,7 +307,7 @@ CONCLUSIONS = (
         "by a factor of ten",
     ),
     Conclusion(
-        "The same of a linear model",
+        "The same for a linear model",
         tuple(f"zhu2018, Table 7.3.2: {_LARGEST.format(start)}" for start in STARTS),
         lambda *found: max(row.as_paper for row in found) > 10.0 * min(row.as_paper for row in found),
         "but where the start is left open the filter is better than our recursion",

@@ -136,7 +136,7 @@ def _virtual_row(rudder: float, index: str, words: str, errors: Pair, aimed: boo
         *errors,
         f"within {WITHIN:g}" if aimed else "",
         _within(errors[1], WITHIN) if aimed else None,
-        "their way: reference tanker; at best: the same hull at full scale",
+        "as the paper: reference tanker; at best: the same hull at full scale",
     )
 
 
@@ -326,13 +326,13 @@ CONCLUSIONS = (
         "on MARIN's turn; the bare tanker is 1 and 6 % off",
     ),
     Conclusion(
-        "The same of the MMG model as the target",
+        "The same with the MMG model as the target",
         tuple(f"{VIRTUAL}: +35 deg: {words}{kind}, error, %" for kind in ("", f", {BARE}")
               for words in WORDS.values()),
         lambda advance, tactical, bare_advance, bare_tactical:
         abs(advance.as_paper) < abs(bare_advance.as_paper)
         and abs(tactical.as_paper) < abs(bare_tactical.as_paper),
-        "where the bare reference happens to be right a correction from zigzags can spoil it",
+        "where the bare reference happens to be right, a correction from zigzags can spoil it",
     ),
     Conclusion(
         "The zigzag's overshoots are acceptable (Table 5)",
@@ -350,7 +350,7 @@ CONCLUSIONS = (
     ),
     Conclusion(
         "It is more accurate than computational fluid dynamics (Tables 5 to 7)",
-        remark="those results are of others; one model test without repetition bounds neither",
+        remark="those results are not ours; one model test without repetition bounds neither",
     ),
 )  # fmt: skip
 PAPER = Paper(

@@ -17,15 +17,15 @@ HEADINGS = ("case", "quantity", "printed", "{ours}", "agrees", "at best", "aim",
 NUMBERS = ("printed", "{ours}", "at best")
 INTRODUCTION = """# The papers' tables, run again
 
-Written by `python scripts/reproduce.py all --markdown docs/reproduction.md`. *Printed* is the paper's number,
-*as the paper* ours by its method on the same case, *at best* ours by the best method that there is here, on
-the same data. A cell is empty where the paper shows only a picture or does not publish what it used; the
-note, whose number stands in the last column, then says what stands in for it.
+Written by `python scripts/reproduce.py all --markdown docs/reproduction.md`. *Printed* is the paper's number;
+*as the paper* is our number by the paper's method on the same case; *at best* is ours by the best method in
+shipgym, on the same data. A cell is empty where the paper shows only a picture or does not publish its data;
+the note, whose number is in the last column, then says what is used instead.
 
-*Agrees* says whether *as the paper* is what is printed: within 10 %, or by what rounding to the printed
-digits hides. It is another question than *met*: whether *at best* reaches the aim. An aim is counted once
-however many rows show the same number. The conclusions of each paper stand before its tables, each with the
-rows that confirm or contradict it; what "accurate" or "better" was taken to mean is said beside.
+*Agrees* says whether *as the paper* equals the printed number within 10 % or within the rounding of the
+printed digits. *Met* is a different question: whether *at best* reaches the aim. An aim is counted once, even
+if several rows show the same number. The conclusions of each paper come before its tables, each with the rows
+that confirm or contradict it and with what "accurate" or "better" was taken to mean.
 """
 
 

@@ -54,7 +54,7 @@ TABLE_3_3 = {"SG": {"K": 52.0, "T": 52.0}, "NISG": {"K": 22.3, "T": 15.3}}
 ESTIMATES = {"SG": (0.072, 22.9088), "NISG": (0.1165, 40.2886)}  # K and T
 TABLE_3_4 = {"SG": {"alpha": 2.6, "beta": 5.5}, "NISG": {"alpha": 0.04, "beta": 2.0}}
 RATIOS = {"c_r": "alpha K/T", "c_r3": "beta K/T", "c_d": "K/T"}
-FAR = "the start is not printed; from 0, and by regressors scaled to 1, the gradient is still on its way"
+FAR = "the start is not printed; from 0, with regressors scaled to 1, the gradient has not converged"
 
 
 def ship(structure: str, coefficients: Mapping[str, float] | None = None) -> ShipModel:
@@ -221,11 +221,11 @@ def innovation_rows() -> Iterator[Row]:
     largest = gradient(X, y, omega=1.0)[1]
     yield Row(
         "Equation 3-7", "largest omega e of the run, omega 1", None, largest, None, "far below 1",
-        largest < 0.1, "so tanh(omega e) is omega e: the innovation is not bent",
+        largest < 0.1, "so tanh(omega e) is omega e: the innovation is not changed",
     )  # fmt: skip
     yield Row(
         "Equation 3-7", f"mean error of K and T, %: NISG of omega {OMEGA:g} less SG", -33.2, half - plain,
-        None, "", None, "as printed omega only shortens the steps; the printed gain cannot come of it",
+        None, "", None, "as printed omega only shortens the steps; that cannot cause the printed gain",
     )  # fmt: skip
     yield Row(
         "Equation 3-7", "mean error of K and T, %: NISG of omega 1 less SG", -33.2, whole - plain, None,
@@ -240,7 +240,7 @@ def innovation_rows() -> Iterator[Row]:
     yield Row(
         "Equation 3-3", "T by SG on columns as they are: error, %", 52.0,
         100.0 * abs(-1.0 / raw[0] / T - 1.0), None, "", None,
-        "r is a fifteenth of delta, and the gradient sees delta alone: the paper must have scaled",
+        "r is a fifteenth of delta, and the gradient depends on delta alone: the paper must have scaled",
     )  # fmt: skip
 
 
@@ -330,7 +330,7 @@ CONCLUSIONS = (
         "It converges better than the other methods",
         ("Figures 3.2, 3.3: K/T by SG: error, %", "Figures 3.2, 3.3: K/T by NISG: error, %"),
         lambda sg, nisg: nisg.as_paper < sg.as_paper,
-        "after 2000 s neither has arrived; least squares (at best) has",
+        "after 2000 s neither has converged; least squares (at best) has",
     ),
     Conclusion(
         "Without the matrix inverse the multi-innovation least squares are faster",

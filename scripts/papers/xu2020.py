@@ -276,7 +276,7 @@ def _term_row(step: Step, name: str) -> Row:
     first = 100.0 * path[0].relative_errors[name]
     note = "" if revised is None else "kept by the paper here and dropped later: the truth has none"
     if abs(first) < 1.0 and not kept:
-        note = "u' = 1 in this type of test: the pair is one term, of which half is found twice"
+        note = "u' = 1 in this type of test: the pair is one term, and each gets half of it"
     return Row(
         f"Table {step.table}", f"{name}: standard error before it is dropped, %", old, first, None, "dropped",
         not kept, note,
@@ -320,7 +320,7 @@ def kept_rows() -> Iterator[Row]:
     yield Row(
         "Tables 3 to 10", f"of {REPEATED} draws of the noise those that leave exactly the 18", None,
         counts[0], counts[1], f"{REPEATED}", min(counts) == REPEATED,
-        "of two terms that say the same the one of which u is a factor (equation 42) stays, as in the paper",
+        "of two equivalent terms the one with the factor u (equation 42) is kept, as in the paper",
     )  # fmt: skip
 
 
@@ -346,7 +346,7 @@ def validation_rows() -> Iterator[Row]:
         yield Row(
             "Table 12", f"R2 of {force}, all tests", printed, ours[force], best[force],
             "at least the printed", best[force] > printed,
-            "the paper's is of a real ship, of whom 18 terms do not say all",
+            "the paper's is for a real ship, which 18 terms cannot fully describe",
         )  # fmt: skip
 
 
@@ -383,8 +383,8 @@ def uncertainty_rows() -> Iterator[Row]:
     yield Row(
         "Table 12", "largest standard error of Table 11 if all that R2 leaves were white noise, %", 3.85,
         None, worst, "", None,
-        "the printed errors and the printed R2 do not go together as white noise on this many samples: most "
-        "of what R2 leaves is not noise",
+        "the printed errors and the printed R2 are not consistent with white noise on this many samples: "
+        "most of what R2 leaves is not noise",
     )  # fmt: skip
 
 
@@ -427,7 +427,7 @@ CONCLUSIONS = (
         "Classical LS-SVM reproduces the training data and fails on other data: it overfits",
         (f"Table 2: of {len(SCANNED)} C those that fit the training set and fail in validation",),
         lambda found: found.as_paper > 0,
-        "both are good up to C = 1e14, both bad from 1e16 on: where it fails it has not fitted either",
+        "both are good up to C = 1e14, both bad from 1e16 on: where it fails, its fit has failed too",
     ),
     Conclusion(
         "Truncation gives a robust estimate where the columns are collinear",

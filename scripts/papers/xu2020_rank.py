@@ -103,6 +103,6 @@ def rows() -> Iterator[Row]:
             yield Row(
                 "Section 3.2", f"38 terms, noise of {100 * noise:g} %: {what}", None, float(found[k][-1]),
                 found.chosen[k], "below that of all 38 directions", found.chosen[k] < found[k][-1],
-                f"condition number {condition:.2g}; their way all 38 directions, as in LS-SVM; at best "
+                f"condition number {condition:.2g}; as the paper: all 38 directions, as in LS-SVM; at best "
                 f"truncated at the corner of the L-curve, rank {ranks}; {DRAWS} draws",
             )  # fmt: skip

@@ -212,10 +212,10 @@ def _painter(tests: Captive, found: dict[str, Found]) -> Callable[[Any], None]:
 
 
 TEXT = """
-{count} different steady conditions (some of the 81 listed stand there twice) at a constant shaft speed:
-rudder at six speeds, drift, drift with rudder. Terms: powers of v' = -sin(drift), rudder d and loading n =
-U0/U; forces by rho L^2 U0^2/2 with one U0 for all, as the balance feels them. Terms are dropped one by
-one (uncertain or collinear) while what is held out, five folds with tests of every kind, is explained as
+{count} different steady conditions (some of the 81 listed are repeated) at a constant shaft speed: rudder
+at six speeds, drift, drift with rudder. Terms: powers of v' = -sin(drift), rudder d and loading n = U0/U;
+forces by rho L^2 U0^2/2 with one U0 for all, as the balance measures them. Uncertain or collinear terms are
+dropped one by one as long as the held-out tests (five folds with tests of every kind) are explained as
 well.
 
 {fits}
@@ -224,12 +224,13 @@ The reduced models:
 
 {coefficients}
 
-Harder: the same terms fitted to rudder and drift tests alone, the tests with both predicted:
+A harder test: the same terms are fitted to rudder tests and drift tests alone, and the tests with both are
+predicted:
 
 {combined}
 
-**Limits.** Without yaw or acceleration the tests identify neither inertia nor the damping of yaw; the
-terms that rudder and drift share show in the tests with both only.
+**Limits.** Without yaw or acceleration the tests identify neither inertia nor the damping of yaw; the cross
+terms of rudder and drift appear only in the tests with both.
 
 ![Measured and modelled forces](images/real_ships_e.svg)
 """

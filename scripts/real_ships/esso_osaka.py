@@ -171,9 +171,9 @@ def _painter(ship: MeasuredShip, found: dict[str, Any]) -> Callable[[Any], None]
 
 
 TEXT = """
-Each of the six zigzags predicted from the five others, open loop from measured rudder and shaft speed; 5
-Hz. The ship lies still at first; the structures `cubic` and the grey box know the shaft speed and so can
-start from rest. From where she has way on her (0.1 m/s):
+Each of the six zigzags is predicted from the five others, open loop from measured rudder and shaft speed; 5
+Hz. The ship is at rest at first; the structure `cubic` and the grey box include the shaft speed and so can
+start from rest. From when she has way on (0.1 m/s):
 
 {way}
 
@@ -181,17 +181,17 @@ The whole runs, from rest:
 
 {rest}
 
-How large the motion is (under way):
+For comparison, the size of the motion (under way):
 
 {size}
 
 Values that the repair replaces as outliers: {repaired}.
 
-**Limits.** The wind is a third of the ship's speed and no model here knows it: what it does to heading
-is counted as error. About half of the yaw rate is predicted; heading, its integral, is missed by more
-than the motion itself. Repair changes little here: least squares over whole runs hardly feels a few
-short spikes. Each run has its own shaft speed (10 to 17 1/s), so that most predictions are at a speed
-that few of the others have. A structure that does not know the shaft keeps its speed.
+**Limits.** The wind is a third of the ship's speed and no model here includes it: its effect on the heading
+counts as error. About half of the yaw rate is predicted; the error of heading, its integral, is larger than
+the motion itself. Repair changes little here: a few short spikes hardly affect least squares over whole
+runs. Each run has its own shaft speed (10 to 17 1/s), so that most predictions are at a speed that few of
+the other runs cover. A structure without the shaft speed keeps its speed.
 
 ![Zigzags from rest](images/real_ships_d.svg)
 """

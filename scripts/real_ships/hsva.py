@@ -159,26 +159,26 @@ def _painter(ship: MeasuredShip, found: dict[str, Any]) -> Callable[[Any], None]
 
 
 TEXT = """
-Means over the runs not used, all {count} ways to take three of the six zigzags that switch at 5 or 10
-degrees, predicted open loop from the measured rudder; every fourth sample (5 Hz).
+Means over the runs that are not used, for all {count} ways to take three of the six zigzags that switch at
+5 or 10 degrees, predicted open loop from the measured rudder; every fourth sample (5 Hz).
 
 {table}
 
-Fits that the guard refuses run away in a simulated hard turn or reversal; the table shows what they
-predict all the same, without the runs in which they run away.
+Fits that the guard refuses run away in a simulated hard turn or reversal; the table still shows their
+predictions, without the runs in which they run away.
 
 `abkowitz12` is the Abkowitz table of the Mariner without the cube of the rudder, its products with drift,
 and three terms of surge. Its coefficients are pulled toward the KVLCC2 of the literature by virtual trials
-of that ship, which is what fixes the turn. Chosen within the triple, the pull is the strongest of 0 to 0.2
-whose error of r, each run predicted from the two others, is within a quarter of the least. The last row has
-the pull of 0.1 that all six runs choose by that rule, see (b): one recipe for zigzags and turns.
-**The table itself was found while looking at all six runs** (some fifty were tried), so that its figures
-are favourable to it. 'Table and pull chosen within the triple' chooses between `abkowitz`, `abkowitz12`
-and `abkowitz12` with the cube of the rudder, and the pull of least error, within each triple: of it only
-the list of three tables has seen the runs that it predicts. Where a model runs away in the guard the
-next stronger pull is taken.
+of that ship, which determines the turn. Chosen within the triple, the pull is the strongest of 0 to 0.2
+whose error of r, each run predicted from the two others, is within a quarter of the smallest. The last row
+has the pull of 0.1 that this rule gives for all six runs, see (b): one recipe for zigzags and turns. **The
+table itself was found while looking at all six runs** (some fifty were tried), so its figures are
+optimistic. 'Table and pull chosen within the triple' chooses between `abkowitz`, `abkowitz12` and
+`abkowitz12` with the cube of the rudder, and the pull with the smallest error, within each triple: only the
+list of three tables depends on the runs that it predicts. If a model runs away in the guard, the next
+stronger pull is taken.
 
-What the same fits sail with the rudder at 35 degrees, from straight ahead, means and standard deviations
+Turns of the same fits with the rudder at 35 degrees, from straight ahead, means and standard deviations
 over the fits (measured at MARIN, see (b): 3.25 and 3.34 to starboard):
 
 {turns}
@@ -187,12 +187,12 @@ By run, `abkowitz12` with the pull:
 
 {runs}
 
-**Limits.** Repeats of the 10/10 agree within 0.2 to 0.5 degrees of first overshoot: the aim of 0.4 lies
-within what the experiment itself repeats. Z_10_05 is the worst in second overshoot: even least squares with
-the full Abkowitz table on all six runs misses it by 2.9 degrees. Z_30_05 is an extrapolation from runs of
-at most 20 degrees of rudder. Zigzags that switch at 1 degree are not counted:
-KVLCC2 is unstable on course, and open loop the smallest error of the neutral helm grows into a drift of
-heading; the model of the first triple gives
+**Limits.** Repeats of the 10/10 agree within 0.2 to 0.5 degrees of first overshoot: the aim of 0.4 is
+within the repeatability of the experiment itself. Z_10_05 is the worst in second overshoot: even least
+squares with the full Abkowitz table on all six runs misses it by 2.9 degrees. Z_30_05 is an extrapolation
+from runs of at most 20 degrees of rudder. Zigzags that switch at 1 degree are not counted: KVLCC2 is
+unstable on course, and in open loop the smallest error of the neutral helm grows into a heading drift; the
+model of the first triple gives
 
 {slight}
 

@@ -141,10 +141,10 @@ def _circles(axis: Any, models_: dict[str, ShipModel]) -> None:
 
 
 TEXT = """
-Fitted to all six HSVA zigzags of (a), scaled to MARIN's length and speed by Froude's law. The settings
-come from HSVA data alone but for one: how much worse a stronger pull may be on the zigzags (a quarter) was
-set when it was known how the turns depend on the pull. MARIN's zigzags are predicted open loop from the
-measured rudder, full scale (times 6.76 for the yaw rate of a 7 m model).
+Fitted to all six HSVA zigzags of (a), scaled to MARIN's length and speed by Froude's law. The settings come
+from HSVA data alone, with one exception: by how much a stronger pull may increase the error on the zigzags
+(a quarter) was set after it was known how the turns depend on the pull. MARIN's zigzags are predicted open
+loop from the measured rudder, full scale (times 6.76 for the yaw rate of a 7 m model).
 
 {zigzags}
 
@@ -156,22 +156,22 @@ Turning circles with 35 degrees of rudder from straight ahead at service speed, 
 
 {turns}
 
-The refinement fits what the model simulates in segments of 8 ship lengths; the reference ship's turns stay
-inside its cost (`anchor="kvlcc2-l7"`) with a weight of 0.01.
+The refinement fits the simulated motion in segments of 8 ship lengths; the reference ship's turns are
+included in its cost (`anchor="kvlcc2-l7"`) with a weight of 0.01.
 
-{verdict} The measured values printed for -35 repeat those of +35 and are not used; measured circles are not
-among the data here.
+{verdict} The measured values printed for -35 repeat those of +35 and are not used; the data here do not
+include measured circles.
 
-The pull, {strength}, is found as in (a), each of the six runs predicted from the five others. How the turn
-depends on it, which the zigzags hardly tell:
+The pull, {strength}, is found as in (a), each of the six runs predicted from the five others. The next
+table shows how the turn depends on it, which the zigzags hardly determine:
 
 {path}
 
-**Limits.** MARIN's neutral helm is about -0.8 to -1.2 degrees, HSVA's is not: the heading of an unstable
-ship drifts by it, whatever the model. The steady turn (drift of 20 degrees, speed down to 0.37) lies
-outside all zigzags. What fixes it is the reference ship: the weaker the pull, the better the zigzags and the
-wider the circle. The rule that chooses the pull gives up a quarter of the zigzags' accuracy for it; that
-quarter is a judgement, no measurement.
+**Limits.** MARIN's neutral helm is about -0.8 to -1.2 degrees, HSVA's is not: this makes the heading of an
+unstable ship drift, whatever the model. The steady turn (drift of 20 degrees, speed down to 0.37) lies
+outside all zigzags. It is determined by the reference ship: the weaker the pull, the better the zigzags and
+the wider the circle. The rule that chooses the pull gives up a quarter of the zigzags' accuracy for it;
+that quarter is a judgement, not a measurement.
 
 ![MARIN's zigzags and circles](images/real_ships_b.svg)
 """

@@ -104,13 +104,13 @@ def shown(ship: MeasuredShip, fitted: dict[str, ShipModel]) -> Callable[[Any], N
 
 
 TEXT = """
-Samples at about 1 Hz, the reference ship converted by similarity, Mei's reference (the tanker, which his
-selection by particulars picks) and the KVLCC2 of the literature. Each zigzag predicted from the three
-others:
+Samples are at about 1 Hz and the reference ship is converted by similarity. The reference ships are Mei's
+(the tanker, which his selection by particulars gives) and the KVLCC2 of the literature. Each zigzag is
+predicted from the three others:
 
 {zigzags}
 
-The 20/20 to starboard (the paper tunes on it) from a fit of all four runs:
+The 20/20 to starboard, on which the paper tunes, from a fit of all four runs:
 
 {overshoots}
 
@@ -118,9 +118,9 @@ Turning circles with 35 degrees of rudder, ship lengths:
 
 {turns}
 
-**Limits.** The overshoots that the paper prints as measured are not those of this record. First
-overshoots to starboard and to port, measured, degrees: {differences}. The linear correction of RM-SVM is
-fitted where the zigzags are; in the steady turn it is extrapolated, and may make the turn worse than the
+**Limits.** The overshoots that the paper prints as measured are not those of this record. First overshoots
+to starboard and to port, measured, degrees: {differences}. The linear correction of RM-SVM is fitted in the
+range of the zigzags; in the steady turn it is extrapolated, and may make the turn worse than that of the
 bare reference ship.
 
 ![MARIN's zigzags and circles by RM-SVM](images/real_ships_c.svg)

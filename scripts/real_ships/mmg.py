@@ -201,23 +201,24 @@ def painter(
     return paint
 
 
-LIMITS = """Met are the aims of yaw rate, heading and first overshoot by both priors; of the advance to port
-and of drift and diameter to starboard by that of the reference ship, of drift to starboard by that of
-formulas. Missed are the second overshoot (0.68 and 0.58 for 0.45), the advance (3.7 % to starboard; 1.6 and
-1.4 %), the tactical diameter to port (5.9 %) or to both sides (5.4 and 12.6 %), and drift to port by 0.3
-and 0.1 degrees. In MARIN's tank the ship turns tighter to port, by 3 % in advance and 8 % in diameter;
-HSVA's zigzags show no such difference, and the models turn nearly alike to both sides: a diameter alike to
-both sides is at best 4.2 % off one of them. HSVA's measured thrust differs to the two sides; models that
-have it predict the fitted runs no better. A weaker prior predicts the zigzags better and the turn wider:
-with formulas as wide as published ships scatter the zigzags are met better than before (0.082 for 0.091
-deg/s) and the circle worse (5.4 and 12.6 for 1.0 and 8.8 %). The rule that chose the strength decides
-between them, and the trials hardly do."""
+LIMITS = """Both priors meet the aims for yaw rate, heading and first overshoot; that of the reference ship
+also those for the advance to port and for drift and diameter to starboard, that of formulas the one for
+drift to starboard. Missed are the aims for the second overshoot (0.68 and 0.58 instead of 0.45), the
+advance (3.7 % to starboard; 1.6 and 1.4 %), the tactical diameter to port (5.9 %) or to both sides (5.4 and
+12.6 %), and drift to port by 0.3 and 0.1 degrees. In MARIN's tank the ship turns tighter to port, by 3 % in
+advance and 8 % in diameter; HSVA's zigzags show no such difference, and the models turn nearly alike to
+both sides: a diameter that is the same to both sides is at best 4.2 % off one of them. HSVA's measured
+thrust differs between the two sides; models that include this predict the fitted runs no better. With a
+weaker prior the zigzags are predicted better and the turns become wider: with formula priors as wide as
+published ships scatter, the zigzags are predicted better than with narrower ones (0.082 instead of 0.091
+deg/s) and the circle worse (5.4 and 12.6 instead of 1.0 and 8.8 %). The choice between them is made by the
+rule for the strength; the trials hardly decide it."""
 
 TEXT = """
 Structure `mmg` ([structures](structures.md#the-mmg-form)), fitted to {fitted} alone. Means over the three
-other zigzags that switch at 5 or 10 degrees, open loop from the measured rudder, every fourth sample (5 Hz);
-the last two columns are the overshoots with the rudder reversed at the measured headings, which the neutral
-helm hardly touches.
+other zigzags that switch at 5 or 10 degrees, open loop from the measured rudder, every fourth sample (5
+Hz); the last two columns are the overshoots with the rudder reversed at the measured headings, which the
+neutral helm hardly affects.
 
 {zigzags}
 
@@ -225,34 +226,34 @@ The terms beyond the standard form and the prior's standard deviations with a re
 earlier study that had seen all of these runs; with formulas the standard deviations are at least the
 scatter of four published ships about them, this one among them (`tests/identification/test_mmg.py`). The
 strength of the prior is the strongest of 1, 2, 3 that is within a tenth of the best when each of the three
-fitted runs is predicted from the two others: the errors of yaw rate, heading and both reversed overshoots
-by their aims, on average:
+fitted runs is predicted from the two others: the score is the average of the errors of yaw rate, heading
+and both reversed overshoots, each divided by its aim:
 
 {chosen}
 
-Forty-five recipes were compared like this for each of the first two priors, before the other runs were
-opened, and none but the strength made a difference that counts: segments of 0.35 to 5 ship lengths in place
+Forty-five recipes were compared in this way for each of the first two priors, before the other runs were
+looked at, and only the strength made a significant difference: segments of 0.35 to 5 ship lengths in place
 of 1.7 (at strength 2 one length is 0.01 and 0.11 better, 1.3 lengths are worse, 3 and 5 far worse), a
-propeller whose advance ratio, or whose thrust, wake and difference of the sides, are those measured (within
-0.09 of the rows above), a helm offset for each run (0.03 better to 0.23 worse), a kernel on the residuals
-(overshoots better, heading worse: 1.3 to 1.9). How far the other runs are met with strengths 1, 2 and 3 had
-been on this page before, with the priors of then.
+propeller whose advance ratio, or whose thrust, wake and difference of the sides, are the measured ones
+(within 0.09 of the rows above), a helm offset for each run (0.03 better to 0.23 worse), a kernel on the
+residuals (overshoots better, heading worse: 1.3 to 1.9). However, the results on the other runs with
+strengths 1, 2 and 3 were already known for earlier priors.
 
 The rows with other strengths are there for comparison. By run, with the prior of the reference ship:
 
 {runs}
 
-What moved farthest from that prior (in its standard deviations): {found}. `c_R` is the rudder's force beyond
-the sine of its angle of attack.
+The coefficients that moved farthest from that prior (in its standard deviations): {found}. `c_R` is the
+rudder's force beyond the sine of its angle of attack.
 
-The same models at MARIN's scale (Froude), rudder 35 degrees from straight ahead at service speed, the clock
-from the execute; in brackets off the measured circles (aims: advance 1 %, tactical diameter 4 %, drift 1.5
-deg):
+The same models at MARIN's scale (Froude), rudder 35 degrees from straight ahead at service speed, with time
+counted from the execute order; in brackets the difference from the measured circles (aims: advance 1 %,
+tactical diameter 4 %, drift 1.5 deg):
 
 {circles}
 
-A fit, its strength chosen and every trial predicted, takes about {seconds:.1f} s of processor time with a
-warm cache (aim: 3 s).
+A fit, including the choice of strength and the prediction of every trial, takes about {seconds:.1f} s of
+processor time with a warm cache (aim: 3 s).
 
 **Limits.** {limits}
 

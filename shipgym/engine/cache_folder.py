@@ -39,7 +39,7 @@ def usable_folder() -> Path | None:
     except OSError as error:
         warn_of(cache_folder(), error)
     except ValueError as error:
-        tell(f"{error}. Until then ships are compiled anew in each process.")
+        tell(f"{error}. Until then ships are compiled again in each process.")
     return None
 
 
@@ -137,7 +137,7 @@ def warn_of(folder: Path, error: BaseException | None) -> None:
     """Say that nothing can be kept, because of an OSError, and what to do."""
     reason = getattr(error, "strerror", error)
     tell(
-        f"{folder}: cannot be written ({reason}), so ships are compiled anew in each process. "
+        f"{folder}: cannot be written ({reason}), so ships are compiled again in each process. "
         f"Set {CACHE_VARIABLE} to a folder that can."
     )
 

@@ -34,7 +34,7 @@ class DiskCache(NullCache):  # type: ignore[misc]
         except OSError:
             pass
         except ValueError as error:
-            tell(f"{self.path.parent}: a compiled loop {error}; it is compiled anew (see shipgym doctor)")
+            tell(f"{self.path.parent}: a compiled loop {error}; it is compiled again (see shipgym doctor)")
         return self._content is not None
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
@@ -46,7 +46,7 @@ class DiskCache(NullCache):  # type: ignore[misc]
         try:
             return CompileResult._rebuild(target_context, *pickle.loads(content))
         except Exception as error:  # whatever the inside of another Numba may raise
-            tell(f"{self.path}: cannot be loaded ({type(error).__name__}: {error}); it is compiled anew")
+            tell(f"{self.path}: cannot be loaded ({type(error).__name__}: {error}); it is compiled again")
             return None
 
     def save_overload(self, sig: Any, data: Any) -> None:

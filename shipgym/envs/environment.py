@@ -220,7 +220,7 @@ class ShipsEnv:
         check_keys(given, known, "options")
         if "state" in given and len(given) > 1:
             raise InputError(
-                f"options: 'state' found beside {sorted({*given} - {'state'})}, expected it alone"
+                f"options: 'state' found together with {sorted({*given} - {'state'})}, expected it alone"
             )
         asked = {name: value for name, value in given.items() if name in ("waypoints", "model_index")}
         if (asked or self._asked) and "state" not in given:

@@ -253,7 +253,7 @@ def _native(env: str | Vectors, num_envs: int | None, options: dict[str, Any]) -
         made = env
         if num_envs is not None or options:
             raise InputError(
-                f"num_envs, options: {sorted(options) or num_envs} found beside an environment that is made "
+                f"num_envs, options: {sorted(options) or num_envs} found with an environment that is made "
                 "already; give them where it is made, or give its id"
             )
     if not isinstance(getattr(made, "unwrapped", None), ShipVectorEnv):

@@ -78,7 +78,7 @@ class ShipVectorEnv(ShipsEnv, VectorEnv[Observation, Any, Floats]):
             steps = options.setdefault("episode_steps", max_episode_steps)
             if steps != max_episode_steps:
                 raise InputError(
-                    f"max_episode_steps: {max_episode_steps!r} found beside episode_steps {steps!r}"
+                    f"max_episode_steps: {max_episode_steps!r} found together with episode_steps {steps!r}"
                 )
         seen, commands = self._make(arguments, VECTOR_OPTIONS, ["rgb_array"])
         self.num_envs = int(num_envs)

@@ -73,7 +73,7 @@ class GreyBox(Structure):
             )
         if self.shaft and "n" not in self.reference.command_names:
             raise InputError(
-                f"{where}: shaft true found, but reference {self.reference.name!r} knows no shaft speed; "
+                f"{where}: shaft true found, but reference {self.reference.name!r} has no shaft speed; "
                 "leave it out"
             )
 

@@ -400,4 +400,4 @@ def _check_terms(terms: tuple[Term, ...], normalisation: str, where: str) -> Non
     products = [term.product for term in terms]
     for i, (name, product) in enumerate(zip(names, products, strict=True)):
         if name in names[:i] or product in products[:i]:
-            raise InputError(f"{where}: a term stands twice in one equation: '{name}'")
+            raise InputError(f"{where}: a term appears twice in one equation: '{name}'")

@@ -43,7 +43,7 @@ class Settings(NamedTuple):
     course_changes_deg: Annotated[
         Numbers,
         Setting(
-            "Changes of the set-point one after another, degrees, positive to starboard, in place of drawn "
+            "Successive changes of the set-point, degrees, positive to starboard, instead of random "
             "ones: the first at the start, the others every `change_interval_steps`.",
             at_least=-180.0,
             at_most=180.0,

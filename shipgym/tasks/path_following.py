@@ -52,8 +52,8 @@ class Range(NamedTuple):
     largest: float
 
 
-Legs = Annotated[int, Setting("Number of legs of a path that is drawn.", at_least=1, at_most=100, whole=True)]
-LegLengths = Annotated[Range, Setting("Least and largest length of its legs.", above=0.0)]
+Legs = Annotated[int, Setting("Number of legs of a random path.", at_least=1, at_most=100, whole=True)]
+LegLengths = Annotated[Range, Setting("Smallest and largest length of its legs.", above=0.0)]
 MaxTurn = Annotated[
     float, Setting("Largest change of course at its waypoints, degrees.", at_least=0.0, at_most=150.0)
 ]
@@ -63,8 +63,8 @@ Ground = Annotated[float, Setting("Distance from the path at which the ship runs
 Paths = Annotated[
     Numbers,
     Setting(
-        "North and east, m, of a path, shape (n, 2), or a list of paths of which each episode has one; by "
-        "default a path is drawn."
+        "North and east, m, of a path, shape (n, 2), or a list of paths, one of which each episode "
+        "follows; by default a path is drawn."
     ),
 ]
 
@@ -80,11 +80,11 @@ class Settings(NamedTuple):
     corridor: Corridor = 1.0
     ground: Ground = 4.0
     rudder_travel_weight: Annotated[
-        float, Setting("Cost of rudder travel by the heading scale.", at_least=0.0)
+        float, Setting("Cost of rudder travel of one heading scale.", at_least=0.0)
     ] = 0.1
     reversal_weight: Annotated[float, Setting("Cost of each reversal of the rudder.", at_least=0.0)] = 0.05
     reversal_deg: Annotated[
-        float, Setting("Way back of the rudder that counts as a reversal, degrees.", above=0.0)
+        float, Setting("Return of the rudder that counts as a reversal, degrees.", above=0.0)
     ] = 1.0
     weights: Weights = Weights()
     waypoints: Paths = NO_NUMBERS

@@ -201,7 +201,7 @@ class Task:
                 f"roll: {model.name!r} does not roll; leave it out, or take a ship with 4 degrees of freedom"
             )
         if self.action == "rudder-shaft" and not model.service_shaft_speed > 0.0:
-            raise InputError(f"action: 'rudder-shaft' found, but {model.name!r} knows no shaft speed")
+            raise InputError(f"action: 'rudder-shaft' found, but {model.name!r} has no shaft speed")
         self.definition.check(self.settings, model)
 
     def observed(self, model: ShipModel) -> tuple[Observed, ...]:

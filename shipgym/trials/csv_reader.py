@@ -160,7 +160,7 @@ def _check_header(path: Path, header: tuple[str, ...], line: int) -> None:
     twice = [name for name, count in Counter(header).items() if name and count > 1]
     if twice:
         raise InputError(
-            f"{path}: line {line}: column '{twice[0]}' stands twice in the header; rename or remove one"
+            f"{path}: line {line}: column '{twice[0]}' appears twice in the header; rename or remove one"
         )
     if all(is_number(name) for name in header):
         raise InputError(

@@ -49,7 +49,7 @@ def _guess(table: Table, channel: str, name: str) -> Guess:
     told = re.split(r"[\[( _]", name.lower().strip(" ])"))[-1]
     for unit, pattern in WORDS["units"].items():
         if unit in UNITS[quantity] and re.fullmatch(pattern, told):
-            return Guess(channel, name, unit, "by its name")
+            return Guess(channel, name, unit, "from its name")
     try:
         values = table.numbers(name)
     except InputError:  # clock times, degrees and minutes
@@ -60,7 +60,7 @@ def _guess(table: Table, channel: str, name: str) -> Guess:
     if largest <= limit:
         unit = next(iter(UNITS[quantity]))
     return Guess(
-        channel, name, unit, f"by its size, up to {largest:.4g}" if values.size else "by what is in it"
+        channel, name, unit, f"from its size, up to {largest:.4g}" if values.size else "from its content"
     )
 
 

@@ -129,7 +129,7 @@ def correct_offsets(log: Log, tools: Instruments) -> None:
                     f"{needed}; give {key} in degrees, or leave it out"
                 )
             offset = found[0]
-            log.notes.append(f"{key} {offset / DEGREE:.2f}, estimated from straight parts and taken out")
+            log.notes.append(f"{key} {offset / DEGREE:.2f}, estimated from straight parts and removed")
         channels[name] = channels[name] - offset if offset else channels[name]
 
 
@@ -203,6 +203,6 @@ def set_and_drift(psi: Floats, water: Floats, ground: tuple[Floats, Floats]) -> 
     size, toward = float(np.hypot(*current)), math.degrees(math.atan2(current[1], current[0])) % 360.0
     return current, (
         f"set and drift by the speed log against the ground: {size:.2f} m/s ({size * 3.6 / 1.852:.2f} kn) "
-        f"toward {toward:03.0f} deg, {np.std(values - rows @ current):.2f} m/s unexplained; "
-        "taken out of the sway"
+        "toward "
+        f"{toward:03.0f} deg, {np.std(values - rows @ current):.2f} m/s unexplained; removed from the sway"
     )

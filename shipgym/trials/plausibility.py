@@ -253,7 +253,7 @@ def check_log(log: Log, tools: Instruments, source: Source, gnss: bool) -> list[
     fastest = float(np.quantile(np.abs(velocity), 0.95))
     if fastest < SLOWEST:
         raise InputError(
-            f"{source.table.path}: the ship makes at most {fastest:.2g} m/s over ground, she lies at berth "
+            f"{source.table.path}: the ship makes at most {fastest:.2g} m/s over ground, she is at berth "
             "or at anchor, expected a manoeuvre; read another log"
         )
     moving = np.abs(velocity) > 0.3 * fastest
@@ -266,7 +266,7 @@ def check_log(log: Log, tools: Instruments, source: Source, gnss: bool) -> list[
         told = f"{offset[0] / DEGREE:.1f}"
         notes.append(
             f"the heading shows {told} deg too much on every course, as a magnetic compass or a gyro that is "
-            f"not aligned does; to take it out write heading_offset_deg = {told} in [sensors]"
+            f"not aligned does; to remove it write heading_offset_deg = {told} in [sensors]"
         )
     elif magnetic and not tools.heading_offset:
         notes.append(

@@ -243,7 +243,7 @@ def _joined(recorded: Sequence[_Recorded]) -> Series:
             )
         if twice := series.keys() & other.series.keys():
             raise InputError(
-                f"{path}: {quoted(sorted(twice))} stands in another file of this log too, expected each in "
+                f"{path}: {quoted(sorted(twice))} is also in another file of this log, expected each in "
                 "one; rename the column that is not to be read"
             )
         shift = (other.start or 0.0) - (base.start or 0.0)
@@ -336,7 +336,7 @@ def _repaired(values: Floats, source: Source, repair: str | None) -> tuple[Float
     whole = np.flatnonzero(~missing.any(axis=1))
     if whole.size < max(3, len(values) // 2):
         raise InputError(
-            f"{source.table.path}: only {whole.size} of {len(values)} rows are without missing values, "
+            f"{source.table.path}: only {whole.size} of {len(values)} rows have no missing values, "
             "expected at least half of them (and 3) to interpolate from; leave out the column that is mostly "
             "empty"
         )

@@ -92,7 +92,7 @@ def test_what_was_done_is_kept_and_not_done_again(folder, copy, monkeypatch):
     parts.mkdir()
     for path in (folder / "parts").iterdir():
         (parts / path.name).write_bytes(path.read_bytes())
-    with pytest.raises(InputError, match=r"holds results already.*--resume"):
+    with pytest.raises(InputError, match=r"already contains results.*--resume"):
         benchmark("pid,lq", tasks=TASKS, out=copy, episodes=N)
     asked = []
     monkeypatch.setattr(
@@ -414,7 +414,7 @@ def test_rows_of_nobody_in_the_summary_are_refused(copy):
 def test_a_folder_takes_the_results_of_one_suite_only(copy, tmp_path):
     assert check_new(tmp_path / "new", False, "shipgym-v1") == tmp_path / "new"
     assert check_new(copy, True, "shipgym-v1") == copy
-    with pytest.raises(InputError, match="holds results already; go on there with --resume"):
+    with pytest.raises(InputError, match="already contains results; continue with --resume"):
         check_new(copy, False, "shipgym-v1")
     with pytest.raises(InputError, match="holds results of another suite than 'shipgym-v2'"):
         check_new(copy, True, "shipgym-v2")

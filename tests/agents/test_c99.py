@@ -234,7 +234,7 @@ def test_what_is_no_closed_law_is_refused():
     with pytest.raises(InputError, match=r"'preview-mpc' found, .*'alos', 'wheel-over' over one of these"):
         autopilot_source(PreviewMPC.from_model(MARINER))
     with pytest.raises(
-        InputError, match=r"'lq-adaptive' found, which is no closed law that could be C. Export 'pid', 'lq'"
+        InputError, match=r"'lq-adaptive' found, which is not a closed law for C. Export 'pid', 'lq'"
     ):
         autopilot_source(AdaptiveLQ.from_model(MARINER))
     with pytest.raises(InputError, match=r"commands rudder-shaft .*expected rudder alone"):

@@ -439,7 +439,7 @@ def test_what_a_training_found_is_told(capsys):
         "resumed at step 1,500",
         "cost of a held-out episode: 1.23; LQ's: 2.50 (step 2,000 of 3,000)",
         "LQ's cost reached at step 1,200, after 8 s",
-        "stopped at step 3,000 of 9,000: go on with --resume --out run",
+        "stopped at step 3,000 of 9,000: continue with --resume --out run",
         "written: run/agent.json",
     ]
 

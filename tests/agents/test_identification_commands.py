@@ -271,7 +271,7 @@ def test_a_table_of_terms_in_the_ship_file_is_taken_and_stays_with_the_model(shi
     [
         ('r = "v, r, v^2 r/U, delta"', 'r = "v, rr"', "[structure]: equations.r: terms: 'rr' found in 'rr'"),
         ('r = "v, r, v^2 r/U, delta"', 'r = ""', "[structure]: equations.r: no terms found"),
-        ('r = "v, r, v^2 r/U, delta"', 'r = "v r, r v"', "stands twice in one equation: 'rv'"),
+        ('r = "v, r, v^2 r/U, delta"', 'r = "v r, r v"', "appears twice in one equation: 'rv'"),
         ('r = "v, r, v^2 r/U, delta"', 'w = "v"', "equations 'v', 'w' found, expected some of 'u', 'v'"),
         ('r = "v, r, v^2 r/U, delta"', 'r = "import os"', "'import' found in 'import os'"),
         ('name = "mine"', 'name = "auto"', "name 'auto' found, which is another structure's"),

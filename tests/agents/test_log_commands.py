@@ -33,9 +33,9 @@ def command(monkeypatch, capsys, *words):
 def test_a_ship_file_is_written_from_a_log_and_says_what_was_guessed(log, monkeypatch, capsys):
     code, said = command(monkeypatch, capsys, "new-ship", "log.csv", "--length", "150")
     assert code == 0
-    assert "psi: column 'Gyro [deg]' in deg, unit by its name" in said
-    assert "delta: column 'Rudder' in deg, unit by its size, up to 10" in said
-    assert "a positive rudder steers to port, by the yaw that follows it" in said
+    assert "psi: column 'Gyro [deg]' in deg, unit from its name" in said
+    assert "delta: column 'Rudder' in deg, unit from its size, up to 10" in said
+    assert "a positive rudder steers to port, by the yaw that follows" in said
     (trial,) = ShipFile.load(log / "ship.toml").trials()
     assert trial["delta"][20] == pytest.approx(np.radians(10.0))
     code, said = command(monkeypatch, capsys, "new-ship", "log.csv")

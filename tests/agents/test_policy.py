@@ -193,7 +193,7 @@ def test_another_environment_is_refused_with_the_difference():
         ({"action_repeat": 1.5}, "action_repeat: 1.5 found, expected a whole number of at least 1"),
         ({"authority": 0.5}, "authority: 0.5 found without a base"),
         ({"base": LQ_MARINER, "authority": -1.0}, "authority: -1 found"),
-        ({"base": LQ_MARINER, "action": "rudder-shaft"}, "'rudder-shaft' found beside a base"),
+        ({"base": LQ_MARINER, "action": "rudder-shaft"}, "'rudder-shaft' found together with a base"),
         ({"base": LQ.from_model(load_model("kvlcc2"))}, "base: the scale of 'yaw_rate'"),
         ({"observation_scales": (1.0,)}, "observation_scales: 1 found, expected 8"),
     ],

@@ -198,7 +198,7 @@ def spoil(tensors):
 CHANGES = {
     "not finite": (spoil, r"layers\[1\].weight: nan found at \[2, 3\], expected finite"),
     "missing": (lambda tensors: tensors.pop("layers.1.bias"), "weights 'layers.1.bias' are missing"),
-    "more": (lambda tensors: tensors.update(x=np.zeros(1)), "unknown 'x' found beside the weights"),
+    "more": (lambda tensors: tensors.update(x=np.zeros(1)), "unknown 'x' found with the weights"),
     "double": (
         lambda tensors: tensors.update({"layers.0.bias": np.zeros(16)}),
         r"'layers.0.bias': float64 of shape \(16,\) found, expected float32",

@@ -84,7 +84,7 @@ def test_a_refused_model_gives_a_report_that_says_why(demo, tmp_path, monkeypatc
     assert names == ["metrics.json", "report.html"]
     page = (tmp_path / "report" / "report.html").read_text()
     assert "No autopilot is given: its steering is wrong; run a turn" in page
-    assert "Worst errors on trials held out: " in page
+    assert "Worst errors on held-out trials: " in page
 
 
 def test_gains_have_one_sign_in_report_and_metrics(chain):

@@ -254,7 +254,7 @@ def test_the_command_trains_and_resumes(tmp_path):
             "action_repeat: 1000 found, expected a whole number of at least 1, no longer than an episode",
         ),
         (["train", "ppo", "--option", "nois=1"], "Did you mean 'noise'?"),
-        (["train", "ppo", "--task", "mariner-calm", "--sea", "rough"], "--task: found beside --sea"),
+        (["train", "ppo", "--task", "mariner-calm", "--sea", "rough"], "--task: found together with --sea"),
         (["train", "sac", "--env", "shipgym/CourseKeepingDiscrete-v0"], "which sac does not learn"),
         (["train", "ppo", "--settings", "none.toml"], "there is no such settings file"),
         (["train", "ppo", "--resume"], "no run of training is there"),
@@ -294,7 +294,7 @@ def test_a_checkpoint_cut_short_or_of_another_network_is_refused(tmp_path):
         train(plan, run, resume=True)
     train(tiny(total_steps=1, net_arch=[4]), tmp_path / "other")
     (tmp_path / "other" / "checkpoint.safetensors").replace(run / "checkpoint.safetensors")
-    with pytest.raises(InputError, match=r"^[^\n]*does not fit this run [^\n]*begin the run anew$"):
+    with pytest.raises(InputError, match=r"^[^\n]*does not fit this run [^\n]*start a new run$"):
         train(plan, run, resume=True)
 
 
@@ -311,7 +311,7 @@ def test_a_process_that_is_killed_is_resumed(tmp_path):
     code, printed = shipgym("train", "ppo", "--resume", "--max-seconds", "0", "--out", run)
     assert code == 0
     assert "resumed at step" in printed
-    assert "go on with --resume" in printed.replace("\n", " ")
+    assert "continue with --resume" in printed.replace("\n", " ")
 
 
 def test_lq_is_reached_at_once_by_what_is_added_to_it_and_not_by_what_knows_nothing():

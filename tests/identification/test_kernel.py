@@ -240,7 +240,7 @@ def test_the_linear_ship_beneath_a_kernel_is_damped_as_little_as_steadies_her() 
         assert shift == pytest.approx(ship.coefficients["c_r"] - found["c_r"])
         steady_at = [worst_of(ship, damping) < 1.0 for damping in (shift, shift - 0.05)]
         assert steady_at == [True, False]
-    with pytest.raises(InputError, match="no damping steadies the linear ship beneath it"):
+    with pytest.raises(InputError, match="no damping stabilises the linear ship beneath it"):
         stabilised(linear_ship(c_d=1e4))
 
 

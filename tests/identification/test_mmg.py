@@ -302,7 +302,7 @@ def test_its_result_is_saved_and_loaded_like_any_other(
         ({"rank": 3}, r"settings: rank found, which structure 'mmg' does not know"),
         (
             {"prior": "kijima", "reference_model": "auto"},
-            r"reference_model: 'auto' found beside prior 'kijima'",
+            r"reference_model: 'auto' found together with prior 'kijima'",
         ),
         ({"reference_model": "mariner"}, r"'mariner' found, which is not written in the MMG form"),
         ({"prior": "clarke"}, r"prior: 'clarke' found with structure 'mmg', expected 'yoshimura'"),

@@ -91,7 +91,7 @@ def test_closed_loop_overshoots_do_not_depend_on_the_neutral_helm(mariner: ShipM
 
 def test_the_worst_errors_on_trials_held_out_are_said(noisy_fit: IdentificationResult) -> None:
     said = held_out_error(noisy_fit)
-    assert said.startswith("Worst errors on trials held out: heading ")
+    assert said.startswith("Worst errors on held-out trials: heading ")
     assert "(zigzag_15_15)" in said
     overshoot = noisy_fit.metrics["trials"]["zigzag_15_15"]["overshoot_1_deg"]
     assert overshoot["closed_loop"] == pytest.approx(overshoot["measured"], abs=0.5)

@@ -76,7 +76,7 @@ def test_a_current_is_found_and_taken_out(mariner: ShipModel, logs: list[Trial])
     assert figure.layout.annotations[0].text.startswith("turn: 0.5")
     told = sea_sentences(report)[0]
     assert told.startswith("turn, zigzag, held out: current of 0.5")
-    assert told.endswith("which differs from zero; taken out")
+    assert told.endswith("which differs from zero; removed")
 
 
 def test_each_trial_may_have_a_current_of_its_own(mariner: ShipModel, logs: list[Trial]) -> None:
@@ -151,7 +151,7 @@ def test_columns_that_contradict_a_given_current(mariner: ShipModel, logs: list[
 def test_one_heading_is_left_as_it_is_with_a_word(mariner: ShipModel, logs: list[Trial]) -> None:
     (found,), report = in_still_water([logs[1]], Options(), mariner.particulars)
     assert found is logs[1]
-    assert "zigzag: no current is taken out: the trials keep" in report["sea_remarks"][0]
+    assert "zigzag: no current is removed: the trials keep" in report["sea_remarks"][0]
     (row,) = report["currents"].values()
     assert not {"standard_errors", "probability"} & row.keys()
     assert (
@@ -193,7 +193,7 @@ def test_a_constant_wind_of_each_trial(mariner: ShipModel) -> None:
     )  # fmt: skip
     found = fit.model.provenance["wind"]["accelerations"]
     assert found["False"]["wind_rdot"] - found["True"]["wind_rdot"] == pytest.approx(2e-6, rel=0.1)
-    assert "False: constant acceleration taken out, vdot" in " ".join(sea_sentences(fit.model.provenance))
+    assert "False: constant acceleration removed, vdot" in " ".join(sea_sentences(fit.model.provenance))
 
 
 def test_wind_without_what_it_needs(mariner: ShipModel) -> None:
@@ -203,6 +203,6 @@ def test_wind_without_what_it_needs(mariner: ShipModel) -> None:
         in_still_water([run], Options(wind="isherwood"), bare)
     (found,), report = in_still_water([run], Options(), bare)
     assert "wind_udot" not in found
-    assert report["sea_remarks"][0].startswith("the wind that was logged is not taken out: weather without")
+    assert report["sea_remarks"][0].startswith("the logged wind is not removed: weather without")
     with pytest.raises(InputError, match="no trial has the columns wind_speed and wind_from"):
         in_still_water([zigzag(mariner, 10, 10, duration=200.0, dt=1.0)], Options(wind="isherwood"), bare)

@@ -116,7 +116,7 @@ def test_a_damaged_file_is_compiled_anew(tmp_path, damage):
     file.write_bytes(damage(whole))
     told, said = start(code, cache=tmp_path, errors=subprocess.PIPE).communicate()
     assert told.split() == ["compiles", "done"]
-    assert said.count(f"{tmp_path}: a compiled loop is damaged; it is compiled anew") == 1
+    assert said.count(f"{tmp_path}: a compiled loop is damaged; it is compiled again") == 1
     assert start(code, cache=tmp_path, errors=subprocess.PIPE).communicate() == ("done\n", "")
 
 
@@ -136,7 +136,7 @@ def test_a_cache_of_another_user_is_read_and_closed_folders_are_said():
     for factor, compilations, messages in found.values():
         assert factor in (2.0, 3.0)
         assert compilations == 1
-        assert re.search("cannot be written .* compiled anew in each process. Set SHIPGYM_CACHE", *messages)
+        assert re.search("cannot be written .* compiled again in each process. Set SHIPGYM_CACHE", *messages)
 
 
 @pytest.fixture
@@ -255,7 +255,7 @@ def test_what_cannot_be_loaded_is_said_and_compiled_anew(folder):
     cache = DiskCache(folder, "tag", "void()")
     cache_folder.write_loop(b"no pickle", cache.path)
     assert cache.ready()
-    with pytest.warns(UserWarning, match=r"cannot be loaded \(UnpicklingError: .*; it is compiled anew"):
+    with pytest.warns(UserWarning, match=r"cannot be loaded \(UnpicklingError: .*; it is compiled again"):
         assert cache.load_overload(None, SimpleNamespace(refresh=lambda: None)) is None
 
 
@@ -289,7 +289,7 @@ def test_a_cache_that_cannot_be_made_is_said_and_survived(tmp_path, monkeypatch)
     (tmp_path / "file").write_text("")
     monkeypatch.setenv("SHIPGYM_CACHE", str(tmp_path / "file" / "cache"))
     cache_folder.usable_folder.cache_clear()
-    with pytest.warns(UserWarning, match="compiled anew in each process"):
+    with pytest.warns(UserWarning, match="compiled again in each process"):
         assert cache_folder.usable_folder() is None
     cache_folder.usable_folder.cache_clear()
 

@@ -177,7 +177,7 @@ def test_wrong_actions_of_rudder_and_shaft():
         ({"sea": []}, "sea: none found"),
         ({"sea": ["calm", "rugh"]}, "sea: 'rugh' found.*Did you mean 'rough'"),
         ({"action": "ruder"}, "action: 'ruder' found.*Did you mean 'rudder'"),
-        ({"action": "rudder-shaft"}, "action: 'rudder-shaft' found, but 'mariner' knows no shaft speed"),
+        ({"action": "rudder-shaft"}, "action: 'rudder-shaft' found, but 'mariner' has no shaft speed"),
         ({"measurement": "filterd"}, "Did you mean 'filtered'"),
         ({"noise": -0.1}, "noise: -0.1 found"),
         ({"noise": math.nan}, "noise: nan found"),

@@ -164,7 +164,7 @@ def test_libraries_read_the_steps_of_an_episode():
     env = many(max_episode_steps=4)
     env.reset(seed=0)
     assert [env.step(np.zeros((3, 1), np.float32))[3].all() for _ in range(4)] == [False, False, False, True]
-    with pytest.raises(InputError, match="max_episode_steps: 4 found beside episode_steps 5"):
+    with pytest.raises(InputError, match="max_episode_steps: 4 found together with episode_steps 5"):
         many(max_episode_steps=4, episode_steps=5)
 
 

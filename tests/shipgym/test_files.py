@@ -23,7 +23,7 @@ def said(read, *arguments):
         ('{"a": -1e101}', "a.json: a: -1e+101 found, expected a number of magnitude 1e+100 at most"),
         ('{"a": 99999999999999999999}', "99 found, expected a whole number of at most 64 bits"),
         ('{"a": %s}' % ("9" * 5000), "a.json: a whole number of more than 64 bits found"),
-        ('{"a": 1, "b": 2, "a": 3}', "a.json: key 'a' stands twice, expected each once"),
+        ('{"a": 1, "b": 2, "a": 3}', "a.json: key 'a' appears twice, expected each once"),
         ('{"a": "\\ud800"}', "found, expected a text without null bytes and halves of characters"),
         ('{"a\\u0000": 1}', "expected a text of at most 4096 characters"),
         ("[" * 21 + "]" * 21, "lists or tables nest deeper than 20"),

@@ -429,7 +429,7 @@ def test_a_ship_at_berth_is_named(tmp_path):
     head = "Zeit;lat;lon;psi;delta\n"
     (tmp_path / "log.csv").write_text(head + "".join(still.format(k) for k in range(60)))
     columns = {"t": "Zeit"} | {name: name for name in ("lat", "lon", "psi", "delta")}
-    assert "she lies at berth or at anchor" in refusal(tmp_path / "log.csv", columns)
+    assert "she is at berth or at anchor" in refusal(tmp_path / "log.csv", columns)
 
 
 # --- ship files

@@ -231,7 +231,7 @@ def test_a_table_is_registered_in_a_line_and_saved_with_its_models(tmp_path, mon
             {"equations": {"r": "r", "p": "p, phi"}, "normalisation": "prime", "quantity": "force"},
             "forces found, expected accelerations in a table with roll",
         ),
-        ({"equations": {"r": "v r, r v"}}, "stands twice in one equation: 'rv'"),
+        ({"equations": {"r": "v r, r v"}}, "appears twice in one equation: 'rv'"),
         ({"equations": {"r": ()}}, "no terms found"),
         ({"equations": {"r": ["v", "r"]}}, "equations.r: 'v' found, expected a formula"),
         ({"equations": {"r": 3}}, "equations.r: 3 found, expected formulas"),

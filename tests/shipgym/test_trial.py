@@ -466,7 +466,7 @@ def test_fewer_than_three_samples_are_refused(tmp_path, rows):
         (b"t,u\n0,1\n1,\xff\n", "line 3 holds byte 0xff"),
         ("t,u\n0,1\n".encode("utf-16"), "the file is in UTF-16"),
         (b"\x01\x02\x03\n", "expected column names"),
-        (b"t,u,u\n0,1,1\n", "column 'u' stands twice"),
+        (b"t,u,u\n0,1,1\n", "column 'u' appears twice"),
         (b"0,1,2\n1,1,1\n", "only numbers, expected a header"),
         (b"time,speed\n0,1\n", "no column is named like a channel"),
         (b"t,speed\n0,1\n", "no column is named like a channel"),

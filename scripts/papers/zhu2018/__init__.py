@@ -83,7 +83,7 @@ CONCLUSIONS = (
         "A start by LS-SVR makes RLS more accurate and steadier (ship integrated accurately)",
         tuple(f"Table 7.3.2: {what}" for what in _START),
         _start_helps,
-        "what LS-SVR hands on is then off by Euler's rule itself",
+        "the start from LS-SVR then has the error of Euler's rule",
     ),
     Conclusion(
         "The bee colony selects a better C than cross-validation and the particle swarm",

@@ -253,7 +253,7 @@ def printed_coefficients() -> Iterator[tuple[str, str, str, tuple[float, ...]]]:
 
 def coefficient_rows() -> Iterator[Row]:
     """Tables 7.4.3 and 7.4.5 to 7.4.7, with the printed C."""
-    drift = f"C as printed; seven collinear terms, condition number {condition():.0f}: small things move them"
+    drift = f"C as printed; seven collinear terms, condition number {condition():.0f}: easily changed"
     notes = {"u": "C as printed", "v": drift, "r": drift}
     for table, method, q, printed in printed_coefficients():
         fit = fit_equation(q, LSSVM(C=PRINTED_C[method][q], scale=False))

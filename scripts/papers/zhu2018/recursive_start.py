@@ -242,7 +242,7 @@ def figure_rows() -> Iterator[Row]:
                 best,
                 f"within {WITHIN:g}",
                 best < WITHIN,
-                "the thesis shows a picture; 200 clean samples suffice it, as they do where Euler's rule "
+                "the thesis shows a picture; 200 clean samples are enough for it, as where Euler's rule "
                 "integrates the ship",
             )
 

@@ -52,7 +52,7 @@ MEASURES = (
     "lags of its autocorrelation beyond the 95 % bounds, %",
     "lags of its correlation with the rudder beyond them, %",
 )
-ONE_AMPLITUDE = "one zigzag has one steady yaw rate, which shows K and a together, not each"
+ONE_AMPLITUDE = "one zigzag has one steady yaw rate, which gives K and a together but not separately"
 STAND_IN = "the log is not published: a stand-in, means over 20 logs"
 
 

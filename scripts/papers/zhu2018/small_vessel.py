@@ -133,6 +133,6 @@ def rows() -> Iterator[Row]:
             best[q, angle],
             f"below {printed:g}",
             best[q, angle] < printed,
-            "her records are not published: the printed model with noise in its place, which the terms fit "
-            "exactly, as they do not fit a ship; at best by simulation of the whole record",
+            "her records are not published: the printed model with noise is used instead, which the terms "
+            "fit exactly, unlike a real ship; at best by simulation of the whole record",
         )
