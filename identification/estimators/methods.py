@@ -176,7 +176,8 @@ class Adapted:
 
     def predict(self, X: ArrayLike) -> Floats:
         """Targets, shape (n_samples,)."""
-        return np.asarray(X, dtype=float) @ self.coef_
+        prediction: Floats = np.asarray(X, dtype=float) @ self.coef_
+        return prediction
 
 
 def without_constant(estimator: Any) -> Estimator:

@@ -53,7 +53,8 @@ class Rudder:
         """Rudder angle, rad, at times within the samples."""
         times = np.asarray(times, dtype=float)
         if not self.follows_gear:
-            return np.interp(times, self.t, self.delta)
+            between: Floats = np.interp(times, self.t, self.delta)
+            return between
         k = np.clip(np.searchsorted(self.t, times, side="right") - 1, 0, len(self.t) - 2)
         return self._within(k, times - self.t[k])
 
@@ -126,7 +127,8 @@ def _flow(start: Any, order: Any, elapsed: Any, rate: float, lag: float) -> Floa
     ramping = np.minimum(elapsed, (distance - tail) / rate)
     decay = np.exp(-(elapsed - ramping) / lag) if lag > 0.0 else 1.0
     moved = rate * ramping + np.where(ramping < elapsed, tail * (1.0 - decay), 0.0)
-    return start + side * moved
+    flow: Floats = start + side * moved
+    return flow
 
 
 def _orders(t: Floats, delta: Floats, rate: float, lag: float) -> Floats:

@@ -24,7 +24,8 @@ class ErrorOfC:
     def __call__(self, log_c: Floats) -> Floats:
         """Mean squared errors, shape (n_candidates,), of log10 C of shape (n_candidates, 1)."""
         error = self.offset - (1.0 / (self.squares + 10.0**-log_c)) @ self.gain
-        return np.einsum("kij,kij->i", error, error) / self.n_samples
+        values: Floats = np.einsum("kij,kij->i", error, error) / self.n_samples
+        return values
 
 
 def training_error(

@@ -169,7 +169,8 @@ class _Problem:
         lanes = sailed(self.blank, segment, ships, starts, np.zeros(LANES))
         lanes = lanes[1:, self.columns, : len(IDENTIFIED) + 1]
         share = np.sqrt(self._weight(segment) / len(lanes))
-        return (lanes - segment.measured[1:, :, None]) * share
+        found: Floats = (lanes - segment.measured[1:, :, None]) * share
+        return found
 
     def scales(self, errors: Floats, which: Integers) -> Floats:
         """Root mean square of the errors by channel, not below the floors."""
