@@ -1,7 +1,5 @@
 """Identification of a ship file: its options, those given beside it, and its trials."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 

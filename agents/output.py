@@ -1,7 +1,5 @@
 """Folders of results: one process at a time, written whole or not at all, never over other files."""
 
-from __future__ import annotations
-
 import os
 import shlex
 import shutil

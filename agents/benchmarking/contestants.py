@@ -20,8 +20,6 @@ What a file of results names so is made again by name, or from files that have t
 where the user names it too (`remade`).
 """
 
-from __future__ import annotations
-
 import glob
 import hashlib
 import json

@@ -1,7 +1,5 @@
 """The table of episodes as columns, and its Parquet file."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from importlib import import_module
 from pathlib import Path

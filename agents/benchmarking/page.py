@@ -1,7 +1,5 @@
 """The page of a benchmark: one HTML file with tables that sort, curves, and its worst episodes to replay."""
 
-from __future__ import annotations
-
 import base64
 import gzip
 import shlex

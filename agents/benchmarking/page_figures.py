@@ -1,7 +1,5 @@
 """The figures of the benchmark's page. Contestants keep their colour and dashes in all of them."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from functools import partial
 from typing import Any

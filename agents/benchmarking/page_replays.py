@@ -1,7 +1,5 @@
 """The worst episodes of a benchmark, ready for the replay player in its page."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Single episodes of a benchmark run once more, with all that happened in them."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from functools import partial

@@ -1,7 +1,5 @@
 """What stands where in `results.json`, format 2, and that it is checked when read."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from types import NoneType
 from typing import Any

@@ -1,7 +1,5 @@
 """The benchmark: every contestant steers every task of a suite, in the same episodes."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from contextlib import nullcontext
 from functools import partial

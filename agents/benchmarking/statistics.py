@@ -13,8 +13,6 @@ performance profiles); Efron & Tibshirani 1993, An Introduction to the Bootstrap
 interval) and 8 (more than one source of chance).
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 

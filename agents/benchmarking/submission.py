@@ -8,8 +8,6 @@ contestant      {"name", "source", "files": {path: SHA-256}}
 costs           {task: [one list of costs of the episodes for each training run]}
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any

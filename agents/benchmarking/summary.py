@@ -1,7 +1,5 @@
 """The summary of a benchmark: per task and contestant, the ranking, and who improves on which other."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Whether a file of benchmark results is true: a sample of it is run again and compared."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path

@@ -1,7 +1,5 @@
 """What all commands share: what goes wrong becomes one message and an exit code; options of several."""
 
-from __future__ import annotations
-
 import functools
 import inspect
 import os

@@ -1,7 +1,5 @@
 """What `shipgym doctor` checks: versions, the cache of compiled ships, optional packages, names."""
 
-from __future__ import annotations
-
 import importlib.metadata
 import importlib.util
 import os

@@ -1,7 +1,5 @@
 """The options of `identify` on the command line, made from `shipgym.trials.identify_table.Options`."""
 
-from __future__ import annotations
-
 import functools
 import inspect
 from collections.abc import Callable, Mapping, Sequence

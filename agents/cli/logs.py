@@ -1,7 +1,5 @@
 """Commands for logs as ships make them: `new-ship` and `look`."""
 
-from __future__ import annotations
-
 import json
 import os
 from contextlib import suppress

@@ -1,7 +1,5 @@
 """The parameters of a command as typer sees them, for decorators that add some."""
 
-from __future__ import annotations
-
 import inspect
 from collections.abc import Callable
 from typing import get_type_hints

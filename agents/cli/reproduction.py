@@ -1,7 +1,5 @@
 """`shipgym reproduce`: the papers' tables are evidence, run from a checkout by `scripts/reproduce.py`."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Standard manoeuvres of one model, for `shipgym trials`: runs, indices and criteria."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from typing import Any

@@ -1,7 +1,5 @@
 """`shipgym steer` and `shipgym simulate`: an autopilot and a simulated ship, the two ends of NMEA 0183."""
 
-from __future__ import annotations
-
 import asyncio
 from math import inf, radians
 from pathlib import Path

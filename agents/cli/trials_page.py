@@ -1,7 +1,5 @@
 """The page of figures that `shipgym trials` writes: one self-contained HTML file."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -1,7 +1,5 @@
 """`shipgym warm`: compile beforehand what environments and models need, so that no run waits for it."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable, Iterator
 from functools import partial

@@ -1,7 +1,5 @@
 """A conformance suite for controllers: what rollouts, the benchmark and stable-baselines3's tools rely on."""
 
-from __future__ import annotations
-
 import inspect
 from copy import deepcopy
 from typing import Any

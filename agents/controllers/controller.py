@@ -4,8 +4,6 @@ A controller is a list of gains on deviations from straight running. By itself i
 of the heading error, with its anti-windup, is part of the observation.
 """
 
-from __future__ import annotations
-
 import hashlib
 import json
 from collections.abc import Mapping, Sequence

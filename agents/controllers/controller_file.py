@@ -1,7 +1,5 @@
 """The controller file as it is read: JSON, versioned, checked by fields (listed in docs/deployment.md)."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import fields
 from typing import Any

@@ -9,8 +9,6 @@ adaptive line-of-sight (ALOS) guidance law for path following of aircraft and ma
 on Control Systems Technology 31 (adaptive).
 """
 
-from __future__ import annotations
-
 from abc import abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Observations and memories as controllers take them: one row a ship, a single ship without that axis."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

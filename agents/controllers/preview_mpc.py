@@ -10,8 +10,6 @@ Optimal Control, 2.4 (rollout: a base policy improved by looking ahead); William
 Model predictive path integral control, Journal of Guidance, Control, and Dynamics 40 (sampling on the model).
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache

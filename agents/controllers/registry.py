@@ -1,7 +1,5 @@
 """Controllers by the names that `--controllers`, files and the setting `base` know them by."""
 
-from __future__ import annotations
-
 from importlib import import_module
 from typing import TypeVar
 

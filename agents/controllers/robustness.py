@@ -1,7 +1,5 @@
 """How certain a controller's margins are: its loop with ships drawn from a model's covariance."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import astuple, dataclass, fields

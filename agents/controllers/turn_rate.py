@@ -7,8 +7,6 @@ Source: Fossen 2011, Handbook of Marine Craft Hydrodynamics and Motion Control, 
 reference feed-forward); Bech 1968, The reverse spiral test (rudder as a function of the rate of turn).
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar, Self

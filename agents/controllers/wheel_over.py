@@ -10,8 +10,6 @@ IEC 62065 (track control: wheel-over line); Crane, Eda & Landsburg 1989, Princip
 chapter IX, 5 (advance, transfer, tactical diameter).
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache

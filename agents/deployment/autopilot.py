@@ -1,7 +1,5 @@
 """A controller as it stands on a bridge: numbers of one ship in SI units in, the ordered rudder out."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from functools import cache
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Ships and autopilots as C99: a header and a source, without allocation and without dependencies."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import dataclass
 from functools import cache

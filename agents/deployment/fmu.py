@@ -1,7 +1,5 @@
 """FMUs for co-simulation, FMI 2.0 and 3.0: the exported C with its sources and a binary for this computer."""
 
-from __future__ import annotations
-
 import os
 import platform
 import shutil

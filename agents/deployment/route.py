@@ -1,7 +1,5 @@
 """A route of waypoints for track control: where a ship stands on it, and which turns lie ahead."""
 
-from __future__ import annotations
-
 from math import copysign, degrees, fabs
 from pathlib import Path as File
 from typing import Any, NamedTuple, Self

@@ -1,7 +1,5 @@
 """How soon a thread runs when it wakes, on a computer that is busy."""
 
-from __future__ import annotations
-
 import ctypes
 import os
 import platform

@@ -1,7 +1,5 @@
 """`shipgym simulate`: a ship model with the instruments of a ship, to steer over NMEA 0183."""
 
-from __future__ import annotations
-
 import asyncio
 from collections.abc import Mapping
 from contextlib import closing, suppress

@@ -1,7 +1,5 @@
 """`shipgym steer`: an autopilot on NMEA 0183, which hands over when it cannot trust what it is told."""
 
-from __future__ import annotations
-
 import asyncio
 import gc
 from collections.abc import Callable, Iterable

@@ -4,8 +4,6 @@ A function is translated for the kinds of its arguments, with all that it calls,
 `shipgym.engine.specialise` fills them. Nothing but checked names and numbers becomes part of the C.
 """
 
-from __future__ import annotations
-
 import ast
 import builtins
 import inspect

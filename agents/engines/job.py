@@ -1,7 +1,5 @@
 """One job: a function of a dict that JSON can hold, done on one thread wherever that is."""
 
-from __future__ import annotations
-
 import json
 import os
 import sys

@@ -3,8 +3,6 @@
 The results do not depend on where the jobs ran, nor on how many ran at once, bit for bit.
 """
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass

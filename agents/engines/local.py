@@ -1,7 +1,5 @@
 """Jobs in processes of this computer, by joblib's loky backend."""
 
-from __future__ import annotations
-
 import os
 import threading
 import time

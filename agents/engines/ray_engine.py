@@ -1,7 +1,5 @@
 """Jobs on a ray cluster, or on ray started on this computer."""
 
-from __future__ import annotations
-
 import os
 import socket
 import subprocess

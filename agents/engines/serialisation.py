@@ -4,8 +4,6 @@ Every result passes through this text, wherever it was computed and whether it w
 the same bit for bit in every case. Arrays keep their type and shape.
 """
 
-from __future__ import annotations
-
 import base64
 import hashlib
 import json

@@ -1,7 +1,5 @@
 """A policy's network in NumPy: dense layers in single precision, as they were learned."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise

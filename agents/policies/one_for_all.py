@@ -11,8 +11,6 @@ identification, RSS (a policy that is told the dynamics); Nomoto, Taguchi, Honda
 steering dynamics); Johannink et al. 2019, Residual reinforcement learning for robot control, ICRA.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path

@@ -4,8 +4,6 @@ Inputs, outputs and metadata stand in docs/policies.md; in these `history` and `
 `frame_stack` and `action_repeat`.
 """
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any

@@ -11,8 +11,6 @@ Sources: Silver, Allen, Tenenbaum & Kaelbling 2018, Residual policy learning, ar
 al. 2019, Residual reinforcement learning for robot control, ICRA.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path

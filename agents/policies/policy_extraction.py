@@ -5,8 +5,6 @@ that ends so. Whatever else is found (other extractors of features, layers or wr
 guessed.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import chain, count, takewhile
 from typing import Any

@@ -1,7 +1,5 @@
 """Files of learned and shielded policies as they are read; their fields are listed in docs/policies.md."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import fields
 from itertools import pairwise

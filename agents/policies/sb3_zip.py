@@ -5,8 +5,6 @@ reader of weights alone. One pickle, that of the last observations, is disassemb
 executed.
 """
 
-from __future__ import annotations
-
 import base64
 import pickletools
 import re

@@ -5,8 +5,6 @@ limits to hand back lie inside those to take over, so that it does not chatter. 
 do not count as turning away, and before a planned turn any heading up to the course beyond it is on course.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path

@@ -4,8 +4,6 @@ The weights are written first, and the JSON holds their SHA-256, so that files t
 refused. No pickle, no torch.
 """
 
-from __future__ import annotations
-
 import hashlib
 import json
 from collections.abc import Mapping

@@ -1,7 +1,5 @@
 """Episodes of course keeping and step responses of one controller on many ships at once."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple

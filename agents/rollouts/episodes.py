@@ -1,7 +1,5 @@
 """Histories of single episodes of a task, as they are replayed."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 

@@ -8,8 +8,6 @@ Amerongen 1982, Adaptive steering of ships (way lengthened and speed lost by ste
 Propellers and Propulsion, chapter 6 (propeller law: power is proportional to the cube of the shaft speed).
 """
 
-from __future__ import annotations
-
 from itertools import pairwise
 from typing import Any, NamedTuple
 

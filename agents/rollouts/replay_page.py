@@ -1,7 +1,5 @@
 """The replay page: recorded episodes in one HTML file that needs neither network nor installation."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """What the replay page shows of an episode: its states in the units in which they are read."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 

@@ -1,7 +1,5 @@
 """The one loop in which a policy steers ships through episodes of a task, side by side."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable, Collection
 from dataclasses import dataclass

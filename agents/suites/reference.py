@@ -9,8 +9,6 @@ Files of `agents/suites`:
                         (`scripts/tune_controllers.py`)
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

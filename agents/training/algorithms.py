@@ -1,7 +1,5 @@
 """Agents of stable-baselines3 and sb3-contrib by our settings, and the ships that they learn from."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import fields
 from typing import Any

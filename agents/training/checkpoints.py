@@ -5,8 +5,6 @@ ships where they are. A run that is put back goes on as if it had never stopped,
 machine; so checkpoints may be taken at any time without changing what is learned.
 """
 
-from __future__ import annotations
-
 import random
 from collections import deque
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """What a policy sees and does while it learns: the same as when it steers (`agents.policies.policy`)."""
 
-from __future__ import annotations
-
 import copy
 from collections.abc import Mapping
 from typing import Any

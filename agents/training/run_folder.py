@@ -1,7 +1,5 @@
 """The folder of a run of training; its files are listed in docs/training.md."""
 
-from __future__ import annotations
-
 import platform
 from collections.abc import Mapping
 from importlib.metadata import PackageNotFoundError, version

@@ -1,7 +1,5 @@
 """Nested values with arrays in them as one safetensors file: numbers and names, no code; written whole."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import math

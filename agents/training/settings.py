@@ -5,8 +5,6 @@ setting of the algorithm to learn from scratch; those that differ beside a base 
 (`residual`), on every task of a suite (`suites`), on one of them (`tasks`).
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import MISSING, Field, asdict, dataclass, field, fields, replace
 from importlib.resources import files

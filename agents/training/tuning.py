@@ -6,8 +6,6 @@ first trial has the settings as they are. A trial stops early by the median rule
 Vizier, section 3.1): when its best cost so far is above the median of what finished trials had by then.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace

@@ -1,7 +1,5 @@
 """Manoeuvres of many models drawn from one covariance: how certain are the indices and criteria."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any

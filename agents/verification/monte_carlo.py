@@ -3,8 +3,6 @@
 Draws are shared out in jobs of 25, always the same ones: the results do not depend on where they are done.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any

@@ -1,7 +1,5 @@
 """The report of the whole chain: one self-contained HTML page that works offline."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Why no autopilot is given: models that contradict their trials, and designs that lose control."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

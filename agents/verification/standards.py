@@ -4,8 +4,6 @@ The identified ship is steered as `shipgym steer` would, by readings of her inst
 Topics, and the limits that are used, stand in `standards.toml`. No type approval follows from it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import radians

@@ -3,8 +3,6 @@
 Straight legs joined by arcs, as track control systems have them (IEC 62065:2014); the track is our own.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 
