@@ -196,6 +196,22 @@ def test_the_largest_rudder_needs_a_smaller_one(trials: list[Trial]) -> None:
         of_largest_rudder(trials[2:], "folds")
 
 
+def test_a_free_constant_is_not_penalised(target: ShipModel, trials: list[Trial]) -> None:
+    """Of weights that leave nothing of the other corrections it keeps the mean of what she leaves."""
+    given = {"method": "rm-svm", "reference_model": "kvlcc2", "regression": "ls-svm", "C": 1e-12}
+    bound, free = (fit(target, trials, **given, free_constant=is_free).model for is_free in (False, True))
+    constants = {
+        name
+        for q in free.table.equations
+        for name, term in zip(free.table.names(q), free.table.terms(q), strict=True)
+        if term.name == "0"
+    }
+    assert constants
+    for name, value in free.coefficients.items():
+        assert bound.coefficients[name] == pytest.approx(0.0, abs=1e-9)
+        assert (abs(value) > 1e-6) is (name in constants)
+
+
 def test_what_was_chosen_is_told(rm_svm: IdentificationResult) -> None:
     provenance = rm_svm.model.provenance or {}
     assert provenance["reference"] == {"name": "kvlcc2", "similarity": {}, "shaft": True}
