@@ -122,8 +122,8 @@ class Voyages:
             "load_envelope": load["envelope"],
             "load_sea_parameters": load["sea"],
             "load_scale": load["scale"],
-            "common_sea": Part(read_sea if self.shared and self.windy else nothing),
-            "sea_at": Part(sea_of_lane if self.windy and not self.shared else the_common),
+            "common_sea": Part(read_sea if self.shared else nothing),
+            "sea_at": Part(the_common if self.shared else sea_of_lane),
             "common_view": Part(read_view if self.shared else nothing),
             "view_at": Part(the_common if self.shared else view_of_lane),
         }

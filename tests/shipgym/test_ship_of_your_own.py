@@ -59,6 +59,16 @@ def test_she_is_known_by_name_in_files_and_in_other_processes(tug: Path, tmp_pat
     assert float(told.stdout) == model.simulate([[0.1, 2.3]] * 20, 0.5)["r"][-1]
 
 
+def test_her_annotations_may_be_texts(tug: Path, tmp_path: Path) -> None:
+    head, end, rest = TUG.replace('"tug"', '"towboat"').partition('"""\n\n')
+    path = tmp_path / "towboat.py"
+    path.write_text(f"{head}{end}from __future__ import annotations\n{rest}", encoding="utf-8")
+    own, texts = load_model(tug), load_model(path)
+    read = [ship.dynamics.coefficients_record.__annotations__["T_shaft"] is float for ship in (own, texts)]  # type: ignore[union-attr]
+    assert read == [True, False]
+    np.testing.assert_array_equal(*(ship.derivatives(own.service_state, [0.1, 2.0]) for ship in (own, texts)))
+
+
 def test_changed_coefficients_compile_nothing_anew(tug: Path) -> None:
     model = load_model(tug)
     quicker = replace(model, coefficients={**model.coefficients, "N_d": 2.8})

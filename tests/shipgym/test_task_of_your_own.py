@@ -15,6 +15,7 @@ import shipgym
 from shipgym import InputError, ShipVecEnv, check_task, check_vector_env, register_task
 from shipgym.envs.engine import Engine
 from shipgym.tasks.contract import Setting
+from shipgym.tasks.definition import read_definition
 from shipgym.tasks.source import annotated, check_namespace, keywords, make_settings, read_source
 from shipgym.tasks.task import Task
 
@@ -241,6 +242,16 @@ def test_a_file_lacks_nothing_that_is_asked_of_it(text, message, tmp_path):
 def test_annotations_are_texts_only_where_a_file_asks_for_it(tmp_path, before, annotation):
     file, _ = read_source(written(tmp_path, "own.py", f"{before}def scale(x: float): ...\n"))
     assert file.scale.__annotations__ == {"x": annotation}
+
+
+def test_annotations_of_a_reward_may_be_texts(tmp_path):
+    head, end, rest = REWARD.partition('"""\n\n')
+    paths = (
+        written(tmp_path, name, f"{head}{end}{before}{rest}")
+        for name, before in (("own.py", ""), ("texts.py", AS_TEXT))
+    )
+    own, texts = (read_definition("CourseKeeping", path) for path in paths)
+    assert own.reward_names == texts.reward_names == ("heading", "rudder")
 
 
 @pytest.mark.parametrize("before", ["", AS_TEXT])
