@@ -1,7 +1,5 @@
 """Python files of a user's own, such as tasks and ships: read as modules, at the user's own word only."""
 
-from __future__ import annotations
-
 import hashlib
 import sys
 from pathlib import Path

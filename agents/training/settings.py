@@ -20,7 +20,7 @@ from shipgym.tasks.task import ACTIONS
 
 RENAMED = {"history": "frame_stack", "hold": "action_repeat"}  # older names that are still taken
 RUNNING, LEARNED = "running", "learned"  # words in the place of numbers
-NUMBER_OR_WORD, WIDTHS = "float | str", "tuple[int, ...]"  # types of settings
+NUMBER_OR_WORD, WIDTHS = float | str, tuple[int, ...]  # types of settings
 
 
 def hyperparameters(name: str) -> dict[str, Any]:
@@ -177,9 +177,9 @@ ALGORITHMS: Mapping[str, type[Settings]] = {
 def _checked(value: Any, one: Field[Any], allowed: dict[str, Any]) -> Any:
     """The value of a setting, if its type and bounds allow it."""
     name = one.name
-    if one.type == "int":
+    if one.type is int:
         return check_whole(value, name, **allowed)
-    if one.type == "float":
+    if one.type is float:
         return check_number(value, name, **allowed)
     if one.type == WIDTHS:
         if isinstance(value, str) or not isinstance(value, Sequence):
@@ -299,6 +299,6 @@ def _settings(value: Any, kind: type[Settings], where: str) -> dict[str, Any]:
     types = {one.name: one.type for one in fields(kind)}
     check_keys(table, tuple(types), where)
     return {
-        name: float(given) if types[name] in ("float", NUMBER_OR_WORD) and type(given) is int else given
+        name: float(given) if types[name] in (float, NUMBER_OR_WORD) and type(given) is int else given
         for name, given in table.items()
     }

@@ -1,7 +1,5 @@
 """Arrays by their addresses: what a loop takes faster than the arrays themselves."""
 
-from __future__ import annotations
-
 import ctypes
 from collections.abc import Sequence
 from functools import partial

@@ -1,7 +1,5 @@
 """Bare ships through time, 64 at once and without a task: with held commands, or through a measured trial."""
 
-from __future__ import annotations
-
 from math import fabs
 from typing import Any
 

@@ -5,8 +5,6 @@ folder and all above it are theirs, and others may not write them. A folder abov
 is, where others cannot rename what is not theirs.
 """
 
-from __future__ import annotations
-
 import os
 import stat
 import warnings

@@ -6,8 +6,6 @@ the versions of Python and Numba, and the processor. A file that is there is rig
 so a cache that was filled beforehand and may only be read is used as it is.
 """
 
-from __future__ import annotations
-
 import gc
 import re
 import sys

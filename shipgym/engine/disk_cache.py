@@ -1,7 +1,5 @@
 """Machine code of a loop in a file: named by all it depends on, so never stale, and checked when read."""
 
-from __future__ import annotations
-
 import hashlib
 import pickle
 from pathlib import Path

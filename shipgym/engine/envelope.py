@@ -1,7 +1,5 @@
 """How far a state lies outside the data its model was identified from."""
 
-from __future__ import annotations
-
 from math import sqrt
 from typing import NamedTuple
 

@@ -8,8 +8,6 @@ Arrays that are not tiles are indexed by unsigned numbers: an index that could b
 from the end, keeps a loop from being vectorised.
 """
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import numpy as np

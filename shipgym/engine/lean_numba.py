@@ -6,8 +6,6 @@ as far as LLVM's intermediate code and linked once, into the loop; and passes ov
 functions on numbers and records are left out. The loop's code is the same, but for the length of its vectors.
 """
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager

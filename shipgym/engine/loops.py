@@ -1,7 +1,5 @@
 """The loops by name, compiled for a ship when they are first asked for."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cache

@@ -7,8 +7,6 @@ Sun Microsystems 1993); error below 2e-16 for |x| < 1e5. Exponential: the same r
 function of the Cephes library (`atan.c`, Moshier 1995).
 """
 
-from __future__ import annotations
-
 from math import copysign, fabs, pi
 
 import numpy as np

@@ -3,8 +3,6 @@
 Equations: Fossen 2011, Handbook of Marine Craft Hydrodynamics and Motion Control, 2.2 (kinematics).
 """
 
-from __future__ import annotations
-
 from math import fabs
 from typing import Any, NamedTuple
 

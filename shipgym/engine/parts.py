@@ -1,7 +1,5 @@
 """A part: what is put in a place that a loop names."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any

@@ -5,8 +5,6 @@ recorded of it (`SEA_CHANNELS`). `sea` is the vector of the sea's state and `wor
 numbers, one word long; both are changed. `parameters` tell of the sea, `numbers` of the ship.
 """
 
-from __future__ import annotations
-
 from math import atan2
 from typing import Any
 

@@ -4,8 +4,6 @@ Each function stands for one that is given when a loop is compiled (`shipgym.eng
 raises an error that names who gives it.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 #: Functions by what gives them.

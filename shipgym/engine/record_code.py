@@ -4,8 +4,6 @@ Written out as source, a record's load would take Numba as long to translate as 
 function comes as a `Part` with instructions of its own.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping
 from functools import partial, reduce
 from typing import Any

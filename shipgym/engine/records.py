@@ -5,8 +5,6 @@ one-dimensional array, and lane `i` of row `k` is entry `64 k + i`. A single shi
 row. Field order is row order, so no row number is written by hand.
 """
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Iterable
 from dataclasses import dataclass

@@ -6,8 +6,6 @@ functions are copied with the globals that they name replaced, so that nothing i
 originals stay what they are, to be called from Python.
 """
 
-from __future__ import annotations
-
 import dis
 import hashlib
 import platform

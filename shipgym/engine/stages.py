@@ -5,8 +5,6 @@ stage of the Runge-Kutta step is finished in all lanes of a tile before the next
 has that over lanes inside. What stands between the loops lies in the room for results.
 """
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 from shipgym.engine.episodes import Tile, conclude_step

@@ -4,8 +4,6 @@ Each loop but `derivatives` begins with the state in row 0 of `out` and writes o
 (`passages`); it returns the last row at which the ship had not yet run away.
 """
 
-from __future__ import annotations
-
 from math import ceil, fabs
 from typing import Any
 

@@ -1,7 +1,5 @@
 """A ship as loops take her: her functions, what she has, and where her numbers stand."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cache, cached_property

@@ -1,7 +1,5 @@
 """Episodes compiled for a ship, a sea, a sensor set and a task: where their numbers stand, and the loops."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cache, cached_property
 from typing import Any

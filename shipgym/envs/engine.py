@@ -1,7 +1,5 @@
 """Many ships at once under a task, without Gymnasium's interface."""
 
-from __future__ import annotations
-
 import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor

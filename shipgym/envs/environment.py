@@ -1,7 +1,5 @@
 """What environments of one ship and of many have in common: options, copies, states, resets."""
 
-from __future__ import annotations
-
 import copy
 from collections.abc import Mapping, Sequence
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """The state of many ships by lane: laid out, read, written, copied, taken and put back between two steps."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 

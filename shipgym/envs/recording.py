@@ -1,7 +1,5 @@
 """Episodes of an environment written to files, to be replayed and identified again."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping
 from glob import escape

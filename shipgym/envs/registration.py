@@ -1,7 +1,5 @@
 """The environments' ids, and tasks of your own."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

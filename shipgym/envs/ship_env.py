@@ -1,7 +1,5 @@
 """One ship under a task as one of Gymnasium's environments."""
 
-from __future__ import annotations
-
 from math import isfinite
 from pathlib import Path
 from typing import Any, SupportsFloat

@@ -1,7 +1,5 @@
 """Many ships under a task as one of Gymnasium's vector environments, on the compiled kernels."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from math import isfinite
 from pathlib import Path

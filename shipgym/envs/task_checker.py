@@ -1,7 +1,5 @@
 """What is wrong with a task: a battery for any task, reward or sensor set of a user's own."""
 
-from __future__ import annotations
-
 import traceback
 from collections.abc import Iterator
 from typing import Any

@@ -1,7 +1,5 @@
 """Ship files with recorded trials that come with the package, to try it out."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from shipgym.checks import check_choice

@@ -4,8 +4,6 @@ The notch filter (s^2 + 2 a w s + w^2) / (s^2 + 2 b w s + w^2) around the freque
 Handbook of Marine Craft Hydrodynamics and Motion Control, 11.1.2.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Instruments without error, in calm water."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 from shipgym.engine.motion import Motion, ground_velocity

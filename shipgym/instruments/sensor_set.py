@@ -1,7 +1,5 @@
 """Sensor sets: those beside this file, and a user's own, each a file of plain functions on named records."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cache

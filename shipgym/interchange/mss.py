@@ -6,8 +6,6 @@ in m, the speed `U0` in m/s and the rudder's `delta_max` and `Ddelta_max` in deg
 reads it with `jsondecode`. MSS writes its Mariner for a rudder positive to port.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import replace
 from math import sqrt

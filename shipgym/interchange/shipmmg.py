@@ -4,8 +4,6 @@ Source: shipmmg 0.0.11 (T. Mitsuyuki). Its MMG model is that of Yasukawa & Yoshi
 the wake and with drift at the centre of gravity, which `load_model("kvlcc2-l7")` has in its form "shipmmg".
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any

@@ -1,7 +1,5 @@
 """Figures of the standard manoeuvres, each with what its indices are read from."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Figures of any trial: time histories and paths, measured beside predicted."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 
 import numpy as np

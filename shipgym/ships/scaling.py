@@ -1,7 +1,5 @@
 """A model at another length and speed: from model scale to full scale and back."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

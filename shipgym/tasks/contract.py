@@ -33,8 +33,6 @@ of `math` that the compiler vectorises (`sqrt`, `fabs`) and those of `shipgym.en
 by `pick` or a conditional expression. The other functions are called ship by ship and may do what Numba can.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Annotated, Any, NamedTuple

@@ -5,8 +5,6 @@ in units of 30 degrees, the rate per ship length sailed (Norrbin 1972; van Amero
 costs as much as the rest of the episode at the largest heading error, so that it never pays to end early.
 """
 
-from __future__ import annotations
-
 from math import fabs, floor, pi, radians
 from typing import Annotated, NamedTuple
 

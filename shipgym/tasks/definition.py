@@ -1,7 +1,5 @@
 """A task file as the engine takes it: read from a module, path or name, checked, its reward replaced."""
 
-from __future__ import annotations
-
 import importlib
 import sys
 from collections.abc import Callable, Mapping

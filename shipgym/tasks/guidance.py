@@ -5,8 +5,6 @@ of acceptance); Borhaug, Pavlov & Pettersen 2008, Integral LOS control for path 
 marine surface vessels in the presence of constant ocean currents (integral line of sight).
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, NamedTuple

@@ -10,8 +10,6 @@ Legs, arcs and a planned turn radius as in IEC 62065:2014, Track control systems
 Fossen 2011, Handbook of Marine Craft Hydrodynamics and Motion Control, 10.3.
 """
 
-from __future__ import annotations
-
 from math import copysign, cos, fabs, pi, sin, sqrt, tan
 from typing import Annotated, Any, NamedTuple
 

@@ -11,8 +11,6 @@ speed. Running aground costs as much as the rest of the episode there.
 Guidance by line of sight: Fossen 2011, Handbook of Marine Craft Hydrodynamics and Motion Control, 10.3.
 """
 
-from __future__ import annotations
-
 from math import fabs, pi, sqrt
 from typing import Annotated, NamedTuple
 

@@ -1,7 +1,5 @@
 """Files such as tasks, rewards and sensor sets: read, checked for what lacks, and their settings made."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property

@@ -4,8 +4,6 @@ The reward is the classical steering cost with the sign turned (Norrbin 1972, On
 steering on a straight course; van Amerongen 1982, Adaptive steering of ships).
 """
 
-from __future__ import annotations
-
 from math import copysign, fabs, radians
 from typing import Annotated, NamedTuple
 
