@@ -102,7 +102,7 @@ class Plan:
 
 @dataclass(frozen=True)
 class Given:
-    """What a user gives; None or nothing for what is left to the defaults, or to the run that is resumed."""
+    """What a user gives; None or empty for what is left to the defaults, or to the run that is resumed."""
 
     algorithm: str
     environment: str | None = None  # "course-keeping", "path-following", or an id
@@ -120,7 +120,7 @@ class Given:
 
 
 def make_plan(given: Given, stored: Plan | None = None) -> Plan:
-    """The run that a user asks for; what is not given is as in `stored`, the run that is resumed.
+    """The run that a user asks for; what is not given is taken from `stored`, the run that is resumed.
 
     Raises InputError for an unknown algorithm, environment, task, model, option or setting, with the nearest
     known one, or a value out of its range.

@@ -239,7 +239,7 @@ def load_settings(
     given: Mapping[str, Any] | None = None,
     action: str = "rudder",
 ) -> Settings:
-    """The tuned settings of an algorithm, with those that are given, by name, in their place.
+    """The tuned settings of an algorithm, with those given by name replaced.
 
     `environment`: "course-keeping" or "path-following"; `task`: name of a suite's task; one without settings
     of its own has those of its environment; `action`: what is commanded. With other actions than the rudder,

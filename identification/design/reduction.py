@@ -81,7 +81,7 @@ def backward_elimination(
     threshold: float = 0.1,
     prefer: Sequence[str] = (),
 ) -> Reduction:
-    """Drop terms one by one while nothing that is held out is explained worse.
+    """Drop terms one by one as long as held-out data is explained equally well.
 
     Parameters
     ----------
