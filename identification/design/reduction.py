@@ -200,7 +200,9 @@ def reduced_structure(structure: Structure, reductions: dict[str, Reduction], na
 def table_of(model: ShipModel) -> Structure:
     """The table of terms of a model; InputError for a ship with equations written by hand."""
     if not isinstance(model.dynamics, Structure):
-        raise InputError(f"model {model.name!r}: equations written by hand found, expected a table of terms")
+        raise InputError(
+            f"structure: {model.structure!r} found, expected a table of terms, such as 'abkowitz'"
+        )
     return model.table
 
 
