@@ -200,9 +200,7 @@ def reduced_structure(structure: Structure, reductions: dict[str, Reduction], na
 def table_of(model: ShipModel) -> Structure:
     """The table of terms of a model; InputError for a ship with equations written by hand."""
     if not isinstance(model.dynamics, Structure):
-        raise InputError(
-            f"structure: {model.structure!r} found, expected a table of terms, such as 'abkowitz'"
-        )
+        raise InputError(f"structure: {model.structure!r} found, expected a table of terms, as 'abkowitz'")
     return model.table
 
 
