@@ -6,7 +6,7 @@ LONGEST_MESSAGE = 2000  # characters
 
 
 class InputError(ValueError):
-    """Something the user gave is wrong: a file, a row, a field or an argument.
+    """Invalid input by the user: a file, a row, a field or an argument.
 
     The message names the file, the row or field, the value found, what is expected, and the remedy.
     The command line prints it and exits with code 2. Of a message longer than `LONGEST_MESSAGE` the middle is

@@ -265,7 +265,7 @@ COMMANDS: dict[str, tuple[Callable[..., None], str]] = {
     "export": (export_command, "report/lq.json --c lq/"),
     "steer": (steer_command, "report/lq.json --nmea tcp:192.168.1.20:10110 --heading 45"),
     "simulate": (simulate_command, "my_ship/model.json --nmea tcp:127.0.0.1:10110 --sea moderate"),
-    "train": (train_command, "sac --env path-following --model my_ship/model.json --out run/"),
+    "train": (train_command, "sac --env path-following-v1 --model my_ship/model.json --out run/"),
     "tune": (tune_command, "sac --trials 40 --workers 2 --out study/"),
     "benchmark": (benchmark_command, "--suite shipgym-v1 --controllers pid,lq,ppo --out results/"),
     "reproduce": (reproduce_command, "cao2015 --markdown tables.md"),

@@ -21,7 +21,7 @@ LONGEST_NAME = 200  # characters of a path that are told
 ShipFileArgument = Annotated[Path, typer.Argument(metavar="SHIP.TOML", help="The ship file with its trials.")]
 Algorithm = Annotated[str, typer.Argument(metavar="ALGORITHM", help="ppo, sac, td3 or tqc.")]
 Environment = Annotated[
-    str | None, typer.Option(help="course-keeping (default), path-following, or an environment's id.")
+    str | None, typer.Option(help="course-keeping (default), path-following-v1, or an environment id.")
 ]
 Model = Annotated[
     str | None, typer.Option(help="A model file, or the name of a shipped model; default: mariner.")

@@ -58,8 +58,8 @@ def standard_trials(
     """Sail every standard manoeuvre that suits the ship, with the model and with models drawn from it.
 
     `model`: the ship; `draws`: models drawn from its covariance; a ship without one has none; `seed`: of the
-    draws; `progress`: told the number of draws done; `water_depth`: m, for ships that know shallow water.
-    Raises InputError for water that is too shallow, or shallow water in a ship that knows none;
+    draws; `progress`: told the number of draws done; `water_depth`: m, for ships with
+    shallow-water equations. Raises InputError for water too shallow, or a ship without such equations;
     UnstableModelError if the ship itself runs away in every manoeuvre; where she does in some, or an index
     cannot be read, these are in `refused` and the others stay.
     """

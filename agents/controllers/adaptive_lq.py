@@ -40,7 +40,7 @@ RESTLESS_LIMIT = 1.4  # times what the sensors' noise makes of the yaw rate's se
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class AdaptiveLQ(Controller):
-    """LQ whose gains follow the ship: linear steering is identified by TMILS, the gains designed for it.
+    """LQ whose gains adapt to the ship: TMILS identifies linear steering, for which the gains are designed.
 
     It begins every episode with the design on the model; `gains` and `margins` are those. Turns too hard to
     be linear are not learned from, nor is anything while the yaw rate oscillates more than noise explains: in

@@ -23,7 +23,7 @@ ROUNDING = 1e-5  # of the rudder limit: matrix products of learned policies depe
 def check_controller(
     controller: Policy, model: ShipModel | None = None, task: Task | None = None, *, n_steps: int = 60
 ) -> None:
-    """Check that a controller keeps the promises of `predict`, on ships that it steers.
+    """Check that a controller meets the requirements of `predict`, on ships that it steers.
 
     Its signature; names and scales of observations, if it has `observation_names` and
     `observation_scales`; one finite command in [-1, 1] for each ship, also for a single one; the same
@@ -44,7 +44,7 @@ def check_controller(
     Raises
     ------
     InputError
-        Naming the first promise that is not kept, what was found and what is expected.
+        Naming the first requirement that is not met, what was found and what is expected.
     """
     check_whole(n_steps, "n_steps", at_least=2)
     ship = load_model("mariner") if model is None else model

@@ -49,7 +49,7 @@ NUMBERS, SCALES = Range(-1e9, 1e9), Range(1e-9, 1e9)
 
 
 class Policy(Protocol):
-    """Anything that steers: our controllers, stable-baselines3's agents, a user's own."""
+    """Anything that steers: controllers of shipgym, agents of stable-baselines3, your own."""
 
     def predict(
         self, observation: Any, state: Any = None, episode_start: Any = None, deterministic: bool = True
@@ -91,7 +91,7 @@ class Controller:
     Attributes
     ----------
     gains : dict of str to float
-        By the names of `feedback`, SI units: rad of rudder per rad, rad/s, rad s or m/s.
+        By the names in `feedback`, SI units: rad of rudder per rad, rad/s, rad s or m/s.
     neutral_rudder : float
         Rudder at which the ship runs straight, rad.
     neutral_sway : float

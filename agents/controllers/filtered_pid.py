@@ -28,7 +28,7 @@ FROM_NONE = Range(0.0, 1e6)  # of rates and frequencies; 0 leaves a filter out
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class FilteredPID(Controller):
-    """PID with a reference filter, an integral that does not wind up, and a notch filter for waves.
+    """PID with a reference filter, anti-windup, and a notch filter for waves.
 
     order = neutral + proportional * (reference - heading) + derivative * (reference's rate - yaw rate)
     + integral of that error. The integral is its own, not the environment's: what the rudder's limit cuts off

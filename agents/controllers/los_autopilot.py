@@ -140,7 +140,7 @@ class Guided(Controller):
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class LineOfSight(Guided):
-    """Steer for the point of the leg that lies the lookahead ahead (Fossen 2011, 10.3.2).
+    """Steer for the point on the leg one lookahead ahead (Fossen 2011, 10.3.2).
 
     A steady current sets the ship off the path.
     """
@@ -198,7 +198,7 @@ class LineOfSight(Guided):
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class IntegralLineOfSight(LineOfSight):
-    """Line of sight with an integral of the cross-track error, which ends at 0 in a steady current."""
+    """Line of sight with an integral of the cross-track error, which goes to 0 in a steady current."""
 
     kind: ClassVar[str] = "ilos"
 
@@ -214,7 +214,7 @@ class IntegralLineOfSight(LineOfSight):
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class AdaptiveLineOfSight(LineOfSight):
-    """Line of sight less an estimate of the crab angle (Fossen 2023), which a steady current brings to 0."""
+    """Line of sight minus an estimate of the crab angle (Fossen 2023); a steady current leaves no error."""
 
     kind: ClassVar[str] = "alos"
 

@@ -41,7 +41,7 @@ DEEP, FAR = 1e6, 1e9  # m: of water that is not shallow; of a turn that lies beh
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class PreviewMPC(WheelOver):
-    """Wheel-over with a course that sampling on the design model, its `ship`, improves."""
+    """Wheel-over whose course is improved by sampling on the design model, its `ship`."""
 
     kind: ClassVar[str] = "preview-mpc"
     has_ship: ClassVar[bool] = True

@@ -31,7 +31,7 @@ _REGISTERED: dict[str, type[Controller]] = {}
 
 
 def register_controller(controller: type[C]) -> type[C]:
-    """Let `--controllers`, files, the benchmark and learning know a controller by its `kind`.
+    """Make a controller known by its `kind` to `--controllers`, files, the benchmark and learning.
 
     Parameters
     ----------

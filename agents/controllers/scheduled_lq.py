@@ -26,7 +26,7 @@ SPEEDS = (0.6, 0.7, 0.8, 0.9, 1.0, 1.1)  # over service speed
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class ScheduledLQ(Controller):
-    """LQ designed at several speeds; gains and neutral rudder lie straight between them.
+    """LQ designed at several speeds, with gains and neutral rudder interpolated linearly between them.
 
     Below the lowest and above the highest speed those of the nearest are kept. `gains` and `margins` are
     those at service speed.

@@ -38,7 +38,7 @@ COURSE_ERROR = ("course_error_sin", "course_error_cos")
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class WheelOver(Guided):
-    """Line of sight with turns begun by the ship's own turning circle, and the current countered."""
+    """Line of sight that begins turns by the ship's own turning circle, and counters the current."""
 
     kind: ClassVar[str] = "wheel-over"
     observes: ClassVar[tuple[str, ...]] = (*Guided.observes, *COURSE_ERROR, "turn_distance", "turn_angle")

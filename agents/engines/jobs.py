@@ -48,7 +48,7 @@ def run_jobs(
     retries: int = 2,
     progress: JobProgress | None = None,
 ) -> list[Any]:
-    """Do many independent jobs and return their results in the order of the jobs.
+    """Run many independent jobs and return their results in the order of the jobs.
 
     Parameters
     ----------
@@ -64,7 +64,7 @@ def run_jobs(
         Of a ray cluster, such as ``"10.0.0.1:6379"``, ``"ray://10.0.0.1:10001"`` or ``"auto"``; by default
         ray is started on this computer. shipgym must be installed on the computers of the cluster.
     keep : str or Path, optional
-        Folder in which each result is kept as soon as it is there; such jobs are not done again.
+        Folder in which each result is kept as soon as it is available; such jobs are not run again.
     retries : int
         How often a job is done again whose worker died, the last time alone, so that it is the one at fault.
     progress : callable, optional

@@ -66,15 +66,15 @@ class LearnedPolicy:
     observation_scales : tuple of float
         Physical value of each observation of 1, SI units.
     action : {"rudder", "rudder-discrete", "rudder-shaft"}
-        What it commands. Of discrete orders that with the largest output is taken.
+        What it commands. With discrete orders, the one with the largest output.
     frame_stack : int
         Number of observations the network sees, the newest last.
     base : Controller or None
         Whose rudder the network adds to.
     authority : float
-        Share of the rudder limit by which it may differ from the base; 1 without a base.
+        Fraction of the rudder limit by which it may differ from the base; 1 without a base.
     action_repeat : int
-        Control intervals for which an output of the network holds.
+        Control intervals for which an output of the network lasts.
     rate_limit : float
         Largest change of the output in force in a control interval; 2, its whole range, does not limit it.
     env_id : str

@@ -38,7 +38,7 @@ class Episodes:
     heading_rmse_deg : array
         Root mean square of the heading error, degrees.
     rudder_travel_deg_min : array
-        Way of the rudder per minute, degrees per minute.
+        Rudder travel, degrees per minute.
     extrapolating : array
         Share of the time outside the model's operating envelope.
     terminated : bool array

@@ -21,7 +21,7 @@ Flags = NDArray[np.bool_]
 
 @dataclass(frozen=True, eq=False)
 class Rollout:
-    """What became of some episodes of a task.
+    """The course and results of some episodes of a task.
 
     Attributes
     ----------
@@ -35,7 +35,7 @@ class Rollout:
     costs : array of shape (n,)
         Minus the sum of the rewards, up to where the policy failed.
     sailing : bool array of shape (n_steps, n)
-        Whether the episode was going on in the interval; what is recorded of the others means nothing.
+        Whether the episode was running in the interval; what is recorded of the others is meaningless.
     terminated, truncated, failed : bool array of shape (n,)
         How the episode ended; the last: because the policy gave no command.
     failure : str

@@ -39,7 +39,7 @@ def best_known(suite: str) -> dict[str, dict[str, Any]]:
 
 
 def reference_costs(suite: str) -> dict[str, tuple[float, float]]:
-    """Mean costs that are scores of 0 and 1, by task: wheel-over's from the model, and the best known."""
+    """Mean costs with scores 0 and 1, by task: wheel-over designed on the model, and the best known."""
     return {
         task: (float(one["zero"]), float(np.mean(one["costs"]))) for task, one in best_known(suite).items()
     }

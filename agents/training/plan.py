@@ -102,7 +102,7 @@ class Plan:
 
 @dataclass(frozen=True)
 class Given:
-    """What a user gives; None or nothing for what is left to the defaults, or to the run that is resumed."""
+    """What a user gives; None or empty for what is left to the defaults, or to the run that is resumed."""
 
     algorithm: str
     environment: str | None = None  # "course-keeping", "path-following", or an id

@@ -24,7 +24,7 @@ Flags = NDArray[np.bool_]
 
 
 class ResidualVecEnv(VecEnvWrapper):  # type: ignore[misc]  # stable-baselines3 is not type-checked here
-    """Ships steered by a base controller to which an agent adds; the agent remembers observations.
+    """Ships steered by a base controller to which an agent adds, with a frame stack of observations.
 
     What it sees, and what becomes of its output, stands in `agents.policies.policy`. A step has
     `action_repeat` control intervals, its reward is their sum. Where an episode ends among them, the rest of

@@ -51,7 +51,7 @@ def check_new(folder: Path) -> None:
     Raises InputError which says how to go on with a run that is there.
     """
     if (folder / RUN).is_file():
-        raise InputError(f"{folder}: a run is there already; resume it with --resume, or name another folder")
+        raise InputError(f"{folder}: contains a run already; resume it with --resume, or name another folder")
     if folder.exists() and (not folder.is_dir() or present(folder)):
         raise InputError(f"{folder}: exists and is not a training run; name another folder")
     check_writable(folder)

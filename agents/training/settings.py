@@ -213,7 +213,7 @@ def load_settings(
     given: Mapping[str, Any] | None = None,
     action: str = "rudder",
 ) -> Settings:
-    """The tuned settings of an algorithm, with those that are given in their place.
+    """The tuned settings of an algorithm, with those given by name replaced.
 
     Parameters
     ----------

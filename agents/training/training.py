@@ -123,7 +123,7 @@ def train(
     tell: Callable[[Progress], None] | None = None,
     command: str | None = None,
 ) -> TrainingResult:
-    """Let an agent learn.
+    """Train an agent.
 
     Parameters
     ----------
@@ -132,7 +132,7 @@ def train(
     out : str or Path, optional
         Folder of the run (`run_folder`); by default nothing is written.
     resume : bool
-        Go on with the run in the folder.
+        Continue the run in the folder.
     max_seconds : float, optional
         Time after which the training stops at the next boundary; it can be resumed.
     tell : callable, optional

@@ -85,7 +85,7 @@ def backward_elimination(
     threshold: float = 0.1,
     prefer: Sequence[str] = (),
 ) -> Reduction:
-    """Drop terms one by one while nothing that is held out is explained worse.
+    """Drop terms one by one as long as held-out data is explained equally well.
 
     Parameters
     ----------
@@ -219,7 +219,7 @@ def reduced_structure(structure: Structure, reductions: dict[str, Reduction], na
 def table_of(model: ShipModel) -> Structure:
     """The table of terms of a model; InputError for a ship with equations written by hand."""
     if not isinstance(model.dynamics, Structure):
-        raise InputError(f"model {model.name!r}: equations written by hand found, expected a table of terms")
+        raise InputError(f"structure: {model.structure!r} found, expected a table of terms, as 'abkowitz'")
     return model.table
 
 

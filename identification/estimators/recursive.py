@@ -260,7 +260,7 @@ class StochasticGradient(Recursion):
     """Stochastic gradient, with a linear (SG) or a nonlinear innovation (NISG).
 
     Cheap and slow: without forgetting its steps shrink as the samples grow, and with correlated regressors it
-    has not arrived by the end of a trial. Prefer the least-squares forms for anything but comparison.
+    has not converged by the end of a trial. Prefer the least-squares forms for anything but comparison.
 
     Parameters
     ----------

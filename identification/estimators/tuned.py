@@ -34,7 +34,7 @@ class TunedLSSVM(LinearRegressor):
         Artificial bee colony, particle swarm, grid or differential evolution; with its settings as
         `{"name": "abc", "rounds": 60}`.
     objective : {"k-fold", "training", "free-running"}
-        Error of blocks of time held out; error on the samples fitted, as the thesis has it, whose
+        Error on held-out blocks of time; error on the fitted samples, as in the thesis, whose
         optimum is the upper bound; error of simulated trials (through `identify` only).
     bounds : tuple of float
         Least and largest C.

@@ -56,7 +56,7 @@ def compare_methods(
     structures: Sequence[str | Structure] | None = None,
     **arguments: Any,
 ) -> Comparison:
-    """Identify by several methods, or structures and methods, and rank them on trials held out.
+    """Identify by several methods, or structures and methods, and rank them on held-out trials.
 
     These are marked `validate` or named by `hold_out`; where there are none, each trial to fit in turn.
 

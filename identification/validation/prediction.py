@@ -17,7 +17,7 @@ TURNING = ("advance_lengths", "transfer_lengths", "tactical_diameter_lengths")
 
 
 def predict(model: ShipModel, trial: Trial) -> Trial | None:
-    """Simulate a trial from its initial state and measured rudder; None where the model runs away.
+    """Simulate a trial from its initial state and measured rudder; None if the model runs away.
 
     Initial velocities that were derived are estimated (`with_start`).
     """

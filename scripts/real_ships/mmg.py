@@ -203,7 +203,7 @@ def painter(
 
 LIMITS = """Both priors meet the aims for yaw rate, heading and first overshoot; that of the reference ship
 also those for the advance to port and for drift and diameter to starboard, that of formulas the one for
-drift to starboard. Missed are the aims for the second overshoot (0.68 and 0.58 instead of 0.45), the
+drift to starboard. They miss those for the second overshoot (0.68 and 0.58 instead of 0.45), the
 advance (3.7 % to starboard; 1.6 and 1.4 %), the tactical diameter to port (5.9 %) or to both sides (5.4 and
 12.6 %), and drift to port by 0.3 and 0.1 degrees. In MARIN's tank the ship turns tighter to port, by 3 % in
 advance and 8 % in diameter; HSVA's zigzags show no such difference, and the models turn nearly alike to

@@ -22,7 +22,7 @@ def check_vector_env(
     make_single: Callable[[], gymnasium.Env[Any, Any]] | None = None,
     n_steps: int = STEPS,
 ) -> None:
-    """Check that a vector environment keeps the promises of Gymnasium's interface.
+    """Check that a vector environment meets the requirements of Gymnasium's interface.
 
     Spaces and shapes, seeds that hold, arrays that are not changed later, the autoreset that its metadata
     name, wrong actions, and, given single environments, that each row is one of them, bit for bit.
@@ -40,7 +40,7 @@ def check_vector_env(
     Raises
     ------
     InputError
-        Naming the first promise that is not kept, what was found and what is expected.
+        Naming the first requirement that is not met, what was found and what is expected.
     """
     for check in (_check_spaces, _check_reset, _check_steps, _check_seeds, _check_actions, _check_autoreset):
         with closing(make()) as env:

@@ -26,9 +26,9 @@ SUCCESS = ("success", "is_success")
 class RecordEpisode(
     gymnasium.Wrapper[Observation, Action, Observation, Action], gymnasium.utils.RecordConstructorArgs
 ):
-    """Writes what happened in each episode to a file of its own, `episode-00000.json` and so on.
+    """Writes each episode to a file of its own, `episode-00000.json` and so on.
 
-    A file is written whole when its episode ends. One that is cut off by `reset` or `close` is written as
+    A file is written, complete, when its episode ends. One cut off by `reset` or `close` is written as
     well, neither terminated nor truncated, if it has a step.
 
     Parameters

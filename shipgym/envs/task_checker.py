@@ -30,7 +30,7 @@ class TaskCheck(Findings):
 
 
 def check_task(task: Any, **options: Any) -> TaskCheck:
-    """Look for what is wrong with a task.
+    """Check a task for errors.
 
     Its records and functions; compilation; some steps in plain Python, whose errors name the line; some
     hundred steps of many ships by orders of a beginner: rewards, state and observations finite and within

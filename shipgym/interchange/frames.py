@@ -44,7 +44,7 @@ def to_frame(recorded: Trial | Episode) -> DataFrame:
 
 
 def from_frame(frame: DataFrame) -> Trial | Episode:
-    """What `to_frame` made a frame of; a trial's `raw` is lost.
+    """The trial or episode that `to_frame` converted; a trial's `raw` is lost.
 
     Raises InputError for another frame: one of a log is read by `Trial.from_frame`.
     """
@@ -66,7 +66,7 @@ def to_xarray(recorded: Trial | Episode) -> Dataset:
 
 
 def from_xarray(dataset: Dataset) -> Trial | Episode:
-    """What `to_xarray` made a dataset of; a trial's `raw` is lost. Raises InputError for another dataset."""
+    """The trial or episode of `to_xarray`; a trial's `raw` is lost. Raises InputError for another dataset."""
     series = {str(name): values.to_numpy() for name, values in dataset.data_vars.items()}
     return put_together(dataset["t"].to_numpy(), series, dataset.attrs, "expected one of to_xarray")
 

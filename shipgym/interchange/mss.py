@@ -44,7 +44,7 @@ def to_mss(model: ShipModel) -> dict[str, float]:
 
 
 def from_mss(parameters: Mapping[str, Any], name: str = "mss", water_density: float = 1025.0) -> ShipModel:
-    """The model of a set of MSS: of structure `abkowitz` or, with `Xphiphi`, the container ship's equations.
+    """The model for a parameter set of MSS: structure `abkowitz` or, with `Xphiphi`, the container ship.
 
     Raises InputError for a parameter that is missing, unknown or no number, or a container ship of another
     length than hers, which is in her equations.

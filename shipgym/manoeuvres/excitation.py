@@ -47,7 +47,7 @@ def prbs_rudder(
     duration, dt : float
         s. The samples are dt apart.
     water_depth : float
-        m, for ships that know shallow water.
+        m, for ships whose equations cover shallow water.
     weather : Weather or str, optional
         A weather or the name of a sea state, with the same seed; by default calm.
 

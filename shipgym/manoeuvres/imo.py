@@ -40,7 +40,7 @@ LARGE_DISPLACEMENT = (
 
 @dataclass(frozen=True)
 class Criterion:
-    """One criterion; the worse of both sides counts."""
+    """One criterion; the worse of the two sides counts."""
 
     value: float | None  # of the model, in `unit`; None where the manoeuvre never got so far
     limit: float  # largest value allowed

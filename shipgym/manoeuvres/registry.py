@@ -119,7 +119,7 @@ def standard_manoeuvres(model: ShipModel, water_depth: float = np.inf) -> dict[s
     model : ShipModel
         Her length and speed give durations and steps, her rudder's limit the angles.
     water_depth : float
-        m, for ships that know shallow water.
+        m, for ships whose equations cover shallow water.
 
     Returns
     -------
@@ -132,7 +132,7 @@ def standard_manoeuvres(model: ShipModel, water_depth: float = np.inf) -> dict[s
     Raises
     ------
     InputError
-        For water that is too shallow, or shallow water in a ship that knows none.
+        For water that is too shallow, or for shallow water with a deep-water model.
     """
     families = families_of(model, water_depth).values()
     return {name: manoeuvre for family in families for name, manoeuvre in family.items()}

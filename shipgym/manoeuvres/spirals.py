@@ -40,7 +40,7 @@ SHORT_PLATEAU = 0.1  # of the longest plateau; shorter ones are the rudder on it
 
 @dataclass(frozen=True, eq=False)
 class Spiral:
-    """Steady turns at one rudder angle after the other."""
+    """Steady turns at a sequence of rudder angles."""
 
     trial: Trial  # the manoeuvre
     # shape (n_points,); of each steady turn, in the order in which they were sailed; degrees and degrees per
@@ -94,7 +94,7 @@ def reverse_spiral(
     weather: Weather | str | None = None,
     seed: Seed = 0,
 ) -> Spiral:
-    """Simulate a reverse spiral (Bech): a helmsman holds one yaw rate after the other until it is steady.
+    """Simulate a reverse spiral (Bech): a helmsman keeps a sequence of yaw rates, each until it is steady.
 
     It also finds the turns at which an unstable ship would not stay by itself. The helmsman is a
     proportional-integral controller, designed from the rudder's effect on the ship.

@@ -191,7 +191,7 @@ def acceleration(
 
 
 def acceleration_indices(trial: Trial, part: float = 0.9, length: float | None = None) -> AccelerationIndices:
-    """Time and distance in which a ship makes a part of a change of speed.
+    """Time and distance that a ship needs for a part of a change of speed.
 
     The trial has u and v, beginning with the order and ending at steady speed; `part` is that of the change
     of surge speed from the first sample to the last, `length` as in `stopping_indices`. Raises InputError if

@@ -27,7 +27,7 @@ CAPTION = "Path from above, from the position and along the heading at which the
 
 @dataclass(frozen=True)
 class TurningIndices:
-    """Indices of a turning circle; None where the ship did not turn so far.
+    """Indices of a turning circle; None if the ship did not turn that far.
 
     Lengths are measured from the position and along the heading at which the rudder was ordered.
     """

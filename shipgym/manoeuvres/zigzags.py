@@ -23,7 +23,7 @@ CAPTION = "Heading change and rudder in degrees; dotted: the heading at which th
 
 @dataclass(frozen=True)
 class ZigzagIndices:
-    """Indices of a zigzag; None where the manoeuvre ended before."""
+    """Indices of a zigzag; None if the manoeuvre ended earlier."""
 
     # heading beyond that at which the rudder was reversed for the first and the second time, degrees
     overshoot_1_deg: float | None
@@ -63,7 +63,7 @@ def zigzag(
         Reverse the rudder at the instant at which the heading is reached, inside a step, or at the
         first sample at which it has been reached.
     water_depth : float
-        m, for ships that know shallow water.
+        m, for ships whose equations cover shallow water.
     must_reverse : bool
         Whether a ship that never reaches the heading of the first reversal is an error.
     weather : Weather or str, optional

@@ -19,7 +19,7 @@ ORDERS = ("delta_command", "delta", "n_command", "n")
 
 
 def zigzag_figure(trial: Trial, height: int = 320) -> Figure:
-    """A zigzag as the field draws it: heading change and rudder over time, with the switch headings.
+    """A zigzag in the usual form: heading change and rudder over time, with the switch headings.
 
     Of a trial with psi and delta; height in pixels.
     """
@@ -132,7 +132,7 @@ def speed_figure(trial: Trial, length: float | None = None, height: int = 380) -
 
 
 def excitation_figure(trial: Trial) -> Figure:
-    """A manoeuvre for identification, such as of `prbs_rudder`: orders above what the ship made of them."""
+    """A manoeuvre for identification, such as `prbs_rudder`: orders above the ship's response."""
     orders = [name for name in ORDERS if name in trial.channels and np.ptp(trial[name]) > 0.0]
     figure = history_figure({"simulated": trial}, (*orders, "psi", "r", "speed", "drift"))
     figure.update_layout(showlegend=False)

@@ -80,7 +80,7 @@ class Wind:
         Of the gusts (`shipgym.sea.gusts`).
     coefficients : str or WindTable
         "blendermann" (type of ship guessed from its fullness), "blendermann-" and a type of
-        `BLENDERMANN`, "isherwood", or a table of one's own.
+        `BLENDERMANN`, "isherwood", or a table of your own.
 
     Raises
     ------
@@ -203,7 +203,7 @@ def sea_states() -> dict[str, SeaState]:
 
 @dataclass(frozen=True)
 class Weather:
-    """What the sea does to a ship: current, wind and waves, each optional, and a name for reports.
+    """Current, wind and waves, each optional, and a name for reports.
 
     Raises InputError for parts that are not of these types.
     """

@@ -21,7 +21,7 @@ _NARROWEST = 2.0  # beam by draught, likewise
 
 @dataclass(frozen=True)
 class WaveDrift:
-    """Mean wave drift over the direction of the waves, and how it varies slowly.
+    """Mean wave drift over the direction of the waves, and its slow variation.
 
     The force at any time is the mean one times (1 + s), s a Gauss-Markov process with the time constant and
     standard deviation given here.

@@ -53,7 +53,7 @@ def coefficient_names() -> tuple[str, ...]:
 
 @dataclass(frozen=True)
 class WindTable:
-    """Measured or computed wind coefficients of one's own ship.
+    """Measured or computed wind coefficients of your own ship.
 
     Parameters
     ----------
@@ -61,9 +61,9 @@ class WindTable:
         Where the relative wind comes from, degrees from the bow, rising from 0 to 180; the other side is
         the mirror image.
     CX : tuple of float
-        Surge force by the frontal area; negative in head wind.
+        Surge force divided by the frontal area; negative in head wind.
     CY : tuple of float
-        Sway force to the LEE side by the lateral area, positive.
+        Sway force to the LEE side divided by the lateral area, positive.
     CN : tuple of float
         Yaw moment about midship by lateral area and length overall, positive where the bow turns to lee.
     CK : tuple of float, optional

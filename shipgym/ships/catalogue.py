@@ -83,7 +83,7 @@ def list_models() -> list[str]:
 
 
 def register_ship_equations(ship: ShipEquations | str | Path) -> ShipEquations:
-    """Make a ship with equations of her own known by her name, so that `load_model` finds her.
+    """Register a ship with equations of her own, so that `load_model` finds her by name.
 
     Given is the ship, or the Python file that defines her as `SHIP`, which is run. A ship that does not come
     from a file, or from one that cannot be imported, stays in this process. Raises InputError for a file that
@@ -124,7 +124,7 @@ def load_model(name: str | Path) -> ShipModel:
 def truth_of(model: str | Path | ShipModel) -> ShipModel:
     """The reference ship whose simulated trials an identified model comes from.
 
-    What was designed, tuned or trained on the model can be evaluated on her: the identified models in the box
+    What was designed, tuned or trained on the model can be evaluated on her: the shipped identified models
     name her in their provenance, as `truth`. A model is given as itself, or as `load_model` takes it.
 
     Raises InputError for a model that names no reference ship of its size: a reference ship herself, one

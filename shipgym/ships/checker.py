@@ -51,7 +51,7 @@ class ModelCheck(Findings):
 
 
 def check_ship_model(model: ShipModel | str | Path) -> ModelCheck:
-    """Look for what is wrong with a model.
+    """Check a model for errors.
 
     The file and its coefficients; the inertia; accelerations over the states that a manoeuvre passes
     (finite, as the table of terms says, alike to both sides); straight running; the side to which the rudder

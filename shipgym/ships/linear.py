@@ -263,7 +263,7 @@ class StraightLineStability:
 
 
 def straight_line_stability(model: ShipModel) -> StraightLineStability:
-    """Straight-line stability of a ship about straight running, rudder, speed and shaft fixed, roll at once.
+    """Straight-line stability of a ship about straight running, rudder, speed and shaft fixed, roll balanced.
 
     The criterion is the determinant of the linear derivatives of force, which is that of the inertia times
     that of the linearised accelerations; the inertia is positive, so both tell the same. Raises InputError if

@@ -33,11 +33,11 @@ class Particulars(Mapping[str, Any]):
     mass, xg, yaw_gyradius : float, optional
         Displacement mass, kg; centre of gravity forward of midship, m; radius of gyration in yaw about it, m.
     block_coefficient, speed : float, optional
-        Displaced volume by length * beam * draught; service speed, m/s.
+        Displaced volume divided by length * beam * draught; service speed, m/s.
     rudder_area, propeller_diameter : float, optional
         Movable area of the rudder, of all rudders together, m2; m.
     rudder_aspect_ratio, propeller_pitch_ratio : float, optional
-        Span of a rudder squared by its area; pitch of the propeller by its diameter.
+        Squared span of a rudder divided by its area; pitch of the propeller divided by its diameter.
     rudders, propellers : float, optional
         How many; 1 where not given.
     length_overall, frontal_area, lateral_area : float, optional

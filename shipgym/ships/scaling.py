@@ -19,7 +19,7 @@ def scale_model(
 ) -> ShipModel:
     """A geometrically similar ship of another length, at another service speed.
 
-    What has no unit stays: the manoeuvre is the same in ship lengths sailed. Speeds go with the ratio of
+    What is dimensionless stays: the manoeuvre is the same in ship lengths sailed. Speeds go with the ratio of
     the service speeds, times with that of the times to sail a ship length; the steering gear follows.
     Scale effects (friction, wake) are not estimated.
 

@@ -71,7 +71,7 @@ class ShipModel(ManoeuvringModel):
         state : array-like of shape (n_state,), optional
             Where to start; by default straight ahead at service speed.
         water_depth : float
-            In m, for ships that know shallow water.
+            In m, for ships whose equations cover shallow water.
         weather : Weather or str, optional
             A weather or the name of a sea state; by default calm.
         seed : int or Generator

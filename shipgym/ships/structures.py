@@ -85,14 +85,14 @@ def register_structure(
     normalisation: str = "si",
     quantity: str = "acceleration",
 ) -> Structure:
-    """Make a table of terms known by a name, so that it works wherever a structure does.
+    """Register a table of terms by name, so that it works wherever a structure does.
 
     Models and their files carry their table, so only the process that identifies has to register it.
 
     Parameters
     ----------
     name : str
-        By which `identify` and `ShipModel` are to know it.
+        Name for `identify` and `ShipModel`.
     equations : dict of str to str
         Formulas of surge `u`, sway `v`, yaw `r`, roll `p` and the memory `q` of yaw (see `Structure`), or
         some of them, separated by commas: symbols side by
@@ -103,7 +103,7 @@ def register_structure(
     normalisation : {"si", "prime", "service"}
         Units of the terms; see `Structure`.
     quantity : {"acceleration", "force"}
-        What they make up; forces need the ship's mass and added mass.
+        What the terms add up to; forces need the ship's mass and added mass.
 
     Raises
     ------

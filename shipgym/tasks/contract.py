@@ -78,7 +78,7 @@ class Interval(NamedTuple):
 
 
 class Readings(NamedTuple):
-    """The ship as her instruments show her."""
+    """The readings of the ship's instruments."""
 
     x: float  # m, north
     y: float  # m, east

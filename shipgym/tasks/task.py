@@ -47,7 +47,7 @@ class Observed(NamedTuple):
 
 @dataclass(frozen=True)
 class Task:
-    """What is asked of an autopilot.
+    """What an autopilot has to do.
 
     Attributes
     ----------

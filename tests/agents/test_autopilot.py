@@ -91,7 +91,7 @@ def test_a_learned_guest_flies_beside_them_without_gains_and_margins(chain, tmp_
     assert told["learned"]["gains"] is told["learned"]["margins"] is None
     assert told["lq"] == verification_metrics(result.verification)["controllers"]["lq"]
     write_report(replace(result, verification=found), tmp_path / "report.html")
-    assert "LEARNED was learned before, on another model" in (tmp_path / "report.html").read_text()
+    assert "LEARNED was trained earlier, on another model" in (tmp_path / "report.html").read_text()
     table = ranking_table(replace(result, verification=found))
     rows = dict(zip(table.columns[0].cells, table.columns[5].cells, strict=True))
     assert rows["LEARNED"] == "-"

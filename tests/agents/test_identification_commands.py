@@ -253,7 +253,7 @@ def test_without_a_structure_it_is_auto_but_for_what_needs_a_table(ship, monkeyp
     assert "mmg by map was not fitted: trial" in answer.stdout
     told = json.loads((tmp_path / "out" / "metrics.json").read_text())["selection"]
     assert told["ranking"][0]["structure"] == load_model(tmp_path / "out" / "model.json").structure
-    assert "The call named no structure" in (tmp_path / "out" / "report.html").read_text()
+    assert "No structure was named" in (tmp_path / "out" / "report.html").read_text()
 
 
 def test_a_table_of_terms_in_the_ship_file_is_taken_and_stays_with_the_model(ship):

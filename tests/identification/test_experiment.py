@@ -141,7 +141,9 @@ def test_what_cannot_be_advised_is_named(ship: ShipModel) -> None:
         advise(ship, [gentle(ship)], coefficient="Y_v")
     with pytest.raises(InputError, match="trials: none found"):
         advise(ship, [])
-    with pytest.raises(InputError, match="equations written by hand"):
+    with pytest.raises(
+        InputError, match="structure: 'container' found, expected a table of terms, as 'abkowitz'"
+    ):
         advise(shipgym.load_model("container"), [gentle(ship)])
 
 
