@@ -1,6 +1,5 @@
 """`shipgym steer` and `shipgym simulate`: an autopilot and a simulated ship, the two ends of NMEA 0183."""
 
-import asyncio
 from math import inf, radians
 from pathlib import Path
 from typing import Annotated
@@ -50,6 +49,8 @@ def steer_command(
     the rudder does not follow or the computer is late, it raises the alarm (ALR), marks its order invalid and
     stops steering. Not certified: read docs/deployment.md first. Exits with 1 after an alarm.
     """
+    import asyncio
+
     from agents.agent_file import load_agent
     from agents.cli.terminal import answer, say
     from agents.deployment.route import Route
@@ -95,6 +96,8 @@ def simulate_command(
 
     Over TCP it waits for connections; the autopilot and a chart plotter may connect at once.
     """
+    import asyncio
+
     from agents.cli.terminal import answer
     from agents.deployment.simulated import STEP, SimulatedShip, simulate_ship
     from shipgym.checks import check_number
