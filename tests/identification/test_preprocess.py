@@ -126,6 +126,19 @@ def test_kalman_smoother_makes_velocities_better_and_keeps_the_record(
         assert after < 0.7 * before
 
 
+@pytest.mark.parametrize("channel", ["psi", "r"])
+def test_kalman_smoother_takes_a_heading_or_a_yaw_rate_alone(
+    mariner: ShipModel, record: Callable[..., Trial], channel: str
+) -> None:
+    run = zigzag(mariner, 20, 20, duration=200, dt=0.1)
+    truth, noisy = (
+        Trial(one.t, {channel: one[channel], "delta": one["delta"]}, name="alone")
+        for one in (record(run, 10), record(run, 10, 1.0, 5))
+    )
+    before, after = (np.std(one[channel] - truth[channel]) for one in (noisy, smooth_kinematics(noisy)))
+    assert after < 0.7 * before
+
+
 def test_kalman_smoother_takes_positions_without_velocities(
     mariner: ShipModel, record: Callable[..., Trial]
 ) -> None:

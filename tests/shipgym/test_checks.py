@@ -15,6 +15,7 @@ from shipgym.checks import (
     check_flag,
     check_keys,
     check_number,
+    check_shape,
     check_table,
     check_text,
     check_whole,
@@ -132,3 +133,13 @@ def test_rows_of_an_array_are_equally_long_and_one_row_is_enough():
     assert check_array([[1, 2.5]], (None, None), "x").tolist() == [[1.0, 2.5]]
     with pytest.raises(InputError, match=r"x\[1\]: 1 entries found, expected a list of 2 numbers"):
         check_array([[1.0, 2.0], [3.0]], (None, None), "x")
+
+
+def test_a_list_of_one_kind_has_any_length_and_one_of_several_kinds_theirs():
+    check_shape([1, 2, 3], [(int,)], "x")
+    check_shape([], [(int,)], "x")
+    check_shape([1, "a"], [(int,), (str,)], "x")
+    with pytest.raises(InputError, match=r"x: .* found, expected a list of 2"):
+        check_shape([1], [(int,), (str,)], "x")
+    with pytest.raises(InputError, match=r"x\[1\]: 2 found, expected a text"):
+        check_shape([1, 2], [(int,), (str,)], "x")
