@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
 
 from agents import LQ, Policy, benchmark
 from agents.suites.suite import BenchmarkTask
@@ -13,10 +16,10 @@ def gentle(task: BenchmarkTask) -> Policy:
     return LQ.from_model(task.ship, integral_lengths=60.0)
 
 
-def main(out: str) -> None:
+def main(out: Annotated[Path, typer.Argument(help="Folder of the results.")] = Path("results")) -> None:
     """Run them, then print the ranking and each task's best."""
     contestants = {"pid": "pid", "lq": "lq", "lqg": "lqg", "ilos": "ilos", "gentle": gentle}
-    result = benchmark(contestants, suite="shipgym-v1", out=out, workers=2, resume=True)
+    result = benchmark(contestants, suite="shipgym-v1", out=str(out), workers=2, resume=True)
     for place, entry in enumerate(result.summary["ranking"], start=1):
         print(f"{place}. {entry['name']:8} {entry['relative_cost']:.3f} times the lowest costs")
     for task, by_name in result.summary["tasks"].items():
@@ -26,4 +29,4 @@ def main(out: str) -> None:
 
 
 if __name__ == "__main__":
-    main(sys.argv[1] if len(sys.argv) > 1 else "results")
+    typer.run(main)

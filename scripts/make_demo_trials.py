@@ -9,12 +9,13 @@ the ship file that reads them. The same seed always gives the same files.
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Collection
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
+import typer
 from numpy.typing import NDArray
 
 from shipgym import ShipModel, example_ship, load_model
@@ -168,9 +169,16 @@ def write(folder: Path, files: Collection[str] | None = None) -> None:
     (folder / "ship.toml").write_text(text, encoding="utf-8")
 
 
+def main(
+    folder: Annotated[Path | None, typer.Argument(help="By default those of the project.")] = None,
+) -> None:
+    """Write the ship file and its trials."""
+    if folder is not None:
+        write(folder)
+        return
+    write(FOLDER)
+    write(example_ship().parent, PACKAGED)
+
+
 if __name__ == "__main__":
-    if len(sys.argv) > 1:
-        write(Path(sys.argv[1]))
-    else:
-        write(FOLDER)
-        write(example_ship().parent, PACKAGED)
+    typer.run(main)

@@ -68,7 +68,7 @@ SETTINGS = {
 }  # fmt: skip
 #: The rule that is searched, powers of a corridor narrower than a ship length: in wider ones the settings are
 #: the design's own.
-START = dict.fromkeys((f"{name}_power" for name in RULED), 0.0)
+SEARCHED = tuple(f"{name}_power" for name in RULED)
 LARGEST_POWER = 4.0
 EVALUATIONS, INSANE = 80, 0.02  # of the search; share of ships whose loops may have less than the margins
 BUDGET = 24, 16  # of tuning: settings, episodes
@@ -107,7 +107,7 @@ def search(out: Path) -> None:
     """Find the rule of the base's settings on a part of the fleet: least cost over the design's own."""
     fleets = [replace(one, lanes=one.lanes[:2]) for one in draw_fleets(FLEET_SEED, PATHS, SHIPS, out)[::2]]
     zero = [fleet.cost_of(Pilots(fleet.pilots), 0).mean() for fleet in fleets]
-    names = list(START)
+    names = SEARCHED
     found: list[tuple[float, dict[str, float]]] = []
 
     def cost(x: Any) -> float:
@@ -234,7 +234,7 @@ def unseen(folder: Path) -> list[tuple[str, Path, Any]]:
 
 
 def kinds(ship: Any) -> dict[str, dict[str, Any]]:
-    """Options of the paths, laid down before anything was trained."""
+    """Options of the paths; `river` was laid down before the shipped rule was run on it."""
     speed, time_of_length = ship.particulars["speed"], ship.particulars["length"] / ship.particulars["speed"]
     current = Current(0.2 * speed, variation=0.05 * speed, time_constant=20.0 * time_of_length)
     sharp = {"max_turn_deg": 120.0, "turn_radius": 3.0, "leg_lengths": [12.0, 18.0], "ground": 8.0}

@@ -5,10 +5,11 @@ python scripts/train_autopilot.py FOLDER
 
 from __future__ import annotations
 
-import sys
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
+import typer
 
 from agents import load_agent
 from agents.controllers.designs import design
@@ -25,7 +26,7 @@ def tell(now: Progress) -> None:
         print(f"step {now.steps:,}: cost {now.cost:.2f}, LQ's {now.lq_cost:.2f}")
 
 
-def main(folder: Path) -> None:
+def main(folder: Annotated[Path, typer.Argument(help="Folder of the training.")]) -> None:
     """Train, or go on with a training that was stopped, then compare on new episodes."""
     plan = make_plan(Given("ppo", environment="path-following", model="mariner", threads=2))
     train(plan, folder, resume=folder.exists(), tell=tell)
@@ -36,4 +37,4 @@ def main(folder: Path) -> None:
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]))
+    typer.run(main)

@@ -15,11 +15,13 @@ import sys
 import tempfile
 import time
 from pathlib import Path
+from typing import Annotated
 
 import matplotlib as mpl
 import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
+import typer
 from gallery import DPI, SIZE, STYLE
 
 import shipgym
@@ -190,9 +192,16 @@ def main(folder: Path) -> None:
     pictures(folder)
 
 
+def run(
+    folder: Annotated[Path | None, typer.Argument(help="Keeps all files; by default none are.")] = None,
+) -> None:
+    """Run the tutorial in a folder."""
+    if folder is not None:
+        main(folder.resolve())
+        return
+    with tempfile.TemporaryDirectory() as made:
+        main(Path(made))
+
+
 if __name__ == "__main__":
-    if len(sys.argv) > 1:
-        main(Path(sys.argv[1]).resolve())
-    else:
-        with tempfile.TemporaryDirectory() as made:
-            main(Path(made))
+    typer.run(run)

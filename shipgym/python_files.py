@@ -29,8 +29,8 @@ def load_file(path: Path, expected: str = "a Python file") -> ModuleType:
     module.__file__ = str(resolved)
     sys.modules[name] = module
     try:
-        # compiled here, because Python's own cache takes a file changed within a second for the same; without
-        # what this file imports from __future__
+        # compiled here, because Python's own cache takes a file changed within a second for the same; and
+        # independent of what this file may import from __future__
         code = compile(resolved.read_bytes(), str(resolved), "exec", dont_inherit=True)
         exec(code, vars(module))
     except Exception as error:

@@ -56,9 +56,11 @@ def _help(name: str) -> str:
     """The meaning of an option, its choices and its default."""
     option = OPTIONS[name]
     text = option.meaning[0].upper() + option.meaning[1:]
-    choices = [choice for choice in option.choices or () if choice]
-    if choices:
-        text += ": " + ", ".join(choices[:-1]) + (" or " if choices[1:] else "") + choices[-1]
+    *others, last = [choice for choice in option.choices or () if choice] or [""]
+    if others:
+        last = f"{', '.join(others)} or {last}"
+    if last:
+        text += f": {last}"
     default = AUTO if name == "structure" else getattr(Options, name)
     if isinstance(default, str):
         text += f"; default: the ship file's, else {default}"

@@ -204,7 +204,10 @@ class Controller:
 
     @property
     def row(self) -> Floats:
-        """Feedback of the deviations in the order of `linear_loop.SIGNALS`, shape (5,)."""
+        """Feedback of the deviations in the order of `linear_loop.SIGNALS`, shape (5,).
+
+        With gains of n ships at once, as arrays of shape (n,), it is of shape (5, n).
+        """
         by_signal = {signal: sign * self.gains[gain] for gain, (signal, sign) in self.feedback.items()}
         return np.array([by_signal.get(signal, 0.0) for signal in SIGNALS])
 
@@ -275,7 +278,7 @@ class Controller:
         memory : array of shape (n, memory_size)
         """
         found = deviations(seen, self.neutral_rudder, self.neutral_sway)
-        rows = np.broadcast_to(self.row.T, found.shape)  # the same for all ships, or one for each
+        rows = np.broadcast_to(self.row.T, found.shape)
         return self.neutral_rudder + np.einsum("ij,ij->i", found, rows), memory
 
     def check_fits(self, names: Sequence[str], scales: Sequence[float], where: str = "observations") -> None:

@@ -79,7 +79,8 @@ def identify_reduced(
     Raises
     ------
     InputError
-        For a grey box, whose table is what its reference ship leaves, and fewer than five samples a term.
+        For a grey box, whose table is what its reference ship leaves, for a structure with a memory of yaw,
+        and for fewer than five samples a term.
     """
     full = identify(trials, **arguments)
     table = full.model.table
@@ -87,6 +88,11 @@ def identify_reduced(
         raise InputError(
             f"structure: {table.name!r} found, whose table adds to a reference ship, expected one of "
             "its own to reduce, such as 'abkowitz'"
+        )
+    if tuple(table.regressed) != tuple(table.equations):
+        raise InputError(
+            f"structure: {table.name!r} found, whose memory of yaw has no regression of its own, expected "
+            "one without memory to reduce, such as 'abkowitz'"
         )
     reductions = reduce(full.samples, table, direction, tolerance)
     small = reduced_structure(table, reductions, table.name)

@@ -20,7 +20,7 @@ from identification.estimators.linear import LinearRegressor, check_weight, sett
 from identification.estimators.robust import fit_weighted
 from shipgym import InputError
 from shipgym.arrays import Floats
-from shipgym.checks import check_choice, check_whole
+from shipgym.checks import check_choice, check_number, check_whole
 
 KERNELS = ("linear", "rbf", "poly")
 SELECTIONS = ("l-curve", "gcv", "explained-variance", "full")
@@ -72,6 +72,8 @@ class LSSVM(LinearRegressor):
         Lagrange multipliers (rbf and poly kernels).
     support_ : array of shape (n_samples, n_features)
         Centred and scaled samples that the multipliers belong to (rbf and poly kernels).
+    ridge_ : KernelRidge
+        The kernel's matrix and its solution by scikit-learn (rbf and poly kernels).
     weights_ : array of shape (n_samples,)
         Of the samples; 1 but for outliers.
     n_features_in_ : int
@@ -91,6 +93,10 @@ class LSSVM(LinearRegressor):
         """Fit to samples of shape (n_samples, n_features) and targets of shape (n_samples,)."""
         check_choice(self.kernel, KERNELS, "kernel")
         check_weight(self.C)
+        if self.gamma is not None:
+            check_number(self.gamma, "gamma", above=0.0)
+        check_whole(self.degree, "degree", at_least=1)
+        check_number(self.coef0, "coef0")
         X, y = validated(self, X, y)
         fit_once = self._fit_primal if self.kernel == "linear" else self._fit_dual
         self.weights_ = fit_weighted(lambda weights: fit_once(X, y, weights), y, self.robust)

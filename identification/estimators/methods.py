@@ -31,7 +31,7 @@ def fit_all(estimator: Callable[[], Estimator], samples: Samples) -> Estimators:
 
 
 def fit_equations(make: Callable[[], Estimator], task: FitTask) -> Estimators:
-    """Fit one estimator to each equation by itself, or those that use more than its samples together."""
+    """Fit an estimator to each equation; those that are tuned on the trials, to all equations together."""
     kind = type(make())
     if issubclass(kind, TunedLSSVM):
         return fit_tuned(make, task)
@@ -47,7 +47,7 @@ class Method:
     name: str  # as `identify` knows it
     estimator: Callable[..., Estimator]  # makes an unfitted estimator from settings
     regularised: bool = True  # whether the guard against models that run away may penalise it
-    #: fits estimators, made by its first argument, to the task that is its second
+    #: fits estimators, made by its first argument, to the task that is its second; a prior has its own
     fit: Callable[[Callable[[], Estimator], FitTask], Estimators] = fit_equations
     refined: bool = False  # whether what was fitted is the start of a refinement by simulation (`refine`)
 

@@ -131,7 +131,7 @@ def locked(path: Path) -> Iterator[None]:
         lock.release()
 
 
-def warn_of(folder: Path, error: BaseException | None) -> None:
+def warn_of(folder: Path, error: BaseException) -> None:
     """Say that nothing can be kept, because of an OSError, and what to do."""
     reason = getattr(error, "strerror", error)
     tell(

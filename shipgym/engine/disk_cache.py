@@ -54,4 +54,4 @@ class DiskCache(NullCache):  # type: ignore[misc]
         try:
             write_loop(dumps(data._reduce()), self.path)
         except InputError as error:
-            warn_of(self.path.parent, error.__cause__)
+            warn_of(self.path.parent, error.__cause__ or error)

@@ -15,7 +15,7 @@ Path = tuple[int, ...]
 #: LLVM instructions of a function: of Numba's context, a builder, types and values of the arguments.
 Generate = Callable[[Any, Any, Any, Any], Any]
 Answer = Callable[[], Any] | None  # Numba's type of what a function returns
-Number = Callable[[str, Any], Any]  # what is made of a number, of its path and kind
+OfNumber = Callable[[str, Any], Any]  # what is made of a number, of its path and kind
 
 
 def loader(rows: Rows, lanes: int = LANES) -> Part:
@@ -206,12 +206,14 @@ def _constant(context: Any, number: float) -> Any:
     return context.get_constant(_double(), number)
 
 
-def _fold(record: Record, number: Number, made: Callable[[Record, list[Any]], Any], prefix: str = "") -> Any:
+def _fold(
+    record: Record, number: OfNumber, made: Callable[[Record, list[Any]], Any], prefix: str = ""
+) -> Any:
     """What `made` makes of a record: of what `number` makes of its numbers, and of the records within it."""
-    items = [
-        _fold(kind, number, made, f"{prefix}{name}.") if is_record(kind) else number(prefix + name, kind)
-        for name, kind in field_types(record).items()
-    ]
+    items = []
+    for name, kind in field_types(record).items():
+        path = prefix + name
+        items.append(_fold(kind, number, made, f"{path}.") if is_record(kind) else number(path, kind))
     return made(record, items)
 
 
@@ -224,7 +226,7 @@ def _shape(record: Record) -> Any:
     return _fold(record, kind_of, lambda one, kinds: (one.__name__, *field_types(one), *kinds))
 
 
-def _made(record: Record, number: Number) -> Any:
+def _made(record: Record, number: OfNumber) -> Any:
     """A record of its numbers."""
     return _fold(record, number, lambda one, items: one(*items))
 
@@ -245,7 +247,7 @@ def _type(record: Record) -> Any:
     return _fold(record, typed, lambda one, kinds: types.Tuple.from_types(kinds, one))  # type: ignore[attr-defined]
 
 
-def _coded(context: Any, builder: Any, record: Record, number: Number) -> Any:
+def _coded(context: Any, builder: Any, record: Record, number: OfNumber) -> Any:
     """A record of the values of its numbers."""
     return _fold(record, number, lambda one, items: context.make_tuple(builder, _type(one), items))
 

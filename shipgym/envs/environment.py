@@ -122,7 +122,8 @@ class ShipsEnv:
         self.model, self.task, randomisation = read_options(given["task"], given["model"], options, taken)
         engine = Engine(self.model, num_envs, self.task, randomisation, given["allow_unstable"], threads)
         self._own_engine, self._asked = engine, dict[str, Any]()
-        self._artists = [Artist(self.render_mode, row) for row in range(num_envs) if self.render_mode]
+        drawn = range(num_envs) if self.render_mode else ()
+        self._artists = [Artist(self.render_mode, row) for row in drawn]
         observed = self.task.observed(self.model)
         self.observation_names = tuple(quantity.name for quantity in observed)
         self.observation_scales = np.array([quantity.scale for quantity in observed])

@@ -20,8 +20,8 @@ class Outputs:
     observations: NDArray[np.float32]  # (num_envs, n_observed)
     outcomes: NDArray[np.float64]  # (n_outcomes, num_envs): reward, terminated, truncated, then `info`
     flags: NDArray[np.bool_]  # (n_flags, num_envs): terminated, truncated, then those of `info`
-    terminated: NDArray[np.bool_]  # (num_envs,): the first of the flags, and the second
-    truncated: NDArray[np.bool_]
+    terminated: NDArray[np.bool_]  # (num_envs,): a view of flags[0]
+    truncated: NDArray[np.bool_]  # (num_envs,): a view of flags[1]
     words: NDArray[np.int64]  # (9,): addresses and shapes of the three, by turns
 
     def take(self, other: Outputs) -> None:

@@ -69,7 +69,7 @@ class Renderer:
     """
 
     def __init__(self, mode: str) -> None:
-        self.mode = check_choice(mode, RENDER_MODES, "render_mode", also=", or None")
+        self.mode = check_choice(mode, RENDER_MODES, "render_mode")
         os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")
         try:
             import pygame

@@ -194,14 +194,24 @@ def _tow(model: ShipModel, tank: Tank, motion: _Motion, name: str) -> Trial:
 
 
 def rigid_body_forces(
-    inertia: Sequence[float], velocity: Sequence[Floats] | Floats, acceleration: Sequence[Floats] | Floats
+    rigid: Sequence[float], velocity: Sequence[Floats] | Floats, acceleration: Sequence[Floats] | Floats
 ) -> Floats:
     """Forces X, Y and moment N that accelerate a ship without water, about midship (Fossen 2011, 3.3).
 
-    Mass, its static moment and the yaw inertia; velocities and accelerations in surge, sway and yaw, each of
-    shape (3, n_samples), as what is returned; all in SI units or all in the prime system.
+    All in SI units, or all in the prime system.
+
+    Parameters
+    ----------
+    rigid : sequence of float
+        Mass, its static moment and the yaw inertia.
+    velocity, acceleration : array of shape (3, n_samples)
+        In surge, sway and yaw.
+
+    Returns
+    -------
+    array of shape (3, n_samples)
     """
-    mass, static, yaw = inertia
+    mass, static, yaw = rigid
     u, v, r = velocity
     udot, vdot, rdot = acceleration
     aside = vdot + u * r

@@ -452,7 +452,7 @@ def test_a_training_that_is_interrupted_says_whether_it_can_go_on(tmp_path, monk
         raise KeyboardInterrupt
 
     monkeypatch.setattr("agents.training.training.train", interrupted)
-    told = {"none": "interrupted", "kept": f"interrupted; go on with --resume --out {tmp_path / 'kept'}"}
+    told = {"none": "interrupted", "kept": f"interrupted; continue with --resume --out {tmp_path / 'kept'}"}
     for name, said in told.items():
         with pytest.raises(typer.Exit) as left:
             training._train(Given("ppo"), tmp_path / name, False, None)

@@ -59,6 +59,7 @@ def test_ppo_learns(name):
 
 
 def test_sac_learns():
+    # with the seeds 0 to 4 the ratio is 0.07 to 0.11
     agent = learned(SAC, COURSE, 5120, load_settings("sac", given={"base": "none", **COARSE}))
     assert mean_return(agent, COURSE) > 0.5 * mean_return(Nothing(), COURSE)
 

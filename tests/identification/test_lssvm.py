@@ -345,3 +345,13 @@ def test_variance_is_held_by_squares_of_singular_values() -> None:
     values = np.array([2.0, 1.0, 1.0])
     ranks = [variance_rank(values, share) for share in (0.5, 0.66, 0.67, 0.83, 0.84, 1.0)]
     assert ranks == [1, 1, 2, 2, 3, 3]
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [({"gamma": -1.0}, "gamma: -1"), ({"degree": 0}, "degree: 0"), ({"coef0": np.inf}, "coef0: inf")],
+)
+def test_settings_of_kernels_are_checked(given, message):
+    X = np.random.default_rng(0).standard_normal((10, 2))
+    with pytest.raises(InputError, match=message):
+        LSSVM(kernel="poly", **given).fit(X, X[:, 0])

@@ -96,6 +96,10 @@ def test_the_first_and_the_last_sample_may_be_outliers() -> None:
     found = repaired(Trial(t, {"u": u, "delta": u}, name="ends"))
     assert found.repaired == {"u": 2}
     assert found["u"][[0, -1]] == pytest.approx(u[[1, -2]])
+    for inside in (1, -2):
+        spiked = np.sin(0.05 * t)
+        spiked[inside] += 0.5
+        assert np.flatnonzero(outliers(t, spiked, may_step=False)).tolist() == [inside % 200]
     for clean in (0.1 * t, np.sin(0.05 * t), np.abs(t - 196.0), np.minimum(t, 5.0), np.exp(-0.3 * t)):
         assert not outliers(t, clean, may_step=False).any()
     gap = np.append(t[:-40], t[-1])

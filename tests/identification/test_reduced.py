@@ -44,5 +44,11 @@ def test_the_model_carries_its_table(found: ReducedIdentification, tmp_path: Pat
 
 def test_a_grey_box_is_refused(noisy_trials: list[Trial], mariner: ShipModel) -> None:
     options = {"particulars": mariner.particulars, "structure": "grey-box", "reference_model": "mariner"}
-    with pytest.raises(InputError, match="structure: 'grey-box' found, whose table stands beside"):
+    with pytest.raises(InputError, match="structure: 'grey-box' found, whose table adds to a reference ship"):
+        identify_reduced(noisy_trials, **options)
+
+
+def test_a_structure_with_a_memory_of_yaw_is_refused(noisy_trials: list[Trial], mariner: ShipModel) -> None:
+    options = {"particulars": mariner.particulars, "structure": "nomoto2"}
+    with pytest.raises(InputError, match="structure: 'nomoto2' found, whose memory of yaw has no regression"):
         identify_reduced(noisy_trials, **options)

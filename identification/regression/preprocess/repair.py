@@ -38,7 +38,8 @@ def outliers(t: ArrayLike, values: ArrayLike, threshold: float = OUTLYING, may_s
     if not may_step and len(values) >= FEWEST_FOR_ENDS:
         ends, inside = np.array([0, -1]), np.abs(np.diff(middle[WIDTH // 2 : -(WIDTH // 2)]))
         longer = np.maximum(np.diff(t)[ends] / np.median(np.diff(t)), 1.0)  # beside a gap it moves further
-        found[ends] = np.abs(np.diff(values))[ends] > (least + WIDTH * inside.max()) * longer
+        jumps = np.abs(np.diff(values))[ends] > (least + WIDTH * inside.max()) * longer
+        found[ends] = jumps & ~found[[1, -2]]  # from an outlier it is not the end that jumps
     return found
 
 
