@@ -10,7 +10,7 @@ Progress = Callable[[str, int, int], None]
 
 
 def _ignored(stage: str, done: int, total: int) -> None:
-    """Nobody wants to know."""
+    """Default: progress is not reported."""
 
 
 PROGRESS: ContextVar[Progress] = ContextVar("progress", default=_ignored)

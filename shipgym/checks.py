@@ -101,6 +101,14 @@ def check_keys(
             raise InputError(f"{where}: field '{key}' is missing, expected {quoted(required)}")
 
 
+def check_fields(content: Mapping[str, Any], names: Collection[str], where: str, remedy: str) -> None:
+    """Refuse an unknown field of a file, and the lack of any of `names`, ending the latter with `remedy`."""
+    check_keys(content, names, where)
+    for name in names:
+        if name not in content:
+            raise InputError(f"{where}: field '{name}' is missing; {remedy}")
+
+
 def check_format(content: Mapping[str, Any], known: int, where: str) -> None:
     """Refuse a file whose number `format` is another than the known one."""
     if (found := content.get("format", known)) != known:

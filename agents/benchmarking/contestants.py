@@ -49,6 +49,8 @@ from shipgym.files import LARGEST_TENSORS, read_bytes
 LEARNED = ("ppo", "sac", "td3", "tqc")
 TUNED = "tuned-"
 BEST_KNOWN = "best-known"
+PARTS = ("policy", "fallback", "base", "autopilot")  # attributes of a policy that are policies
+MOST_PARTS = 1000
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,8 +92,22 @@ class Contestant:
 
 def _models(policy: Any) -> set[str]:
     """Hashes of the models that a policy, and what it is made of, were made for."""
-    parts = (getattr(policy, name, None) for name in ("policy", "fallback", "base", "autopilot"))
-    return {getattr(policy, "model_sha256", "")}.union(*(_models(part) for part in parts if part is not None))
+    found: set[str] = set()
+    seen: dict[int, Any] = {}  # by id; the objects are kept, so that no id is used twice
+    waiting = [policy]
+    while waiting:
+        part = waiting.pop()
+        if part is None or id(part) in seen:
+            continue
+        if len(seen) == MOST_PARTS:
+            raise InputError(
+                f"{type(policy).__name__}: more than {MOST_PARTS} policies within one another found, "
+                "expected a policy made of fewer"
+            )
+        seen[id(part)] = part
+        found.add(getattr(part, "model_sha256", ""))
+        waiting += [getattr(part, name, None) for name in PARTS]
+    return found
 
 
 def remade(

@@ -25,7 +25,7 @@ from agents.benchmarking.summary import Done, summary_of
 from agents.controllers.controller import model_hash
 from agents.output import present
 from agents.suites.suite import FIRST_SEED, BenchmarkTask, suite_hash
-from shipgym.checks import check_choice, check_format, check_keys
+from shipgym.checks import check_choice, check_fields, check_format
 from shipgym.errors import InputError
 from shipgym.files import make_folder, read_json, write_json
 
@@ -130,12 +130,13 @@ def check_new(folder: Path, resume: bool, suite: str) -> Path:
     ours = any(name in (RESULTS, EPISODES, PARTS) for name in found)
     if ours and not resume:
         raise InputError(
-            f"{folder}: already contains results; continue with --resume (resume=True), or choose another"
+            f"{folder}: already contains results; continue with --resume (resume=True), or choose another "
+            "folder"
         )
     if ours and (folder / RESULTS).is_file() and load_results(folder).summary["suite"]["name"] != suite:
-        raise InputError(f"{folder}: holds results of another suite than '{suite}'; choose a new folder")
+        raise InputError(f"{folder}: holds results of another suite than '{suite}'; choose another folder")
     if found and not ours:
-        raise InputError(f"{folder}: holds '{found[0]}', not a result of a benchmark; choose a new folder")
+        raise InputError(f"{folder}: holds '{found[0]}', not a result of a benchmark; choose another folder")
     return folder
 
 
@@ -227,10 +228,7 @@ def load_results(path: str | Path) -> BenchmarkResult:
             f"{where}: kind {content.get('kind')!r} found, expected '{KIND}': not benchmark results"
         )
     check_format(content, FORMAT, str(where))
-    check_keys(content, FIELDS, str(where))
-    for name in FIELDS:
-        if name not in content:
-            raise InputError(f"{where}: field '{name}' is missing; {REMEDY}")
+    check_fields(content, FIELDS, str(where), REMEDY)
     check_summary(content, str(where))
     table = where.with_name(EPISODES)
     if content["episodes"]["sha256"] != file_hash(table):

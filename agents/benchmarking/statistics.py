@@ -58,10 +58,14 @@ class Draws:
 
     Parameters
     ----------
-    n_tasks, n_episodes : int
+    n_tasks : int
+        Number of tasks; each has draws of its own.
+    n_episodes : int
+        Episodes of each task; a draw takes as many of them, with replacement.
     seed : int
         Of the draws.
     n_draws : int
+        Draws of each task.
     """
 
     def __init__(self, n_tasks: int, n_episodes: int, seed: int = 0, n_draws: int = N_DRAWS) -> None:

@@ -148,7 +148,8 @@ def autopilot_command(
         str | None,
         typer.Option(
             metavar="NAMES",
-            help="Designs; default: pid,lq,lq-scheduled,turn-rate,wheel-over. Others: preview-mpc, lqg.",
+            help="Autopilots to design; default: pid,lq,lq-scheduled,turn-rate,wheel-over. "
+            "Others: preview-mpc, lqg.",
         ),
     ] = None,
     standards: Annotated[

@@ -31,7 +31,7 @@ def export_command(
         Path | None, typer.Option(metavar="OUT.FMU", help="Write an FMU for co-simulation.")
     ] = None,
     fmi: Annotated[str, typer.Option(help="Version of the FMU: 3.0 or 2.0.")] = "3.0",
-    name: Annotated[str | None, typer.Option(help="Name in C and FMU; default: as the file.")] = None,
+    name: Annotated[str | None, typer.Option(help="Name in C and FMU; default: the file's name.")] = None,
     depth: Annotated[
         float, typer.Option(metavar="M", help="For a model: depth of water, m; default: deep.")
     ] = float("inf"),

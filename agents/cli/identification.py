@@ -29,7 +29,7 @@ def identify_command(
         str | None, typer.Option(metavar="NAMES", help="Methods to compare, separated by commas, or all.")
     ] = None,
     structures: Annotated[
-        str | None, typer.Option(metavar="NAMES", help="Structures to compare, by commas, or auto.")
+        str | None, typer.Option(metavar="NAMES", help="Structures to compare, separated by commas, or auto.")
     ] = None,
 ) -> None:
     """Identify a manoeuvring model from recorded trials. Writes model, metrics, settings and report.

@@ -26,9 +26,10 @@ def reproduce_command(
     ] = None,
     as_json: Json = False,
 ) -> None:
-    """Reproduce the papers' tables. Shows printed, ours as the paper, ours at best, and if the aim is met.
+    """Reproduce the papers' tables.
 
-    Needs a checkout of the project. Exits with 1 if an aim is missed.
+    Shows the printed numbers, ours by the paper's method and at best, and whether the aim is met. Needs a
+    checkout of the project. Exits with 1 if an aim is missed.
     """
     from agents.cli.terminal import out
 

@@ -43,7 +43,7 @@ def steer_command(
     duration: Duration = inf,
     speed_up: SpeedUp = 1.0,
 ) -> None:
-    """Steer over NMEA 0183. Reads HDT, THS, ROT, RSA, VBW, VTG, RMC, APB, XTE, BWC, BWR; writes ROR, HTD.
+    """Steer over NMEA 0183. Reads HDT/THS, ROT, RSA, VBW, VTG/RMC, APB, XTE, BWC, BWR; writes ROR, HTD.
 
     It begins when everything that the autopilot reads is available. If a sensor falls silent, two disagree,
     the rudder does not follow or the computer is late, it raises the alarm (ALR), marks its order invalid and
@@ -87,7 +87,10 @@ def simulate_command(
     seed: Annotated[int, typer.Option(min=0, help="Seed of the sea.")] = 0,
     drop: Annotated[
         list[str] | None,
-        typer.Option(metavar="HDT=60", help="Sentence that falls silent after so many seconds; repeatable."),
+        typer.Option(
+            metavar="HDT=60",
+            help="Sentence that falls silent after this many seconds (HDT=60: HDT after 60 s); repeatable.",
+        ),
     ] = None,
     duration: Duration = inf,
     speed_up: SpeedUp = 1.0,

@@ -206,7 +206,7 @@ def prediction_table(result: IdentificationResult, what: str = "") -> Table:
 
 
 def selection_table(ranking: Mapping[str, Any]) -> Table:
-    """Structures and methods by how well they predict the trials held out, the best first."""
+    """Structures and methods by how well they predict the held-out trials, the best first."""
     headings = (
         "method", "structure", ">coeffi-\ncients", "model", ">error by\nstd. dev.", ">heading\ndeg",
         ">yaw rate\ndeg/s", ">ran away\ntrials",

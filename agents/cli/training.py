@@ -55,7 +55,9 @@ def train_command(
             "--randomise", help="Domain randomisation: ships drawn from the covariance, all seas, all speeds."
         ),
     ] = None,
-    threads: Annotated[int | None, typer.Option(min=1, help="For torch and the ships; default: 1.")] = None,
+    threads: Annotated[
+        int | None, typer.Option(min=1, help="Threads for torch and the ships; default: 1.")
+    ] = None,
     max_seconds: Annotated[
         float | None, typer.Option(min=0.0, help="Stop after this time; --resume continues.")
     ] = None,

@@ -127,9 +127,9 @@ def autopilot_source(agent: Any, name: str | None = None) -> Source:
     fault = pilot if pilot is not None and not linear and law not in LAWS else None
     if fault := guide if guide is not None and guide.kind not in GUIDES else fault:
         raise InputError(
-            f"controller '{getattr(fault, 'name', type(fault).__name__)}' found, which is not a closed law "
-            f"for C. Export 'pid', 'lq', {', '.join(map(repr, LAWS))}, {', '.join(map(repr, GUIDES))} "
-            "over one of these, or a learned policy"
+            f"controller '{getattr(fault, 'name', type(fault).__name__)}' found, which is not a closed-form "
+            f"law and cannot be written as C. Export 'pid', 'lq', {', '.join(map(repr, LAWS))}, "
+            f"{', '.join(map(repr, GUIDES))} over one of these, or a learned policy"
         )
     bridge = Autopilot(agent)
     inputs = {one: (*VARIABLES["autopilot_input"][one], 0.0) for one in bridge.inputs}

@@ -53,7 +53,7 @@ def put_back(agent: Any, memory: Memory) -> None:
     """Let an agent made alike go on from what `take` gave, by `learn(..., reset_num_timesteps=False)`.
 
     Raises ValueError, naming the first difference, if that has other names, kinds or shapes than the agent's
-    own, or an infinite number, or none, where the agent's own is finite.
+    own, or a number that is infinite or NaN where the agent's own is finite.
     """
     memory = _with_own_settings(agent, memory)
     check_like(memory, _own(agent), "agent")

@@ -105,7 +105,7 @@ class Given:
     """What a user gives; None or empty for what is left to the defaults, or to the run that is resumed."""
 
     algorithm: str
-    environment: str | None = None  # "course-keeping", "path-following", or an id
+    environment: str | None = None  # "course-keeping", "path-following", "path-following-v1", or an id
     #: name or file of a model, and a sea state
     model: str | None = None
     sea: str | None = None

@@ -11,8 +11,8 @@ from agents.training.plan import Given, Plan, check_same
 from agents.training.settings import LATER, present_names
 from shipgym.checks import (
     Shape,
+    check_fields,
     check_format,
-    check_keys,
     check_shape,
     check_table,
     check_whole,
@@ -107,10 +107,7 @@ def _content(folder: Path) -> Mapping[str, Any]:
     if not path.is_file():
         raise InputError(f"{folder}: no run of training is there; leave --resume out to begin one")
     content = read_json(path, "run file", REMEDY)
-    check_keys(content, FIELDS, str(path))
-    for name in FIELDS:
-        if name not in content:
-            raise InputError(f"{path}: field '{name}' is missing; {REMEDY}")
+    check_fields(content, FIELDS, str(path), REMEDY)
     check_format(content, FORMAT, str(path))
     configuration = dict(check_table(content["configuration"], f"{path}: configuration"))
     if isinstance(settings := configuration.get("settings"), Mapping):

@@ -68,7 +68,7 @@ def check_like(found: Any, own: Any, where: str) -> None:
     """Raise ValueError, naming the first place, unless one value is like another.
 
     The same names and texts, lists of one length, arrays and tensors of the same type and shape, finite where
-    the other is, numbers of a kind: finite, whole ones not negative. A function in `own` is asked what is
+    `own` is finite, numbers of a kind: finite, whole ones not negative. A function in `own` is asked what is
     expected, of what is found.
     """
     own = own(found) if callable(own) else own
@@ -89,7 +89,7 @@ def check_like(found: Any, own: Any, where: str) -> None:
 
 
 def _check_finite(found: Any, own: Any, where: str) -> None:
-    """Raise ValueError for the first number that is infinite, or none, where its own is finite."""
+    """Raise ValueError for the first number that is infinite or NaN where its own is finite."""
     wrong = np.argwhere(np.isfinite(own) & ~np.isfinite(found))
     if len(wrong):
         at = tuple(wrong[0].tolist())

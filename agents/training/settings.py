@@ -218,7 +218,7 @@ def load_settings(
     Parameters
     ----------
     algorithm : {"ppo", "sac", "td3", "tqc"}
-    environment : {"course-keeping", "path-following"}
+    environment : {"course-keeping", "path-following", "path-following-v1"}
     task : str
         Name of a suite's task; one without settings of its own has those of its environment.
     given : mapping of str to Any, optional
@@ -226,6 +226,11 @@ def load_settings(
     action : {"rudder", "rudder-discrete", "rudder-shaft"}
         What is commanded. With others than the rudder, or `base` given as "none", a policy learns from
         scratch.
+
+    Returns
+    -------
+    Settings
+        Of the algorithm's class in `ALGORITHMS`.
 
     Raises
     ------

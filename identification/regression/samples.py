@@ -106,8 +106,8 @@ def build_samples(
     samples : {"euler", "integral", "spline"}
         Sample structure.
     window : int, optional
-        Sampling steps per row; windows overlap by half. By default 1 for data without noise, and as many
-        as the noise asks for otherwise, up to a third of the time to sail one ship length.
+        Sampling steps per row; windows overlap by half. By default 1 for data without noise,
+        otherwise chosen by the noise level, up to a third of the time to sail one ship length.
     gear : SteeringGear, optional
         Helps to rebuild the rudder between samples (spline only).
     smooth : bool or str

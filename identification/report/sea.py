@@ -1,4 +1,4 @@
-"""What was taken out of the trials for current and wind: sentences, and tracks through the water."""
+"""What was removed from the trials for current and wind: sentences, and tracks through the water."""
 
 from collections.abc import Mapping
 from pathlib import PurePath
@@ -52,7 +52,7 @@ def _set_and_drift(row: Mapping[str, Any]) -> str:
 
 
 def track_figure(fit: Fit) -> Figure | None:
-    """Tracks over ground and through the water, and the way of the current; None where none was taken out."""
+    """Tracks over ground and through the water, and the way of the current; None where none was removed."""
     rows = {n: row for n, row in (fit.model.provenance or {}).get("currents", {}).items() if row["taken_out"]}
     trials = [trial for trial in fit.trials if trial.name in rows and {"x", "y"} <= trial.channels.keys()]
     if not trials:

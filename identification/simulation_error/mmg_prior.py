@@ -40,7 +40,8 @@ VISCOSITY = 1.19e-6  # m^2/s, sea water at 15 deg
 LARGEST_DRIFT, LARGEST_TURN = 0.35, 0.8  # to which Kijima's squares are turned into cubes
 
 _NUMBERS = shipped_toml("identification.simulation_error", "mmg_prior.toml")
-RANGES: dict[str, tuple[float, float]] = _NUMBERS["ranges"]  # of main dimensions
+#: Least and largest block coefficient, L/B and B/T of the ships that the formulas were made for.
+RANGES: dict[str, list[float]] = _NUMBERS["ranges"]
 DEVIATIONS: dict[str, list[float]] = _NUMBERS["deviations"]
 
 

@@ -84,8 +84,8 @@ def compare_methods(
     marked = held_out(trials, arguments.get("hold_out", ()))
     fitted, held = ([trial for trial in marked if trial.use == use] for use in ("fit", "validate"))
     if not held and len(fitted) < 2:
-        told = f"trials: {len(fitted)} to fit and none to validate found, expected one held out to rank the"
-        raise InputError(f'{told} methods on; mark one use = "validate", or give two to fit')
+        told = f"trials: {len(fitted)} to fit and none to validate found, expected a held-out trial to rank"
+        raise InputError(f'{told} the methods on; mark one use = "validate", or give two to fit')
     left_out = _left_out([get_method(method) for _, method in pairs], arguments)
     found: list[tuple[Standing, IdentificationResult]] = []
     refused: dict[str, str] = {}

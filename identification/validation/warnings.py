@@ -130,7 +130,7 @@ def _not_corrected(fit: Fit) -> list[str]:
     like = "" if likeness is None else f", with a similarity of {likeness:.2g}"
     return [
         f"the model is the bare reference ship {reference['name']!r}{like}: no correction predicted the "
-        "trials held out better, so C = 0; name another reference_model, add trials, or choose another "
+        "held-out trials better, so C = 0; name another reference_model, add trials, or choose another "
         "structure"
     ]
 

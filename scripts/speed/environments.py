@@ -1,4 +1,4 @@
-"""Environments: one at a time, in vectors, in weather, of kernel ships, and with a learner on top."""
+"""Environments: one at a time, in vectors, in weather, of kernel models, and with a learner on top."""
 
 from __future__ import annotations
 
@@ -159,7 +159,7 @@ def weather(n_envs: int) -> Row:
 
 
 def kernel_ship(n_envs: int = 1024, centres: int = 64) -> Row:
-    """A black-box ship with radial basis functions, against their sums alone on NumPy arrays."""
+    """A black-box model with radial basis functions, against their sums alone on NumPy arrays."""
     ship = shipgym.load_model("kvlcc2-l7")
     trials = [
         zigzag(ship, angle, angle, duration=100.0, dt=0.2, port_first=port).with_(name=f"{angle} {port}")
@@ -175,9 +175,9 @@ def kernel_ship(n_envs: int = 1024, centres: int = 64) -> Row:
     states["delta"] = np.linspace(-0.5, 0.5, n_envs)
     stage = best_time(lambda: model.table.features("r", states, model.particulars), 50)
     return Row(
-        f"CourseKeeping, {n_envs} kernel ships of {centres} centres",
+        f"CourseKeeping, {n_envs} kernel models of {centres} centres",
         f"{native / 1e6:.1f} M steps/s",
-        f"their centres alone in NumPy {n_envs / (4.0 * stage) / 1e6:.2f} M steps/s",
+        f"the sums over their centres alone in NumPy {n_envs / (4.0 * stage) / 1e6:.2f} M steps/s",
         native * 4.0 * stage / n_envs,
         "3 M steps/s",
     )

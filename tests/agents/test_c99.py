@@ -233,9 +233,10 @@ def test_guidance_orders_what_it_commands_along_a_path(version, kind):
 def test_what_is_no_closed_law_is_refused():
     with pytest.raises(InputError, match=r"'preview-mpc' found, .*'alos', 'wheel-over' over one of these"):
         autopilot_source(PreviewMPC.from_model(MARINER))
-    with pytest.raises(
-        InputError, match=r"'lq-adaptive' found, which is not a closed law for C. Export 'pid', 'lq'"
-    ):
+    said = (
+        "'lq-adaptive' found, which is not a closed-form law and cannot be written as C. Export 'pid', 'lq'"
+    )
+    with pytest.raises(InputError, match=said):
         autopilot_source(AdaptiveLQ.from_model(MARINER))
     with pytest.raises(InputError, match=r"commands rudder-shaft .*expected rudder alone"):
         autopilot_source(random_policy(action="rudder-shaft"))

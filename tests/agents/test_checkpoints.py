@@ -160,7 +160,7 @@ def test_weights_with_which_outputs_overflow_are_refused(fresh, memory):
         (("variables", "log_ent_coef"), "agent.variables.log_ent_coef"),
     ],
 )
-def test_numbers_that_are_none_or_without_bound_are_refused(fresh, memory, path, where, wrong):
+def test_numbers_that_are_infinite_or_nan_are_refused(fresh, memory, path, where, wrong):
     changed = copy.deepcopy(memory)
     inside = changed
     for key in path:
@@ -173,7 +173,7 @@ def test_numbers_that_are_none_or_without_bound_are_refused(fresh, memory, path,
 
 
 def test_numbers_of_ships_without_bound_stay_so(fresh, memory):
-    """Of water that is deep, and of a model whose operating envelope is not known."""
+    """The depth of deep water is infinite, and so are the limits of an unknown operating envelope."""
     assert np.isinf(memory["ships"][1]["ships"]).any()
     checkpoints.put_back(fresh, copy.deepcopy(memory))
 

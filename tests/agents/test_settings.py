@@ -1,5 +1,7 @@
 """Settings and plans of learning: what is allowed, where a value comes from, what is refused."""
 
+from dataclasses import fields
+
 import pytest
 
 from agents.suites.suite import load_suite
@@ -14,7 +16,9 @@ from agents.training.plan import (
 )
 from agents.training.settings import (
     ALGORITHMS,
+    KNOWN,
     SACSettings,
+    Settings,
     changed,
     load_settings,
     make_settings,
@@ -73,6 +77,17 @@ def test_settings_reach_to_their_bounds_and_no_further(algorithm, name, allowed,
 def test_settings_that_cannot_be_meant_are_refused(given, message):
     with pytest.raises(InputError, match=message):
         changed(load_settings("sac", given=FREE), given)
+
+
+def test_every_setting_has_a_meaning_in_the_section_of_its_class_and_nothing_else_stands_there():
+    kinds = {kind for one in ALGORITHMS.values() for kind in one.__mro__ if issubclass(kind, Settings)}
+    assert {kind.section for kind in kinds} == set(KNOWN)
+    for kind in kinds:
+        inherited = {one.name for base in kind.__bases__ if base in kinds for one in fields(base)}
+        own = {one.name for one in fields(kind)} - inherited
+        assert own == set(KNOWN[kind.section]), kind.section
+        for name, about in KNOWN[kind.section].items():
+            assert about.get("meaning", "").strip(), f"{kind.section}.{name}"
 
 
 def test_words_stand_for_numbers_where_they_may():

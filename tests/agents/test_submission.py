@@ -1,6 +1,8 @@
 """A suite with ships behind its models, and submissions: what is handed out, written and refused."""
 
 import json
+from functools import partial
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -74,6 +76,24 @@ def test_contestants_are_handed_the_model_only():
     hidden = Contestant("cheat", lambda handed: Shielded(LQ.from_model(handed.ship), rescue, 1.0))
     with pytest.raises(InputError, match=said):
         hidden.policies(task, "small")
+
+
+def test_a_policy_that_is_its_own_part_is_still_searched_for_the_ship():
+    task = load_suite("small").task("turns-far")
+    rescue = LQ.from_model(task.sailed[0])
+
+    def looped(handed, **parts):
+        made = LQ.from_model(handed.ship)
+        for name, part in {"policy": made, **parts}.items():
+            object.__setattr__(made, name, part)  # its class is frozen
+        return made
+
+    (policy,) = Contestant("mine", looped).policies(task, "small")
+    assert policy.policy is policy
+    with pytest.raises(InputError, match="was designed on the ship, 'mariner'"):
+        Contestant("cheat", partial(looped, fallback=rescue)).policies(task, "small")
+    with pytest.raises(InputError, match="LQ: more than 1000 policies within one another found"):
+        Contestant("endless", partial(looped, base=Mock())).policies(task, "small")
 
 
 def test_a_submission_is_verified(tmp_path):

@@ -124,7 +124,7 @@ def test_advice_for_an_identified_mariner_of_forty_coefficients() -> None:
 
 
 def test_a_grey_box_that_explains_her_trials_is_certain_of_her_coefficients() -> None:
-    """What her reference ship does is no noise."""
+    """The accelerations that the reference ship explains are not counted as noise."""
     mariner = shipgym.load_model("mariner")
     blank = converted_model("mariner", mariner.particulars, mariner.steering)
     coefficients = {name: -0.1 if name in ("a_du", "b_v", "c_r") else 0.01 for name in blank.coefficients}

@@ -197,7 +197,9 @@ def test_the_largest_rudder_needs_a_smaller_one(trials: list[Trial]) -> None:
 
 
 def test_a_free_constant_is_not_penalised(target: ShipModel, trials: list[Trial]) -> None:
-    """Of weights that leave nothing of the other corrections it keeps the mean of what she leaves."""
+    """At a weight that leaves no other correction, the constant keeps the mean of what the reference ship
+    leaves.
+    """
     given = {"method": "rm-svm", "reference_model": "kvlcc2", "regression": "ls-svm", "C": 1e-12}
     bound, free = (fit(target, trials, **given, free_constant=is_free).model for is_free in (False, True))
     constants = {

@@ -11,6 +11,7 @@ from shipgym.arrays import integral
 from shipgym.checks import (
     check_array,
     check_choice,
+    check_fields,
     check_finite,
     check_flag,
     check_keys,
@@ -80,6 +81,11 @@ def test_tables_keys_and_choices():
     said = r"\[ship\]: unknown key 'baem'\. Did you mean 'beam'\? Known keys: 'beam', 'length'"
     with pytest.raises(InputError, match=said):
         check_keys({"baem": 1}, ("beam", "length"), "[ship]")
+    check_fields({"a": 1, "b": None}, ("a", "b"), "run.json", "train again")
+    with pytest.raises(InputError, match=r"^run\.json: field 'b' is missing; train again$"):
+        check_fields({"a": 1}, ("a", "b"), "run.json", "train again")
+    with pytest.raises(InputError, match=r"^run\.json: unknown key 'c'\."):
+        check_fields({"a": 1, "b": 2, "c": 3}, ("a", "b"), "run.json", "train again")
     assert check_choice("pso", ("abc", "pso"), "optimiser") == "pso"
     for wrong, hint in (("abd", r" Did you mean 'abc'\?"), (3, "$")):
         with pytest.raises(InputError, match=rf"optimiser: .* found, expected one of 'abc', 'pso'\.{hint}"):
