@@ -19,6 +19,7 @@ from agents.deployment.scheduling import short_slice
 from shipgym.checks import check_number
 from shipgym.errors import InputError
 from shipgym.tasks.guidance import wrapped
+from shipgym.trials.units import KNOT
 
 STANDBY, STEERING, MANUAL = "standby", "steering", "manual"
 LONGEST_TICK = 1.0  # s, between two looks at the sensors
@@ -58,7 +59,7 @@ class Limits:
             return self.position_m / EARTH_M
         if quantity in ("cross_track", "waypoint_distance"):
             return inf
-        return self.disagreement_kn * 1852.0 / 3600.0
+        return self.disagreement_kn * KNOT
 
 
 @dataclass

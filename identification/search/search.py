@@ -103,6 +103,11 @@ class Optimiser(ABC):
         seed : int
             The same seed gives the same search.
 
+        Returns
+        -------
+        SearchResult
+            The best candidate, its value, and the course of the search.
+
         Raises
         ------
         InputError

@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 from shipgym.arrays import Floats
 from shipgym.envs.engine import Engine
 from shipgym.envs.rendering import Renderer, Scene
+from shipgym.trials.units import KNOT
 
-KNOT = 1852.0 / 3600.0  # m/s
 WAKE_POINTS = 400  # kept of the wake
 USUAL_BEAM = 0.15  # of the length, where the beam is not known
 

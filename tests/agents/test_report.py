@@ -1,6 +1,8 @@
+import hashlib
 import re
 from dataclasses import replace
 from html.parser import HTMLParser
+from importlib.resources import files
 
 import numpy as np
 import pytest
@@ -69,6 +71,12 @@ def test_nothing_is_loaded_from_anywhere(source, page):
 
 def test_plotly_stands_in_the_page_once(source):
     assert source.count("plotly.js (cartesian - minified) v") == 1
+
+
+def test_the_bundle_of_plotly_is_the_published_one():
+    bundle = files("shipgym.pages").joinpath("plotly/plotly-cartesian.min.js").read_bytes()
+    published = "79542150855a52c567260e3137095dbe2b744e6d702a5cabe67da246942fba7a"  # npm, 4.1.1
+    assert hashlib.sha256(bundle).hexdigest() == published
 
 
 def test_a_report_has_less_than_3_megabytes(source):

@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import gymnasium
 import numpy as np
 import pytest
@@ -129,6 +131,8 @@ def test_path_orders_and_success_are_recorded_where_there_are_any(tmp_path):
     episode = Episode.load(tmp_path / "episode-00000.json")
     assert np.array_equal(episode.waypoints, PATH)
     assert episode.corridor == 80.0
+    with pytest.raises(InputError, match="waypoints"):
+        replace(episode, waypoints=np.vstack([PATH, PATH[-1:]]))  # the last leg has no direction
     assert episode.success is True
     assert episode.commands["delta"].tolist() == [0.125] * 5
     assert episode.states["cross_track_error"].tolist() == [1.0] * 6
