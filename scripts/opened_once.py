@@ -13,7 +13,8 @@ any of them was identified:
 * Autopilots: the five of `shipgym autopilot`, refused as that command refuses them, with 60 models drawn. One
   that keeps a heading steers if it keeps control of the ship herself in all of 8 episodes of course keeping
   in calm water, one that keeps a track if it leads her to its end. Episodes in a moderate sea are told beside
-  them. A model that is unstable, or refused, has none.
+  them. A model that is unstable, or refused, has none. (How many of those refused would steer was added
+  later.)
 * The command line is told main dimensions, mass and centre of gravity, but no added mass and no gyradius, and
   no structure; its 200 models drawn and its files count like the rest.
 """
@@ -121,8 +122,10 @@ def case(name: str, structure: str, kind: str, seed: int, draws: int) -> dict[st
     if found is not None:
         reported = {key: one.to_dict() for key, one in found.manoeuvres.criteria.items()}
         row["reported"] = verdicts(reported, ship)
-        written = [p.controller for p in found.pilots] + [track.controller for track in found.tracks]
-        row["pilots"] |= steered((one for one in written if one.kind not in found.refused), ship)
+        designed = [p.controller for p in found.pilots] + [track.controller for track in found.tracks]
+        tried = steered(designed, ship)
+        row["needless"] = sum(tried[kind] != "LOST" for kind in tried.keys() & found.refused)
+        row["pilots"] |= {kind: what for kind, what in tried.items() if kind not in found.refused}
     return row
 
 
@@ -130,7 +133,7 @@ def counts(rows: Sequence[Mapping[str, Any]]) -> str:
     """Verdicts and autopilots of each ship, in Markdown."""
     lines = [
         "| ship, trials | verdicts by models: decided, wrong | in reports: decided, wrong | autopilots: "
-        "steer, lost, refused | lost in a moderate sea |",
+        "steer, lost, refused (of which would steer) | lost in a moderate sea |",
         "| --- | --- | --- | --- | --- |",
     ]
     every = {f"{ship}, {kind}": [r for r in rows if (r["ship"], r["trials"]) == (ship, kind)]
@@ -144,7 +147,8 @@ def counts(rows: Sequence[Mapping[str, Any]]) -> str:
                 print(f"wrong {label}: {name}: {told}", file=sys.stderr)
         pilots = Counter(one for row in group for one in row["pilots"].values())
         rough = pilots["lost in a moderate sea"]
-        cells.append(f"{pilots['steers'] + rough}, {pilots['LOST']}, {pilots['refused']}")
+        needless = sum(row.get("needless", 0) for row in group)
+        cells.append(f"{pilots['steers'] + rough}, {pilots['LOST']}, {pilots['refused']} ({needless})")
         lines.append(f"| {name} | {' | '.join(cells)} | {rough} |")
     return "\n".join(lines)
 
