@@ -29,8 +29,7 @@ INTERPRETED := $(patsubst %,tests/shipgym/test_%.py,$(INTERPRETED))
 
 test: lint type
 	NUMBA_DISABLE_JIT=1 OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n 2 -m "not compiled" $(INTERPRETED)
-	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n 2 -m compiled $(INTERPRETED)
-	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n 2 --dist loadfile $(addprefix --ignore=,$(INTERPRETED) tests/test_site.py)
+	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n 2 --dist loadfile -m "compiled or not interpreted" --ignore=tests/test_site.py
 
 lint: $(VENV)/dev-installed
 	$(BIN)/ruff format --check .

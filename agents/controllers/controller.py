@@ -209,7 +209,8 @@ class Controller:
         With gains of n ships at once, as arrays of shape (n,), it is of shape (5, n).
         """
         by_signal = {signal: sign * self.gains[gain] for gain, (signal, sign) in self.feedback.items()}
-        return np.array([by_signal.get(signal, 0.0) for signal in SIGNALS])
+        nothing = 0.0 * next(iter(by_signal.values()), 0.0)  # of each ship
+        return np.array([by_signal.get(signal, nothing) for signal in SIGNALS])
 
     def margins_on(self, model: ShipModel) -> Margins:
         """Margins and bandwidth of the same controller on another ship.

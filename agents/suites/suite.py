@@ -10,7 +10,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, replace
-from functools import cached_property, lru_cache
+from functools import cache, cached_property, lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -160,6 +160,7 @@ def find_task(name: str) -> BenchmarkTask:
     return known[check_choice(name, known, "task")]
 
 
+@cache
 def _designed_for(suite: str) -> dict[str, BenchmarkTask]:
     """Tasks of a suite by name, as they are handed out."""
     return {task.name: task.handed_out for task in load_suite(suite).tasks if task.on == "ship"}

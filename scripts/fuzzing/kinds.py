@@ -255,7 +255,7 @@ KINDS = (
     Kind("log", lambda path: [guess_trial(path)[2]], use_ship, slow=4),
     Kind("model", ShipModel.load, use_model, slow=2),
     Kind("controller", load_agent, use_agent),
-    Kind("policy", read_policy, use_agent, main="agent.json"),
+    Kind("policy", read_policy, use_agent, main="agent.json", slow=4),
     Kind("sb3", read_zip, use_agent, slow=10),
     Kind("episode", Episode.load, use_episode),
     Kind("results", load_results, use_results, main="results.json", slow=8),

@@ -27,6 +27,8 @@ from shipgym.ships.conversions import (
 )
 from shipgym.ships.ship_model import ShipModel
 
+pytestmark = pytest.mark.interpreted
+
 MARINER = shipgym.load_model("mariner")
 SHIP = Particulars(length=160.93, speed=7.7175)
 FORM = Nomoto(K=0.185, T1=118.0, T2=7.8, T3=18.5, T=107.3)  # Mariner, Fossen 2011, table 7.2

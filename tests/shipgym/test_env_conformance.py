@@ -18,6 +18,8 @@ from shipgym.envs.registration import environments
 from shipgym.sea import Current, Weather, Wind
 from shipgym.ships import ShipModel
 
+pytestmark = pytest.mark.interpreted
+
 COURSE, PATH = "shipgym/CourseKeeping-v0", "shipgym/PathFollowing-v0"
 IDS = list(environments())
 SEA = Weather(current=Current(0.5), wind=Wind(9.0))

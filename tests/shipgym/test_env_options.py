@@ -16,6 +16,8 @@ from shipgym.tasks.steering import ROLL_SCALE
 from shipgym.tasks.task import RUDDER_ORDERS
 from shipgym.trials.sensors import SEA_TRIAL
 
+pytestmark = pytest.mark.interpreted
+
 COURSE, PATH = "shipgym/CourseKeeping-v0", "shipgym/PathFollowing-v0"
 SHAFT = {"model": "kvlcc2", "action": "rudder-shaft"}
 UNBOUND = {"course_change_deg": 0.0, "max_heading_error_deg": 180.0}

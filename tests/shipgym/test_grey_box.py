@@ -20,6 +20,8 @@ from shipgym.ships.linear import nomoto
 from shipgym.ships.scaling import scale_model
 from shipgym.ships.structures import get_structure, register_structure
 
+pytestmark = pytest.mark.interpreted
+
 
 @pytest.fixture(scope="module")
 def tanker() -> ShipModel:

@@ -9,6 +9,8 @@ import shipgym
 from shipgym import InputError, UnstableModelError, load_model, manoeuvres
 from shipgym.ships.simulate import open_loop
 
+pytestmark = pytest.mark.interpreted
+
 
 @pytest.mark.parametrize(
     ("name", "rudder", "shaft", "said"),

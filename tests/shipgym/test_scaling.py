@@ -11,6 +11,8 @@ from shipgym.manoeuvres import turning_circle, turning_indices, zigzag, zigzag_i
 from shipgym.ships import Envelope
 from shipgym.ships.structures import get_structure
 
+pytestmark = pytest.mark.interpreted
+
 NUMBERS = {
     "steering5": [-0.06, -2.3, -0.9, -0.08, -1e-3, -0.104, -0.03, 3.7e-3],
     "surge": [-1e-3, -2e-4, -2e-5, 0.02],

@@ -16,6 +16,8 @@ from shipgym import InputError, check_ship_model, load_model, manoeuvres, regist
 from shipgym.ships.linear import nomoto
 from shipgym.ships.structures import EQUATIONS, SHIPPED_EQUATIONS
 
+pytestmark = pytest.mark.interpreted
+
 PAGE = Path(__file__).parents[2] / "docs" / "ship_of_your_own.md"
 TUG = re.search(r"```python\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)[1]  # type: ignore[index]
 

@@ -16,6 +16,8 @@ from shipgym.ships.structures import STRUCTURES, get_structure
 from shipgym.ships.term_table import Structure
 from shipgym.ships.terms import read_terms
 
+pytestmark = pytest.mark.interpreted
+
 ABKOWITZ = get_structure("abkowitz")
 
 speeds = st.floats(2.0, 10.0)
