@@ -15,7 +15,7 @@ from agents.identifying import identification_settings, identify_ship
 from agents.verification import chain as links
 from agents.verification import refusal
 from agents.verification.page import verification_view
-from agents.verification.refusal import lost_control, rudder_effect, why_refused
+from agents.verification.refusal import lost_control, rudder_effect, simpler_structures, why_refused
 from agents.verification.result import verification_metrics
 from identification.design.experiment import advise
 from shipgym import InputError, ShipFile, UnstableModelError, load_model
@@ -71,6 +71,28 @@ def test_designs_that_lose_control_are_not_written(chain, tmp_path, monkeypatch)
     assert names == ["metrics.json", "model.json", "report.html"]
     assert json.loads((tmp_path / "report" / "metrics.json").read_text())["refusal"] == why
     assert "No autopilot is given: " in (tmp_path / "report" / "report.html").read_text()
+
+
+def stood(structure, coefficients, stable=True, ran_away=0):
+    return {"structure": structure, "coefficients": coefficients, "stable": stable, "ran_away": ran_away}
+
+
+def test_the_next_best_structures_with_fewer_coefficients_are_named():
+    chosen, larger, smaller = stood("mmg4dof", 55), stood("cubic-full", 60), stood("abkowitz", 40)
+    lost, unstable = stood("cubic", 30, ran_away=1), stood("linear-steering", 9, stable=False)
+    ranking = [chosen, larger, lost, unstable, smaller, stood("nomoto", 2)]
+    assert simpler_structures(ranking, "mmg4dof") == ["abkowitz", "nomoto"]
+    assert simpler_structures([*ranking, stood("mmg4dof", 40)], "mmg4dof") == ["nomoto"]  # by another method
+    assert simpler_structures(ranking, "nomoto") == []
+
+
+def test_a_refusal_of_a_structure_that_was_chosen_names_another(chain, monkeypatch):
+    result, fit = chain[1], chain[1].identification
+    monkeypatch.setattr(refusal, "MOST_LOST", -1.0)
+    own = fit.model.provenance["structure"]
+    ranking = {"ranking": [stood(own, 40), stood("nomoto", 2)]}
+    _, why = links._decided(result.verification, replace(fit, metrics=fit.metrics | {"selection": ranking}))
+    assert why.endswith(" to both sides, or try --structure nomoto")
 
 
 def test_a_refused_model_gives_a_report_that_says_why(demo, tmp_path, monkeypatch):
