@@ -236,6 +236,11 @@ def test_offsets_are_estimated_from_straight_parts_on_several_courses_only():
     assert heading_offset(channels, few) is None
     assert heading_offset(channels, few | np.isin(t, [4, 305]))[0] == pytest.approx(3.0 * DEGREE, abs=1e-6)
     assert heading_offset({"psi": psi}, straight) is None
+    # of samples one in ten tells something new; courses 90 deg apart have the chord 2 sin 45 deg
+    noisy = channels | {"ground_north": ground.real + np.where(t % 2, 0.1, -0.1)}
+    spread = 0.1 / np.sqrt(2.0)  # of both components
+    error = spread * np.sqrt(10.0 * 2.0 / np.count_nonzero(straight)) / 5.0
+    assert heading_offset(noisy, straight)[1] == pytest.approx(error, rel=1e-3)
     tools = Instruments(heading_offset="estimate", rudder_offset="estimate")
     log = Log(t, dict(channels), "log", [])
     correct_offsets(log, tools)
@@ -310,6 +315,15 @@ def test_a_frame_has_columns_and_values(monkeypatch):
     monkeypatch.setattr(tables, "MOST_CELLS", 3)
     with pytest.raises(InputError, match="2 columns of 2 rows found, expected a table of at most 3 values"):
         from_frame(frame)
+
+
+def test_of_a_matlab_file_numeric_vectors_of_the_commonest_length_are_read(tmp_path):
+    others = {"name": "abc", "ship": {"length": 7.0}, "turn": np.eye(3), "dt": 0.1, "long": np.arange(9.0)}
+    shaft = np.array([[1], [2], [3]], np.int16)
+    savemat(tmp_path / "log.mat", {**others, "u": np.array([0.5, 1.0, 1.5]), "n": shaft}, oned_as="row")
+    table = read_log(tmp_path / "log.mat")
+    assert table.header == ("u", "n")
+    assert (table.numbers("u").tolist(), table.numbers("n").tolist()) == ([0.5, 1.0, 1.5], [1.0, 2.0, 3.0])
 
 
 def test_a_compressed_matlab_file_is_unpacked_within_bounds(tmp_path, monkeypatch):
