@@ -7,6 +7,7 @@ import pytest
 
 import shipgym
 from shipgym import InputError, ManoeuvreError, Trial, load_model, manoeuvres
+from shipgym.manoeuvres.execution import departure, execute_time
 from shipgym.manoeuvres.imo import overshoot_limits_deg
 
 
@@ -73,6 +74,16 @@ def test_measured_rudder_and_ordered_rudder_tell_the_same(mariner):
     assert seen.overshoot_1_deg == pytest.approx(ordered.overshoot_1_deg, abs=1e-6)
     assert seen.overshoot_2_deg == pytest.approx(ordered.overshoot_2_deg, abs=1e-6)
     assert seen.initial_turning_lengths == pytest.approx(ordered.initial_turning_lengths, abs=0.05)
+
+
+def test_a_manoeuvre_begins_with_the_first_order_of_half_its_usual_rudder():
+    """Not with the helm of the approach; a measured rudder is traced back to where it left its angle."""
+    t = np.arange(0.0, 20.0, 0.5)
+    ordered = np.where(t < 3.0, 4.9, np.where(t < 5.0, -5.1, 10.0))
+    assert execute_time(Trial(t, {"delta_command": np.radians(ordered)})) == 3.0
+    measured = 1.0 + np.clip(2.5 * (t - 5.2), 0.0, 15.0)
+    assert execute_time(Trial(t, {"delta": np.radians(measured)})) == pytest.approx(5.2)
+    assert departure(t[:6], 3.0 + 0.0 * t[:6]) == 0.0
 
 
 def test_a_perfect_circle():
