@@ -15,7 +15,7 @@ import pytest
 
 import shipgym
 from identification import IdentificationResult, identify
-from identification.simulation_error.maximum_a_posteriori import LARGEST, _groups, _Problem
+from identification.simulation_error.maximum_a_posteriori import LARGEST, Estimate, _groups, _Problem
 from identification.simulation_error.mmg_prior import (
     HULL_FORMULAS,
     formula_coefficients,
@@ -323,6 +323,34 @@ def test_a_trial_without_shaft_speed_or_with_a_still_rudder_is_refused() -> None
     without = Trial(trial.t, {c: v for c, v in trial.channels.items() if c != "n"}, name="still")
     with pytest.raises(InputError, match="'still': channel 'n' is missing, structure 'mmg' needs"):
         identify([without], "mmg", particulars=L7)
+
+
+class Constant(_Problem):
+    """Four rows of one channel, two trials, each a ship length long: one number is to be found, by hand."""
+
+    def __init__(self, measured: float) -> None:
+        self.groups = np.array([0, 0, 1, 1])
+        self.segments = [measured, measured, 0.0, 0.0]
+
+    def _weight(self, segment: Any) -> float:
+        return 1.0
+
+    def rows(self, z: Any, which: Any, scales: Any, strength: float) -> tuple[Any, Any]:
+        errors = (z[0] - np.take(self.segments, which)) / scales[0]
+        return np.append(errors, strength * z), np.append(np.ones(len(which)) / scales[0], strength)[:, None]
+
+
+def test_standard_errors_grow_by_what_is_held_out_beyond_what_is_expected() -> None:
+    """Of 9, 9 from 0, 0 and the reverse: (9 + 9) / 2^2 / (2 / 2^2 + 2^2) = 1 from the former, 0.
+
+    In scales of 2 their squares are 2 (9 / 2)^2 and 2 (1 / 2)^2, one each but for the variance of the fit, of
+    1 / (2 / 2^2 + 1) with the prior as it is.
+    """
+    fit = Estimate(np.array([3.0]), np.array([2.0]), 2.0, np.eye(1), 1)
+    error, factor = Constant(9.0).held_out(fit, np.array([1.0]))
+    assert error == pytest.approx(np.sqrt((81.0 + 1.0) / 2.0))
+    assert factor == pytest.approx(np.sqrt((40.5 + 0.5 - 4.0) / (2 * 0.5 / 1.5)))
+    assert Constant(0.1).held_out(fit, np.array([1.0]))[1] == 1.0
 
 
 @pytest.fixture(scope="module")

@@ -189,6 +189,10 @@ def test_auto_takes_the_ship_most_alike(target: ShipModel, short_trials: list[Tr
     [
         ({"structure": "cubic", "prior": "clarke"}, r"prior: 'clarke' found with structure 'cubic'"),
         ({"structure": "nomoto", "prior": "kijima"}, r"prior: 'kijima' found with structure 'nomoto'"),
+        (
+            {"structure": "grey-box", "reference_model": "tanker", "prior": "kvlcc2"},
+            r"prior: 'kvlcc2' found with structure 'grey-box'",
+        ),
         ({"prior": "titanic"}, r"titanic"),
         ({"prior": "tanker", "prior_strength": -1.0}, r"prior_strength: -1"),
         ({"prior_strength": 1.0}, r"prior_strength: 1.0 found without a prior"),
