@@ -13,6 +13,7 @@ from stable_baselines3.common.vec_env import VecFrameStack, VecNormalize
 
 from agents import LQ, LearnedPolicy, load_agent
 from agents.policies.policy import order_numbers
+from agents.policies.policy_extraction import actor_network
 from agents.training.residual import ResidualVecEnv
 from shipgym import ShipVecEnv
 from shipgym.errors import InputError
@@ -161,6 +162,23 @@ def test_what_a_policy_cannot_be_is_refused(name):
     make, message = REFUSED[name]
     with pytest.raises(InputError, match=message):
         LearnedPolicy.from_sb3(make())
+
+
+def test_layers_that_are_not_dense_are_refused_by_name():
+    layers = {
+        "mlp_extractor.policy_net.0": (2, 3),
+        "mlp_extractor.policy_net.2": (2, 2),
+        "action_net": (1, 2),
+    }
+    weights = {f"{name}.weight": torch.ones(shape) for name, shape in layers.items()}
+    weights |= {f"{name}.bias": torch.zeros(shape[0]) for name, shape in layers.items()}
+    network = actor_network({**weights, "value_net.weight": torch.ones(1, 2)}, None, "mine")
+    assert (network.sizes, network.activation, network.output) == ((3, 2, 2, 1), "tanh", "linear")
+    bare = {name: value for name, value in weights.items() if name != "action_net.bias"}
+    with pytest.raises(InputError, match=r"agent: weights 'action_net.bias' missing or not known, expected"):
+        actor_network(bare, None, "mine")
+    with pytest.raises(InputError, match=r"weights 'norm.weight' missing or not known"):
+        actor_network({**weights, "norm.weight": torch.ones(2)}, None, "mine")
 
 
 def test_single_environments_are_known_too():

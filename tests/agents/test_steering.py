@@ -15,7 +15,7 @@ from typer.testing import CliRunner
 from agents import LQ, PID, IntegralLineOfSight, TurnRate, WheelOver, load_agent
 from agents.cli import app
 from agents.deployment import scheduling
-from agents.deployment.nmea import Link, Reading, readings, sentences
+from agents.deployment.nmea import Line, Link, Reading, readings, sentences
 from agents.deployment.route import Route
 from agents.deployment.simulated import SimulatedShip, simulate_ship
 from agents.deployment.steering import MANUAL, STANDBY, STEERING, Helm, Limits, Sensors, steer
@@ -87,6 +87,14 @@ def test_sentences_are_understood_in_si_units(line, expected):
 )
 def test_what_is_damaged_is_told_apart(line):
     assert readings(line) is None
+
+
+def test_lines_come_in_any_portions_and_an_endless_one_is_forgotten():
+    heard = []
+    line = Line(heard.append, set())
+    for portion in (b"$HE", b"HDT", b",1\r\n \n$B", b"\n", b"x" * 512, b"\n", b"y" * 513, b"rest\n"):
+        line.data_received(portion)
+    assert heard == ["$HEHDT,1", "$B", "x" * 512, "rest"]
 
 
 def helm(agent=PID_MARINER, **limits):
