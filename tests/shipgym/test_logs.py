@@ -211,6 +211,21 @@ def test_a_sheet_with_merged_cells_is_refused(tmp_path):
         read_log(tmp_path / "log.xlsx")
 
 
+@pytest.mark.parametrize("names", [["t", "t"], [0, 1]])
+def test_a_sheet_begins_with_names_where_it_is_not_empty(names, tmp_path):
+    openpyxl = pytest.importorskip("openpyxl")
+    book = openpyxl.Workbook()
+    for row in ([], [None, "t", "u"], [None, 0, 1], [], [None, 1, 2]):
+        book.active.append(row)
+    book.save(tmp_path / "log.xlsx")
+    table = read_log(tmp_path / "log.xlsx")
+    assert (table.header, list(table.lines)) == (("t", "u"), [3, 5])
+    book.active["B2"], book.active["C2"] = names
+    book.save(tmp_path / "log.xlsx")
+    with pytest.raises(InputError, match=r"log.xlsx: row 2: .* found, expected names of columns, each once"):
+        read_log(tmp_path / "log.xlsx")
+
+
 @pytest.mark.parametrize("ending", ["xlsx", "parquet", "mat"])
 def test_a_damaged_file_is_one_message(tmp_path, ending):
     (tmp_path / f"log.{ending}").write_bytes(b"PK\x03\x04" + bytes(300))
