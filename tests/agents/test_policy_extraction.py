@@ -5,6 +5,7 @@ from copy import deepcopy
 import numpy as np
 import pytest
 import torch
+from gymnasium.spaces import Box
 from gymnasium.wrappers import RescaleObservation
 from sb3_contrib import TQC
 from stable_baselines3 import A2C, DQN, PPO, SAC, TD3
@@ -179,6 +180,19 @@ def test_layers_that_are_not_dense_are_refused_by_name():
         actor_network(bare, None, "mine")
     with pytest.raises(InputError, match=r"weights 'norm.weight' missing or not known"):
         actor_network({**weights, "norm.weight": torch.ones(2)}, None, "mine")
+
+
+def test_an_agent_that_commands_otherwise_than_its_layers_is_refused(monkeypatch):
+    agent = PPO("MlpPolicy", ships(), **QUICK)
+    predict = agent.predict
+    monkeypatch.setattr(agent, "predict", lambda x, **more: (predict(x, **more)[0] + 0.9e-4, None))
+    LearnedPolicy.from_sb3(agent)
+    monkeypatch.setattr(agent, "predict", lambda x, **more: (predict(x, **more)[0] - 1.1e-4, None))
+    with pytest.raises(InputError, match="gives other commands than its layers do"):
+        LearnedPolicy.from_sb3(agent)
+    agent.observation_space = Box(-1.0, 1.0, (9,))
+    with pytest.raises(InputError, match=r"shape \(9,\) found, expected \(8,\), as its network has inputs"):
+        LearnedPolicy.from_sb3(agent)
 
 
 def test_single_environments_are_known_too():
