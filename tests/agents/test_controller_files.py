@@ -190,6 +190,13 @@ def test_what_a_kind_needs_of_its_design_is_checked_when_it_is_read(path, tmp_pa
             lambda arrays: arrays["effect"].__setitem__(3, 0.0),
             "share of an order .* 0 found, .* >= 1e-06 and <= 1$",
         ),
+        (
+            "mpc",
+            lambda arrays: arrays["transition"][3].__setitem__(3, -0.01),
+            "stays: -0.01 found, .* >= 0 and",
+        ),
+        ("mpc", lambda arrays: arrays["transition"][3].__setitem__(3, 1.01), "stays: 1.01 found, .* <= 1$"),
+        ("mpc", lambda arrays: arrays["effect"].__setitem__(3, 1.01), "followed: 1.01 found"),
         ("mpc", lambda arrays: arrays["transition"][0].__setitem__(0, 9.0), "a sampled pole of size"),
         ("lq-scheduled", lambda arrays: arrays["speeds"].sort(reverse=True), "speeds: .* in rising order"),
         ("lq-scheduled", lambda arrays: arrays["neutral"][0].pop(), "expected a list of 2 numbers"),

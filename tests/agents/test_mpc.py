@@ -46,6 +46,8 @@ def test_it_plans_two_ship_lengths_ahead_or_two_steps_at_least():
         "horizon_steps": round(2.0 * 160.93 / 7.7175 / 0.5), "rudder_rate_rad_s": np.radians(0.6),
     }  # fmt: skip
     assert MPC.from_model(MARINER, horizon_lengths=0.01).design["horizon_steps"] == 2.0
+    with pytest.raises(InputError, match=r"horizon_steps: 834 found, .* <= 640; a shorter horizon or longer"):
+        MPC.from_model(MARINER, dt=0.05)
 
 
 def hard_questions(model, n=20):
