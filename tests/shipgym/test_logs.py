@@ -297,6 +297,17 @@ def test_a_log_with_wrong_checksums_or_without_time_is_refused(tmp_path):
         read_log(tmp_path / "dark.nmea")
 
 
+def test_a_tenth_of_the_sentences_may_be_damaged(tmp_path):
+    lines = nmea_log(tmp_path / "log.nmea", end=20).read_text().splitlines()[1:201]
+    for count in (20, 21):
+        damaged = [one[:-2] + "ZZ" if k >= 200 - count else one for k, one in enumerate(lines)]
+        (tmp_path / "log.nmea").write_text("\n".join(damaged))
+        if count == 20:
+            assert "20 of 200 sentences with a wrong checksum" in read_log(tmp_path / "log.nmea").notes[0]
+    with pytest.raises(InputError, match=r"21 of 200 sentences have a wrong checksum.*in line 180\)"):
+        read_log(tmp_path / "log.nmea")
+
+
 def test_a_wind_of_no_unit_is_left_out(tmp_path):
     path = nmea_log(tmp_path / "log.nmea", end=60)
     before = Trial.from_csv(path)
