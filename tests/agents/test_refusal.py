@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -164,3 +165,37 @@ def test_advice_is_not_about_a_coefficient_near_zero(fit):
     found = advise(tiny, used, {"zigzag": lambda ship: used[0]})
     assert max(found.before, key=lambda name: found.before[name]) == "N_0u"
     assert found.coefficient != "N_0u"
+
+
+@pytest.mark.parametrize(("t", "refused"), [(-3.05, True), (-2.95, False), (3.05, False)])
+def test_trials_tell_to_which_side_the_rudder_turns_from_three_standard_errors_on(t, refused, monkeypatch):
+    steered = np.array([[-1.0, -0.3], [-1.5, -2.0]]), np.array([[-0.1], [0.5]])  # to starboard
+    assert bool(refusal_of([steered] * 61, t, monkeypatch)) == refused
+
+
+@pytest.mark.parametrize(("row", "name"), [(0, "sway damping"), (1, "yaw damping")])
+def test_a_damping_that_drives_the_motion_in_60_of_61_models_is_refused(row, name, monkeypatch):
+    sound = np.array([[-1.0, -0.3], [-1.5, -2.0]])
+    driven = sound.copy()
+    driven[row, row] = 0.1
+    rudder = np.array([[-0.1], [0.5]])
+    for count, refused in ((60, True), (59, False)):
+        found = refusal_of([(driven, rudder)] * count + [(sound, rudder)] * (61 - count), 0.0, monkeypatch)
+        assert (name in (found or "")) == refused
+
+
+def refusal_of(steering, t, monkeypatch):
+    """Why a model is refused whose steering and that of 60 models drawn is given, and the rudder's t."""
+    models = iter(steering)
+    monkeypatch.setattr(refusal, "steering_state_space", lambda _: next(models))
+    monkeypatch.setattr(refusal, "rudder_effect", lambda *_: t)
+    monkeypatch.setattr(refusal, "helpful_trial", lambda _: "a trial")
+    model = SimpleNamespace(sample=lambda count, seed: [None] * count, dynamics=None)
+    return refusal.why_refused(SimpleNamespace(model=model, trials=()))
+
+
+def test_an_autopilot_may_lose_one_model_in_twenty():
+    lost = np.arange(1000) < 50
+    assert refusal.lost_control(lost) is None
+    lost[50:53] = True
+    assert refusal.lost_control(lost) == "it loses control of 53 of 1000 models drawn"
