@@ -71,6 +71,7 @@ evidence: $(VENV)/dev-installed
 	$(BIN)/python scripts/train_pretrained.py --table build/suite-v2
 	$(BIN)/python scripts/transfer.py --data $(DATA)
 	$(BIN)/python scripts/certainty.py
+	$(BIN)/python scripts/opened_once.py
 	$(BIN)/python scripts/bridge_logs.py
 	$(BIN)/python scripts/standards.py
 	$(BIN)/python scripts/run_notebooks.py

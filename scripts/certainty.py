@@ -29,7 +29,7 @@ if str(ROOT) not in sys.path:
     sys.path.insert(0, str(ROOT))
 
 import shipgym  # noqa: E402 - the folder above has to be found first
-from identification import identify  # noqa: E402
+from identification import IdentificationResult, identify  # noqa: E402
 from shipgym import ShipModel, Trial  # noqa: E402
 from shipgym.manoeuvres import Manoeuvre, turning_circle, zigzag  # noqa: E402
 from shipgym.manoeuvres.imo import imo_manoeuvres  # noqa: E402
@@ -114,27 +114,33 @@ def holds(found: Key[IndexInterval], truth: Key[float]) -> Key[bool]:
     }
 
 
-def case(name: str, structure: str, kind: str, seed: int, draws: int) -> dict[str, object]:
-    """Coverage of one case without and with model error: lists of whether an interval holds the truth."""
-    warnings.simplefilter("ignore")
-    ship = ship_of(name)
+def fitted(ship: ShipModel, structure: str, trials: list[Trial]) -> IdentificationResult:
+    """A ship identified by a structure, or `grey-box:SHIP`, which is RM-SVM on a reference ship."""
     table, _, reference = structure.partition(":")
     grey = {"reference_model": reference, "method": "rm-svm"} if reference else {}
-    result = identify(
-        sea_trials(ship, kind, seed), table, particulars=ship.particulars, steering=ship.steering, **grey
-    )
-    row: dict[str, object] = {"ship": name, "structure": structure, "trials": kind, "seed": seed}
-    if not result.stable:
-        return row | {"unstable": True}
-    factor = result.model.provenance["model_error"]["factor"]
+    return identify(trials, table, particulars=ship.particulars, steering=ship.steering, **grey)
+
+
+def coverage(ship: ShipModel, model: ShipModel, draws: int) -> dict[str, object]:
+    """Whether the intervals of a model hold a ship's indices, without and with model error."""
+    row: dict[str, object] = {"factor": (factor := model.provenance["model_error"]["factor"])}
     truth = true_indices(ship)
     for label, size in (("noise", factor**-2), ("all", 1.0)):
-        found = index_intervals(replace(result.model, covariance=size * result.model.covariance), draws)
+        found = index_intervals(replace(model, covariance=size * model.covariance), draws)
         row[label] = holds(found, truth)
         row[f"{label} ran away"] = float(np.mean([one.ran_away.mean() for one in found.values()]))
         widths = [np.ptp(one.interval) / 2.0 / truth[key] for key, one in found.items() if one.interval]
         row[f"{label} width"] = float(np.median(widths))
-    return row | {"factor": factor}
+    return row
+
+
+def case(name: str, structure: str, kind: str, seed: int, draws: int) -> dict[str, object]:
+    """Coverage of one case without and with model error: lists of whether an interval holds the truth."""
+    warnings.simplefilter("ignore")
+    ship = ship_of(name)
+    result = fitted(ship, structure, sea_trials(ship, kind, seed))
+    row: dict[str, object] = {"ship": name, "structure": structure, "trials": kind, "seed": seed}
+    return row | (coverage(ship, result.model, draws) if result.stable else {"unstable": True})
 
 
 def share(rows: Sequence[dict[str, object]], label: str, part: str = "") -> str:
@@ -146,7 +152,7 @@ def share(rows: Sequence[dict[str, object]], label: str, part: str = "") -> str:
 def table(rows: Sequence[dict[str, object]]) -> str:
     """The table, in Markdown: a row for each ship and trials, and one for all."""
     groups = {f"{ship}, {kind}": [r for r in rows if (r["ship"], r["trials"]) == (ship, kind)]
-              for ship in SHIPS for kind in TRIALS}  # fmt: skip
+              for ship in dict.fromkeys(row["ship"] for row in rows) for kind in TRIALS}  # fmt: skip
     for kind in TRIALS:
         groups[f"**all, {kind}**"] = [row for row in rows if row["trials"] == kind]
     groups["**all**"] = list(rows)

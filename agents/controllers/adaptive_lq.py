@@ -275,7 +275,7 @@ def has_sway(model: ShipModel) -> bool:
 def _stable(A: Floats, B: Floats, rows: Floats) -> Flags:
     """Whether ships are held by feedback rows, shape (n,)."""
     poles = np.linalg.eigvals(A + B[:, :, None] * rows[:, None, :])
-    held: Flags = np.abs(poles).max(axis=1, initial=0.0) < 1.0
+    held: Flags = np.abs(poles).max(axis=1) < 1.0
     return held
 
 

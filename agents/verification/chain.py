@@ -19,7 +19,7 @@ from agents.output import whole_folder
 from agents.rollouts.course_keeping import sail, step_response
 from agents.rollouts.rollout import check_fits
 from agents.verification.monte_carlo import monte_carlo
-from agents.verification.refusal import helpful_trial, lost_control, why_refused
+from agents.verification.refusal import helpful_trial, lost_control, simpler_structures, why_refused
 from agents.verification.result import STEP_DEG, AutopilotResult, Pilot, Verification
 from agents.verification.tracks import Track, keep_track, track_task
 from identification import IdentificationResult
@@ -154,7 +154,9 @@ def _decided(found: Verification, fit: IdentificationResult) -> tuple[Verificati
     lost = {pilot.key: why for pilot in designed if (why := lost_control(pilot.episodes.terminated))}
     if not lost:
         return found, None
-    remedy = helpful_trial(fit)
+    ranking = fit.metrics.get("selection", {}).get("ranking", ())
+    simpler = simpler_structures(ranking, (fit.model.provenance or {}).get("structure", ""))
+    remedy = helpful_trial(fit) + (f", or try --structure {' or '.join(simpler)}" if simpler else "")
     refused = {**found.refused, **{key: f"{why}; run {remedy}" for key, why in lost.items()}}
     refusal = None
     if len(lost) == len(designed):

@@ -1,6 +1,7 @@
 """Why no autopilot is given: models that contradict their trials, and designs that lose control."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -76,6 +77,17 @@ def helpful_trial(fit: Fit) -> str:
         return f"a {advise(fit.model, used, criterion='D').chosen[0]} to both sides"
     except InputError:  # a grey box has no table to advise on
         return FALLBACK
+
+
+def simpler_structures(ranking: Sequence[Mapping[str, Any]], structure: str) -> list[str]:
+    """The next best two structures with fewer coefficients than the one that was chosen, or fewer than two.
+
+    `ranking`: of `structure = "auto"`, as `Ranking.to_dict` has it. Where the trials leave coefficients open,
+    some of the models drawn run away whatever steers them.
+    """
+    fewest = min((one["coefficients"] for one in ranking if one["structure"] == structure), default=0)
+    fewer = (one for one in ranking if one["coefficients"] < fewest and one["stable"] and not one["ran_away"])
+    return list(dict.fromkeys(str(one["structure"]) for one in fewer))[:2]
 
 
 def lost_control(terminated: NDArray[np.bool_]) -> str | None:

@@ -125,9 +125,11 @@ def open_loop(model: ManoeuvringModel, trial: Trial) -> Trial:
         )
     t = np.array(trial.t)
     states = np.empty((len(t), len(model.state_names)))
-    first = [trial[name][0] if name in trial.channels else 0.0 for name in model.state_names]
+    states[0] = [trial[name][0] if name in trial.channels else 0.0 for name in model.state_names]
+    if "q" in model.state_names:  # which no trial records: that of a steady yaw rate
+        rates = model.rates({name: trial[name][:1] for name in needed})
+        states[0, model.state_names.index("q")] = -rates["r"][0]
     n = np.array(trial["n"]) if "n" in trial.channels else np.zeros(len(t))
-    states[0] = _settled(model, np.array([first]), n[:1])[0]
     longest_step = LONGEST_STEP * model.travel_time
     wind = wind_accelerations(trial, model.dynamics)
     wind = 0.5 * (wind[1:] + wind[:-1])
@@ -179,15 +181,6 @@ def _channels(model: ManoeuvringModel, states: Floats) -> dict[str, Floats]:
     """What can be recorded of states; a memory of yaw cannot."""
     columns = zip(model.state_names, states.T, strict=False)
     return {name: column for name, column in columns if name in CHANNELS}
-
-
-def _settled(model: ManoeuvringModel, states: Floats, shaft: Floats) -> Floats:
-    """States whose memory of yaw, which no trial records, is that of a steady yaw rate."""
-    if "q" in model.state_names:
-        commands = np.stack([states[:, -1], shaft], axis=-1)[:, : len(model.command_names)]
-        rates = model.derivatives(states, commands)
-        states[:, model.state_names.index("q")] = -rates[:, model.state_names.index("r")]
-    return states
 
 
 def unstable(model: ManoeuvringModel, time_s: float, state: Floats) -> UnstableModelError:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -119,9 +119,10 @@ def correct_offsets(log: Log, tools: Instruments) -> None:
             continue
         if isinstance(offset, str):
             straight = straight_parts(log.t, channels)
-            found = heading_offset(channels, straight) if name == "psi" else None
-            if name == "delta" and straight.any():
-                found = float(np.mean(channels["delta"][straight])), 0.0
+            if name == "psi":
+                found: Sequence[float] | None = heading_offset(channels, straight)
+            else:
+                found = [float(np.mean(channels["delta"][straight]))] if straight.any() else None
             if found is None:
                 needed = "with sog and cog on courses over 60 deg apart" if name == "psi" else "and a heading"
                 raise InputError(

@@ -1,11 +1,20 @@
 from itertools import count
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from agents import LQ, PID, sail
 from agents.rollouts import rollout as rollout_module
-from agents.rollouts.metrics import evaluate, reversals, step_figures, worst_step_cost
+from agents.rollouts.metrics import (
+    course_changes,
+    evaluate,
+    path_following,
+    reversals,
+    steering,
+    step_figures,
+    worst_step_cost,
+)
 from agents.suites.suite import BenchmarkTask
 from shipgym import load_model
 from shipgym.tasks.guidance import wrapped
@@ -106,6 +115,8 @@ def test_reversals_within_the_dead_band_are_none():
     assert reversals(angle, counts).tolist() == [4.0, 0.0, 0.0]  # two periods: four turns; a tremble; a ramp
     counts[100:] = False
     assert reversals(angle, counts).tolist() == [1.0, 0.0, 0.0]
+    to_and_fro = np.radians(np.outer([0.0, 1.0, 0.0, 1.0, 0.0], [0.48, 0.52]))
+    assert reversals(to_and_fro, np.ones((4, 2), dtype=np.bool_)).tolist() == [0.0, 3.0]
 
 
 def test_overshoot_and_settling_of_a_damped_oscillation():
@@ -118,6 +129,50 @@ def test_overshoot_and_settling_of_a_damped_oscillation():
         outside = t[np.abs(response) > 0.05].max()
         assert (settling, unsettled) == (pytest.approx(outside + 0.1), 0.0)
     assert step_figures(np.radians([20.0, 15.0, 10.0]), 1.0) == (0.0, 2.0, 1.0)  # has not settled
+
+
+@pytest.mark.parametrize(
+    ("error", "expected"),
+    [
+        ([40.0, -2.1, 1.95, 0.0], (5.25, 4.0, 0.0)),  # settled within 5 per cent
+        ([10.0, 1.05, -0.95, 0.0], (9.5, 4.0, 0.0)),  # or a degree
+        ([10.0, 5.0, 0.0, 1.05], (0.0, 6.0, 1.0)),
+    ],
+)
+def test_changes_of_course_by_hand(error, expected):
+    assert step_figures(np.radians(error), 2.0) == pytest.approx(expected)
+
+
+@pytest.mark.parametrize(("error_deg", "counts"), [(-5.1, True), (4.9, False), (355.1, False), (354.9, True)])
+def test_a_change_of_course_counts_from_five_degrees_on(error_deg, counts):
+    states = {"psi": np.zeros((3, 1)), "set_point": np.full((3, 1), np.radians(error_deg))}
+    run = SimpleNamespace(seeds=[0], steps=np.array([2.0]), states=states, dt=1.0)
+    assert course_changes(run)["unsettled"].tolist() == pytest.approx(
+        [1.0 if counts else np.nan], nan_ok=True
+    )
+
+
+def test_figures_of_steering_and_of_paths_by_hand():
+    """Two episodes of 4 and 2 intervals of 3 s; what is recorded later or at the beginning does not count."""
+    sailing = np.array([[1, 1], [1, 1], [1, 0], [1, 0]], dtype=np.bool_)
+    run = SimpleNamespace(sailing=sailing, steps=sailing.sum(axis=0).astype(float), dt=3.0)
+    run.states = {"delta": np.radians([[0, 0], [2, 1], [-2, 1], [1, 9], [1, 0]])}
+    run.infos = {
+        "heading_error": np.radians([[9, 9], [3, -1], [4, 1], [0, 9], [0, 9]]),
+        "cross_track": np.array([[9.0, 9.0], [3.0, -1.0], [-4.0, 1.0], [0.0, 9.0], [0.0, 9.0]]),
+        "in_corridor": np.array([[0, 0], [1, 1], [0, 1], [0, 0], [1, 0]]),
+        "grounded": np.array([[1, 1], [0, 0], [0, 0], [0, 1], [0, 1]]),
+        "success": np.array([[0, 0], [0, 0], [0, 1], [1, 0], [1, 0]]),
+    }
+    turned = steering(run)
+    assert turned["heading_rmse_deg"] == pytest.approx([2.5, 1.0])
+    assert turned["rudder_travel_deg_min"] == pytest.approx([9.0 / 0.2, 1.0 / 0.1])
+    assert turned["rudder_reversals_min"] == pytest.approx([2.0 / 0.2, 0.0])
+    followed = {name: values.tolist() for name, values in path_following(run).items()}
+    assert followed == {
+        "cross_track_rmse_m": [2.5, 1.0], "outside_corridor": [0.5, 0.0], "left_corridor": [1.0, 0.0],
+        "grounded": [0.0, 0.0], "success": [1.0, 1.0],
+    }  # fmt: skip
 
 
 def test_overshoot_and_settling_of_a_run_are_those_of_its_recorded_heading(lq):

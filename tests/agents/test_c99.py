@@ -309,5 +309,12 @@ def test_the_command_writes_c_and_says_what_it_cannot(tmp_path):
     assert sorted(one.name for one in (tmp_path / "out").iterdir()) == ["pid.c", "pid.h"]
     found = run(app, ["export", "mariner", "--c", str(tmp_path)])
     assert (found.exit_code, (tmp_path / "mariner.c").exists()) == (2, False)  # a folder with other files
-    assert run(app, ["export", "mariner"]).exit_code == 2
-    assert run(app, ["export", "marinr", "--c", str(tmp_path / "no")]).exit_code == 2
+    for said, *arguments in (
+        ("nothing to write: give --c FOLDER", "mariner"),
+        ("Did you mean 'mariner'", "marinr", "--c", tmp_path / "no"),
+        ("--depth found, which are for --c and --fmu", "mariner", "--onnx", tmp_path / "no", "--depth", 9),
+        ("--depth: 9 found, but", tmp_path / "pid.json", "--c", tmp_path / "no", "--depth", 9),
+    ):
+        found = run(app, ["export", *map(str, arguments)])
+        assert found.exit_code == 2
+        assert said in " ".join(found.output.split())

@@ -81,7 +81,9 @@ def test_steps_and_costs_are_those_of_each_autopilot():
     above, below = [trace for trace in traces(figure, "pid") if trace.fill is None]
     np.testing.assert_allclose(above.y, [0.0, 10.0, 20.0], rtol=1e-6)
     np.testing.assert_allclose(below.y, [0.0, -10.0, -20.0], rtol=1e-6)
-    assert len(traces(figure, "pid")) == 4  # with the bands of the draws
+    bands = [trace for trace in traces(figure, "pid") if trace.fill is not None]  # of the two draws
+    np.testing.assert_allclose(bands[0].y, [0.0, 11.9, 21.9, 18.1, 8.1, 0.0], rtol=1e-6)
+    np.testing.assert_allclose(bands[1].y, [0.0, -8.1, -18.1, -21.9, -11.9, 0.0], rtol=1e-6)
     assert len(traces(figure, "lq")) == 2
     course = only(figure, "set course")
     assert (list(course.x), list(course.y)) == ([0.0, 2.0], [20.0, 20.0])

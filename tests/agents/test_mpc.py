@@ -38,6 +38,18 @@ def test_without_a_limit_in_reach_it_is_lq():
     assert mpc.predict(shown)[0] == pytest.approx(lq.predict(shown)[0], abs=1e-6)
 
 
+def test_it_plans_two_ship_lengths_ahead_or_two_steps_at_least():
+    mpc = MPC.from_model(SLOW, dt=0.5)
+    assert mpc.design == {
+        "dt": 0.5, "integral_lengths": 20.0, "rudder_weight": 0.1,
+        "rate_weight_s2": pytest.approx(0.01 * (160.93 / 7.7175) ** 2),
+        "horizon_steps": round(2.0 * 160.93 / 7.7175 / 0.5), "rudder_rate_rad_s": np.radians(0.6),
+    }  # fmt: skip
+    assert MPC.from_model(MARINER, horizon_lengths=0.01).design["horizon_steps"] == 2.0
+    with pytest.raises(InputError, match=r"horizon_steps: 834 found, .* <= 640; a shorter horizon or longer"):
+        MPC.from_model(MARINER, dt=0.05)
+
+
 def hard_questions(model, n=20):
     random = np.random.default_rng(1)
     widths = np.radians([[60.0], [0.5], [30.0]])

@@ -5,6 +5,7 @@ from copy import deepcopy
 import numpy as np
 import pytest
 import torch
+from gymnasium.spaces import Box
 from gymnasium.wrappers import RescaleObservation
 from sb3_contrib import TQC
 from stable_baselines3 import A2C, DQN, PPO, SAC, TD3
@@ -13,6 +14,7 @@ from stable_baselines3.common.vec_env import VecFrameStack, VecNormalize
 
 from agents import LQ, LearnedPolicy, load_agent
 from agents.policies.policy import order_numbers
+from agents.policies.policy_extraction import actor_network
 from agents.training.residual import ResidualVecEnv
 from shipgym import ShipVecEnv
 from shipgym.errors import InputError
@@ -161,6 +163,36 @@ def test_what_a_policy_cannot_be_is_refused(name):
     make, message = REFUSED[name]
     with pytest.raises(InputError, match=message):
         LearnedPolicy.from_sb3(make())
+
+
+def test_layers_that_are_not_dense_are_refused_by_name():
+    layers = {
+        "mlp_extractor.policy_net.0": (2, 3),
+        "mlp_extractor.policy_net.2": (2, 2),
+        "action_net": (1, 2),
+    }
+    weights = {f"{name}.weight": torch.ones(shape) for name, shape in layers.items()}
+    weights |= {f"{name}.bias": torch.zeros(shape[0]) for name, shape in layers.items()}
+    network = actor_network({**weights, "value_net.weight": torch.ones(1, 2)}, None, "mine")
+    assert (network.sizes, network.activation, network.output) == ((3, 2, 2, 1), "tanh", "linear")
+    bare = {name: value for name, value in weights.items() if name != "action_net.bias"}
+    with pytest.raises(InputError, match=r"agent: weights 'action_net.bias' missing or not known, expected"):
+        actor_network(bare, None, "mine")
+    with pytest.raises(InputError, match=r"weights 'norm.weight' missing or not known"):
+        actor_network({**weights, "norm.weight": torch.ones(2)}, None, "mine")
+
+
+def test_an_agent_that_commands_otherwise_than_its_layers_is_refused(monkeypatch):
+    agent = PPO("MlpPolicy", ships(), **QUICK)
+    predict = agent.predict
+    monkeypatch.setattr(agent, "predict", lambda x, **more: (predict(x, **more)[0] + 0.9e-4, None))
+    LearnedPolicy.from_sb3(agent)
+    monkeypatch.setattr(agent, "predict", lambda x, **more: (predict(x, **more)[0] - 1.1e-4, None))
+    with pytest.raises(InputError, match="gives other commands than its layers do"):
+        LearnedPolicy.from_sb3(agent)
+    agent.observation_space = Box(-1.0, 1.0, (9,))
+    with pytest.raises(InputError, match=r"shape \(9,\) found, expected \(8,\), as its network has inputs"):
+        LearnedPolicy.from_sb3(agent)
 
 
 def test_single_environments_are_known_too():

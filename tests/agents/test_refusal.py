@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -15,7 +16,7 @@ from agents.identifying import identification_settings, identify_ship
 from agents.verification import chain as links
 from agents.verification import refusal
 from agents.verification.page import verification_view
-from agents.verification.refusal import lost_control, rudder_effect, why_refused
+from agents.verification.refusal import lost_control, rudder_effect, simpler_structures, why_refused
 from agents.verification.result import verification_metrics
 from identification.design.experiment import advise
 from shipgym import InputError, ShipFile, UnstableModelError, load_model
@@ -71,6 +72,28 @@ def test_designs_that_lose_control_are_not_written(chain, tmp_path, monkeypatch)
     assert names == ["metrics.json", "model.json", "report.html"]
     assert json.loads((tmp_path / "report" / "metrics.json").read_text())["refusal"] == why
     assert "No autopilot is given: " in (tmp_path / "report" / "report.html").read_text()
+
+
+def stood(structure, coefficients, stable=True, ran_away=0):
+    return {"structure": structure, "coefficients": coefficients, "stable": stable, "ran_away": ran_away}
+
+
+def test_the_next_best_structures_with_fewer_coefficients_are_named():
+    chosen, larger, smaller = stood("mmg4dof", 55), stood("cubic-full", 60), stood("abkowitz", 40)
+    lost, unstable = stood("cubic", 30, ran_away=1), stood("linear-steering", 9, stable=False)
+    ranking = [chosen, larger, lost, unstable, smaller, stood("nomoto", 2)]
+    assert simpler_structures(ranking, "mmg4dof") == ["abkowitz", "nomoto"]
+    assert simpler_structures([*ranking, stood("mmg4dof", 40)], "mmg4dof") == ["nomoto"]  # by another method
+    assert simpler_structures(ranking, "nomoto") == []
+
+
+def test_a_refusal_of_a_structure_that_was_chosen_names_another(chain, monkeypatch):
+    result, fit = chain[1], chain[1].identification
+    monkeypatch.setattr(refusal, "MOST_LOST", -1.0)
+    own = fit.model.provenance["structure"]
+    ranking = {"ranking": [stood(own, 40), stood("nomoto", 2)]}
+    _, why = links._decided(result.verification, replace(fit, metrics=fit.metrics | {"selection": ranking}))
+    assert why.endswith(" to both sides, or try --structure nomoto")
 
 
 def test_a_refused_model_gives_a_report_that_says_why(demo, tmp_path, monkeypatch):
@@ -142,3 +165,37 @@ def test_advice_is_not_about_a_coefficient_near_zero(fit):
     found = advise(tiny, used, {"zigzag": lambda ship: used[0]})
     assert max(found.before, key=lambda name: found.before[name]) == "N_0u"
     assert found.coefficient != "N_0u"
+
+
+@pytest.mark.parametrize(("t", "refused"), [(-3.05, True), (-2.95, False), (3.05, False)])
+def test_trials_tell_to_which_side_the_rudder_turns_from_three_standard_errors_on(t, refused, monkeypatch):
+    steered = np.array([[-1.0, -0.3], [-1.5, -2.0]]), np.array([[-0.1], [0.5]])  # to starboard
+    assert bool(refusal_of([steered] * 61, t, monkeypatch)) == refused
+
+
+@pytest.mark.parametrize(("row", "name"), [(0, "sway damping"), (1, "yaw damping")])
+def test_a_damping_that_drives_the_motion_in_60_of_61_models_is_refused(row, name, monkeypatch):
+    sound = np.array([[-1.0, -0.3], [-1.5, -2.0]])
+    driven = sound.copy()
+    driven[row, row] = 0.1
+    rudder = np.array([[-0.1], [0.5]])
+    for count, refused in ((60, True), (59, False)):
+        found = refusal_of([(driven, rudder)] * count + [(sound, rudder)] * (61 - count), 0.0, monkeypatch)
+        assert (name in (found or "")) == refused
+
+
+def refusal_of(steering, t, monkeypatch):
+    """Why a model is refused whose steering and that of 60 models drawn is given, and the rudder's t."""
+    models = iter(steering)
+    monkeypatch.setattr(refusal, "steering_state_space", lambda _: next(models))
+    monkeypatch.setattr(refusal, "rudder_effect", lambda *_: t)
+    monkeypatch.setattr(refusal, "helpful_trial", lambda _: "a trial")
+    model = SimpleNamespace(sample=lambda count, seed: [None] * count, dynamics=None)
+    return refusal.why_refused(SimpleNamespace(model=model, trials=()))
+
+
+def test_an_autopilot_may_lose_one_model_in_twenty():
+    lost = np.arange(1000) < 50
+    assert refusal.lost_control(lost) is None
+    lost[50:53] = True
+    assert refusal.lost_control(lost) == "it loses control of 53 of 1000 models drawn"

@@ -103,6 +103,18 @@ def test_another_algorithm_and_a_policy_of_ones_own_are_refused(tmp_path):
         read_sb3(tmp_path / "model.zip")
 
 
+@pytest.mark.parametrize(
+    "space", [{}, {"low": "[-1. -1.]", "high": "[a b]"}, {"low": "[-1.]", "high": "[1. 1.]"}]
+)
+def test_a_space_of_observations_that_is_no_flat_box_is_refused(space, tmp_path):
+    _, path = saved(tmp_path)
+    with zipfile.ZipFile(path) as file:
+        data = json.loads(file.read("data"))
+    rewritten(path, data=json.dumps({**data, "observation_space": space}))
+    with pytest.raises(InputError, match="observation_space: no flat Box found"):
+        read_sb3(path)
+
+
 class Touch:
     def __reduce__(self):
         return Path.touch, (Path("RAN"),)

@@ -15,11 +15,13 @@ from typer.testing import CliRunner
 from agents import LQ, PID, IntegralLineOfSight, TurnRate, WheelOver, load_agent
 from agents.cli import app
 from agents.deployment import scheduling
-from agents.deployment.nmea import Link, Reading, readings, sentences
+from agents.deployment.nmea import Line, Link, Reading, readings, sentences
 from agents.deployment.route import Route
 from agents.deployment.simulated import SimulatedShip, simulate_ship
 from agents.deployment.steering import MANUAL, STANDBY, STEERING, Helm, Limits, Sensors, steer
+from shipgym.engine.passages import SEA_CHANNELS
 from shipgym.errors import InputError
+from shipgym.ships import load_model
 from shipgym.tasks.task import Task
 from tests.agents.policies import MARINER
 
@@ -87,6 +89,14 @@ def test_sentences_are_understood_in_si_units(line, expected):
 )
 def test_what_is_damaged_is_told_apart(line):
     assert readings(line) is None
+
+
+def test_lines_come_in_any_portions_and_an_endless_one_is_forgotten():
+    heard = []
+    line = Line(heard.append, set())
+    for portion in (b"$HE", b"HDT", b",1\r\n \n$B", b"\n", b"x" * 512, b"\n", b"y" * 513, b"rest\n"):
+        line.data_received(portion)
+    assert heard == ["$HEHDT,1", "$B", "x" * 512, "rest"]
 
 
 def helm(agent=PID_MARINER, **limits):
@@ -168,6 +178,38 @@ def test_the_rudder_ordered_is_limited_and_the_helmsman_is_warned():
         found.sensors.take(Reading(*one, "EC"), 0.0)
     found.watch(1.0, 0.0)
     assert found.warnings == ["off heading", "course change ahead"]
+
+
+def test_a_course_change_is_ahead_by_the_time_to_where_the_turn_is_begun_or_to_the_waypoint():
+    found = Helm(WHEEL_OVER, None, Limits(), Route(np.array([[54.0, 7.5], [54.1, 7.5], [54.1, 7.6]]), 600.0))
+    reach = WHEEL_OVER.gains["turn_reach"]
+
+    def seconds(next_m, next_angle, second_m, second_angle):
+        given = {"next_turn_distance": reach + next_m, "next_turn_angle": next_angle}
+        given |= {"second_turn_distance": reach + second_m, "second_turn_angle": second_angle}
+        return found._seconds_to_turn(given, 0.0)
+
+    assert seconds(400.0, 0.5, 1000.0, -0.5) == math.inf  # without way
+    found.sensors.take(Reading("speed", 8.0, "GP"), 0.0)
+    assert seconds(400.0, -0.5, 1000.0, 0.5) == pytest.approx(50.0)
+    assert seconds(400.0, 0.0, 1000.0, 0.5) == seconds(-1.0, 0.5, 1000.0, 0.5) == pytest.approx(125.0)
+    assert seconds(400.0, 0.0, 1000.0, 0.0) == math.inf
+    plotted = helm()
+    assert plotted._seconds_to_turn({}, 0.0) == math.inf
+    for one in (("speed", 8.0), ("waypoint_distance", 488.0)):
+        plotted.sensors.take(Reading(*one, "EC"), 0.0)
+    assert plotted._seconds_to_turn({}, 0.0) == pytest.approx(61.0)
+
+
+def test_warnings_are_given_beyond_their_limits():
+    found = Helm(PID_MARINER, 0.1, Limits(off_heading_deg=3.0, off_track_m=50.0))
+    for heading, cross_track, told in (
+        (0.151, 0.0, []), (0.153, 0.0, ["off heading"]), (0.047, 0.0, ["off heading"]),
+        (2.0 * np.pi + 0.06, 49.0, []), (0.1, -51.0, ["off track"]), (0.1, 51.0, ["off track"]),
+    ):  # fmt: skip
+        given = {"heading": heading, "set_point": 0.1, "cross_track": cross_track, "rate_of_turn": 0.0}
+        assert found._warned(given, 0.0) == told
+    assert found._warned(given | {"heading": 1.0, "cross_track": None, "rate_of_turn": 0.01}, 0.0) == []
 
 
 def test_a_plotters_bearing_to_the_waypoint_is_steered_if_it_was_heard_first():
@@ -312,6 +354,39 @@ def sailed(agent, kind=SimulatedShip, seconds=120.0, drop=None, **more):
 
     with asyncio.Runner(loop_factory=no_waiting) as runner:
         return runner.run(both()), ship, told
+
+
+def test_instruments_show_where_the_ship_is_and_sentences_tell_it():
+    """6 miles north and half a mile east of 54 N, 7.5 E, in waves and a current, at a moment of hour 27."""
+    ship = SimulatedShip(MARINER, leg=0.3, weather="moderate", step=0.5)
+    state = {"x": 6 * 1852.0, "y": 926.0, "psi": 0.5, "u": 7.0, "v": -0.4, "r": 0.003, "delta": -0.1}
+    ship.states[0, : len(state)] = [state[name] for name in MARINER.state_names]
+    ship.states[0, -len(SEA_CHANNELS) :] = 0.02, 0.004, 0.0, 0.0, -0.3, 0.5, 0.0, 0.0
+    over_ground = (7.0 - 0.4j) * np.exp(0.5j) - 0.3 + 0.5j
+    left = 18520.0 * np.exp(0.3j) - (6 * 1852.0 + 926.0j)
+    shown = {
+        "heading": 0.52, "yaw_rate": 0.007, "rudder": -0.1, "surge": 7.0, "sway": -0.4, "leg": 0.3,
+        "course": np.angle(over_ground), "speed": abs(over_ground), "latitude": np.radians(54.1),
+        "longitude": np.radians(7.5 + 0.5 / 60.0 / np.cos(np.radians(54.1))),
+        "cross_track": 926.0 * np.cos(0.3) - 6 * 1852.0 * np.sin(0.3),
+        "waypoint_bearing": np.angle(left), "waypoint_distance": abs(left),
+    }  # fmt: skip
+    assert ship.measured() == pytest.approx(shown)
+    ship.steps = 2 * (27 * 3600 + 15 * 60 + 5)
+    lines = ship.sentences().splitlines()
+    told = {one.quantity: one.value for line in lines for one in readings(line)}
+    assert told == pytest.approx({**shown, "to_steer": 0.3}, rel=1e-5, abs=3e-5)
+    for name in ("latitude", "longitude"):
+        assert told[name] == pytest.approx(shown[name], rel=0.0, abs=2e-8)
+    assert any(",031505.00," in line for line in lines)
+
+
+def test_what_a_heeled_ship_makes_sideways_over_ground_is_level():
+    ship = SimulatedShip(load_model("container"))
+    for name, value in (("u", 0.0), ("v", 2.0), ("phi", np.pi / 3)):
+        ship.states[0, ship.model.state_names.index(name)] = value
+    shown = ship.measured()
+    assert (shown["sway"], shown["speed"], shown["course"]) == pytest.approx((2.0, 1.0, np.pi / 2))
 
 
 def test_a_ship_is_steered_over_tcp_though_garbage_is_sent():

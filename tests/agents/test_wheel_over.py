@@ -22,6 +22,10 @@ def test_radius_and_reach_are_those_of_the_turning_circle():
         turn = turning_indices(turning_circle(MARINER, side, 1500.0), MARINER.particulars["length"])
         assert abs(turn.tactical_diameter_lengths) == pytest.approx(2.0 * radius, rel=0.05)
         assert turn.advance_lengths == pytest.approx(radius + reach, rel=0.1)
+    with pytest.raises(
+        InputError, match=r"does not turn round within .* lengths with 0\.4 degrees of rudder"
+    ):
+        own_turn(MARINER, share=0.01)
 
 
 def test_it_steers_the_next_leg_within_the_tangent_and_the_reach_and_mirrors():

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from identification import LSSVM, IdentificationResult, Samples, identify
+from identification.validation import diagnostics
 from identification.validation.diagnostics import (
     autocorrelation,
     check_trials,
@@ -94,6 +95,21 @@ def test_a_short_zigzag_in_a_long_record_moves(mariner: ShipModel) -> None:
     check_trials([with_rudder(delta)], mariner.table)
 
 
+@pytest.mark.parametrize(
+    ("noise_deg", "limit_deg"), [(0.0, 0.5), (0.08, 0.5), (0.2, 1.2), (0.45, 2.7), (0.6, 3.0)]
+)
+def test_a_rudder_moves_by_half_a_degree_and_six_times_its_noise_but_for_three_degrees(
+    noise_deg: float, limit_deg: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """For three samples at least: two beside each other are outliers."""
+    monkeypatch.setattr(diagnostics.preprocess, "noise_level", lambda t, values: np.radians(noise_deg))
+    t, plateau = np.arange(100.0), np.zeros(100)
+    for size, samples, still in ((0.98, 3, True), (1.02, 3, False), (9.0, 2, True)):
+        plateau[50:53] = 0.0
+        plateau[50 : 50 + samples] = np.radians(size * limit_deg)
+        assert diagnostics._is_still(t, plateau) == still
+
+
 def test_orders_at_every_sample_are_no_noise(mariner: ShipModel) -> None:
     check_trials([with_rudder(np.random.default_rng(0).choice([-10.0, 10.0], 300))], mariner.table)
 
@@ -108,6 +124,16 @@ def test_times_that_nearly_coincide_are_refused(
     message = r"twice\.csv': samples at 100 and 100\.0000\d+ s are only .* remove the repeated row"
     with pytest.raises(InputError, match=message):
         identify([twice], particulars=mariner.particulars)
+
+
+def test_the_shortest_step_is_a_ten_thousandth_of_the_usual_one() -> None:
+    def stepping(shortest: float) -> Trial:
+        t = 2.0 * np.arange(9.0)
+        return Trial(np.append(t, t[-1] + shortest), {"u": np.ones(10)}, name="run")
+
+    diagnostics._check_steps(stepping(2.05e-4))
+    with pytest.raises(InputError, match=r"only 0\.00019 s apart, expected a step near the usual 2 s"):
+        diagnostics._check_steps(stepping(1.9e-4))
 
 
 def test_each_equation_tells_its_numbers() -> None:

@@ -10,7 +10,12 @@ from papers.xu2020_tank import PMM18, PMM38, TABLE_11, xu_ship
 
 import shipgym
 from identification import identify
-from identification.regression.forces import force_regression, force_variances, identify_forces
+from identification.regression.forces import (
+    _between_jumps,
+    force_regression,
+    force_variances,
+    identify_forces,
+)
 from shipgym import InputError, Particulars, ShipModel, Trial
 from shipgym.manoeuvres.towing_tank import Tank, pure_surge, pure_sway, pure_yaw, static_drift, yaw_with_drift
 from shipgym.ships.shared_structure import read_shares, shared_structure
@@ -189,3 +194,14 @@ def test_the_variance_of_a_force_is_that_of_its_own_residuals_with_one_degree_of
     np.testing.assert_allclose(
         force_variances(equation, residuals, leverages), [[3.0, 4.0], [25.0, 2.0], [25.0, 36.0]]
     )
+
+
+def test_a_static_test_is_cut_where_a_velocity_jumps_by_twenty_usual_changes() -> None:
+    for jump, pieces in ((19.0, [slice(0, 20)]), (21.0, [slice(0, 10), slice(10, 20)])):
+        change = np.where(np.arange(19) == 9, jump, 1.0)
+        u = 5.0 + 0.01 * np.append(0.0, np.cumsum(change))
+        trial = Trial(np.arange(20.0), {"u": u, "v": np.zeros(20), "r": np.zeros(20)})
+        assert _between_jumps(trial) == pieces
+    angle = np.repeat([0.0, 0.2, 0.4, 0.6], [5, 3, 4, 8])  # of three samples none tells an acceleration
+    held = Trial(np.arange(20.0), {"u": np.ones(20), "v": -angle, "r": np.zeros(20)})
+    assert _between_jumps(held) == [slice(0, 5), slice(8, 12), slice(12, 20)]

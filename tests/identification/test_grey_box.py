@@ -10,10 +10,15 @@ from sklearn.utils.estimator_checks import check_estimator
 
 import shipgym
 from identification import IdentificationResult, identify
-from identification.estimators.rm_svm import ERROR_TOLERANCE, RMSVM, heading_error
+from identification.estimators.rm_svm import ERROR_TOLERANCE, RMSVM, heading_error, most_regularised
 from identification.report.figures import search_figure
 from identification.search.pattern_search import pattern_search
-from identification.simulation_error.similarity import correlations, select_reference, similarity_vector
+from identification.simulation_error.similarity import (
+    check_alike,
+    correlations,
+    select_reference,
+    similarity_vector,
+)
 from identification.validation.folds import of_largest_rudder
 from shipgym import ShipModel, Trial
 from shipgym.errors import InputError
@@ -186,6 +191,28 @@ def test_the_weight_may_be_judged_by_the_largest_rudder(
         errors.append(learnt.metrics["trials"]["starboard-20"]["rmse"]["psi"])
     least = next(w for w, e in zip(weights, errors, strict=True) if e <= ERROR_TOLERANCE * min(errors))
     assert provenance["search"]["r"]["C"] == least
+
+
+def test_rudders_within_a_tenth_of_the_largest_are_the_largest() -> None:
+    rudders = np.radians([10.0, -8.9, -9.1, 5.0])
+    runs = [Trial(np.arange(3.0), {"delta": np.array([0.0, rudder, 0.05])}) for rudder in rudders]
+    assert of_largest_rudder(runs, "folds").tolist() == [True, False, True, False]
+
+
+@pytest.mark.parametrize(
+    ("errors", "chosen"),
+    [((1.11, 1.09, 1.0), "b"), ((1.09, 1.0, 2.0), "a"), ((1.2, 1.11, 1.0), "c"), ((np.inf,) * 3, "a")],
+)
+def test_the_most_regularised_within_a_tenth_of_the_least_error_is_taken(
+    errors: tuple[float, ...], chosen: str
+) -> None:
+    assert most_regularised("abc", errors) == chosen
+
+
+def test_a_reference_ship_is_alike_by_a_correlation_of_a_half() -> None:
+    check_alike("tanker", 0.51, "leave it")
+    with pytest.raises(InputError, match=r"a similarity of 0\.49, expected at least 0\.5; leave it, or name"):
+        check_alike("tanker", 0.49, "leave it")
 
 
 def test_the_largest_rudder_needs_a_smaller_one(trials: list[Trial]) -> None:

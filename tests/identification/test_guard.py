@@ -2,17 +2,20 @@ from __future__ import annotations
 
 import re
 from dataclasses import replace
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 
+import shipgym
 from identification import IdentificationResult, Samples, identify
 from identification.estimators.methods import fit_held
 from identification.validation import guard
-from identification.validation.guard import hard_turn_features, reasons_unstable
+from identification.validation.guard import _runs_away, hard_turn_features, reasons_unstable
 from shipgym import ShipModel, Trial
 from shipgym.manoeuvres import zigzag
+from shipgym.ships import get_structure
 
 
 def runaway(model: ShipModel) -> ShipModel:
@@ -46,6 +49,58 @@ def test_size_of_a_term_in_the_hard_turn(mariner: ShipModel) -> None:
     speed = 0.47 * p["speed"]
     assert sizes["r"][names.index("d")] == pytest.approx(np.radians(35.0) * speed**2)
     assert sizes["r"][names.index("r")] == pytest.approx(0.8 * speed**2 / p["length"])
+
+
+def test_sizes_of_shaft_heel_and_memory_in_the_hard_turn(mariner: ShipModel) -> None:
+    """At 0.47 of the speed and 0.9 of the shaft's, r L / U = 0.8, 20.5 deg of drift, 5 deg of heel."""
+    p, speed = mariner.particulars, 0.47 * 7.7175
+    u, v = speed * np.cos(np.radians(20.5)), speed * np.sin(np.radians(20.5))
+    r, d, heel = 0.8 * speed / 160.93, np.radians(35.0), np.radians(5.0)
+    memory = hard_turn_features(get_structure("nomoto2"), p)["r"]
+    assert memory == pytest.approx([r, d, r * 160.93 / speed, d * 160.93 / speed])
+    assert hard_turn_features(get_structure("cubic"), p, 2.0)["u"][:5] == pytest.approx(
+        [1.8**2, 1.8 * u, u**2, v**2, v * r]
+    )
+    rolling = shipgym.register_structure("heeling", {"v": "v", "r": "r, delta", "p": "p, phi"})
+    p_term, phi_term = hard_turn_features(rolling, p)["p"]
+    assert p_term / phi_term == pytest.approx(speed / 160.93)
+    assert phi_term == pytest.approx(heel)
+
+
+@pytest.mark.parametrize(
+    ("channel", "value", "said"),
+    [
+        ("u", 15.1, "surge speed from 8 to 15.1 m/s"), ("v", -10.1, "sway speed of 10.1 m/s"),
+        ("r", -0.302, "yaw rate of 17.3 deg/s"),
+    ],
+)  # fmt: skip
+def test_what_no_ship_does(channel: str, value: float, said: str) -> None:
+    """Of 100 m and 10 m/s: half as fast again, as fast sideways, turning at 3 U / L, astern if never seen."""
+    model: Any = SimpleNamespace(particulars={"length": 100.0, "speed": 10.0})
+
+    def found(least: float = 3.0, **changed: float) -> str | None:
+        values = {"u": 8.0, "v": 0.0, "r": 0.0}
+        channels = {name: np.array([now, now, changed.get(name, now)]) for name, now in values.items()}
+        return _runs_away(model, lambda: Trial(np.arange(3.0), channels), least)
+
+    assert (found(**{channel: value}), found(**{channel: 0.99 * value})) == (said, None)
+    assert (found(u=-0.1), found(-0.2, u=-0.1)) == ("surge speed from -0.1 to 8 m/s", None)
+
+
+def test_the_rudder_is_reversed_at_intervals_by_the_ship_s_length() -> None:
+    """For 50 ship lengths in steps of a fiftieth; a ship that sails 10 m/s and is 100 m long takes 10 s."""
+    given: list[Any] = []
+    model: Any = SimpleNamespace(
+        service_command=np.array([0.0, 1.5]), travel_time=10.0, simulate=lambda *what: given.extend(what)
+    )
+    guard._reversed(model, -35.0, 2.5)
+    orders, dt = given
+    assert (orders.shape, dt) == ((2500, 2), pytest.approx(0.2))
+    assert orders[:, 1].tolist() == [1.5] * 2500
+    starboard = np.flatnonzero(np.diff(orders[:, 0]))
+    assert orders[0, 0] == pytest.approx(np.radians(-35.0))
+    assert np.diff(starboard).tolist() == [125] * 18
+    assert np.abs(orders[:, 0]) == pytest.approx(np.radians(35.0))
 
 
 @pytest.fixture(scope="module")

@@ -12,14 +12,14 @@ import numpy as np
 import pytest
 
 from identification import LSSVM, IdentificationResult, identify
-from identification.estimators.kernel_residual import stabilised
+from identification.estimators.kernel_residual import chosen_centres, principal, stabilised
 from identification.report.page import report_page
 from shipgym import ShipModel, Trial
 from shipgym.errors import InputError
 from shipgym.manoeuvres import zigzag
 from shipgym.ships.catalogue import fitted_box
 from shipgym.ships.checker import check_ship_model
-from shipgym.ships.kernel_boxes import Kernel, KernelBox, kernel_box
+from shipgym.ships.kernel_boxes import Kernel, KernelBox, gaussians, kernel_box
 from shipgym.ships.linear import nomoto
 from shipgym.ships.particulars import Particulars
 from shipgym.ships.scaling import scale_model
@@ -222,6 +222,41 @@ def test_what_cannot_be(trials: list[Trial], reference: ShipModel, truth: ShipMo
         identify(trials, structure="linear", particulars=SHIP, method=LSSVM(kernel="rbf"))
     with pytest.raises(InputError, match="no kernel found"):
         replace(truth.table, kernel=None)
+
+
+SIDES = np.array([-1.0, -1.0, -1.0, 1.0])  # of drift, turn, rudder and speed seen from the other side
+
+
+def test_centres_are_those_of_samples_brought_to_one_side_and_the_same_of_the_other() -> None:
+    """Two groups of samples beside each other, a third of both from the other side: their means are found."""
+    random = np.random.default_rng(0)
+    groups = np.repeat([[0.1, 0.4, -0.3, 1.0], [-0.2, 0.8, 0.5, 1.1]], 300, axis=0)
+    around = groups + 1e-3 * random.standard_normal((600, 4))
+    around[::3] *= SIDES
+    offset, scale, centres = chosen_centres(around, 4)
+    assert offset == pytest.approx([0.0, 0.0, 0.0, 1.05], abs=1e-3)
+    assert scale == pytest.approx([*np.sqrt([0.025, 0.4, 0.17]), 0.05], rel=5e-3)
+    np.testing.assert_array_equal(centres[2:], centres[:2] * SIDES)
+    at = (offset + scale * centres[:2])[np.argsort(centres[:2, 0])]
+    assert at == pytest.approx(groups[[300, 0]], abs=1e-3)
+    still = chosen_centres(around * [1.0, 1.0, 1.0, 0.0], 4)[1]
+    assert still[3] == 0.02
+    assert len(chosen_centres(around[:12], 4)[2]) == 4
+    with pytest.raises(InputError, match="12 samples found for 5 centres of the kernel, expected at least 3"):
+        chosen_centres(around[:12], 5)
+
+
+def test_features_are_the_principal_components_of_samples_of_both_sides() -> None:
+    x = np.random.default_rng(1).standard_normal((400, 4)) * [0.2, 0.4, 0.3, 0.1] + [0.0, 0.0, 0.0, 0.9]
+    kernel = principal(Kernel(*chosen_centres(x, 48), np.eye(48)), x)
+    z = (x - kernel.offset) / kernel.scale
+    features = gaussians(np.concatenate([z, z * SIDES]), kernel.centres) @ kernel.basis
+    powers = features.T @ features / len(features)
+    assert kernel.basis.shape == (48, 40)
+    np.testing.assert_allclose(powers, np.diag(np.diag(powers)), atol=1e-9)
+    assert np.all(np.diff(np.diag(powers)) < 0.0)
+    norms = kernel.basis.T @ gaussians(kernel.centres, kernel.centres) @ kernel.basis
+    np.testing.assert_allclose(norms, np.eye(40), atol=1e-5)
 
 
 def linear_ship(**changes: float) -> ShipModel:

@@ -14,6 +14,7 @@ from identification import LSSVM, ArtificialBeeColony, TruncatedLSSVM, TunedLSSV
 from identification.estimators.comparators import LinearSupportVectorMachine
 from identification.estimators.decomposition import decompose_triangle, triangle
 from identification.estimators.l_curve import variance_rank
+from identification.estimators.robust import hampel_weights
 from shipgym import InputError
 
 Floats = np.ndarray[Any, np.dtype[np.float64]]
@@ -262,6 +263,17 @@ def test_robust_kernel_fit_is_not_moved_by_outliers() -> None:
         for on in (False, True)
     }
     assert error[True] < 0.03 < 0.2 < error[False]
+
+
+def test_hampel_s_weights_fall_from_one_to_nearly_none_between_2_5_and_3_deviations() -> None:
+    """1.4826 times the median absolute deviation, here of 1, is the standard deviation."""
+    sizes = np.array([0.5, 1.0, 1.4826 * 2.49, 1.4826 * 2.6, 1.4826 * 2.75, 1.4826 * 2.9, 1.4826 * 3.0, 9.0])
+    residuals = np.concatenate([[0.0] * 5, np.full(4, 1.0), sizes])
+    residuals = np.concatenate([residuals, -residuals])
+    assert np.median(np.abs(residuals)) == 1.0
+    expected = [1.0, 1.0, 1.0, 0.8, 0.5, 0.2, 1e-4, 1e-4]
+    assert hampel_weights(residuals, 9.0)[9:17] == pytest.approx(expected, abs=1e-9)
+    assert hampel_weights(residuals, 1e15).tolist() == [1.0] * 34  # of rounding alone
 
 
 def test_robust_fit_of_clean_data_is_the_plain_one() -> None:

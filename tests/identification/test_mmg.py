@@ -15,7 +15,9 @@ import pytest
 
 import shipgym
 from identification import IdentificationResult, identify
-from identification.simulation_error.maximum_a_posteriori import LARGEST, _groups, _Problem
+from identification.options import Options
+from identification.simulation_error import maximum_a_posteriori
+from identification.simulation_error.maximum_a_posteriori import LARGEST, Estimate, _groups, _Problem
 from identification.simulation_error.mmg_prior import (
     HULL_FORMULAS,
     formula_coefficients,
@@ -323,6 +325,70 @@ def test_a_trial_without_shaft_speed_or_with_a_still_rudder_is_refused() -> None
     without = Trial(trial.t, {c: v for c, v in trial.channels.items() if c != "n"}, name="still")
     with pytest.raises(InputError, match="'still': channel 'n' is missing, structure 'mmg' needs"):
         identify([without], "mmg", particulars=L7)
+
+
+class Constant(_Problem):
+    """Four rows of one channel, two trials, each a ship length long: one number is to be found, by hand."""
+
+    def __init__(self, measured: float) -> None:
+        self.groups = np.array([0, 0, 1, 1])
+        self.segments = [measured, measured, 0.0, 0.0]
+
+    def _weight(self, segment: Any) -> float:
+        return 1.0
+
+    def rows(self, z: Any, which: Any, scales: Any, strength: float) -> tuple[Any, Any]:
+        errors = (z[0] - np.take(self.segments, which)) / scales[0]
+        return np.append(errors, strength * z), np.append(np.ones(len(which)) / scales[0], strength)[:, None]
+
+
+def test_standard_errors_grow_by_what_is_held_out_beyond_what_is_expected() -> None:
+    """Of 9, 9 from 0, 0 and the reverse: (9 + 9) / 2^2 / (2 / 2^2 + 2^2) = 1 from the former, 0.
+
+    In scales of 2 their squares are 2 (9 / 2)^2 and 2 (1 / 2)^2, one each but for the variance of the fit, of
+    1 / (2 / 2^2 + 1) with the prior as it is.
+    """
+    fit = Estimate(np.array([3.0]), np.array([2.0]), 2.0, np.eye(1), 1)
+    error, factor = Constant(9.0).held_out(fit, np.array([1.0]))
+    assert error == pytest.approx(np.sqrt((81.0 + 1.0) / 2.0))
+    assert factor == pytest.approx(np.sqrt((40.5 + 0.5 - 4.0) / (2 * 0.5 / 1.5)))
+    assert Constant(0.1).held_out(fit, np.array([1.0]))[1] == 1.0
+
+
+@pytest.mark.parametrize(
+    ("held_out", "strength"), [((1.0, 1.09, 1.2), 2.0), ((1.0, 1.11, 1.09), 3.0), ((1.0, 1.11, 1.12), 1.0)]
+)
+def test_the_strongest_prior_within_a_tenth_of_the_least_error_is_taken(
+    held_out: tuple[float, ...], strength: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """With the standard errors of its own fit times the factor, in the prior's deviations."""
+
+    class Given(_Problem):
+        def __init__(self, blank: ShipModel, *_: Any) -> None:
+            super().__init__(blank, [], prior)
+
+        def solve(self, start: Any, strength: float) -> Estimate:
+            begun.append(start[0])
+            return Estimate(np.full(41, 0.1 * strength), np.ones(4), strength, strength**2 * np.eye(41), 5)
+
+        def held_out(self, whole: Estimate, scales: Any) -> tuple[float, float]:
+            return held_out[round(whole.strength) - 1], 1.5
+
+    begun: list[float] = []
+    prior = mmg_prior("kvlcc2-l7", L7)
+    monkeypatch.setattr(maximum_a_posteriori, "_Problem", Given)
+    monkeypatch.setattr(maximum_a_posteriori, "cut", lambda *_, **more: [])
+    monkeypatch.setattr(maximum_a_posteriori, "_groups", lambda _: None)
+    problem: Any = SimpleNamespace(blank=ship_of({}), used=())
+    model, report = maximum_a_posteriori.fit_mmg(problem, Options(reference_model="kvlcc2-l7"))
+    assert begun == [0.0, 0.1, 0.2]
+    assert (report["prior_strength"], report["evaluations"], report["segments"]) == (strength, 15, 0)
+    assert report["errors_held_out"] == dict(zip("123", held_out, strict=True))
+    k = mmg.IDENTIFIED.index("N_r")
+    assert model.coefficients["N_r"] == pytest.approx(prior.mean["N_r"] + 0.1 * strength * prior.deviation[k])
+    assert model.covariance is not None
+    errors = dict(zip(model.coefficients, np.sqrt(np.diag(model.covariance)), strict=True))
+    assert errors["N_r"] == pytest.approx(1.5 * strength * prior.deviation[k])
 
 
 @pytest.fixture(scope="module")

@@ -11,6 +11,7 @@ from identification.regression.preprocess import (
     median,
     noise_level,
     outliers,
+    repair,
     repaired,
     savitzky_golay,
     smooth,
@@ -187,6 +188,23 @@ def test_dropouts_of_up_to_ten_steps_are_filled() -> None:
             assert found.repaired == {"u": missing}
         else:
             assert len(found) == kept.sum()
+
+
+def test_an_outlier_is_six_times_the_noise_away(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(repair, "noise_level", lambda t, values: 0.1)
+    for size, found in ((0.59, []), (0.61, [20]), (-0.61, [20])):
+        values = np.where(np.arange(50) == 20, size, 0.0)
+        assert np.flatnonzero(outliers(np.arange(50.0), values)).tolist() == found
+
+
+def test_a_tenth_of_a_channel_may_be_outliers(monkeypatch: pytest.MonkeyPatch) -> None:
+    t = np.arange(200.0)
+    for count in (20, 21):
+        monkeypatch.setattr(repair, "outliers", lambda *_, n=count, **more: t < n)
+        if count == 20:
+            assert repaired(Trial(t, {"u": t})).repaired == {"u": 20}
+    with pytest.raises(InputError, match="21 of 200 samples of u would be outliers, expected at most a"):
+        repaired(Trial(t, {"u": t}))
 
 
 def test_a_channel_of_outliers_is_refused() -> None:

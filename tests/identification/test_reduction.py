@@ -10,6 +10,7 @@ import pytest
 
 from identification import build_samples
 from identification.design.reduction import (
+    _collinear,
     backward_elimination,
     forward_selection,
     reduce,
@@ -62,6 +63,17 @@ def test_of_collinear_terms_one_is_dropped() -> None:
     assert len(found.terms) == 3
     assert {"c", "f"} < set(found.terms)
     assert found.path[-1].held_out > 0.999
+
+
+@pytest.mark.parametrize(("share", "found"), [(0.975, False), (0.985, True)])
+def test_collinear_is_what_one_other_or_all_others_make_up_to_98_per_cent(share: float, found: bool) -> None:
+    X, _ = orthogonal()
+    rest = np.sqrt(1.0 - share**2) * X[:, 4]
+    of_one = np.column_stack([X[:, :2], rest - share * X[:, 1]])
+    assert _collinear(5.0 * of_one, [0, 1, 2]) == ({1, 2} if found else set())
+    of_three = np.column_stack([X[:, :4], rest + share * X[:, 1:4].sum(axis=1) / np.sqrt(3.0)])
+    assert _collinear(of_three, [0, 1, 2, 3, 4]) == ({4} if found else set())
+    assert _collinear(of_three, [0, 1, 2, 4]) == set()
 
 
 @pytest.mark.parametrize("preferred", ["a", "copy"])

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from identification.regression import rudder
 from identification.regression.rudder import estimated_gear, rebuild
 from shipgym import ShipModel, SteeringGear, Trial
 from shipgym.manoeuvres import zigzag
@@ -68,6 +69,23 @@ def test_rudder_that_no_gear_explains_is_taken_straight() -> None:
     rebuilt = rebuild(t, delta)
     assert not rebuilt.follows_gear
     assert rebuilt(10.25) == pytest.approx(0.75 * delta[10] + 0.25 * delta[11])
+
+
+@pytest.mark.parametrize(("share", "follows"), [(0.86, True), (0.84, False)])
+def test_a_gear_explains_85_per_cent_of_the_intervals(
+    share: float, follows: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    t = np.arange(200.0)
+    monkeypatch.setattr(rudder, "_explained", lambda *_: share)
+    assert rebuild(t, np.radians(np.interp(t, [50, 60, 120, 140], [0, 10, 10, -10]))).follows_gear == follows
+
+
+def test_a_gear_needs_eight_samples_for_each_change_of_order(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(rudder, "_explained", lambda *_: 1.0)
+    t = np.arange(16.0)
+    delta = np.radians(np.interp(t, [3, 5, 8, 10], [0, 2, 2, 0]))
+    assert rebuild(t, delta).follows_gear
+    assert not rebuild(t[:15], delta[:15]).follows_gear
 
 
 def test_limit_of_an_estimated_gear_is_the_largest_recorded_angle() -> None:

@@ -66,6 +66,12 @@ def test_the_structure_that_predicts_best_is_taken_and_the_ranking_told(
     assert alone.coefficients == result.coefficients
 
 
+@pytest.mark.parametrize(("worse", "taken"), [(1.019, "nomoto"), (1.021, "abkowitz")])
+def test_two_per_cent_of_the_error_decide_nothing(worse: float, taken: str) -> None:
+    ranked = [standing("abkowitz", 20, 1.0, 1.0), standing("nomoto", 2, worse, worse)]
+    assert _simplest(ranked).structure == taken
+
+
 def test_a_single_trial_is_cut_into_thirds(auto: Auto, trials: list[Trial]) -> None:
     result = auto(trials[1:2])
     told = result.metrics["selection"]

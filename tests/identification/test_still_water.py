@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from identification import identify
+from identification.regression import still_water
 from identification.regression.still_water import in_still_water, through_water
 from identification.report.sea import sea_sentences, track_figure
 from shipgym import ShipModel, Trial
@@ -122,6 +123,46 @@ def test_a_given_current_and_a_logged_speed(mariner: ShipModel) -> None:
     found = through_water(mixed, NORTH, EAST)
     np.testing.assert_array_equal(found["u"], run["u"])
     np.testing.assert_allclose(found["v"], run["v"], atol=0.01)
+
+
+def straight(psi_deg: float) -> Trial:
+    """A trial of 100 s over ground, half of it on one heading and half on its mirror image."""
+    psi = np.radians(np.repeat([psi_deg, -psi_deg], 50))
+    channels = {"u": np.full(100, 2.0), "v": np.zeros(100), "r": np.zeros(100), "psi": psi, "delta": psi}
+    return Trial(np.arange(100.0), channels, name="run", over_ground=True)
+
+
+@pytest.mark.parametrize(
+    ("psi_deg", "error", "doubt"),
+    [
+        (32.0, 0.098, ""),  # cos 32 deg is 0.848
+        (31.5, 0.098, "the trials keep to one heading"),  # 0.853
+        (32.0, 0.102, "its standard error is 0.1 m/s"),
+    ],
+)
+def test_a_current_is_known_to_five_per_cent_of_the_speed_by_several_headings(
+    psi_deg: float, error: float, doubt: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    trial, mean, covariance = straight(psi_deg), np.array([1.0, 0.0]), np.diag([error**2, 1e-6])
+    monkeypatch.setattr(still_water, "_currents", lambda *_: [(trial, mean, covariance, "all trials")])
+    remarks: list[str] = []
+    rows = still_water._take_out_current({"run": trial}, 7.0, 2.0, "auto", remarks)
+    assert rows["run"]["taken_out"] == (not doubt)
+    assert [doubt in remark for remark in remarks] == [True] * bool(doubt)
+
+
+def test_a_current_is_estimated_from_trials_of_five_ship_lengths() -> None:
+    """99 s at 2 m/s."""
+    for length, known in ((39.5, True), (39.7, False)):
+        found = list(still_water._currents([straight(40.0)], length, 2.0, "shared"))
+        assert (len(found) == 1) == known
+
+
+def test_a_current_in_columns_and_one_that_is_given_agree_to_a_decimetre_per_second() -> None:
+    logged = straight(40.0).with_channels({"current_north": np.full(100, 0.2), "current_east": np.zeros(100)})
+    still_water._known(logged, {"north": 0.2, "east": 0.099})
+    with pytest.raises(InputError, match=r"have means of 0\.20 and 0\.00 m/s, current = .* was given"):
+        still_water._known(logged, {"north": 0.2, "east": 0.101})
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,13 @@ import numpy as np
 import pytest
 
 from identification.validation.prediction import trial_metrics
-from identification.validation.warnings import exactly_collinear, model_warnings, undetermined, why_unstable
+from identification.validation.warnings import (
+    exactly_collinear,
+    held_out_error,
+    model_warnings,
+    undetermined,
+    why_unstable,
+)
 from shipgym import ShipModel, Trial
 
 
@@ -84,6 +90,45 @@ def test_a_lost_heading_is_told_with_its_trial_and_cause(mariner: ShipModel) -> 
         unstable, coefficients=unstable.coefficients | {"N_v": 3.0 * mariner.coefficients["N_v"]}
     )
     assert "unstable on a straight course" in model_warnings(fit(unstable, heading=1.0))[-1]
+
+
+def test_the_worst_of_what_was_held_out_is_said(mariner: ShipModel) -> None:
+    def said(*metrics: dict[str, Any]) -> str:
+        names = (f"runs/{letter}.csv" for letter in "abc")
+        known = [{"use": "validate", "diverged": False, "rmse": {"psi": None}, **one} for one in metrics]
+        return held_out_error(fit(mariner, metrics={"trials": dict(zip(names, known, strict=False))}))
+
+    def pair(measured: float | None, predicted: float | None) -> dict[str, float | None]:
+        return {"measured": measured, "predicted": predicted}
+
+    def heading(degrees: float) -> dict[str, Any]:
+        return {"rmse": {"psi": np.radians(degrees)}}
+
+    assert said({"use": "fit"}) == "No trial was held out."
+    assert said({}, {"diverged": True}) == "On b.csv, held out, the model runs away."
+    assert said({}) == "No held-out trial has a heading."
+    first = {**heading(2.0), "overshoot_1_deg": pair(8.0, 10.0), "overshoot_2_deg": pair(None, 3.0)}
+    other = {**heading(3.1), "overshoot_2_deg": pair(10.0, 6.5), "period_s": pair(9.0, None)}
+    assert said({"use": "fit", **heading(9.0)}, first, other) == (
+        "Worst errors on held-out trials: heading 3.1 deg rms (c.csv), second overshoot 35 % (c.csv)."
+    )
+    late = {"initial_turning_lengths": pair(1.0, 1.3)}
+    assert said({**first, **late}) == (
+        "Worst errors on held-out trials: heading 2 deg rms (a.csv), initial turning 30 % (a.csv)."
+    )
+
+
+def test_a_shaft_speed_may_vary_by_two_per_cent_and_ships_begin_at_half_their_speed(
+    mariner: ShipModel,
+) -> None:
+    """Of 95 per cent of the samples; the Mariner's service speed is 7.7175 m/s."""
+    cases = ((0.021, 4.0, True), (0.019, 4.0, False), (0.0, 3.8, True), (0.0, 3.9, False))
+    for spread, speed, warned in cases:
+        n = 1.0 + spread / 0.95 * np.linspace(-0.5, 0.5, 1001)
+        n[[0, -1]] = 0.5, 2.0
+        channels = {"n": n, "u": np.full(1001, 0.6 * speed), "v": np.full(1001, 0.8 * speed)}
+        found = fit(given(mariner), trials=(Trial(np.arange(1001.0), channels, name="a.csv"),))
+        assert bool(model_warnings(found)) == warned
 
 
 def test_terms_that_cannot_be_separated_are_named(mariner: ShipModel) -> None:

@@ -8,6 +8,7 @@ import pytest
 
 import shipgym
 from shipgym import Particulars, ShipModel, SteeringGear, check_ship_model
+from shipgym.ships import checker
 from shipgym.ships.structures import get_structure
 
 
@@ -106,3 +107,20 @@ def test_a_ship_without_rudder_or_thrust_is_remarked():
     remarks = check_ship_model(ship).remarks
     assert any("no rudder turns this model" in remark for remark in remarks)
     assert any("% of service speed" in remark for remark in remarks)
+
+
+def test_remarks_begin_at_a_tenth_of_asymmetry_and_at_70_and_130_per_cent_of_the_speed(mariner, monkeypatch):
+    for asymmetry, speed, remarks in (
+        (0.099, 0.71, 0), (0.101, 1.0, 1), (0.0, 0.69, 1), (0.0, 1.29, 0), (0.0, 1.31, 1),
+    ):  # fmt: skip
+        monkeypatch.setattr(checker, "_run", lambda *_, by=speed: {"u": np.array([by * 7.7175])})
+        assert len(list(checker._unusual(mariner, asymmetry))) == remarks
+
+
+@pytest.mark.parametrize(("heel_deg", "capsized"), [(59.0, False), (-61.0, True)])
+def test_a_heel_of_sixty_degrees_is_a_capsize(mariner, heel_deg, capsized, monkeypatch):
+    monkeypatch.setattr(checker, "_run", lambda *_: {"phi": np.radians([0.0, heel_deg])})
+    found = list(checker._wrong_courses(mariner))
+    assert [one.partition(":")[0] for one in found] == [
+        "straight ahead", "rudder 40 deg to starboard", "rudder 40 deg to port"
+    ] * capsized  # fmt: skip

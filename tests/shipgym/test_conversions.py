@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from scipy.signal import lsim
 
 import shipgym
-from shipgym import InputError, Particulars, SteeringGear, straight_line_stability
+from shipgym import InputError, Particulars, SteeringGear, Trial, straight_line_stability
 from shipgym.ships.conversions import (
     Nomoto,
     linear_steering_ship,
@@ -26,6 +26,7 @@ from shipgym.ships.conversions import (
     transfer_function,
 )
 from shipgym.ships.ship_model import ShipModel
+from shipgym.ships.simulate import open_loop
 
 pytestmark = pytest.mark.interpreted
 
@@ -108,6 +109,13 @@ def test_a_nomoto_ship_follows_her_transfer_function_in_any_manoeuvre():
     np.testing.assert_allclose(trial["r"], r, atol=1e-4 * np.abs(r).max())  # lsim: straight between samples
     assert "q" not in trial
     np.testing.assert_array_equal(trial["v"], 0.0)
+
+
+def test_a_record_of_a_steady_turn_goes_on_as_one():
+    """Its first sample does not tell the memory of yaw: it is taken for that of a steady yaw rate."""
+    constant = {"u": SHIP["speed"], "v": 0.0, "r": 0.2 * FORM.K, "psi": 0.0, "delta": 0.2}
+    record = Trial(np.arange(50.0), {name: np.full(50, value) for name, value in constant.items()})
+    np.testing.assert_allclose(open_loop(nomoto2_ship(FORM, SHIP), record)["r"], record["r"], rtol=1e-9)
 
 
 def test_an_environment_sails_the_same_ship_of_second_order():

@@ -18,8 +18,8 @@ from shipgym.envs.engine import Engine
 from shipgym.envs.randomisation import Randomisation
 from shipgym.ships import Envelope
 from shipgym.tasks import course_keeping
-from shipgym.tasks.contract import Interval, Random
-from shipgym.tasks.steering import Weights, integrated, steering_reward
+from shipgym.tasks.contract import Interval, Random, Readings
+from shipgym.tasks.steering import Weights, extras, helm, integrated, steering_reward
 from shipgym.tasks.task import OBSERVATION_NAMES, control_interval, course_keeping_task, observation_scales
 
 ID = "shipgym/CourseKeeping-v0"
@@ -321,6 +321,20 @@ def test_costs_of_steering_are_squares_by_their_scales(delta, before, heel, outs
     assert found.rudder_rate == pytest.approx(-0.03 * ((delta - before) / 0.5 * 20.0 / scale) ** 2)
     assert found.roll == pytest.approx(-0.4 * (heel / (np.pi / 12)) ** 2)
     assert found.envelope == (-0.7 if outside else 0.0)
+
+
+def test_the_helmsman_sees_the_ship_against_her_course():
+    readings = Readings(*np.arange(1.0, 1.0 + len(Readings._fields)))
+    held = interval(rudder_command=0.5, shaft_command=0.25)
+    seen = helm(1.2 + readings.psi, 7.0, readings, held, SHIP)._asdict()
+    assert (seen.pop("heading_error_sin"), seen.pop("heading_error_cos")) == pytest.approx(
+        (np.sin(1.2), np.cos(1.2))
+    )
+    assert seen == {
+        "yaw_rate": readings.r, "sway": readings.v, "surge": readings.u, "rudder": readings.delta,
+        "last_command": 0.5 * 0.6, "heading_error_integral": 7.0,
+    }  # fmt: skip
+    assert extras(readings, held, SHIP) == (readings.phi, readings.p, readings.n, 0.25 * 1.5)
 
 
 @given(st.floats(-30.0, 30.0), st.floats(-1.0, 1.0))

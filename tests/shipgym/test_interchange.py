@@ -86,6 +86,13 @@ def test_an_episode_that_ran_otherwise_is_no_dataset(tmp_path, monkeypatch, epis
     other = Episode(**(vars(episodes[0]) | {"rewards": episodes[0].rewards - 1.0}))
     with pytest.raises(InputError, match=r"episodes\[0\]: cost .* when run again"):
         interchange.to_minari([other], "shipgym/mariner/other-v0", **CARD)
+    unknown = Episode(**(vars(episodes[0]) | {"seed": None}))
+    with pytest.raises(InputError, match=r"episodes\[1\]: no seed found"):
+        interchange.to_minari([episodes[0], unknown], "shipgym/mariner/other-v0", **CARD)
+    longer = Episode(**(vars(episodes[0]) | {"arguments": {"max_episode_steps": 9}}))
+    for several in ([], [episodes[0], longer]):
+        with pytest.raises(InputError, match=f"of {len(several)} environments found, expected all of one"):
+            interchange.to_minari(several, "shipgym/mariner/other-v0", **CARD)
 
 
 @pytest.mark.parametrize("name", ["mariner", "mariner-tls-svm", "container"])

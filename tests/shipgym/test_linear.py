@@ -7,7 +7,7 @@ import pytest
 from scipy.signal import lsim
 
 from shipgym.errors import InputError
-from shipgym.ships import load_model
+from shipgym.ships import linear, load_model
 from shipgym.ships.linear import (
     StraightRunning,
     is_course_stable,
@@ -144,3 +144,12 @@ def test_a_rudder_without_effect_has_no_nomoto_form():
     A, _ = steering_state_space(MARINER)
     with pytest.raises(InputError, match="no steady effect"):
         nomoto_of(A, np.zeros((2, 1)))
+
+
+@pytest.mark.parametrize(("share", "believed"), [(0.74, False), (0.76, True), (1.24, True), (1.26, False)])
+def test_a_steady_speed_is_believed_within_a_quarter_of_service_speed(share, believed, monkeypatch):
+    def balance(model, unknowns, speed=None):
+        return {"u": 7.7175 * (share if "u" in unknowns else 1.0), "v": 0.0, "delta": 0.0}
+
+    monkeypatch.setattr(linear, "_balance", balance)
+    assert linear.straight_running(MARINER).surge == pytest.approx(7.7175 * (share if believed else 1.0))

@@ -16,7 +16,17 @@ from shipgym.trials.columns import Column, Source
 from shipgym.trials.csv_reader import Table, read_table
 from shipgym.trials.cuts import check_cut, cut_log
 from shipgym.trials.navigation import Instruments, correct_offsets, heading_offset, straight_parts, to_midship
-from shipgym.trials.plausibility import _fit, check_log, check_overlap, find_outliers
+from shipgym.trials.plausibility import (
+    _at_windows,
+    _check_course,
+    _detrended,
+    _fit,
+    check_consistency,
+    check_heading,
+    check_log,
+    check_overlap,
+    find_outliers,
+)
 from shipgym.trials.resampling import Log, have_own_clocks, on_one_clock, own_clock
 from shipgym.trials.tables import from_frame, read_log
 from shipgym.trials.trial_import import _cg_to_midship, _earth_to_body
@@ -66,6 +76,8 @@ def test_the_slowest_channel_of_the_motion_gives_the_clock_and_holes_stay():
     assert log.notes == ["psi has 1 holes, of up to 8 s; nothing is put there"]
     six = np.delete(np.arange(40.0), np.arange(11, 16))
     assert on_one_clock(series | {"psi": (six, six)}, "").notes == []  # six usual steps are none
+    later = np.where(six > 11.0, six + 0.1, six)
+    assert on_one_clock(series | {"psi": (later, later)}, "").notes[0].startswith("psi has 1 holes")
     holed = np.delete(np.arange(0.0, 40.0, 1.0), np.arange(11, 18))
     found = on_one_clock({"r": (np.arange(40.0), np.arange(40.0)), "psi": (holed, holed)}, "")
     assert found.t.tolist() == holed.tolist()
@@ -129,11 +141,15 @@ def test_stretches_are_those_asked_for():
 
 def test_a_manoeuvre_lasts_from_before_the_rudder_moves_until_it_is_quiet():
     delta = np.zeros(601)
-    delta[100:140] = delta[190:200] = 3.1 * DEGREE  # quiet for less than a minute between
+    delta[100:140] = delta[190:199] = delta[200:205] = 3.1 * DEGREE  # quiet for less than a minute between
     delta[300:310] = 20.0 * DEGREE  # too short for a manoeuvre
     delta[400:432] = -10.0 * DEGREE
     (first, last) = cut_log("rudder", log(delta=delta + 5.0 * DEGREE), "")
-    assert (first, last) == (slice(70, 230), slice(370, 462))
+    assert (first, last) == (slice(70, 235), slice(370, 462))
+    for begin, parts in ((199, 1), (200, 2)):
+        delta = np.zeros(601)
+        delta[100:140] = delta[begin:240] = 4.0 * DEGREE
+        assert len(cut_log("rudder", log(delta=delta), "")) == parts
 
 
 # --- what a log is checked for
@@ -149,6 +165,156 @@ def test_positions_that_no_ship_reaches_are_outliers():
     track[0, 1::2] += 1e5
     with pytest.raises(InputError, match=r"line 3 .*jumps 100 km within 1 s, as in 99 of 99 steps"):
         find_outliers(t, track, here, rows)
+
+
+def test_a_tenth_of_the_steps_may_be_faster_than_50_metres_per_second():
+    t, rows, here = np.arange(201.0), np.arange(201), source(range(201), t="time", lat="lat")
+    for size, found in ((49.9, 0), (50.1, 10)):
+        track = np.zeros((2, 201))
+        track[1, 10:200:20] = size
+        assert find_outliers(t, track, here, rows).size == found
+    track[1, -1] = size
+    with pytest.raises(InputError, match="as in 21 of 200 steps"):
+        find_outliers(t, track, here, rows)
+
+
+def turning(step_deg, dt=1.0, n=1):
+    """Arguments of `check_heading`: 101 samples, n steps of some degrees one way and as many back."""
+    step = np.zeros(100)
+    step[10 : 10 + 4 * n : 4], step[12 : 12 + 4 * n : 4] = step_deg * DEGREE, -step_deg * DEGREE
+    psi = np.r_[0.0, np.cumsum(step)]
+    table = Table(Path("log.csv"), ("t", "psi"), {}.__getitem__, range(101))
+    return (
+        dt * np.arange(101.0),
+        psi,
+        psi,
+        Source(table, {"t": Column("t", "s"), "psi": Column("psi", "deg")}, np.arange(101)),
+    )
+
+
+def test_headings_turn_by_60_degrees_a_second_but_for_single_outliers_of_30():
+    for right in (turning(59.0, n=9), turning(29.0, dt=0.1, n=2), turning(61.0, dt=1.02, n=9)):
+        check_heading(*right)
+    for wrong, message in (
+        (turning(61.0), "goes from 0 to 61 deg within 1 s, expected at most 60 deg/s; empty the wrong cells"),
+        (turning(31.0, dt=0.1), "goes from 0 to 31 deg within 0.1 s, .*; empty the wrong cells"),
+        (turning(7.0, dt=0.1, n=3), "goes from 0 to 7 deg within 0.1 s, .* likely a wrong unit: declare"),
+    ):
+        with pytest.raises(InputError, match=message):
+            check_heading(*wrong)
+    t, psi, _, here = turning(0.0)
+    check_heading(t, psi, np.where(t == 50.0, 389.0 * DEGREE, 0.0), here)
+    with pytest.raises(InputError, match=r"goes from 0 to 391 deg within 1 s, .* likely a wrong unit"):
+        check_heading(t, psi, np.where(t >= 50.0, 391.0 * DEGREE, 0.0), here)
+
+
+def test_windows_are_thirty_at_most():
+    assert _at_windows(np.arange(61.0)).tolist() == np.arange(0.0, 61.0, 2.0).tolist()
+    assert _at_windows(np.arange(20.0)).tolist() == np.arange(20.0).tolist()
+
+
+@pytest.mark.parametrize(
+    ("course_deg", "turned_deg", "message"),
+    [
+        (0.29, 30.0, "is the course over ground, from which it differs by less than 0.3 deg in a turn of 30"),
+        (0.31, 30.0, ""),
+        (0.0, 19.0, ""),
+        (0.0, 21.0, "is the course over ground"),
+        (24.9, 30.0, ""),
+        (25.1, 30.0, "contradicts the course over ground by -25 deg, .* heading_offset_deg = -25"),
+        (-25.1, 30.0, "contradicts the course over ground by 25 deg"),
+    ],
+)
+def test_a_heading_beside_the_course_over_ground(course_deg, turned_deg, message):
+    psi = np.linspace(1.0, 1.0 + turned_deg * DEGREE, 50)
+    here = source(range(50), t="time", psi="gyro")
+    if not message:
+        _check_course(psi, psi + course_deg * DEGREE, Instruments(), here)
+        return
+    with pytest.raises(InputError, match=f"log.csv: the heading {message}"):
+        _check_course(psi, psi + course_deg * DEGREE, Instruments(), here)
+
+
+def test_a_heading_that_turns_the_other_way_is_refused_and_a_known_offset_is_not():
+    psi = np.linspace(0.0, 40.0 * DEGREE, 50)
+    here = source(range(50), t="time", psi="gyro")
+    with pytest.raises(InputError, match="it turns the other way, expected it clockwise from north"):
+        _check_course(psi, 0.1 - psi, Instruments(), here)
+    _check_course(psi, psi + 30.0 * DEGREE, Instruments(heading_offset=0.5), here)
+
+
+@pytest.mark.parametrize(("offset_deg", "told"), [(1.9, False), (2.1, True), (-2.1, True)])
+def test_an_offset_of_the_compass_on_every_course_is_told_from_two_degrees_on(offset_deg, told):
+    t = np.arange(400.0)
+    course = np.where(t < 200.0, 0.2, 0.2 + 90.0 * DEGREE)
+    values = {"psi": course + offset_deg * DEGREE, "delta": np.zeros(400)}
+    values |= {"ground_north": 5.0 * np.cos(course), "ground_east": 5.0 * np.sin(course)}
+    notes = check_log(Log(t, values, "", []), Instruments(), source(t, t="time", psi="gyro"), gnss=True)
+    assert [f"heading_offset_deg = {offset_deg:g} in [sensors]" in note for note in notes] == [True] * told
+
+
+@pytest.mark.parametrize(("gain", "fits"), [(0.19, False), (0.21, True), (4.9, True), (5.1, False)])
+@pytest.mark.parametrize("turned_deg", [1.95, 2.05])
+def test_heading_and_yaw_rate_may_differ_up_to_five_times_in_turns_of_two_degrees(gain, fits, turned_deg):
+    t = np.arange(300.0)
+    yaw = np.sin(0.05 * t)
+    yaw *= turned_deg * DEGREE / np.ptp(_detrended(t, yaw)) / max(gain, 1.0)
+    channels = {"psi": gain * yaw, "r": np.gradient(yaw) + 0.001}  # a rate sensor has a bias
+    table = Table(Path("log.csv"), ("t", "psi", "r"), {}.__getitem__, range(300))
+    here = Source(table, {"psi": Column("psi", "rad"), "r": Column("r", "rad/s")}, np.arange(300))
+    if fits or turned_deg < 2.0:
+        check_consistency(Log(t, channels, "", []), "body", here)
+        return
+    with pytest.raises(InputError, match=f"the heading changes {gain:g}.* times as fast as the yaw rate"):
+        check_consistency(Log(t, channels, "", []), "body", here)
+
+
+@pytest.mark.parametrize(("gain", "fits"), [(0.54, False), (0.56, True), (1.79, True), (1.81, False)])
+def test_positions_and_velocities_may_differ_by_less_than_knots_from_metres_per_second(gain, fits):
+    t = np.arange(100.0)
+    channels = {
+        "x": gain * (3.0 * t),
+        "y": gain * (-4.0 * t),
+        "psi": 0.0 * t,
+        "u": 3.0 + 0.0 * t,
+        "v": -4.0 + 0.0 * t,
+    }
+    here = source(range(100), t="time", x="x", y="y", u="u", v="v", psi="gyro")
+    if fits:
+        check_consistency(Log(t, channels, "", []), "body", here)
+        return
+    with pytest.raises(
+        InputError, match=f"the position changes {gain:g} times as fast as the velocities say"
+    ):
+        check_consistency(Log(t, channels, "", []), "earth", here)
+
+
+def test_a_ship_at_berth_is_none_that_manoeuvres():
+    t = np.arange(100.0)
+    for speed in (0.29, 0.31):
+        values = {"ground_north": np.full(100, speed), "ground_east": np.zeros(100), "delta": t}
+        values["ground_north"][:4] = 9.0
+        if speed > 0.3:
+            assert check_log(Log(t, values, "", []), Instruments(), source(t, t="time"), gnss=True) == []
+            continue
+        with pytest.raises(InputError, match=r"makes at most 0\.29 m/s over ground, she is at berth"):
+            check_log(Log(t, values, "", []), Instruments(), source(t, t="time"), gnss=True)
+
+
+@pytest.mark.parametrize(("apart_deg", "known"), [(59.0, False), (61.0, True)])
+def test_courses_60_degrees_apart_tell_an_offset_of_the_heading_from_a_current(apart_deg, known):
+    psi = np.repeat([0.3, 0.3 + apart_deg * DEGREE], 20)
+    channels = {"psi": psi, "ground_north": np.cos(psi), "ground_east": np.sin(psi)}
+    assert (heading_offset(channels, np.ones(40, dtype=bool)) is not None) == known
+
+
+def test_straight_is_what_stays_within_two_degrees_for_twenty_seconds():
+    t = np.arange(100.0)
+    for size, straight in ((1.95, True), (2.05, False)):
+        for name in ("psi", "delta"):
+            channels = {"psi": np.zeros(100), "delta": np.zeros(100)} | {name: size * DEGREE * (t % 2.0)}
+            assert straight_parts(t, channels).all() == straight
+    assert not straight_parts(t, {"delta": np.zeros(100)}).any()
 
 
 def test_files_of_one_log_overlap_in_time():
@@ -236,6 +402,11 @@ def test_offsets_are_estimated_from_straight_parts_on_several_courses_only():
     assert heading_offset(channels, few) is None
     assert heading_offset(channels, few | np.isin(t, [4, 305]))[0] == pytest.approx(3.0 * DEGREE, abs=1e-6)
     assert heading_offset({"psi": psi}, straight) is None
+    # of samples one in ten tells something new; courses 90 deg apart have the chord 2 sin 45 deg
+    noisy = channels | {"ground_north": ground.real + np.where(t % 2, 0.1, -0.1)}
+    spread = 0.1 / np.sqrt(2.0)  # of both components
+    error = spread * np.sqrt(10.0 * 2.0 / np.count_nonzero(straight)) / 5.0
+    assert heading_offset(noisy, straight)[1] == pytest.approx(error, rel=1e-3)
     tools = Instruments(heading_offset="estimate", rudder_offset="estimate")
     log = Log(t, dict(channels), "log", [])
     correct_offsets(log, tools)
@@ -310,6 +481,15 @@ def test_a_frame_has_columns_and_values(monkeypatch):
     monkeypatch.setattr(tables, "MOST_CELLS", 3)
     with pytest.raises(InputError, match="2 columns of 2 rows found, expected a table of at most 3 values"):
         from_frame(frame)
+
+
+def test_of_a_matlab_file_numeric_vectors_of_the_commonest_length_are_read(tmp_path):
+    others = {"name": "abc", "ship": {"length": 7.0}, "turn": np.eye(3), "dt": 0.1, "long": np.arange(9.0)}
+    shaft = np.array([[1], [2], [3]], np.int16)
+    savemat(tmp_path / "log.mat", {**others, "u": np.array([0.5, 1.0, 1.5]), "n": shaft}, oned_as="row")
+    table = read_log(tmp_path / "log.mat")
+    assert table.header == ("u", "n")
+    assert (table.numbers("u").tolist(), table.numbers("n").tolist()) == ([0.5, 1.0, 1.5], [1.0, 2.0, 3.0])
 
 
 def test_a_compressed_matlab_file_is_unpacked_within_bounds(tmp_path, monkeypatch):

@@ -211,6 +211,21 @@ def test_a_sheet_with_merged_cells_is_refused(tmp_path):
         read_log(tmp_path / "log.xlsx")
 
 
+@pytest.mark.parametrize("names", [["t", "t"], [0, 1]])
+def test_a_sheet_begins_with_names_where_it_is_not_empty(names, tmp_path):
+    openpyxl = pytest.importorskip("openpyxl")
+    book = openpyxl.Workbook()
+    for row in ([], [None, "t", "u"], [None, 0, 1], [], [None, 1, 2]):
+        book.active.append(row)
+    book.save(tmp_path / "log.xlsx")
+    table = read_log(tmp_path / "log.xlsx")
+    assert (table.header, list(table.lines)) == (("t", "u"), [3, 5])
+    book.active["B2"], book.active["C2"] = names
+    book.save(tmp_path / "log.xlsx")
+    with pytest.raises(InputError, match=r"log.xlsx: row 2: .* found, expected names of columns, each once"):
+        read_log(tmp_path / "log.xlsx")
+
+
 @pytest.mark.parametrize("ending", ["xlsx", "parquet", "mat"])
 def test_a_damaged_file_is_one_message(tmp_path, ending):
     (tmp_path / f"log.{ending}").write_bytes(b"PK\x03\x04" + bytes(300))
@@ -280,6 +295,17 @@ def test_a_log_with_wrong_checksums_or_without_time_is_refused(tmp_path):
     (tmp_path / "dark.nmea").write_text("\n".join(one for one in lines if "HETHS" in one))
     with pytest.raises(InputError, match="no time that can be read in this log, expected some of RMC"):
         read_log(tmp_path / "dark.nmea")
+
+
+def test_a_tenth_of_the_sentences_may_be_damaged(tmp_path):
+    lines = nmea_log(tmp_path / "log.nmea", end=20).read_text().splitlines()[1:201]
+    for count in (20, 21):
+        damaged = [one[:-2] + "ZZ" if k >= 200 - count else one for k, one in enumerate(lines)]
+        (tmp_path / "log.nmea").write_text("\n".join(damaged))
+        if count == 20:
+            assert "20 of 200 sentences with a wrong checksum" in read_log(tmp_path / "log.nmea").notes[0]
+    with pytest.raises(InputError, match=r"21 of 200 sentences have a wrong checksum.*in line 180\)"):
+        read_log(tmp_path / "log.nmea")
 
 
 def test_a_wind_of_no_unit_is_left_out(tmp_path):

@@ -7,6 +7,7 @@ import pytest
 
 import shipgym
 from shipgym import InputError, ManoeuvreError, Trial, load_model, manoeuvres
+from shipgym.manoeuvres.execution import departure, execute_time, number_of_steps, reached, reversals
 from shipgym.manoeuvres.imo import overshoot_limits_deg
 
 
@@ -73,6 +74,40 @@ def test_measured_rudder_and_ordered_rudder_tell_the_same(mariner):
     assert seen.overshoot_1_deg == pytest.approx(ordered.overshoot_1_deg, abs=1e-6)
     assert seen.overshoot_2_deg == pytest.approx(ordered.overshoot_2_deg, abs=1e-6)
     assert seen.initial_turning_lengths == pytest.approx(ordered.initial_turning_lengths, abs=0.05)
+
+
+def test_orders_count_by_the_rudder_that_is_exceeded_a_quarter_of_the_time():
+    """Here 10 degrees: helm on the approach below half of it is no order, below nine tenths no reversal."""
+    ordered = np.repeat([4.9, 10.0, -8.9, 10.0, -9.1, 30.0], [10, 40, 10, 10, 10, 20])
+    trial = Trial(np.arange(100.0), {"delta_command": np.radians(ordered)})
+    assert execute_time(trial) == 10.0
+    assert reversals(trial) == (10.0, [70.0, 80.0])
+
+
+def test_a_measured_rudder_is_traced_back_along_its_slope_between_a_tenth_and_half_of_its_way():
+    way = np.array([0.0, 0.0, 1.0, 1.05, 4.0, 5.2, *[10.0] * 10, *[30.0] * 4])
+    begun = 2.0 - 1.0 * 3.0 / 4.2
+    for delta in (way, 3.0 - way):
+        assert departure(np.arange(20.0), delta) == pytest.approx(begun)
+    assert execute_time(Trial(np.arange(20.0), {"delta": np.radians(way)})) == pytest.approx(begun)
+    few = np.array([0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 6.0, 40.0])  # of few samples the furthest counts
+    assert departure(np.arange(9.0), few) == 0.0
+    assert departure(np.arange(8.0), few[1:] - 1.0) == pytest.approx(3.0 - 3.0 * 4.0 / 36.0)
+    assert departure(np.arange(5.0, 9.0), np.full(4, 0.1)) == 5.0
+
+
+def test_a_threshold_is_reached_between_two_samples_at_the_first_or_never():
+    values, other = np.array([0.0, 1.0, 5.0]), np.array([0.0, 10.0, 30.0])
+    found = [reached(values, threshold, other) for threshold in (-1.0, 0.5, 1.0, 2.0, 5.0, 5.1)]
+    assert found == [0.0, 5.0, 10.0, 15.0, 30.0, None]
+
+
+def test_a_duration_has_two_steps_at_least():
+    assert (number_of_steps(1.0, 0.5), number_of_steps(100.0, 0.3)) == (2, 333)
+    with pytest.raises(
+        InputError, match=r"duration: 0\.7 s found, expected at least two steps of dt = 0\.5 s"
+    ):
+        number_of_steps(0.7, 0.5)
 
 
 def test_a_perfect_circle():

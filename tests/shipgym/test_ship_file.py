@@ -239,7 +239,9 @@ def test_a_ship_file_without_ship_or_trials_is_refused(folder):
     assert "no trials found, expected at least one [[trials]]" in refusal(
         folder, text="[ship]\nlength = 7.0\n"
     )
-    assert "[[trials]]" in refusal(folder, text='[ship]\nlength = 7.0\n[trials]\nfile = "a.csv"\n')
+    assert "trials: a single value found" in refusal(
+        folder, text='[ship]\nlength = 7.0\n[trials]\nfile = "a.csv"\n'
+    )
     skipped = '[ship]\nlength = 7.0\n[[trials]]\nfile = "a.csv"\nuse = "skip"\n'
     assert 'all trials have use = "skip"' in refusal(folder, text=skipped)
 

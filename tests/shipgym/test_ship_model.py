@@ -133,6 +133,10 @@ CASES = [
     (broken(lambda f: f["covariance"].pop()), "covariance: 39 entries found, expected a list of 40 lists"),
     (broken(lambda f: f["covariance"][3].pop()), r"covariance\[3\]: 39 entries found, expected a list of 40"),
     (broken(lambda f: f["covariance"][3].__setitem__(2, "1.0")), r"covariance\[3\]\[2\]: '1.0' found"),
+    (broken(lambda f: f["covariance"][3].__setitem__(2, 1.0)), "covariance: not symmetric"),
+    (broken(lambda f: f["covariance"][3].__setitem__(3, -1.0)), "covariance: a variance .* is negative"),
+    (broken(lambda f: f["envelope"].update(channels=["u"])), r"envelope\.channels: \['u'\] found, expected"),
+    (broken(lambda f: f.update(normalisation="bis")), "normalisation 'bis' found, expected 'prime'"),
     (
         broken(lambda f: f["coefficients"].update(Y_v=f["coefficients"]["Y_v"] * 1.01)),
         "leave out the field sha",

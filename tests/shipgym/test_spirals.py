@@ -58,6 +58,18 @@ def test_a_measured_spiral_gives_the_same_points():
     assert seen_width == pytest.approx(manoeuvres.spiral_indices(spiral).loop_width_deg, abs=0.02)
 
 
+def test_a_plateau_counts_from_a_tenth_of_the_longest_on_with_its_last_third():
+    """Held for 100, 10, 50, 9 and 30 s; the yaw rate is steady in the last third."""
+    counts, angles = [101, 11, 51, 10, 31], np.array([10.0, 5.0, 0.0, -5.0, -10.0])
+    settling = [np.arange(n) < n - n // 3 for n in counts]
+    rate = np.where(np.concatenate(settling), 9.0, np.repeat(angles, counts))
+    channels = {"delta_command": np.radians(np.repeat(angles, counts)), "r": np.radians(rate)}
+    found = manoeuvres.spiral_from_trial(Trial(np.arange(204.0), channels))
+    kept = [10.0, 5.0, 0.0, -10.0]
+    assert found.rudder_deg == pytest.approx(kept)
+    assert found.yaw_rate_deg_s == pytest.approx(kept)
+
+
 def test_a_loop_drawn_by_hand():
     """Jumps between 2 and 4 deg either side: 6 deg wide; 2 * 0.5 deg/s high at rudder 0."""
     angles = np.array([10, 4, 0, -2, -4, -10, -4, 0, 2, 4, 10], dtype=float)

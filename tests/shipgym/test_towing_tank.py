@@ -72,6 +72,16 @@ def test_without_the_ship_s_own_inertia_the_water_s_derivatives_are_left(mariner
     assert derivatives(yaw, "Y", "r", U / L)[0] * 1e5 == pytest.approx(299, rel=1e-4)
 
 
+def test_samples_of_whole_cycles_with_both_ends_and_of_every_angle(mariner):
+    """By default three periods of 10 ship lengths each, 200 samples a period, and a second at an angle."""
+    swing = towing_tank.pure_sway(mariner, 0.5)
+    np.testing.assert_allclose(swing.t, np.linspace(0.0, 30.0 * L / U, 601))
+    assert (swing["v"][0], swing["v"][100], swing["v"][-1]) == pytest.approx((0.5, -0.5, 0.5))
+    drift = towing_tank.static_drift(mariner, [4.0, -8.0])
+    np.testing.assert_allclose(drift.t, np.arange(400) / 200.0)
+    assert np.degrees(np.arctan2(-drift["v"], drift["u"])) == pytest.approx(np.repeat([4.0, -8.0], 200))
+
+
 @pytest.mark.parametrize("drift_deg", [-12.0, 4.0, 9.0])
 def test_static_drift_of_mariner_with_rudder_by_hand(mariner, drift_deg):
     """The whole polynomial of the sway force at a drift angle with 10 degrees of rudder."""
