@@ -1,4 +1,4 @@
-"""Two ships with cross-flow drag by strips, surge, sway and yaw; made for `scripts/certainty.py`.
+"""Two ships with cross-flow drag by strips, surge, sway and yaw; made for `scripts/opened_once.py`.
 
 A supply vessel with the main dimensions of `osv` of the MSS toolbox (Fossen 2021, Handbook of Marine Craft
 Hydrodynamics and Motion Control), which is steered by azimuth thrusters, and a bulk carrier with the main
@@ -82,7 +82,11 @@ def cross_flow(v: float, r: float, length: float) -> tuple[float, float]:
 
 
 def rudder_force(u: float, v: float, delta: float, c: Any) -> tuple[float, float]:
-    """Forward and starboard force of one rudder over rho / 2, m^4/s^2, in an inflow u, v."""
+    """Forward and starboard force of one rudder over rho / 2, m^4/s^2, in an inflow u, v, m/s.
+
+    Lift is at right angles to the inflow, so its share in surge should be + lift v. It is left as it was when
+    the ships were identified; docs/certainty.md says what that does.
+    """
     sine, _ = sin_cos(delta + arctan2(v, u))
     cosine = sqrt(1.0 - min(sine * sine, 1.0))
     slope = 2.0 * pi * c.aspect * (c.aspect + 0.7) / ((c.aspect + 1.7) * (c.aspect + 1.7))

@@ -1,4 +1,4 @@
-"""Naval vessel of 51.5 m, 4 degrees of freedom: surge, sway, yaw and roll; made for `scripts/certainty.py`.
+"""Naval vessel of 51.5 m, 4 degrees of freedom: surge, sway, yaw and roll; made for `scripts/opened_once.py`.
 
 Hull: Blanke & Christensen 1993, Rudder-roll damping autopilot robustness to sway-yaw-roll couplings, 10th
 Ship Control Systems Symposium, Ottawa; from roll planar motion tests of the Danish Maritime Institute, with
