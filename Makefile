@@ -24,8 +24,7 @@ demo: $(VENV)/demo-installed
 
 # Many loops and few steps of each: plain Python takes a tenth of the time that compiling them would. Tests of
 # these files that are marked as `compiled` take many steps, or state facts about compiled code.
-INTERPRETED := conversions env_conformance env_options grey_box orders scaling ship_of_your_own structures
-INTERPRETED := $(patsubst %,tests/shipgym/test_%.py,$(INTERPRETED))
+INTERPRETED = $(shell grep -l "^pytestmark = pytest.mark.interpreted" tests/shipgym/test_*.py)
 
 test: lint type
 	NUMBA_DISABLE_JIT=1 OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n 2 -m "not compiled" $(INTERPRETED)
