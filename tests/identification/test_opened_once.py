@@ -1,13 +1,14 @@
 """Ships of equations that no structure has: what is known of them."""
 
-from math import pi, sqrt
+from math import atan2, hypot, pi, sqrt
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from shipgym import check_ship_model
 from shipgym.manoeuvres import turning_circle, turning_indices
-from tests.ships.cross_flow import cross_flow
+from tests.ships.cross_flow import cross_flow, rudder_force
 from tests.ships.naval_vessel import DENSITY, GM, GRAVITY, I_XX, PUBLISHED, VOLUME
 from tests.ships.opened_once import OPENED_ONCE
 
@@ -42,3 +43,13 @@ def test_the_naval_vessel_rolls_with_the_period_of_her_metacentric_height() -> N
 def test_strips_make_up_the_integral_of_the_cross_flow() -> None:
     assert cross_flow(2.0, 0.0, 100.0) == pytest.approx((400.0, 0.0))
     assert cross_flow(0.0, -0.1, 100.0) == pytest.approx((0.0, -0.01 * 100.0**4 / 32.0), rel=0.01)
+
+
+@pytest.mark.parametrize(("v", "delta"), [(-1.2, 0.6), (1.2, 0.6), (-0.5, 0.1), (1.2, -0.3)])
+def test_lift_is_at_right_angles_to_the_inflow(v: float, delta: float) -> None:
+    """So that a fixed rudder takes out as much power as its drag in an inflow straight from ahead does."""
+    rudder = SimpleNamespace(aspect=1.5, rudder=12.0)
+    ahead, aside = rudder_force(5.0, v, delta, rudder)
+    straight, _ = rudder_force(hypot(5.0, v), 0.0, delta + atan2(v, 5.0), rudder)
+    assert 5.0 * ahead + v * aside == pytest.approx(hypot(5.0, v) * straight)
+    assert straight < 0.0

@@ -82,18 +82,14 @@ def cross_flow(v: float, r: float, length: float) -> tuple[float, float]:
 
 
 def rudder_force(u: float, v: float, delta: float, c: Any) -> tuple[float, float]:
-    """Forward and starboard force of one rudder over rho / 2, m^4/s^2, in an inflow u, v, m/s.
-
-    Lift is at right angles to the inflow, so its share in surge should be + lift v. It is left as it was when
-    the ships were identified; docs/certainty.md says what that does.
-    """
+    """Forward and starboard force of one rudder over rho / 2, m^4/s^2, in an inflow u, v, m/s."""
     sine, _ = sin_cos(delta + arctan2(v, u))
     cosine = sqrt(1.0 - min(sine * sine, 1.0))
     slope = 2.0 * pi * c.aspect * (c.aspect + 0.7) / ((c.aspect + 1.7) * (c.aspect + 1.7))
     lift = slope * sine + C_Q * sine * fabs(sine) * cosine
     drag = lift * lift / (pi * c.aspect) + C_Q * fabs(sine * sine * sine) + 0.006
     speed = c.rudder * sqrt(u * u + v * v)
-    return -speed * (drag * u + lift * v), -speed * (lift * u + drag * v)
+    return speed * (lift * v - drag * u), -speed * (lift * u + drag * v)
 
 
 def accelerations(motion: Motion, c: Any, ship: Ship) -> tuple[float, float, float, float, float]:
