@@ -208,7 +208,7 @@ advance (3.7 % to starboard; 1.6 and 1.4 %), the tactical diameter to port (5.9 
 12.6 %), and drift to port by 0.3 and 0.1 degrees. In MARIN's tank the ship turns tighter to port, by 3 % in
 advance and 8 % in diameter; HSVA's zigzags show no such difference, and the models turn nearly alike to
 both sides: an advance that is the same to both sides is at best 1.5 % off each of them, a diameter 4.2 %, so
-that no fit of these zigzags alone can meet the aims of 1 and 4 % on both. HSVA's measured
+that a model which turns alike to both sides cannot meet the aims of 1 and 4 % on both. HSVA's measured
 thrust differs between the two sides; models that include this predict the fitted runs no better. With a
 weaker prior the zigzags are predicted better and the turns become wider: with formula priors as wide as
 published ships scatter, the zigzags are predicted better than with narrower ones (0.082 instead of 0.091
