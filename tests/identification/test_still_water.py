@@ -11,6 +11,7 @@ import pytest
 from identification import identify
 from identification.regression import still_water
 from identification.regression.still_water import in_still_water, through_water
+from identification.regression.wind import measured_wind
 from identification.report.sea import sea_sentences, track_figure
 from shipgym import ShipModel, Trial
 from shipgym.errors import InputError
@@ -247,3 +248,24 @@ def test_wind_without_what_it_needs(mariner: ShipModel) -> None:
     assert report["sea_remarks"][0].startswith("the logged wind is not removed: weather without")
     with pytest.raises(InputError, match="no trial has the columns wind_speed and wind_from"):
         in_still_water([zigzag(mariner, 10, 10, duration=200.0, dt=1.0)], Options(wind="isherwood"), bare)
+
+
+def test_the_wind_that_a_ship_feels_is_that_of_her_way_over_ground(mariner: ShipModel) -> None:
+    """In sway and yaw alike for velocities over ground and for those through a current in columns."""
+    t = np.arange(0.0, 40.0, 0.5)
+    psi, north, east = 0.05 * t, 0.8, -0.5
+    own = {
+        "psi": psi,
+        "delta": 0.0 * t,
+        "r": 0.05 + 0.0 * t,
+        "wind_speed": 9.0 + 0.0 * t,
+        "wind_from": 1.0 + 0.0 * t,
+    }
+    drift = {"current_north": north + 0.0 * t, "current_east": east + 0.0 * t}
+    ahead, aside = north * np.cos(psi) + east * np.sin(psi), east * np.cos(psi) - north * np.sin(psi)
+    through = Trial(t, {**own, **drift, "u": 7.0 + 0.0 * t, "v": -0.3 + 0.0 * t}, over_ground=False)
+    ground = Trial(t, {**own, "u": 7.0 + ahead, "v": aside - 0.3}, over_ground=True)
+    felt = [measured_wind(trial, mariner.particulars, "auto") for trial in (through, ground)]
+    for name in ("wind_vdot", "wind_rdot"):
+        np.testing.assert_allclose(felt[0][name], felt[1][name], rtol=1e-9)
+        assert np.abs(felt[0][name]).max() > 0.0
