@@ -42,7 +42,7 @@ if str(ROOT) not in sys.path:
 from agents.agent_file import load_agent  # noqa: E402 - the folder above has to be found first
 from agents.controllers.controller import Controller  # noqa: E402
 from agents.rollouts.course_keeping import sail  # noqa: E402
-from agents.verification.chain import DESIGNS, _examined, verify  # noqa: E402
+from agents.verification.chain import DESIGNS, examined, verify  # noqa: E402
 from agents.verification.tracks import keep_track  # noqa: E402
 from shipgym import ShipModel, load_model  # noqa: E402
 from shipgym.errors import InputError  # noqa: E402
@@ -112,7 +112,7 @@ def case(name: str, structure: str, kind: str, seed: int, draws: int) -> dict[st
         return row | {"unstable": True}
     row |= coverage(ship, result.model, draws)
     drawn = {key: one.to_dict() for key, one in imo_assessment(result.model, 100).items()}
-    chain = _examined(None, result, [], lambda: verify(result.model, DRAWS, 0))
+    chain = examined(None, result, [], lambda: verify(result.model, DRAWS, 0))
     found = chain.verification
     row |= {
         "by models": verdicts(drawn, ship),

@@ -89,7 +89,7 @@ def build_autopilot(
         def verified() -> Verification:
             return verify(fit.model, int(draws), int(seed), tell, where, [one for _, one in guests], designs)
 
-        result = _examined(ship, fit, guests, verified)
+        result = examined(ship, fit, guests, verified)
         found = result.verification
         if standards and found is not None and result.refusal is None:
             with _stage(tell, "standards"):
@@ -124,7 +124,7 @@ def _write(result: AutopilotResult, folder: Path) -> None:
     write_report(result, folder / "report.html")
 
 
-def _examined(
+def examined(
     ship: ShipFile,
     fit: IdentificationResult,
     guests: list[tuple[str, Agent]],
