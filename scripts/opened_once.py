@@ -188,7 +188,8 @@ def chained(name: str, kind: str, folder: Path) -> dict[str, Any]:
         row |= coverage(ship, model, 40) | {"structure": model.structure}
     except InputError as error:
         row |= {"structure": str(error)}
-    metrics = json.loads((place / "autopilot" / "metrics.json").read_text(encoding="utf-8"))
+    told = place / "autopilot" / "metrics.json"
+    metrics = json.loads(told.read_text(encoding="utf-8")) if told.exists() else {}  # none for refused input
     row["reported"] = verdicts(metrics.get("imo", {}), ship)
     files = [place / "autopilot" / f"{kind}.json" for kind in DESIGNS]
     row["pilots"] |= steered((load_agent(file) for file in files if file.exists()), ship)
