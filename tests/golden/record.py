@@ -85,6 +85,13 @@ def compared(section: str, stored: Values, found: Values) -> list[Deviation]:
     return compare(stored, found, SECTIONS[section].tolerances)
 
 
+def beyond_tolerance(section: str, case: str) -> list[Deviation]:
+    """Compute one case anew; the quantities that are not what they were."""
+    stored = {case: load(RESULTS / f"{section}.npz")[case]}
+    deviations = compared(section, stored, {case: recorded(section, case, stored[case])})
+    return [one for one in deviations if one.excess > 1.0]
+
+
 def main(words: list[str] | None = None) -> int:
     """Record or compare; the exit code."""
     given = _arguments(words)
