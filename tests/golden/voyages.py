@@ -46,8 +46,7 @@ def cases() -> dict[str, Case]:
     return {
         "course": Case(course, {**COSTS, **COURSES, **NOISE, **SHIPS, "sea": CHANGING_SEA}, swing=0.6),
         "course random": Case(
-            course,
-            {"course_change_deg": 50.0, "change_interval_steps": 20, "model_uncertainty": "posterior"},
+            course, {"course_change_deg": 50.0, "change_interval_steps": 20, "model_uncertainty": "posterior"}
         ),
         "course single": Case(
             course, {**COSTS, **COURSES, "sea": [GUSTS, SMOOTH], "dt": 5.5, "noise": 1.4}, single=True
