@@ -72,8 +72,9 @@ def test_policy_of_a_ship_is_the_network_told_her_context():
     )
 
 
-def test_what_it_is_told_is_within_three_deviations():
-    assert np.abs(AGENT.inputs(TOLD + 100.0)).max() == 3.0
+def test_what_it_is_told_is_in_deviations_from_the_fleets_mean_and_within_three():
+    assert AGENT.inputs(TOLD) == pytest.approx(-0.25)  # the mean half above, a deviation of two
+    assert AGENT.inputs(np.stack([TOLD + 100.0, TOLD - 100.0])).tolist() == [[3.0] * 12, [-3.0] * 12]
 
 
 def test_file_holds_all_of_it(tmp_path):

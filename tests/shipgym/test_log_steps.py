@@ -1,6 +1,7 @@
 """The steps from a log to a trial, each by itself: what it makes of numbers, and what it refuses."""
 
 import math
+import os
 from pathlib import Path
 
 import numpy as np
@@ -504,6 +505,26 @@ def test_a_compressed_matlab_file_is_unpacked_within_bounds(tmp_path, monkeypatc
         path.write_bytes(head)
         with pytest.raises(InputError, match=r"MATLAB 7.3 \(HDF5\) found, expected an older format"):
             read_log(path)
+
+
+def test_the_limits_of_a_log_are_those_of_the_page(tmp_path):
+    """docs/ship_file.md: 32 MiB, Parquet 64 MiB; unpacked 256 MiB, 5,000,000 values."""
+    for ending, most in (("xlsx", 32), ("mat", 32), ("parquet", 64)):
+        path = tmp_path / f"log.{ending}"
+        path.write_text("MATLAB 7.3")
+        os.truncate(path, most * 2**20)
+        with pytest.raises(InputError, match=rf"log\.{ending}: (cannot be read|MATLAB 7.3)"):
+            read_log(path)
+        os.truncate(path, most * 2**20 + 1)
+        with pytest.raises(InputError, match=f"{most * 2**20 + 1} bytes found, expected a "):
+            read_log(path)
+    tables._check_unpacked(path, 256 * 2**20)
+    with pytest.raises(InputError, match="over 268435456 bytes unpacked, expected less"):
+        tables._check_unpacked(path, 256 * 2**20 + 1)
+    values = np.zeros(5_000_001)
+    assert len(from_frame(pd.DataFrame({"u": values[1:]})).lines) == 5_000_000
+    with pytest.raises(InputError, match="5000001 rows found, expected a table of at most 5000000 values"):
+        from_frame(pd.DataFrame({"u": values}))
 
 
 @pytest.mark.parametrize(

@@ -326,6 +326,24 @@ def test_a_log_without_dates_goes_on_at_midnight(tmp_path):
     assert np.ptp(read_log(tmp_path / "log.nmea").numbers("t")) == 4.0
 
 
+@pytest.mark.parametrize(
+    ("fields", "true_deg"),
+    [
+        ("10.0,2.0,E,3.0,E", 15.0),
+        ("10.0,2.0,W,3.5,W", 4.5),
+        ("10.0,2.0,W,3.0,E", 11.0),
+        ("10.0,,,3.0,E", 13.0),
+        ("10.0,2.0,,3.0,E", 13.0),  # to which side is not told
+    ],
+)
+def test_deviation_and_variation_to_the_east_are_added_to_a_compass(fields, true_deg, tmp_path):
+    clocks = [f"GPGGA,00000{k},5741.0000,N,01144.0000,E,1,08,1.0,20.0,M,,M,," for k in range(3)]
+    lines = [sentence(text) for clock in clocks for text in (clock, f"HCHDG,{fields}")]
+    (tmp_path / "log.nmea").write_text("\n".join(lines))
+    found = np.degrees(read_log(tmp_path / "log.nmea").numbers("psi"))
+    assert found[np.isfinite(found)] == pytest.approx(true_deg)
+
+
 @pytest.mark.skipif(not DATA.is_dir(), reason="the real log lies beside the checkout and is absent here")
 def test_the_real_log_is_read_and_says_that_it_has_no_rudder():
     trial = Trial.from_csv(DATA / "nmea0183" / "hakefjord.txt")
