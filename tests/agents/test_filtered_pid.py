@@ -7,6 +7,7 @@ import pytest
 
 from agents import PID, FilteredPID, check_controller, load_agent, sail, step_response
 from agents.controllers.filtered_pid import notch_band
+from agents.controllers.linear_loop import ERROR, SIGNALS, YAW_RATE
 from agents.controllers.memory import records
 from shipgym.errors import InputError
 from shipgym.ships import load_model
@@ -75,17 +76,47 @@ def test_anti_windup_halves_the_overshoot_of_a_weak_rudder():
     assert overshoots[0] < 0.6 * overshoots[1]
 
 
+def test_without_its_filters_it_steers_as_the_plain_pid():
+    bare = FilteredPID.from_model(MARINER, reference_share=INFINITE, tracking_lengths=INFINITE)
+    assert bare.design["reference_frequency"] == bare.design["tracking_rate"] == 0.0
+    ours, theirs = (
+        step_response(pid, MARINER, 10.0, duration=600.0).heading for pid in (bare, PID.from_model(MARINER))
+    )
+    assert np.degrees(np.abs(ours - theirs).max()) < 0.05
+
+
 def test_the_notch_takes_its_frequency_and_leaves_steady_signals():
     band, once, twice = notch_band(0.7)
 
     def passes(turn):
         z = np.exp(1j * turn)
-        return abs(1.0 - band * (1.0 - z**-2) / (1.0 + once / z + twice / z**2))
+        return 1.0 - band * (1.0 - z**-2) / (1.0 + once / z + twice / z**2)
 
     assert passes(0.7) == pytest.approx(0.1 / 0.7, rel=1e-9)
-    assert passes(1e-6) == pytest.approx(1.0, abs=1e-5)
-    assert passes(np.pi) == pytest.approx(1.0, abs=1e-5)
+    assert abs(passes(1e-6)) == pytest.approx(1.0, abs=1e-5)
+    assert abs(passes(np.pi)) == pytest.approx(1.0, abs=1e-5)
 
+
+def test_in_time_it_is_the_loop_of_which_its_margins_are_and_a_new_course_is_no_wave():
+    pid = FilteredPID.from_model(
+        MARINER, dt=0.5, wave_period=9.0, reference_share=INFINITE, tracking_lengths=INFINITE
+    )
+    rate = 2e-4 * np.sin(0.35 * np.arange(60))
+    error = -np.r_[0.0, np.cumsum(0.25 * (rate[1:] + rate[:-1]))]  # as the ship's own turning makes it
+    loop, within, expected = pid.loop(), np.zeros((len(pid.loop().A), 1)), []
+    for one, turning in zip(error, rate, strict=True):
+        signals = np.zeros((len(SIGNALS), 1))
+        signals[[ERROR, YAW_RATE], 0] = one, turning
+        expected.append(float((loop.C @ within + loop.D @ signals)[0, 0]))
+        within = loop.A @ within + loop.B @ signals
+    scales, state, orders = observation_scales(MARINER), None, []
+    for one, turning in zip(np.r_[error, error[-1] + 0.2], np.r_[rate, rate[-1]], strict=True):
+        seen = np.array([np.sin(one), np.cos(one), turning, 0.0, 7.0, 0.0, 0.0, 0.0]) / scales
+        action, state = pid.predict(seen, state)
+        orders.append(float(action[0]) * MARINER.steering.limit - pid.neutral_rudder)
+    assert orders[:-1] == pytest.approx(expected, abs=2e-6)
+    gain = pid.gains["proportional"] + 0.5 * pid.gains["integral"]
+    assert orders[-1] - orders[-2] == pytest.approx(0.2 * gain, rel=0.02)
 
 def test_the_wave_filter_spares_the_rudder(filtered):
     deaf = FilteredPID.from_model(MARINER, wave_period=9.0)
@@ -128,6 +159,8 @@ def test_impossible_designs_are_refused():
     for arguments in ({"reference_share": 0.0}, {"tracking_lengths": -1.0}, {"wave_period": 1.0}):
         with pytest.raises(InputError, match=f"{next(iter(arguments))}: .* found"):
             FilteredPID.from_model(MARINER, **arguments)
+    with pytest.raises(InputError, match="wave_period: 0.9 found, expected a number > 1; two control"):
+        FilteredPID.from_model(MARINER, dt=0.5, wave_period=0.9)
 
 
 @pytest.mark.parametrize(

@@ -18,7 +18,16 @@ from shipgym.engine import mathematics, specialise
 from shipgym.engine.compiling import explanation
 from shipgym.engine.loops import LOOPS, ship_loop
 from shipgym.engine.parts import Part
-from shipgym.engine.record_code import loader
+from shipgym.engine.record_code import (
+    bounded_storer,
+    chooser,
+    loader,
+    number_storer,
+    row_reader,
+    storer,
+    summer,
+    zero,
+)
 from shipgym.engine.records import Layout, table_of
 from shipgym.engine.specialise import fingerprint
 from shipgym.sea.open_sea import sea_parts
@@ -178,3 +187,38 @@ def test_a_table_in_a_record_is_the_lane_s_column_of_its_tile():
     assert depth == 64 * 4 + 5
     assert shares[:3].tolist() == [64 * 5 + 5, 64 * 6 + 5, 64 * 7 + 5]
     assert loader(rows, 1).function(np.arange(8.0), 5).shares.tolist() == [5.0, 6.0, 7.0]
+
+
+class Fix(NamedTuple):
+    north: float
+    east: float
+
+
+class Anchor(NamedTuple):
+    chain: float
+    place: Fix
+
+
+def test_records_are_stored_in_plain_python_where_their_rows_are():
+    rows, given = Layout(before=Fix, found=Anchor)["found"], Anchor(2.0, Fix(3.0, -4.0))
+    scale, bounds = Anchor(10.0, Fix(0.5, 1.0)), {"chain": (0.0, 15.0), "place.north": (0.0, 9.0)}
+    stored = {  # the rows are 2, 3 and 4, the lane is 5
+        storer(rows): (given,),
+        bounded_storer(rows, bounds | {"place.east": (-1.0, 1.0)}): (given, scale),
+        number_storer(3): (7.0,),
+    }
+    found = []
+    for part, numbers in stored.items():
+        tile = np.zeros(5 * 64)
+        part.function(tile, 5, *numbers)
+        found.append({int(k): float(tile[k]) for k in np.flatnonzero(tile)})
+    assert found[0] == {2 * 64 + 5: 2.0, 3 * 64 + 5: 3.0, 4 * 64 + 5: -4.0}
+    assert found[1] == {2 * 64 + 5: 15.0, 3 * 64 + 5: 1.5, 4 * 64 + 5: -1.0}
+    assert found[2] == {3 * 64 + 5: 7.0}
+    vector = np.zeros(5)
+    storer(rows, 1).function(vector, 5, given)
+    assert vector.tolist() == [0.0, 0.0, 2.0, 3.0, -4.0]
+    assert loader(rows, 1).function(vector, 5) == given
+    assert (summer(Anchor).function(given), zero(Anchor).function()) == (1.0, Anchor(0.0, Fix(0.0, 0.0)))
+    assert [chooser(Anchor).function(yes, given, scale) for yes in (True, False)] == [given, scale]
+    assert row_reader().function(vector[2:], 1) == 3.0

@@ -491,6 +491,7 @@ def test_of_a_matlab_file_numeric_vectors_of_the_commonest_length_are_read(tmp_p
     table = read_log(tmp_path / "log.mat")
     assert table.header == ("u", "n")
     assert (table.numbers("u").tolist(), table.numbers("n").tolist()) == ([0.5, 1.0, 1.5], [1.0, 2.0, 3.0])
+    assert list(table.lines) == [1, 2, 3]
 
 
 def test_a_compressed_matlab_file_is_unpacked_within_bounds(tmp_path, monkeypatch):
@@ -505,6 +506,19 @@ def test_a_compressed_matlab_file_is_unpacked_within_bounds(tmp_path, monkeypatc
         path.write_bytes(head)
         with pytest.raises(InputError, match=r"MATLAB 7.3 \(HDF5\) found, expected an older format"):
             read_log(path)
+
+
+def test_sheets_and_parquet_files_are_refused_by_the_values_that_they_would_unpack_to(tmp_path, monkeypatch):
+    """Three rows of two columns are 8 cells with their names; 1000 rows of two columns 16 000 bytes."""
+    pd.DataFrame({"u": [1.0, 2.0, 3.0], "v": 0.0}).to_excel(tmp_path / "log.xlsx", index=False)
+    pd.DataFrame({"u": np.ones(1000), "v": np.ones(1000)}).to_parquet(tmp_path / "log.parquet")
+    for name, limit, most in (("xlsx", "MOST_CELLS", 8), ("parquet", "LARGEST_UNPACKED", 16_000)):
+        monkeypatch.setattr(tables, limit, most)
+        assert read_log(tmp_path / f"log.{name}").header == ("u", "v")
+        monkeypatch.setattr(tables, limit, most - 1)
+        with pytest.raises(InputError, match=f"{most - 1} (cells found, expected fewer|bytes unpacked)"):
+            read_log(tmp_path / f"log.{name}")
+        monkeypatch.undo()
 
 
 def test_the_limits_of_a_log_are_those_of_the_page(tmp_path):
