@@ -87,6 +87,8 @@ def test_sequences_go_by_the_time_to_travel_a_ship_length(tanker):
     shortest, longest = held(shaft, "n_command").min(), held(shaft, "n_command").max()
     assert (shortest, longest) == (pytest.approx(5.0, abs=0.3), pytest.approx(15.0, abs=0.3))
     assert np.all(shaft["delta_command"] == 0.0)
+    asked = {"shortest_s": 0.5 * travel, "longest_s": 4.0 * travel}
+    assert steps.sha256 == random_rudder_steps(tanker, **asked, **times).sha256
 
 
 def test_the_multi_sine_of_least_crest_is_taken(tanker):
