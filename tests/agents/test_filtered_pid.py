@@ -50,8 +50,10 @@ def test_by_default_its_reference_is_three_times_as_fast_and_the_integral_gives_
     assert design["reference_frequency"] == pytest.approx(3.0 * design["frequency"])
     assert design["tracking_rate"] == pytest.approx(0.5 / time)
     assert design["largest_turn_rate"] == design["wave_frequency"] == 0.0  # neither limit nor filter
-    slow = FilteredPID.from_model(MARINER, largest_turn_rate_deg_s=0.01)
-    assert slow.design["largest_turn_rate"] == pytest.approx(np.radians(0.01))
+    slow = {"largest_turn_rate_deg_s": 0.01, "reference_share": 0.05, "tracking_lengths": 0.05}
+    design = FilteredPID.from_model(MARINER, **slow).design
+    assert design["largest_turn_rate"] == pytest.approx(np.radians(0.01))
+    assert design["tracking_rate"] == pytest.approx(20.0 / time)
 
 
 def test_the_reference_turns_no_faster_than_asked():
@@ -129,6 +131,26 @@ def test_in_time_it_is_the_loop_of_which_its_margins_are_and_a_new_course_is_no_
     assert orders[:-1] == pytest.approx(expected, abs=2e-8)
     gain = pid.gains["proportional"] + 0.5 * pid.gains["integral"]
     assert orders[-1] - orders[-2] == pytest.approx(0.2 * gain, rel=0.02)
+
+
+def test_a_heading_opposite_to_the_course_is_filtered_as_any_other():
+    """Through 180 degrees of error, where its sign changes: what the notch takes away is the same."""
+    pid = FilteredPID.from_model(
+        MARINER, wave_period=9.0, reference_share=INFINITE, tracking_lengths=INFINITE
+    )
+    pid = replace(pid, gains={**pid.gains, "integral": 0.0})
+    rates, orders = 0.01 * np.sin(0.7 * np.arange(12)), []
+    for error in (0.0, np.pi):
+        memory, angle, found = np.zeros((1, pid.memory_size)), error, []
+        for k, rate in enumerate(rates):
+            angle -= 0.5 * (rate + rates[k - 1]) if k else 0.0
+            seen = {"heading_error_sin": np.sin([angle]), "heading_error_cos": np.cos([angle])}
+            order, memory = pid.steer(seen | {"yaw_rate": np.array([rate])}, memory, np.array([k == 0]))
+            found.append(order[0])
+        orders.append(np.array(found))
+    turned = (orders[1] - orders[0]) / pid.gains["proportional"]
+    assert np.cos(turned) == pytest.approx(-1.0, abs=1e-9)
+    assert np.ptp(np.sign(turned)) == 2.0  # on either side
 
 
 def test_the_wave_filter_spares_the_rudder(filtered):

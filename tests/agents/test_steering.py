@@ -508,6 +508,17 @@ def test_the_command_simulates_the_ship_that_is_asked_for_and_drops_sentences():
     assert told["state"]["x"] == pytest.approx(MARINER.particulars["speed"], rel=1e-3)
 
 
+def test_by_default_a_ship_is_simulated_as_time_goes_until_she_is_stopped(monkeypatch):
+    asked = []
+
+    async def stand_in(ship, nmea, **more):
+        asked.append((ship.leg, nmea, more))
+
+    monkeypatch.setattr("agents.deployment.simulated.simulate_ship", stand_in)
+    assert CliRunner().invoke(app, ["simulate", "mariner", "--nmea", "udp:1:2"]).exit_code == 0
+    assert asked == [(0.0, "udp:1:2", {"duration": math.inf, "speed_up": 1.0, "drop": {}})]
+
+
 @pytest.mark.parametrize(
     ("words", "message"),
     [
