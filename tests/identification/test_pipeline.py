@@ -231,6 +231,9 @@ def test_service_speeds_that_are_not_given_are_the_median_of_those_at_the_start(
     assert {"speed", "mass"} <= _ship(sizes, trials, abkowitz).estimated  # of forces by the mass, too
     assert _shaft_speed(None, trials, surge) == 2.0
     assert (_shaft_speed(3.5, trials, surge), _shaft_speed(3.5, trials, nomoto)) == (3.5, 0.0)
+    slow = [begun("slow", u=0.05, v=0.0, n=0.05)]
+    assert (_ship({"length": 0.5}, slow, nomoto).speed, _shaft_speed(None, slow, surge)) == (0.05, 0.05)
+    assert _shaft_speed(0.05, trials, surge) == 0.05
     rest = [begun("rest", u=0.0, v=0.0, n=0.0)]
     with pytest.raises(
         InputError, match=r"trial 'rest': starts at rest, expected way .* service speed in the"

@@ -470,6 +470,7 @@ def test_a_frame_has_columns_and_values(monkeypatch):
     assert (table.header, table.place(1)) == (("u", "v"), "row 6")
     assert table.numbers("u").tolist() == [1.0, 2.0]
     np.testing.assert_array_equal(table.numbers("v"), [3.0, NAN])
+    assert list(from_frame(frame).lines) == [0, 1]
     assert from_frame(frame.set_index(pd.Index([0.0, 0.5], name="t"))).header == ("t", "u", "v")
     assert table.column("u").dtype == float
     assert from_frame(pd.DataFrame({"n": [1, 2]})).numbers("n").dtype == float
@@ -492,6 +493,9 @@ def test_of_a_matlab_file_numeric_vectors_of_the_commonest_length_are_read(tmp_p
     assert table.header == ("u", "n")
     assert (table.numbers("u").tolist(), table.numbers("n").tolist()) == ([0.5, 1.0, 1.5], [1.0, 2.0, 3.0])
     assert list(table.lines) == [1, 2, 3]
+    for kind in "bBhHiIqQfd":
+        savemat(tmp_path / "log.mat", {"u": np.array([1, 2, 100], kind)})
+        assert read_log(tmp_path / "log.mat").numbers("u").tolist() == [1.0, 2.0, 100.0]
 
 
 def test_a_compressed_matlab_file_is_unpacked_within_bounds(tmp_path, monkeypatch):
@@ -514,7 +518,9 @@ def test_sheets_and_parquet_files_are_refused_by_the_values_that_they_would_unpa
     pd.DataFrame({"u": np.ones(1000), "v": np.ones(1000)}).to_parquet(tmp_path / "log.parquet")
     for name, limit, most in (("xlsx", "MOST_CELLS", 8), ("parquet", "LARGEST_UNPACKED", 16_000)):
         monkeypatch.setattr(tables, limit, most)
-        assert read_log(tmp_path / f"log.{name}").header == ("u", "v")
+        table = read_log(tmp_path / f"log.{name}")
+        assert (table.header, table.lines[0]) == (("u", "v"), 2 if name == "xlsx" else 1)
+        assert table.numbers("u")[0] == 1.0
         monkeypatch.setattr(tables, limit, most - 1)
         with pytest.raises(InputError, match=f"{most - 1} (cells found, expected fewer|bytes unpacked)"):
             read_log(tmp_path / f"log.{name}")
