@@ -250,7 +250,7 @@ def _left_out(
             )
             for estimators, rows in without
         ]
-    values, most = np.array(list(fit.model.coefficients.values())), count / max(count - 1, 1)
+    values, most = np.array(list(fit.model.coefficients.values())), count / (count - 1)
     return [
         replace(fit.model.with_coefficients(values - most * change), covariance=most * covariance)
         for change in (

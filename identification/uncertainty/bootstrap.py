@@ -25,7 +25,7 @@ def moving_blocks(groups: Sequence[Integers], lengths: Sequence[int], rng: np.ra
     """
     drawn = []
     for rows, length in zip(groups, lengths, strict=True):
-        block = min(max(length, 1), len(rows))
+        block = min(length, len(rows))
         starts = rng.integers(0, len(rows) - block + 1, -(-len(rows) // block))
         drawn.append(rows[(starts[:, None] + np.arange(block)).ravel()[: len(rows)]])
     return np.concatenate(drawn)
@@ -64,7 +64,7 @@ def influence_covariance(
     stretches.
     """
     rng = np.random.default_rng(seed)
-    stacked = np.concatenate([part - part.mean(axis=0) for part in influences])
+    stacked = np.concatenate(influences)
     ends = np.cumsum([0, *(len(part) for part in influences)])
     groups = [np.arange(a, b) for a, b in pairwise(ends.tolist())]
     totals = [stacked[moving_blocks(groups, [block] * len(groups), rng)].sum(axis=0) for _ in range(draws)]
@@ -79,7 +79,7 @@ def _rows_in(memory: float, start: Floats) -> int:
 def _again(estimator: Estimator, samples: Samples, equation: str, rows: Integers, errors: Floats) -> Floats:
     """Coefficients from the drawn rows."""
     features, targets = samples.features[equation], samples.targets[equation]
-    if isinstance(estimator, TruncatedLSSVM | LSSVM) and not hasattr(estimator, "search_"):
+    if isinstance(estimator, TruncatedLSSVM | LSSVM):
         refit = clone(estimator)
         if isinstance(estimator, TruncatedLSSVM):
             refit.set_params(rank=estimator.rank_)

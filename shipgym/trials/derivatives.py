@@ -8,7 +8,7 @@ from shipgym.arrays import Floats
 
 _DEGREE = 5
 _FEWEST_SPANS = 8
-_STEEPEST_GROWTH = 0.8
+_STEEPEST_GROWTH = 0.8  # of noise, as a power of the distance of knots: that of a random walk has a half
 
 
 def time_derivative(t: Floats, values: Floats) -> Floats:

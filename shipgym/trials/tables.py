@@ -80,7 +80,7 @@ def _check_unpacked(path: Path, size: int) -> None:
 
 
 def _read_excel(path: Path) -> Table:
-    data = read_bytes(path, "Excel file", LARGEST_PACKED)
+    data = read_bytes(path, "workbook of Excel", LARGEST_PACKED)
     with _damage_told(path, "Excel (.xlsx)", "save the sheet anew as .xlsx or as CSV"):
         with zipfile.ZipFile(io.BytesIO(data)) as parts:
             _check_unpacked(path, sum(part.file_size for part in parts.infolist()))

@@ -223,7 +223,16 @@ def test_trials_writes_figures_that_work_offline(tmp_path):
     answer = shipgym("trials", "mariner", "--out", tmp_path / "plots.html")
     assert answer.exit_code == 0
     page = (tmp_path / "plots.html").read_text()
-    assert page.count('Plotly.newPlot("plot-') == 14
+    drawn = {"zigzags-0", "zigzags-1", "zigzags-2", "zigzags-3", "zigzags-paths", "zigzags-histories"}
+    drawn |= {"circles-0", "circles-1", "circles-paths", "circles-histories", "spirals-0"}
+    drawn |= {"spirals-histories", "pull-outs", "pull-outs-histories"}
+    names = re.findall(r'Plotly.newPlot\("plot-([\w-]+)"', page)
+    assert (set(names), len(names)) == (drawn, 14)
+    for caption in (
+        "Zigzag 20/20, starboard first. ", "Paths from above, north up, in metres.", "Sides that end apart",
+        "Time histories: heading, rudder, yaw rate, speed and drift angle.",
+    ):  # fmt: skip
+        assert caption in page
     assert 'src="http' not in page
 
 

@@ -7,6 +7,7 @@ import pytest
 
 from agents import PID, FilteredPID, check_controller, load_agent, sail, step_response
 from agents.controllers.filtered_pid import notch_band
+from agents.controllers.linear_loop import ERROR, SIGNALS, YAW_RATE
 from agents.controllers.memory import records
 from shipgym.errors import InputError
 from shipgym.ships import load_model
@@ -39,7 +40,20 @@ def test_the_reference_is_the_step_response_of_three_equal_poles():
         reference.append(np.radians(20.0) + records(state, pid.record)["lead"])
     t = 0.02 * np.arange(399)
     expected = np.radians(20.0) * (1.0 - (1.0 + t + 0.5 * t**2) * np.exp(-t))
-    assert np.abs(np.array(reference[1:]) - expected).max() < np.radians(0.5)
+    assert np.abs(np.array(reference[1:]) - expected).max() < np.radians(0.25)
+
+
+def test_by_default_its_reference_is_three_times_as_fast_and_the_integral_gives_back_within_two_lengths(
+    filtered,
+):
+    design, time = filtered.design, MARINER.particulars["length"] / MARINER.particulars["speed"]
+    assert design["reference_frequency"] == pytest.approx(3.0 * design["frequency"])
+    assert design["tracking_rate"] == pytest.approx(0.5 / time)
+    assert design["largest_turn_rate"] == design["wave_frequency"] == 0.0  # neither limit nor filter
+    slow = {"largest_turn_rate_deg_s": 0.01, "reference_share": 0.05, "tracking_lengths": 0.05}
+    design = FilteredPID.from_model(MARINER, **slow).design
+    assert design["largest_turn_rate"] == pytest.approx(np.radians(0.01))
+    assert design["tracking_rate"] == pytest.approx(20.0 / time)
 
 
 def test_the_reference_turns_no_faster_than_asked():
@@ -75,16 +89,68 @@ def test_anti_windup_halves_the_overshoot_of_a_weak_rudder():
     assert overshoots[0] < 0.6 * overshoots[1]
 
 
+def test_without_its_filters_it_steers_as_the_plain_pid():
+    bare = FilteredPID.from_model(MARINER, reference_share=INFINITE, tracking_lengths=INFINITE)
+    assert bare.design["reference_frequency"] == bare.design["tracking_rate"] == 0.0
+    ours, theirs = (
+        step_response(pid, MARINER, 10.0, duration=600.0).heading for pid in (bare, PID.from_model(MARINER))
+    )
+    assert np.degrees(np.abs(ours - theirs).max()) < 0.05
+
+
 def test_the_notch_takes_its_frequency_and_leaves_steady_signals():
     band, once, twice = notch_band(0.7)
 
     def passes(turn):
         z = np.exp(1j * turn)
-        return abs(1.0 - band * (1.0 - z**-2) / (1.0 + once / z + twice / z**2))
+        return 1.0 - band * (1.0 - z**-2) / (1.0 + once / z + twice / z**2)
 
     assert passes(0.7) == pytest.approx(0.1 / 0.7, rel=1e-9)
-    assert passes(1e-6) == pytest.approx(1.0, abs=1e-5)
-    assert passes(np.pi) == pytest.approx(1.0, abs=1e-5)
+    assert abs(passes(1e-6)) == pytest.approx(1.0, abs=1e-5)
+    assert abs(passes(np.pi)) == pytest.approx(1.0, abs=1e-5)
+
+
+def test_in_time_it_is_the_loop_of_which_its_margins_are_and_a_new_course_is_no_wave():
+    pid = FilteredPID.from_model(
+        MARINER, dt=0.5, wave_period=9.0, reference_share=INFINITE, tracking_lengths=INFINITE
+    )
+    rate = 2e-4 * np.sin(0.35 * np.arange(60))
+    error = -np.r_[0.0, np.cumsum(0.25 * (rate[1:] + rate[:-1]))]  # as the ship's own turning makes it
+    loop, within, expected = pid.loop(), np.zeros((len(pid.loop().A), 1)), []
+    for one, turning in zip(error, rate, strict=True):
+        signals = np.zeros((len(SIGNALS), 1))
+        signals[[ERROR, YAW_RATE], 0] = one, turning
+        expected.append(float((loop.C @ within + loop.D @ signals)[0, 0]))
+        within = loop.A @ within + loop.B @ signals
+    scales, state, orders = observation_scales(MARINER), None, []
+    for one, turning in zip(np.r_[error, error[-1] + 0.2], np.r_[rate, rate[-1]], strict=True):
+        seen = np.array([np.sin(one), np.cos(one), turning, 0.0, 7.0, 0.0, 0.0, 0.0]) / scales
+        action, state = pid.predict(seen, state)
+        orders.append(float(action[0]) * MARINER.steering.limit - pid.neutral_rudder)
+    assert pid.design["wave_frequency"] == pytest.approx(2.0 * np.pi / 9.0)
+    assert orders[:-1] == pytest.approx(expected, abs=2e-8)
+    gain = pid.gains["proportional"] + 0.5 * pid.gains["integral"]
+    assert orders[-1] - orders[-2] == pytest.approx(0.2 * gain, rel=0.02)
+
+
+def test_a_heading_opposite_to_the_course_is_filtered_as_any_other():
+    """Through 180 degrees of error, where its sign changes: what the notch takes away is the same."""
+    pid = FilteredPID.from_model(
+        MARINER, wave_period=9.0, reference_share=INFINITE, tracking_lengths=INFINITE
+    )
+    pid = replace(pid, gains={**pid.gains, "integral": 0.0})
+    rates, orders = 0.01 * np.sin(0.7 * np.arange(12)), []
+    for error in (0.0, np.pi):
+        memory, angle, found = np.zeros((1, pid.memory_size)), error, []
+        for k, rate in enumerate(rates):
+            angle -= 0.5 * (rate + rates[k - 1]) if k else 0.0
+            seen = {"heading_error_sin": np.sin([angle]), "heading_error_cos": np.cos([angle])}
+            order, memory = pid.steer(seen | {"yaw_rate": np.array([rate])}, memory, np.array([k == 0]))
+            found.append(order[0])
+        orders.append(np.array(found))
+    turned = (orders[1] - orders[0]) / pid.gains["proportional"]
+    assert np.cos(turned) == pytest.approx(-1.0, abs=1e-9)
+    assert np.ptp(np.sign(turned)) == 2.0  # on either side
 
 
 def test_the_wave_filter_spares_the_rudder(filtered):
@@ -128,6 +194,8 @@ def test_impossible_designs_are_refused():
     for arguments in ({"reference_share": 0.0}, {"tracking_lengths": -1.0}, {"wave_period": 1.0}):
         with pytest.raises(InputError, match=f"{next(iter(arguments))}: .* found"):
             FilteredPID.from_model(MARINER, **arguments)
+    with pytest.raises(InputError, match=r"wave_period: 0\.9 found, expected a number > 1;"):
+        FilteredPID.from_model(MARINER, dt=0.5, wave_period=0.9)
 
 
 @pytest.mark.parametrize(

@@ -5,6 +5,7 @@ from dataclasses import replace
 import control
 import numpy as np
 import pytest
+from scipy.stats import norm
 
 from agents import LQ, LQG, load_agent, sail, step_response
 from agents.controllers.linear_loop import sample_ship
@@ -15,6 +16,7 @@ from shipgym.ships.conversions import nomoto, nomoto2_ship
 from shipgym.ships.linear import straight_running
 from shipgym.ships.steering import SteeringGear
 from shipgym.tasks.task import control_interval, course_keeping_task
+from shipgym.trials.sensors import SEA_TRIAL
 
 MARINER = load_model("mariner")
 
@@ -62,6 +64,18 @@ def test_the_wave_model_keeps_its_deviation_and_period():
     assert np.sqrt(covariance[0, 0]) == pytest.approx(0.02, rel=1e-6)
     pole = np.linalg.eigvals(transition)[0]
     assert 2.0 * np.pi / np.abs(np.log(pole)) == pytest.approx(9.0, rel=1e-6)
+    swing = 9.0 / np.sqrt(1.0 - 0.1**2)  # of which each has exp(-2 pi 0.1 / sqrt(0.99)) of the one before
+    assert wave_model(9.0, 0.02, swing)[0] == pytest.approx(0.5318 * np.eye(2), abs=1e-4)
+
+
+def test_noise_makes_a_new_course_once_in_years():
+    """Six deviations of the innovation, whose covariance is (1 - C K)^-1 R: once in 16 years of seconds."""
+    lqg = LQG.from_model(MARINER, noise=3.0)
+    noise = np.diag((3.0 * np.array([SEA_TRIAL["r"].noise, SEA_TRIAL["psi"].noise])) ** 2)
+    deviation = np.sqrt(np.linalg.solve(np.eye(2) - lqg.output @ lqg.kalman, noise)[1, 1])
+    chance = 2.0 * norm.sf(lqg.design["new_course_rad"] / deviation)
+    assert 10.0 < 1.0 / (chance * 365.25 * 86400.0) < 20.0
+    assert LQG.from_model(MARINER).design["new_course_rad"] == pytest.approx(np.radians(1.0))  # at least
 
 
 def gain_at(controller, period):

@@ -9,11 +9,12 @@ from fleet import Pilots
 
 from agents.agent_file import load_agent, read_agent
 from agents.benchmarking.contestants import contestants
-from agents.controllers.wheel_over import WheelOver
+from agents.controllers.wheel_over import WheelOver, own_lead
 from agents.policies.one_for_all import CONTEXT, ONE_FOR_ALL, OneForAll, base_for, context
 from agents.suites.suite import load_suite
 from shipgym.errors import InputError
 from shipgym.ships import load_model
+from shipgym.ships.linear import steering_state_space
 from shipgym.ships.scaling import scale_model
 from shipgym.tasks.task import Task
 from tests.agents.policies import random_network
@@ -56,6 +57,11 @@ def test_context_is_the_prime_linear_dynamics():
     tanker = dict(zip(CONTEXT, context(load_model("tanker"), TASK), strict=True))
     assert tanker["stability"] < 0.0  # unstable on her course
     assert tanker["drift"] < 0.0  # the bow turns into the turn: sway to port in a turn to starboard
+    A, B = steering_state_space(SHIP)
+    (sway, rate), p = np.linalg.solve(A, -B[:, 0]), SHIP.particulars
+    assert told["drift"] == pytest.approx(sway / rate / p["length"])
+    gear, time = SHIP.steering, p["length"] / p["speed"]
+    assert told["gear_rate"] == pytest.approx(gear.rudder_rate_deg_s * time / gear.rudder_limit_deg)
 
 
 def test_policy_of_a_ship_is_the_network_told_her_context():
@@ -72,8 +78,9 @@ def test_policy_of_a_ship_is_the_network_told_her_context():
     )
 
 
-def test_what_it_is_told_is_within_three_deviations():
-    assert np.abs(AGENT.inputs(TOLD + 100.0)).max() == 3.0
+def test_what_it_is_told_is_in_deviations_from_the_fleets_mean_and_within_three():
+    assert AGENT.inputs(TOLD) == pytest.approx(-0.25)  # the mean half above, a deviation of two
+    assert AGENT.inputs(np.stack([TOLD + 100.0, TOLD - 100.0])).tolist() == [[3.0] * 12, [-3.0] * 12]
 
 
 def test_file_holds_all_of_it(tmp_path):
@@ -125,12 +132,19 @@ def test_the_shipped_one_is_the_best_on_the_fleet_held_out():
 
 def test_the_base_follows_the_rule_for_its_path():
     rule = {"lookahead": 2.0, "lookahead_power": 1.0, "crab_share": 0.5, "rudder_weight": 4.0}
+    rule |= {"integral": 2.0, "rate_weight": 3.0, "reach": 0.5}
     narrow = TASK.changed(corridor=0.25)
     plain, ruled = (base_for(SHIP, narrow, one) for one in ({}, rule))
     assert plain.gains == WheelOver.from_model(SHIP, task=narrow).gains
     assert ruled.gains["lookahead"] == pytest.approx(plain.gains["lookahead"] * 2.0 * 0.25)
     assert ruled.gains["crab_share"] == 0.5
-    assert ruled.autopilot.design["rudder_weight"] == 4.0 * plain.autopilot.design["rudder_weight"]
+    ours, own = ruled.autopilot.design, plain.autopilot.design
+    assert ours["rudder_weight"] == 4.0 * own["rudder_weight"]
+    assert (ours["integral_lengths"], own["integral_lengths"]) == (40.0, 20.0)
+    assert ours["rate_weight_s2"] == 3.0 * own["rate_weight_s2"]
+    lead = own_lead(SHIP, ruled.autopilot) * SHIP.particulars["length"]
+    assert ruled.gains["turn_reach"] == pytest.approx(0.5 * lead)
+    assert base_for(SHIP, narrow, {"crab_share": 9.0}).gains["crab_share"] == 2.0  # at most
     wide = TASK.changed(corridor=3.0)
     plain, ruled = (base_for(SHIP, wide, one) for one in ({}, rule))
     assert ruled.gains["lookahead"] == pytest.approx(plain.gains["lookahead"] * 2.0)
@@ -147,7 +161,22 @@ def test_pilots_asked_at_once_steer_as_each_alone():
         assert pilot.predict(seen[None])[0][0] == pytest.approx(action, abs=1e-6)
 
 
-@pytest.mark.parametrize(("rule", "why"), [({"speed": 1.0}, "unknown"), ({"reach": 0.0}, "rule.reach")])
-def test_a_rule_of_other_settings_is_refused(rule, why):
+@pytest.mark.parametrize(
+    ("changes", "why"),
+    [
+        ({"rule": {"speed": 1.0}}, "unknown"),
+        ({"rule": {"reach": 0.00099}}, "rule.reach: 0.00099 found"),
+        ({"rule": {"reach": 1001.0}}, "rule.reach: 1001 found"),
+        ({"rule": {"reach_power": -4.1}}, "rule.reach_power: -4.1 found"),
+        ({"decision": 0.0}, "decision: 0 found"),
+        ({"authority": 0.0}, "authority: 0 found"),
+        ({"fleet": AGENT.fleet * [1.0, 0.0, 1.0, 1.0]}, r"context.damping\[1\]: 0 found"),
+        ({"fleet": AGENT.fleet[:, [0, 1, 2, 2]]}, r"context.damping\[3\]: .* found"),
+        ({"observation_names": ("yaw_rate",)}, r"network: sizes .* found, expected 14 inputs and 1 output"),
+    ],
+)
+def test_settings_beyond_their_bounds_are_refused(changes, why):
+    within = {"rule": {"reach": 1e-3, "integral": 1e3, "reach_power": -4.0}}
+    assert replace(AGENT, **within, decision=0.01, authority=0.01).for_ship(SHIP).action_repeat == 1
     with pytest.raises(InputError, match=why):
-        replace(AGENT, rule=rule)
+        replace(AGENT, **changes)

@@ -93,6 +93,12 @@ def test_a_page_holds_all_of_an_episode_that_is_shown():
     assert run["other"].keys() >= {"under_keel_clearance", "u", "v", "extrapolating"}
     assert "cross_track" not in run["other"]
     assert run["total"] == -0.5 * STEPS
+    assert run["beam"] == 20.0
+
+
+def test_a_ship_of_unknown_beam_is_drawn_as_slender_as_ships_are():
+    (run,) = data_of(replay_page({"first": episode(beam=None)}))["runs"]
+    assert run["length"] / run["beam"] == pytest.approx(6.5)
 
 
 def test_what_no_run_has_is_not_shown():

@@ -9,7 +9,7 @@ import pytest
 from jinja2 import UndefinedError
 
 from agents.cli.standard_trials import StandardTrials
-from agents.cli.trials_page import write_page
+from agents.cli.trials_page import _readable, write_page
 from agents.verification.figures import band, translucent
 from agents.verification.page import write_report
 from shipgym import Trial, load_model
@@ -196,6 +196,21 @@ def test_hostile_names_of_models_and_manoeuvres_stay_text(tmp_path):
     source = (tmp_path / "trials.html").read_text()
     assert Page(source).scripts == 2
     assert " ".join(Page(source).text).count(HOSTILE) == 5  # window, title, head, and why it was refused
+
+
+@pytest.mark.parametrize(
+    ("index", "words"),
+    [
+        ("overshoot_1_deg", "overshoot 1, deg"),
+        ("loop_height_deg_s", "loop height, deg/s"),
+        ("tactical_diameter_lengths", "tactical diameter, ship lengths"),
+        ("period_s", "period, s"),
+        ("final_speed", "final speed, m/s"),
+        ("steady_speed_ratio", "steady speed ratio"),
+    ],
+)
+def test_an_index_is_told_in_words_with_its_unit(index, words):
+    assert _readable(index) == words
 
 
 def test_a_figure_cannot_end_the_script_it_stands_in():

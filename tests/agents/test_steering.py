@@ -1,12 +1,14 @@
 """An autopilot on NMEA 0183: what it understands, when it hands over, and a ship that it steers over TCP."""
 
 import asyncio
+import json
 import math
 import os
 import re
 import selectors
 import socket
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -452,6 +454,83 @@ def test_datagrams_and_a_serial_line_carry_it_too():
     assert os.read(master, 100).startswith(b"order")
     os.close(master)
     os.close(slave)
+
+
+def test_the_command_steers_with_what_it_is_told_and_fails_after_an_alarm(tmp_path, monkeypatch):
+    given, ends = [], [("off", ""), ("manual", "no heading for 3 s")]
+
+    async def stand_in(pilot, nmea, **more):
+        given.append((pilot.kind, nmea, more))
+        more["told"]("0.0 s: standby")
+        state, alarm = ends[len(given) - 1]
+        return SimpleNamespace(state=state, alarm=alarm, counts={"damaged": 2})
+
+    monkeypatch.setattr("agents.deployment.steering.steer", stand_in)
+    PID_MARINER.save(tmp_path / "pid.json")
+    WHEEL_OVER.save(tmp_path / "guide.json")
+    (tmp_path / "route.csv").write_text(ROUTE)
+    words = ["steer", str(tmp_path / "pid.json"), "--nmea", "udp:ship:1", "--heading", "45"]
+    words += ["--limit", "silence_s=4", "--duration", "12", "--rate-of-turn", "15", "--speed-up", "2"]
+    calm = CliRunner().invoke(app, [*words, "--json"])
+    assert (calm.exit_code, json.loads(calm.stdout)) == (0, {"state": "off", "alarm": "", "damaged": 2})
+    kind, address, more = given[0]
+    assert (kind, address, more["limits"], more["route"]) == ("pid", "udp:ship:1", Limits(silence_s=4), None)
+    assert (more["heading"], more["rate"]) == pytest.approx((np.pi / 4.0, np.pi / 12.0 / 60.0))
+    assert (more["duration"], more["speed_up"]) == (12.0, 2.0)
+    route = ["--route", str(tmp_path / "route.csv")]
+    lost = CliRunner().invoke(app, ["steer", str(tmp_path / "guide.json"), "--nmea", "udp:ship:1", *route])
+    assert lost.exit_code == 1
+    assert "0.0 s: standby" in lost.output
+    assert "handed over: no heading for 3 s" in lost.output
+    _, _, more = given[1]
+    assert (more["heading"], more["rate"], more["duration"], more["speed_up"]) == (None, None, math.inf, 1.0)
+    assert more["limits"] == Limits()
+    turn = more["route"].given(np.radians(54.0), np.radians(7.5))
+    expected = Route.from_csv(tmp_path / "route.csv", WHEEL_OVER.gains["path_radius"])
+    assert turn == expected.given(np.radians(54.0), np.radians(7.5))
+    wrong = CliRunner().invoke(app, [*words, "--limit", "silense_s=4"])
+    assert (wrong.exit_code, "--limit: unknown key 'silense_s'" in wrong.output) == (2, True)
+
+
+def test_the_command_simulates_the_ship_that_is_asked_for_and_drops_sentences():
+    """Ten steps of 0.1 s; from 0.45 s on no HDT is heard, in whatever case it is named."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as hears:
+        hears.bind(("127.0.0.1", 0))
+        asked = ["simulate", "mariner", "--nmea", f"udp:127.0.0.1:{hears.getsockname()[1]}", "--leg", "30"]
+        asked += ["--drop", "hdt=0.45", "--duration", "1", "--speed-up", "40", "--json"]
+        told = json.loads(CliRunner().invoke(app, asked).stdout)
+        hears.settimeout(0.0)
+        heard = "".join(hears.recv(65536).decode() for _ in range(10))
+    assert [heard.count(f"{kind},") for kind in ("HDT", "ROT", "RSA")] == [5, 10, 10]
+    (steered,) = {one.value for line in heard.splitlines() for one in readings(line) if one.quantity == "leg"}
+    assert steered == pytest.approx(np.radians(30.0))
+    assert (told["model"], told["duration_s"]) == ("mariner", 1.0)
+    assert told["state"]["x"] == pytest.approx(MARINER.particulars["speed"], rel=1e-3)
+
+
+def test_by_default_a_ship_is_simulated_as_time_goes_until_she_is_stopped(monkeypatch):
+    asked = []
+
+    async def stand_in(ship, nmea, **more):
+        asked.append((ship.leg, nmea, more))
+
+    monkeypatch.setattr("agents.deployment.simulated.simulate_ship", stand_in)
+    assert CliRunner().invoke(app, ["simulate", "mariner", "--nmea", "udp:1:2"]).exit_code == 0
+    assert asked == [(0.0, "udp:1:2", {"duration": math.inf, "speed_up": 1.0, "drop": {}})]
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["--drop", "HDT"], "--drop: 'HDT' found, expected name=value, such as --drop HDT=60"),
+        (["--drop", "hdt='late'"], "--drop hdt: 'late' .*found, expected"),
+        (["--sea", "ruff"], "weather: 'ruff' found, expected one of 'calm'"),
+    ],
+)
+def test_what_no_ship_can_be_asked_for_is_refused(words, message):
+    found = CliRunner().invoke(app, ["simulate", "mariner", "--nmea", "udp:127.0.0.1:9", *words])
+    assert found.exit_code == 2, found.output
+    assert re.search(message, " ".join(found.output.split()))
 
 
 @pytest.mark.parametrize(

@@ -1,5 +1,6 @@
 """Tuning proposes valid settings, goes on after any end as if nothing had happened, stops what is worse."""
 
+import json
 import random
 import sys
 
@@ -8,10 +9,12 @@ from typer.testing import CliRunner
 
 from agents.cli import app
 from agents.engines.jobs import JobEngine
+from agents.training import tuning
 from agents.training.plan import Given, make_plan
 from agents.training.settings import ALGORITHMS, load_settings
 from agents.training.tuning import (
     Trial,
+    Tuning,
     allowed,
     evaluated_evenly,
     limits,
@@ -46,7 +49,8 @@ def bowl(job):
 
 
 def diverges(job):
-    return {"cost": None, "curve": [], "ended": "diverged", "why": "not finite"}
+    why = f"not finite, gamma {job['configuration']['settings']['gamma']}"
+    return {"cost": None, "curve": [], "ended": "diverged", "why": why}
 '''
 
 
@@ -65,8 +69,14 @@ def plan(**settings):
 
 
 def test_better_settings_are_found_and_written_for_training(trainings, tmp_path):
-    folder = tmp_path / "study"
-    found = tune(plan(), folder, 10, training=trainings.bowl)
+    folder, told = tmp_path / "study", []
+    found = tune(plan(), folder, 10, training=trainings.bowl, progress=lambda *now: told.append(now))
+    assert [trial.number for trial in found.trials] == list(range(10))
+    assert [now[:2] for now in told] == [(k, 10) for k in (0, 1, 2, 3, 4, 4, 5, 6, 7, 8, 8, 9, 10)]
+    lowest = [
+        min((one.cost for one in found.trials[:n] if one.cost is not None), default=None) for n in (0, 4, 8)
+    ]
+    assert [now[2] for now in told] == [lowest[0]] * 5 + [lowest[1]] * 5 + [lowest[2]] * 3  # by batches
     assert found.best.cost < found.trials[0].cost
     assert found.best.cost == min(trial.cost for trial in found.trials if trial.cost is not None)
     settings = make_plan(Given("ppo", settings_file=folder / "best.toml")).settings
@@ -146,8 +156,10 @@ def test_folder_of_something_else_is_refused(trainings, tmp_path):
     (tmp_path / "study" / "study.db").write_text("no database " * 100)
     with pytest.raises(InputError, match="not a study of Optuna"):
         tune(plan(), tmp_path / "study", 1, training=trainings.bowl)
-    with pytest.raises(InputError, match="every trial diverged, the first: not finite"):
+    with pytest.raises(InputError, match=r"every trial diverged, the first: not finite, gamma 0\.99$"):
         tune(plan(), tmp_path / "other", 5, training=trainings.diverges)
+    with pytest.raises(InputError, match="trials: 0 found, expected a whole number of at least 1"):
+        tune(plan(), tmp_path / "none", 0, training=trainings.bowl)
 
 
 def test_trials_are_trainings_that_stop_when_they_fall_behind():
@@ -180,6 +192,36 @@ def test_wrong_arguments_of_the_command(arguments, message, tmp_path):
     assert answer.exit_code == 2
     assert message in answer.stderr.replace("\n", " ")
     assert not (tmp_path / "study").exists()
+
+
+def test_the_command_asks_for_what_it_was_told_and_shows_trials_best_first(tmp_path, monkeypatch):
+    asked, drawn = [], {"learning_rate": 0.000312345, "batch_size": 64}
+    trials = (
+        Trial(0, {}, {}, 5.0, (), "finished"),
+        Trial(1, drawn, {}, None, (), "stopped early"),
+        Trial(2, drawn, {}, 4.25, (), "finished"),
+    )
+
+    def stand_in(plan, out, trials_asked, fixed, where, progress):
+        asked.append((plan.settings.gamma, plan.settings.evaluate_every, plan.configuration()["seed"]))
+        asked.append((out, trials_asked, fixed, where.workers, progress))
+        return Tuning(trials, trials[2])
+
+    monkeypatch.setattr(tuning, "tune", stand_in)
+    words = ["tune", "ppo", "--total-steps", "100000", "--set", "gamma=0.9", "--out", str(tmp_path)]
+    told = json.loads(CliRunner().invoke(app, [*words, "--json"]).stdout)
+    assert asked == [(0.9, 10_000, 0), (tmp_path, 20, ("gamma",), 1, None)]  # ten evaluations on the way
+    assert [trial["cost"] for trial in told["trials"]] == [5.0, None, 4.25]
+    assert (told["best"], told["settings"]) == (2, str(tmp_path / "best.toml"))
+    words += ["--set", "evaluate_every=50", "--trials", "3", "--seed", "7", "--workers", "2"]
+    lines = CliRunner().invoke(app, words).stdout.splitlines()
+    assert asked[2:] == [(0.9, 50, 7), (tmp_path, 3, ("gamma", "evaluate_every"), 2, None)]
+    assert [line.split() for line in lines if line.strip()[:1].isdigit()] == [
+        ["2", "4.250", "finished", "learning_rate", "0.000312,", "batch_size", "64"],
+        ["0", "5.000", "finished", "nothing:", "as", "it", "was"],
+        ["1", "-", "stopped", "early", "learning_rate", "0.000312,", "batch_size", "64"],
+    ]
+    assert f"written: {tmp_path / 'best.toml'}" in lines
 
 
 def test_missing_optuna_is_reported_with_its_extra(tmp_path, monkeypatch):

@@ -1,5 +1,7 @@
 """Rate-of-turn autopilot: what it holds in a turn, how it comes to a heading, and its limits."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -56,6 +58,42 @@ def test_a_course_is_changed_at_its_rate_without_overshoot(model):
     assert rates.max() == pytest.approx(15.0, rel=0.05)
     assert np.degrees(found.heading[0].max()) < 40.5
     assert np.degrees(found.heading[0, -1]) == pytest.approx(40.0, abs=0.5)
+
+
+@pytest.mark.parametrize("model", [MARINER, TANKER], ids=["mariner", "tanker"])
+def test_a_rate_is_hardly_overshot_and_a_heading_damped_by_seven_tenths(model):
+    """Of s^2 + (1 / T + p K / T) s + i K / T, around which the heading closes a loop; 0.15 % of overshoot."""
+    agent = TurnRate.from_model(model)
+    gains, design = agent.gains, agent.design
+    time, effect = design["nomoto_T"], design["nomoto_K"] / design["nomoto_T"]
+    rate = np.array([1.0, 1.0 / time + gains["proportional"] * effect, gains["integral"] * effect])
+    pair = np.roots(rate)[0]
+    assert np.abs(pair) == pytest.approx(design["frequency"])
+    assert np.exp(np.pi * pair.real / np.abs(pair.imag)) == pytest.approx(0.0015, abs=0.001)
+    heading = np.roots(np.append(rate, rate[2] / gains["heading_time"]))
+    slowest = heading[np.argmin(np.abs(heading))]
+    assert -slowest.real / np.abs(slowest) == pytest.approx(0.74, abs=0.03)
+
+
+@pytest.mark.parametrize(
+    "model",
+    [replace(MARINER, steering=replace(MARINER.steering, rudder_limit_deg=35.0)), TANKER],
+    ids=["mariner", "tanker"],
+)
+def test_courses_are_changed_at_the_largest_tabulated_rate_of_three_tenths_of_the_rudder(model):
+    agent, most = TurnRate.from_model(model), 0.3 * model.steering.limit
+    time = model.particulars["length"] / model.particulars["speed"]
+    rates = agent.gains["rate"] + np.array([0.0, 0.02 / time])
+    rudders = [np.interp(side * rates, agent.rates, agent.rudders) for side in (1.0, -1.0)]
+    used, further = np.abs(np.array(rudders) - straight_running(model).rudder).max(axis=0)
+    assert used <= most < further
+
+
+def test_a_long_ship_and_a_slow_gear_are_asked_for_less():
+    time = MARINER.particulars["length"] / MARINER.particulars["speed"]
+    assert TurnRate.from_model(MARINER).design["frequency"] * time == pytest.approx(2.0)
+    slow = replace(MARINER, steering=replace(MARINER.steering, time_constant=10.0))
+    assert TurnRate.from_model(slow, dt=2.0).design["frequency"] * (10.0 + 1.0) == pytest.approx(0.3)
 
 
 def test_it_is_a_controller_with_margins_and_a_file(tmp_path):

@@ -3,13 +3,14 @@
 import numpy as np
 import pytest
 
-from agents import LineOfSight, WheelOver, check_controller, load_agent
-from agents.controllers.wheel_over import STEEPEST, bend, own_turn
+from agents import LQ, LineOfSight, WheelOver, check_controller, load_agent
+from agents.controllers.wheel_over import STEEPEST, bend, own_lead, own_turn
 from agents.rollouts.metrics import evaluate
 from agents.suites.suite import BenchmarkTask, load_suite
 from shipgym.errors import InputError
 from shipgym.manoeuvres import turning_circle, turning_indices
 from shipgym.ships import load_model
+from shipgym.ships.linear import straight_running
 from shipgym.tasks.task import path_following_task
 
 MARINER, KVLCC2 = load_model("mariner"), load_model("kvlcc2")
@@ -68,6 +69,20 @@ def test_the_course_of_a_path_bends_by_its_arcs():
     ahead = [np.array([100.0]), np.array([-1.0]), np.array([500.0]), np.array([0.5])]
     for distance, course in ((100.0, 0.0), (150.0, -0.25), (300.0, -1.0), (600.0, -0.5), (900.0, -0.5)):
         assert bend(distance, ahead, 200.0)[0] == pytest.approx(course)
+
+
+def test_an_arc_is_seen_as_far_ahead_as_heading_and_drift_lag_and_a_quarter_of_a_length():
+    """In a turn with a twentieth of a degree of rudder, to both sides: heading and way lag by that."""
+    pilot, neutral, turns = LQ.from_model(MARINER), straight_running(MARINER), []
+    length, speed, side = MARINER.particulars["length"], MARINER.particulars["speed"], np.radians(0.05)
+    for rudder in (side, -side):
+        turn = MARINER.simulate(np.full((1500, 1), neutral.rudder + rudder), 1.0, neutral.state(MARINER))
+        turns.append((turn["v"][-1], turn["r"][-1]))
+    sway, rate = np.subtract(*turns)
+    gains = pilot.gains
+    order = 2.0 * side * (1.0 - gains["rudder"]) - gains["yaw_rate"] * rate - gains["sway"] * sway
+    behind = order / gains["heading_error"] / rate * speed - sway / rate
+    assert own_lead(MARINER, pilot) == pytest.approx(behind / length + 0.25, abs=1e-3)
 
 
 def test_it_is_a_controller_and_a_file(tmp_path):

@@ -6,8 +6,14 @@ import numpy as np
 import pytest
 
 from identification import Samples, identify
+from identification.estimators.lssvm import LSSVM, TruncatedLSSVM
 from identification.estimators.methods import fit_all, get_method
-from identification.uncertainty.bootstrap import bootstrap_covariance, influence_covariance, moving_blocks
+from identification.uncertainty.bootstrap import (
+    _rows_in,
+    bootstrap_covariance,
+    influence_covariance,
+    moving_blocks,
+)
 from identification.uncertainty.covariance import joint_covariance
 from shipgym import InputError, ShipModel, Trial
 
@@ -63,6 +69,33 @@ def test_blocks_keep_to_their_trial_and_to_their_order() -> None:
     assert set(rows[:10]) <= set(range(10))
     np.testing.assert_array_equal(np.diff(rows[:10].reshape(-1)[:4]), 1)
     np.testing.assert_array_equal(rows[10:], np.arange(10, 17))
+
+
+def test_a_block_holds_the_rows_of_its_time() -> None:
+    assert _rows_in(10.0, np.arange(0.0, 100.0, 0.4)) == 25
+    assert _rows_in(10.0, np.array([0.0, 2.0])) == 5
+    assert _rows_in(1.0, np.array([0.0, 4.0, 8.0])) == 1  # at least one
+    assert _rows_in(10.0, np.array([3.0])) == _rows_in(10.0, np.zeros(3)) == 1
+
+
+@pytest.mark.parametrize("method", ["ridge", "tls-svm", "svr"])
+def test_svms_are_fitted_again_with_the_rank_they_had_and_others_take_a_linear_step(method: str) -> None:
+    rng = np.random.default_rng(3)
+    X = rng.standard_normal((40, 3)) * [1.0, 0.3, 0.01] @ rng.standard_normal((3, 3))
+    y = X @ [1.0, 2.0, -1.0] + 0.5 * rng.standard_normal(40)
+    t = np.arange(40.0)
+    samples = Samples({"u": X}, {"u": y}, t, np.ones(40), np.zeros(40, dtype=np.int64), 1)
+    fitted = fit_all(get_method(method).estimator, samples)["u"]
+    again = LSSVM(C=1e6, fit_intercept=False, scale=False)
+    if method == "tls-svm":
+        again = TruncatedLSSVM(rank=fitted.rank_, fit_intercept=False)
+    found, errors, rng = [], y - X @ fitted.coef_, np.random.default_rng(5)
+    for _ in range(6):
+        rows = moving_blocks([np.arange(40)], [4], rng)
+        step = fitted.inverse_moment_ @ X[rows].T @ errors[rows]
+        found.append(step if method == "svr" else again.fit(X[rows], y[rows]).coef_)
+    drawn = bootstrap_covariance({"u": fitted}, samples, 4.0, draws=6, seed=5)
+    np.testing.assert_allclose(drawn, np.cov(np.array(found).T), rtol=1e-9)
 
 
 def test_influences_of_white_noise_add_up_as_variances_do() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from certainty import case
 from identification import IdentificationResult, Samples, identify
 from identification.estimators.methods import METHODS, fit_all, get_method
 from identification.estimators.rm_svm import RMSVM
+from identification.pipeline import _left_out
 from identification.regression.grey_box import chosen_box
 from identification.uncertainty.model_error import DEFAULT, scale_of, without_trial
 from identification.validation.closed_loop import closed_loop
@@ -41,6 +43,23 @@ def test_leaving_a_trial_out_of_the_normal_equations_is_a_fit_without_it(method:
     anew = fit_all(get_method("ls").estimator if method == "ls" else METHODS[method].estimator, rest)
     np.testing.assert_allclose(found["r"].coef_, anew["r"].coef_, rtol=1e-4)
     assert len(rest) == 40
+
+
+def test_what_a_trial_moved_a_refinement_by_is_taken_back_as_from_a_mean(mariner: ShipModel) -> None:
+    """Coefficients that are means over trials: without one they are the means over the others, exactly."""
+    own = np.random.default_rng(0).uniform(-1.0, 1.0, (4, len(mariner.coefficients)))
+    inertia, covariance = np.diag(np.linspace(1.0, 2.0, own.shape[1])), np.eye(own.shape[1])
+    mean = own.mean(axis=0)
+    influences = [np.outer([0.25, 0.75], (one - mean) / 4.0 @ inertia) for one in own]  # of two stretches
+    problem = SimpleNamespace(used=(None,) * 4, blank=SimpleNamespace(acceleration_matrix=inertia))
+    refined = SimpleNamespace(covariance=covariance, influences=influences)
+    found = _left_out(SimpleNamespace(model=mariner.with_coefficients(mean)), problem, refined, covariance)
+    for k, model in enumerate(found):
+        expected = np.delete(own, k, axis=0).mean(axis=0)
+        np.testing.assert_allclose(list(model.coefficients.values()), expected)
+        np.testing.assert_allclose(model.covariance, 4.0 / 3.0 * covariance)
+    problem.used = (None,) * 2  # nothing is learned from leaving out one of two
+    assert _left_out(SimpleNamespace(model=mariner), problem, refined, covariance) == []
 
 
 def test_the_factor_is_that_at_which_errors_with_their_noise_are_of_size_one() -> None:

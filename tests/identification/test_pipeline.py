@@ -10,8 +10,10 @@ import pytest
 import shipgym
 from identification import LSSVM, ArtificialBeeColony, IdentificationResult, identify
 from identification.options import Options, name_of, provenance_settings
+from identification.regression.problem import _at_constant_speed, _shaft_speed, _ship
 from shipgym import InputError, ShipModel, SteeringGear, Trial
 from shipgym.manoeuvres import turning_circle, turning_indices, zigzag, zigzag_indices
+from shipgym.ships import get_structure
 from shipgym.ships.simulate import open_loop
 
 
@@ -207,6 +209,53 @@ def test_wrong_arguments_are_named(
 ) -> None:
     with pytest.raises(InputError, match=message):
         identify([cao_zigzag], **{"particulars": mariner.particulars, **arguments})
+
+
+def begun(name: str, **starts: float) -> Trial:
+    """A trial that begins with some speeds, and goes on with others."""
+    t = np.arange(9.0)
+    return Trial(t, {channel: start + t for channel, start in starts.items()}, name=name)
+
+
+def test_service_speeds_that_are_not_given_are_the_median_of_those_at_the_start() -> None:
+    nomoto, surge, abkowitz = (get_structure(name) for name in ("nomoto", "surge", "abkowitz"))
+    trials = [
+        begun("a", u=6.0, v=8.0, n=1.0),
+        begun("b", u=3.0, v=-4.0, n=3.0),
+        begun("c", u=1.0, v=0.0, n=2.0),
+    ]
+    ship = _ship({"length": 7.0}, trials, nomoto)
+    assert (ship.speed, ship.estimated, ship.mass) == (5.0, {"speed"}, None)
+    assert _ship({"length": 7.0, "speed": 4.0}, trials, nomoto).speed == 4.0
+    sizes = {"length": 7.0, "beam": 1.27, "draught": 0.455, "block_coefficient": 0.81}
+    assert {"speed", "mass"} <= _ship(sizes, trials, abkowitz).estimated  # of forces by the mass, too
+    assert _shaft_speed(None, trials, surge) == 2.0
+    assert (_shaft_speed(3.5, trials, surge), _shaft_speed(3.5, trials, nomoto)) == (3.5, 0.0)
+    slow = [begun("slow", u=0.05, v=0.0, n=0.05)]
+    assert (_ship({"length": 0.5}, slow, nomoto).speed, _shaft_speed(None, slow, surge)) == (0.05, 0.05)
+    assert _shaft_speed(0.05, trials, surge) == 0.05
+    rest = [begun("rest", u=0.0, v=0.0, n=0.0)]
+    with pytest.raises(
+        InputError, match=r"trial 'rest': starts at rest, expected way .* service speed in the"
+    ):
+        _ship({"length": 7.0}, rest, nomoto)
+    with pytest.raises(
+        InputError, match=r"'rest': starts with a shaft speed of 0 1/s, .* give service_shaft"
+    ):
+        _shaft_speed(None, rest, surge)
+    with pytest.raises(InputError, match="service_shaft_speed: 0 found, expected a number > 0"):
+        _shaft_speed(0.0, trials, surge)
+
+
+def test_a_trial_of_heading_and_rudder_alone_is_one_at_service_speed_for_a_form_of_the_yaw_rate() -> None:
+    turn, moving = begun("a", r=0.0, delta=0.0), begun("b", r=0.0, delta=0.0, u=5.0)
+    nomoto, steering, speed = get_structure("nomoto"), get_structure("linear-steering"), {"speed": 4.0}
+    constant = _at_constant_speed(turn, nomoto, speed)
+    assert (set(constant["u"]), set(constant["v"])) == ({4.0}, {0.0})
+    for trial, table, ship in (
+        (moving, nomoto, speed), (turn, steering, speed), (turn, nomoto, {}), (turn, nomoto, None),
+    ):  # fmt: skip
+        assert _at_constant_speed(trial, table, ship) is trial
 
 
 def test_no_trial_to_fit_and_two_of_one_name_are_refused(cao_zigzag: Trial, mariner: ShipModel) -> None:

@@ -14,11 +14,20 @@ import pytest
 from llvmlite.binding import get_host_cpu_features
 
 import shipgym
-from shipgym.engine import mathematics, specialise
+from shipgym.engine import compiling, mathematics, specialise
 from shipgym.engine.compiling import explanation
 from shipgym.engine.loops import LOOPS, ship_loop
 from shipgym.engine.parts import Part
-from shipgym.engine.record_code import loader
+from shipgym.engine.record_code import (
+    bounded_storer,
+    chooser,
+    loader,
+    number_storer,
+    row_reader,
+    storer,
+    summer,
+    zero,
+)
 from shipgym.engine.records import Layout, table_of
 from shipgym.engine.specialise import fingerprint
 from shipgym.sea.open_sea import sea_parts
@@ -178,3 +187,55 @@ def test_a_table_in_a_record_is_the_lane_s_column_of_its_tile():
     assert depth == 64 * 4 + 5
     assert shares[:3].tolist() == [64 * 5 + 5, 64 * 6 + 5, 64 * 7 + 5]
     assert loader(rows, 1).function(np.arange(8.0), 5).shares.tolist() == [5.0, 6.0, 7.0]
+
+
+class Fix(NamedTuple):
+    north: float
+    east: float
+
+
+class Anchor(NamedTuple):
+    chain: float
+    place: Fix
+
+
+def moved(given, out):
+    """A loop: what lane 5 of a tile holds is stored elsewhere in several ways; the parts are its globals."""
+    record = load(given, 5)  # noqa: F821
+    one = load_one(given, 5)  # noqa: F821
+    store(out, 7, record)  # noqa: F821
+    store_one(out, 9, choose(record.chain > 1.0, one, record))  # noqa: F821
+    store_bounded(out, 11, record, one)  # noqa: F821
+    store_number(out, 13, total(choose(record.chain > 9.0, one, record)))  # noqa: F821
+    store(out, 15, none())  # noqa: F821
+    store_number(out, 17, row_of(load_table(given, 5).shares, 1))  # noqa: F821
+
+
+moved.__module__ = "shipgym"  # in a user's function names are the user's
+
+
+@pytest.mark.parametrize("jit", [True, False], ids=["compiled", "plain"])
+def test_records_are_read_and_stored_where_their_rows_are(jit, monkeypatch):
+    """The rows of the tile are 2, 3 and 4, those of the vector 0 and 1: it has no chain, which is 0 then."""
+    rows = Layout(before=Fix, found=Anchor)["found"]
+    single = Layout(found=(Anchor, ("place.north", "place.east")))["found"]
+    table = Layout(found=Sounding)["found"]
+    bounds = {"chain": (-9.0, 9.0), "place.north": (-9.0, 15.0), "place.east": (-6.0, 9.0)}
+    parts = {
+        "load": loader(rows), "load_one": loader(single, 1), "store": storer(rows),
+        "store_one": storer(single, 1), "store_bounded": bounded_storer(rows, bounds),
+        "store_number": number_storer(3), "choose": chooser(Anchor), "none": zero(Anchor),
+        "total": summer(Anchor), "row_of": row_reader(), "load_table": loader(table),
+    }  # fmt: skip
+    monkeypatch.setattr(compiling, "plain_python", lambda: not jit)
+    given, out = np.zeros(5 * 64), np.full(5 * 64, np.nan)
+    given[[2 * 64 + 5, 3 * 64 + 5, 4 * 64 + 5]] = 2.0, 3.0, -4.0
+    given[[0, 1]] = 10.0, 2.0  # north and east in the vector
+    compiling.compiled(moved, "void(float64[::1], float64[::1])", parts, "records")(given, out)
+    found = {int(k): float(out[k]) for k in np.flatnonzero(np.isfinite(out))}
+    tile = {2: 2.0, 3: 3.0, 4: -4.0}
+    expected = {64 * row + 7: value for row, value in tile.items()}
+    expected |= {0: 10.0, 1: 2.0}  # as the vector had it
+    expected |= {2 * 64 + 11: 0.0, 3 * 64 + 11: 15.0, 4 * 64 + 11: -6.0}  # products within their bounds
+    expected |= {3 * 64 + 13: 1.0, 2 * 64 + 15: 0.0, 3 * 64 + 15: 0.0, 4 * 64 + 15: 0.0}
+    assert found == expected | {3 * 64 + 17: 2.0}  # of a table in rows 1 to 3 the second

@@ -59,6 +59,7 @@ def test_conformance_without_a_warning(check):
         env = make().unwrapped
         check(env)
     assert env.spec.id == ID
+    assert (env.waypoints, env.corridor, env.turn_radius) == (None, None, None)  # it has no path
 
 
 def test_registered_by_import_for_worker_processes():

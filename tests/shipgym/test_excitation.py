@@ -87,6 +87,8 @@ def test_sequences_go_by_the_time_to_travel_a_ship_length(tanker):
     shortest, longest = held(shaft, "n_command").min(), held(shaft, "n_command").max()
     assert (shortest, longest) == (pytest.approx(5.0, abs=0.3), pytest.approx(15.0, abs=0.3))
     assert np.all(shaft["delta_command"] == 0.0)
+    asked = {"shortest_s": 0.5 * travel, "longest_s": 4.0 * travel}
+    assert steps.sha256 == random_rudder_steps(tanker, **asked, **times).sha256
 
 
 def test_the_multi_sine_of_least_crest_is_taken(tanker):
@@ -97,6 +99,17 @@ def test_the_multi_sine_of_least_crest_is_taken(tanker):
     ]
     crests = [np.abs(wave).max() / wave.std() for wave in waves]
     assert max(crests) < 2.6
+
+
+def test_the_multi_sine_is_of_the_least_crest_of_32_draws(tanker):
+    """Of 10 to 30 periods in 300 s; the seed is one whose 30th to 32nd is the least, and a later one less."""
+    phases = np.random.default_rng(139).uniform(0.0, 2.0 * np.pi, (40, 21))
+    angles = 2.0 * np.pi * np.outer(np.arange(10, 31), np.arange(300) / 300.0)
+    waves = np.cos(phases[:, :, None] + angles).sum(axis=1)
+    crests = np.abs(waves).max(axis=1) / waves.std(axis=1)
+    found = multi_sine_rudder(tanker, 5.0, 139, 30.0, 10.0, duration=300.0, dt=1.0)["delta_command"][:-1]
+    assert crests[:29].min() > crests[:32].min() > crests[32:35].min()
+    assert np.abs(found).max() / found.std() == pytest.approx(crests[:32].min())
 
 
 @pytest.mark.parametrize("name", ["container", "kvlcc2"])

@@ -131,6 +131,23 @@ def test_a_model_without_straight_course_is_refused_by_name():
         straight_running(with_coefficients(N_0=0.01))
 
 
+def test_a_straight_course_has_less_than_20_deg_of_rudder_and_sway_of_half_the_speed():
+    """Of two linear equations, one for each: sway over all of the speed = -Y_0 / Y_v, rudder = -N_0 / N_d."""
+
+    def running(sway, rudder):  # sway over surge
+        none = dict.fromkeys(MARINER.coefficients, 0.0) | {"Y_v": -0.01, "N_d": 0.002, "N_r": -0.002}
+        found = with_coefficients(**none | {"Y_0": 0.01 * sway / np.hypot(1.0, sway), "N_0": -0.002 * rudder})
+        return straight_running(found)
+
+    for side in (1.0, -1.0):
+        sway, rudder = side * 0.49, side * np.radians(19.9)
+        assert running(sway, 0.0).sway == pytest.approx(sway * SPEED)
+        assert running(0.0, rudder).rudder == pytest.approx(rudder)
+        for beyond in ((1.04 * sway, 0.0), (0.0, 1.01 * rudder)):
+            with pytest.raises(InputError, match="no straight course found with less than 20 deg"):
+                running(*beyond)
+
+
 @pytest.mark.parametrize("degrees", [-20.0, 10.0, 30.0])
 def test_rudder_of_a_steady_turn_is_that_which_turns_her_so(degrees):
     commands = np.tile(MARINER.service_command, (4000, 1))

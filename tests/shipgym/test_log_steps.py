@@ -1,6 +1,7 @@
 """The steps from a log to a trial, each by itself: what it makes of numbers, and what it refuses."""
 
 import math
+import os
 from pathlib import Path
 
 import numpy as np
@@ -469,6 +470,7 @@ def test_a_frame_has_columns_and_values(monkeypatch):
     assert (table.header, table.place(1)) == (("u", "v"), "row 6")
     assert table.numbers("u").tolist() == [1.0, 2.0]
     np.testing.assert_array_equal(table.numbers("v"), [3.0, NAN])
+    assert list(from_frame(frame).lines) == [0, 1]
     assert from_frame(frame.set_index(pd.Index([0.0, 0.5], name="t"))).header == ("t", "u", "v")
     assert table.column("u").dtype == float
     assert from_frame(pd.DataFrame({"n": [1, 2]})).numbers("n").dtype == float
@@ -490,6 +492,10 @@ def test_of_a_matlab_file_numeric_vectors_of_the_commonest_length_are_read(tmp_p
     table = read_log(tmp_path / "log.mat")
     assert table.header == ("u", "n")
     assert (table.numbers("u").tolist(), table.numbers("n").tolist()) == ([0.5, 1.0, 1.5], [1.0, 2.0, 3.0])
+    assert list(table.lines) == [1, 2, 3]
+    for kind in "bBhHiIqQfd":
+        savemat(tmp_path / "log.mat", {"u": np.array([1, 2, 100], kind)})
+        assert read_log(tmp_path / "log.mat").numbers("u").tolist() == [1.0, 2.0, 100.0]
 
 
 def test_a_compressed_matlab_file_is_unpacked_within_bounds(tmp_path, monkeypatch):
@@ -504,6 +510,41 @@ def test_a_compressed_matlab_file_is_unpacked_within_bounds(tmp_path, monkeypatc
         path.write_bytes(head)
         with pytest.raises(InputError, match=r"MATLAB 7.3 \(HDF5\) found, expected an older format"):
             read_log(path)
+
+
+def test_sheets_and_parquet_files_are_refused_by_the_values_that_they_would_unpack_to(tmp_path, monkeypatch):
+    """Three rows of two columns are 8 cells with their names; 1000 rows of two columns 16 000 bytes."""
+    pd.DataFrame({"u": [1.0, 2.0, 3.0], "v": 0.0}).to_excel(tmp_path / "log.xlsx", index=False)
+    pd.DataFrame({"u": np.ones(1000), "v": np.ones(1000)}).to_parquet(tmp_path / "log.parquet")
+    for name, limit, most in (("xlsx", "MOST_CELLS", 8), ("parquet", "LARGEST_UNPACKED", 16_000)):
+        monkeypatch.setattr(tables, limit, most)
+        table = read_log(tmp_path / f"log.{name}")
+        assert (table.header, table.lines[0]) == (("u", "v"), 2 if name == "xlsx" else 1)
+        assert table.numbers("u")[0] == 1.0
+        monkeypatch.setattr(tables, limit, most - 1)
+        with pytest.raises(InputError, match=f"{most - 1} (cells found, expected fewer|bytes unpacked)"):
+            read_log(tmp_path / f"log.{name}")
+        monkeypatch.undo()
+
+
+def test_the_limits_of_a_log_are_those_of_the_page(tmp_path):
+    """docs/ship_file.md: 32 MiB, Parquet 64 MiB; unpacked 256 MiB, 5,000,000 values."""
+    for ending, most in (("xlsx", 32), ("mat", 32), ("parquet", 64)):
+        path = tmp_path / f"log.{ending}"
+        path.write_text("MATLAB 7.3")
+        os.truncate(path, most * 2**20)
+        with pytest.raises(InputError, match=rf"log\.{ending}: (cannot be read|MATLAB 7.3)"):
+            read_log(path)
+        os.truncate(path, most * 2**20 + 1)
+        with pytest.raises(InputError, match=f"{most * 2**20 + 1} bytes found, expected a "):
+            read_log(path)
+    tables._check_unpacked(path, 256 * 2**20)
+    with pytest.raises(InputError, match="over 268435456 bytes unpacked, expected less"):
+        tables._check_unpacked(path, 256 * 2**20 + 1)
+    values = np.zeros(5_000_001)
+    assert len(from_frame(pd.DataFrame({"u": values[1:]})).lines) == 5_000_000
+    with pytest.raises(InputError, match="5000001 rows found, expected a table of at most 5000000 values"):
+        from_frame(pd.DataFrame({"u": values}))
 
 
 @pytest.mark.parametrize(

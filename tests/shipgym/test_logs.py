@@ -315,6 +315,18 @@ def test_a_wind_of_no_unit_is_left_out(tmp_path):
     assert Trial.from_csv(path).channels.keys() == before.channels.keys()
 
 
+@pytest.mark.parametrize(("unit", "metres"), [("M", 1.0), ("N", 1852.0 / 3600.0), ("K", 1.0 / 3.6)])
+def test_a_wind_is_told_in_metres_per_second_knots_or_kilometres_per_hour(unit, metres, tmp_path):
+    clocks = [f"GPGGA,00000{k},5741.0000,N,01144.0000,E,1,08,1.0,20.0,M,,M,," for k in range(3)]
+    wind = f"WIMWV,030.0,T,10.0,{unit},A"
+    lines = [sentence(text) for clock in clocks for text in (clock, "HEHDT,20.0,T", wind)]
+    (tmp_path / "log.nmea").write_text("\n".join(lines))
+    table = read_log(tmp_path / "log.nmea")
+    found = {name: table.numbers(name) for name in ("wind_speed", "wind_from")}
+    assert found["wind_speed"][np.isfinite(found["wind_speed"])] == pytest.approx(10.0 * metres)
+    assert np.degrees(found["wind_from"][np.isfinite(found["wind_from"])]) == pytest.approx(50.0)
+
+
 def test_a_log_without_dates_goes_on_at_midnight(tmp_path):
     texts = ("235958", "235959", "000000", "000001", "000002")
     lines = [
@@ -324,6 +336,25 @@ def test_a_log_without_dates_goes_on_at_midnight(tmp_path):
     ]
     (tmp_path / "log.nmea").write_text("\n".join(lines))
     assert np.ptp(read_log(tmp_path / "log.nmea").numbers("t")) == 4.0
+
+
+@pytest.mark.parametrize(
+    ("fields", "true_deg"),
+    [
+        ("10.0,2.0,E,3.0,E", 15.0),
+        ("10.0,2.0,W,3.5,W", 4.5),
+        ("10.0,2.0,W,3.0,E", 11.0),
+        ("10.0,,,3.0,E", 13.0),
+        ("10.0,2.0,,3.0,E", 13.0),  # to which side is not told
+        ("10.0,,W,3.0,E", 13.0),
+    ],
+)
+def test_deviation_and_variation_to_the_east_are_added_to_a_compass(fields, true_deg, tmp_path):
+    clocks = [f"GPGGA,00000{k},5741.0000,N,01144.0000,E,1,08,1.0,20.0,M,,M,," for k in range(3)]
+    lines = [sentence(text) for clock in clocks for text in (clock, f"HCHDG,{fields}")]
+    (tmp_path / "log.nmea").write_text("\n".join(lines))
+    found = np.degrees(read_log(tmp_path / "log.nmea").numbers("psi"))
+    assert found[np.isfinite(found)] == pytest.approx(true_deg)
 
 
 @pytest.mark.skipif(not DATA.is_dir(), reason="the real log lies beside the checkout and is absent here")

@@ -129,6 +129,8 @@ def test_way_and_course_go_on_evenly_through_turns():
 
 def test_two_turns_are_seen_ahead():
     env = sail(waypoints=HOOK)[2]
+    assert env.waypoints.tolist() == HOOK.tolist()
+    assert (env.turn_radius, env.corridor) == (pytest.approx(RADIUS), pytest.approx(LENGTH))
     (seen, info), over, checked = env.reset(seed=0), False, set()
     tangent, arc = RADIUS * np.tan(np.pi / 8.0), RADIUS * np.pi / 4.0
     first = 1500.0 - tangent

@@ -8,9 +8,12 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from scipy.interpolate import make_interp_spline
+from scipy.optimize import brentq
 
 from shipgym.errors import InputError
 from shipgym.trials import plausibility
+from shipgym.trials.derivatives import time_derivative
 from shipgym.trials.navigation import rotate_to_body
 from shipgym.trials.trial import Trial
 from shipgym.trials.units import QUANTITIES, UNITS, si_factor
@@ -331,6 +334,37 @@ def test_a_noisy_heading_gives_a_yaw_rate_that_is_better_than_differences(tmp_pa
     error = np.sqrt(np.mean((trial["r"] - channels["r"]) ** 2))
     differences = np.sqrt(np.mean((np.gradient(noisy, T) - channels["r"]) ** 2))
     assert error < 0.2 * differences
+
+
+def quintic(values, spacing):
+    """Least squares with a knot at every so many samples: the slope at them, and the noise that is left."""
+    s = np.arange(float(values.size))
+    knots = s[np.arange(spacing, s.size - spacing, spacing)]
+    above = np.clip((s[:, None] - knots) / s.size, 0.0, None)
+    terms = np.column_stack([*((s / s.size) ** k for k in range(6)), above**5])
+    slopes = np.column_stack(
+        [np.zeros(s.size), *(k * (s / s.size) ** (k - 1) for k in range(1, 6)), 5 * above**4]
+    )
+    weights = np.linalg.lstsq(terms, values, rcond=None)[0]
+    noise = np.linalg.norm(values - terms @ weights) / (s.size - terms.shape[1])
+    return slopes @ weights / s.size, noise
+
+
+def test_noise_grows_by_less_than_the_power_of_eight_tenths_of_the_distance_of_knots():
+    """Between knots at every second and every third of 24 samples; with fewer samples nothing is smoothed."""
+    t, noise = np.arange(24.0), np.random.default_rng(0).standard_normal(24)
+
+    def growth(motion):
+        values = noise + motion * np.sin(1.2 * t)
+        return math.log(quintic(values, 3)[1] / quintic(values, 2)[1]) / math.log(1.5)
+
+    for power, smoothed in ((0.78, True), (0.82, False)):
+        values = noise + brentq(lambda motion, at=power: growth(motion) - at, 0.0, 5.0) * np.sin(1.2 * t)
+        through_all = make_interp_spline(t, values).derivative()(t)
+        expected = quintic(values, 3)[0] if smoothed else through_all
+        np.testing.assert_allclose(time_derivative(0.5 * t, values), 2.0 * expected, rtol=1e-6)
+    through_all = make_interp_spline(t[:-1], noise[:-1]).derivative()(t[:-1])
+    np.testing.assert_allclose(time_derivative(t[:-1], noise[:-1]), through_all)
 
 
 def test_heading_from_the_start_follows_from_the_yaw_rate_where_no_position_is_known(tmp_path):

@@ -73,9 +73,9 @@ def test_speed_and_breadth_count_within_the_formulas_range_only():
     fast, faster = (np.sqrt(GRAVITY * S175.length) * froude for froude in (0.4, 0.6))
     assert added_resistance(0.5, 0.3, S175, fast) == added_resistance(0.5, 0.3, S175, faster)
     assert added_resistance(0.5, 0.3, S175, 0.95 * fast) != added_resistance(0.5, 0.3, S175, fast)
-    deep, deeper = (replace(S175, draught=S175.beam / ratio) for ratio in (2.0, 1.6))
-    long = 0.25  # rad/s: waves too long to be reflected
-    assert added_resistance(long, 0.3, deep, 8.0) == added_resistance(long, 0.3, deeper, 8.0)
+    ships = (replace(S175, draught=S175.beam / ratio) for ratio in (1.6, 1.99, 2.0, 2.01))
+    deepest, deeper, deep, less = (added_resistance(0.25, 0.3, ship, 8.0) for ship in ships)
+    assert deepest == deeper == deep != less  # in waves too long to be reflected, 0.25 rad/s
 
 
 def test_short_waves_are_resisted_by_reflection_as_in_model_tests():

@@ -34,6 +34,10 @@ def test_blendermanns_resistances_stand_ahead_abeam_and_astern():
     assert at(curves, 90)[1] == pytest.approx(-row.CD_t * 2700.0)
     assert at(curves, 90)[2] == pytest.approx(row.CD_t * 2700.0 * 4.0)  # lever of the centroid
     assert at(curves, 90)[3] == pytest.approx(-row.kappa * row.CD_t * 2700.0 * 9.0)
+    loaded = wind_curves(S175, "blendermann-cargo-loaded").X / 600.0
+    row = BLENDERMANN["cargo-loaded"]
+    assert row.CD_l_bow != row.CD_l_stern
+    assert (loaded[0], loaded[len(loaded) // 2]) == pytest.approx((-row.CD_l_bow, row.CD_l_stern))
 
 
 def test_blendermann_at_30_degrees_worked_by_hand():
@@ -61,6 +65,11 @@ def test_isherwood_worked_by_hand():
     house = 0.15 * 0.07 * 175.0**2
     CY_130 = 1.014 + 0.191 * 2.0 * frontal / beam**2 - 0.280 * perimeter / length - 0.69 * 94.0 / length
     assert at(curves, 130)[1] == pytest.approx(-(CY_130 + 0.44 * house / lateral) * lateral)
+    low = replace(S175, lateral_area=300.0)  # of which a house of 322 m2 cannot be more than nine tenths
+    given = 180.0, 25.4, 300.0, 600.0, 180.0 + 600.0 / 180.0 + 24.5, 94.0, 2.0, 270.0
+    assert at(wind_curves(low, "isherwood"), 130)[1] == pytest.approx(
+        -isherwood_coefficients(*given)[1][13] * 300.0
+    )
 
 
 def test_isherwoods_superstructure_is_felt_on_the_quarter_only():
@@ -106,7 +115,7 @@ def test_wind_pushes_to_lee_and_its_mirror_image_the_other_way(coefficients):
 @pytest.mark.parametrize("ship", [S175, KVLCC2])
 def test_eight_harmonics_stay_near_the_curve(coefficients, ship):
     curves = wind_curves(ship, coefficients)
-    series = curves.harmonics(8)
+    series = curves.harmonics()
     assert [len(row) for row in series] == [9, 8, 8, 8]
     allowed = 0.09 if coefficients == "isherwood" else 0.015
     for name in "XYNK":
@@ -166,6 +175,12 @@ def test_a_table_of_ones_own_is_followed():
     assert at(curves, 45) == pytest.approx(
         (-0.3 * 600, -0.4 * 2700, -0.025 * 2700 * 180, -0.6 * 2700 * 2700 / 180)
     )
+    np.testing.assert_array_equal(wind_curves(S175, replace(table, CK=None)).K, 0.0)
+
+
+def test_coefficients_that_are_not_known_are_refused():
+    with pytest.raises(InputError, match="wind coefficients: 'isherwod' found, expected a WindTable or"):
+        wind_curves(S175, "isherwod")
 
 
 def test_wind_needs_proportions():
