@@ -162,7 +162,7 @@ def drawn(script: str) -> Iterator[str]:
 
 
 def flat(content: Any, path: str) -> Iterator[str]:
-    """Lines of nested data: a path and its value each, of a row of numbers the length, a few, and the mean."""
+    """Lines of nested data: a path and its value each, of a row of numbers the length, some and the mean."""
     if isinstance(content, dict) and "bdata" in content:
         content = np.frombuffer(base64.b64decode(content["bdata"]), content["dtype"]).tolist()
     if isinstance(content, dict):
