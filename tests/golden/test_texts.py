@@ -50,8 +50,10 @@ def test_the_text_of_a_page_has_its_rows_and_what_is_drawn():
         '{"height":300},{"responsive":true});</script>'
     )
     assert texts.page_text(page).splitlines() == [
-        "<class=good> It passes", "| a | 1.5", "figure plot-one",
-        "data[0].x 7 of 7: 0.000 1.000 3.000 4.000 60.000 mean 10.714",
-        "data[0].y 1 of 1: 1.5000 mean 1.5000",
-        "layout.height 300",
-    ]  # fmt: skip
+        "<class=good> It passes",
+        "| a | 1.5",
+        "figure: plot-one",
+        "data[0].x: 7 of 7, 0.000 1.000 3.000 4.000 60.000, mean 10.714",
+        "data[0].y: 1 of 1, 1.5000, mean 1.5000",
+        "layout: height 300",
+    ]
