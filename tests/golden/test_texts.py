@@ -37,6 +37,8 @@ def test_a_text_that_is_not_the_golden_one_is_told_with_its_lines(tmp_path, monk
     monkeypatch.setattr(texts, "TEXTS", tmp_path)
     monkeypatch.setenv(texts.VARIABLE, "write")
     assert texts.same_text("one", "a 1.0\nb 2.0")
+    with pytest.raises(AssertionError, match="-a 1"):
+        texts.same_text("one", "another of the same name")
     monkeypatch.delenv(texts.VARIABLE)
     with pytest.raises(AssertionError, match=r"-b 2\.0\n\+b 3\.0"):
         texts.same_text("one", "a 1.0\nb 3.0")

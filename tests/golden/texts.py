@@ -24,6 +24,7 @@ import shipgym
 
 TEXTS = Path(__file__).parent / "results" / "texts"
 VARIABLE = "SHIPGYM_GOLDEN"
+WRITTEN: set[str] = set()  # names, each once: a second text of one name has to be the same
 
 RELATIVE = 1e-3
 NUMBER = re.compile(r"(?<![A-Za-z_\d.])[-−]?\d+(?:\.\d+)?(?:[eE][-+]?\d+)?(?![A-Za-z_\d])")  # noqa: RUF001
@@ -51,8 +52,9 @@ def same_text(name: str, text: str, *masks: str) -> bool:
 
     `masks` are regular expressions of what differs from run to run, such as durations.
     """
-    path, found = TEXTS / f"{name}.txt", masked(text, *masks)
-    if os.environ.get(VARIABLE) == "write":
+    path, found = TEXTS / f"{re.sub('[^A-Za-z0-9/]+', '-', name)}.txt", masked(text, *masks)
+    if os.environ.get(VARIABLE) == "write" and name not in WRITTEN:
+        WRITTEN.add(name)
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(found, encoding="utf-8")
     golden = path.read_text(encoding="utf-8")
