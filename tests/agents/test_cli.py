@@ -369,6 +369,11 @@ def test_what_cannot_be_read_or_written_is_one_line(error, code, said, monkeypat
     assert told == (f"error: {said}" if said else "")
 
 
+def test_doctor_has_a_mark_for_each_state():
+    told = [doctor.Finding(f"what is {state}", state, "and why").line().plain for state in doctor.MARKS]
+    assert same_text("doctor", "\n".join(told))
+
+
 def test_doctor_names_what_is_missing_and_packages_of_one_name(monkeypatch):
     found = doctor._installed("numpy", ["numpy", "scipy"], "wrong", "shipgym")
     assert (found.what, found.state) == ("numpy", "fine")

@@ -1,8 +1,8 @@
 """Golden texts: what commands print, messages say and pages show, kept in results/texts.
 
-`SHIPGYM_GOLDEN=write python -m pytest TESTS` writes them anew. Words are compared exactly, numbers to a
-thousandth or one unit of their last printed decimal; spaces and ends of lines too, where all numbers are as
-long as they were and nothing was taken out.
+`SHIPGYM_GOLDEN=write python -m pytest TESTS` writes them anew. Words and whole numbers are compared exactly,
+others to a thousandth or one unit of their last printed decimal; spaces and ends of lines too, where all
+numbers are as long as they were and nothing was taken out.
 """
 
 from __future__ import annotations
@@ -96,12 +96,13 @@ def parted(text: str) -> tuple[list[str], list[str]]:
 
 
 def close(golden: str, found: str) -> bool:
-    """Whether two printed numbers are the same but for rounding; whole ones to a thousandth."""
+    """Whether two printed numbers are the same but for rounding; whole ones have to be the same."""
     a, b = (float(one.replace("\N{MINUS SIGN}", "-")) for one in (golden, found))
     mantissa, _, exponent = golden.lower().partition("e")
     decimals = len(mantissa.partition(".")[2])
-    unit = 10.0 ** (int(exponent or 0) - decimals) if decimals or exponent else 0.0
-    return abs(a - b) <= max(RELATIVE * abs(a), 1.001 * unit)
+    if not decimals and not exponent:
+        return a == b
+    return abs(a - b) <= max(RELATIVE * abs(a), 1.001 * 10.0 ** (int(exponent or 0) - decimals))
 
 
 def page_text(page: str) -> str:
@@ -195,8 +196,10 @@ def _row(numbers: list[float | None]) -> str:
     known = row[np.isfinite(row)]
     places = np.linspace(0, len(row) - 1, min(len(row), THINNED)).astype(int)
     largest = float(np.abs(known).max(initial=0.0))
-    shown = [_rounded(one, largest) for one in [*row[places], known.mean() if len(known) else np.nan]]
-    return f"{len(row)} of {len(known)}, {' '.join(shown[:-1])}, mean {shown[-1]}"
+    whole = all(isinstance(one, int) for one in numbers)
+    shown = [str(numbers[place]) if whole else _rounded(row[place], largest) for place in places]
+    mean = _rounded(known.mean() if len(known) else np.nan, largest)
+    return f"{len(row)} of {len(known)}, {' '.join(shown)}, mean {mean}"
 
 
 def _word(value: Any) -> str:
