@@ -21,6 +21,7 @@ from agents.suites.suite import load_suite
 from shipgym import load_model
 from shipgym.errors import InputError
 from tests.agents.policies import random_policy
+from tests.golden.texts import same_text
 
 TASKS = ["mariner-calm"]
 N = 4
@@ -292,6 +293,7 @@ def test_a_result_that_was_touched_up_is_found_out(copy):
     assert (told["passed"], told["difference"]) == (False, checks["lq"].difference)
     answer = shipgym("--verify", copy, "--workers", 1)
     assert answer.exit_code == 1
+    assert same_text("verify", answer.stdout + answer.stderr)
     assert "1 of 2 differ: lq on mariner-calm" in answer.stderr
 
 
@@ -485,6 +487,7 @@ def test_the_command_ranks_and_writes(tmp_path):
         "--out", tmp_path / "r", "--no-page",
     )  # fmt: skip
     assert answer.exit_code == 0, answer.stderr
+    assert same_text("benchmark", answer.stdout + answer.stderr, r"(?m)(?<=  )\d+\.\d\d$")  # us by action
     assert "1 tasks of 2 episodes" in answer.stdout
     assert "for a quick look, not for a ranking" in answer.stderr
     assert load_results(tmp_path / "r").ranking == ["pid"]

@@ -20,6 +20,7 @@ from agents.cli.warm import _jobs, _names
 from agents.training.plan import Given
 from agents.training.run_folder import CHECKPOINT
 from shipgym import InputError, load_model
+from tests.golden.texts import same_page, same_text
 
 ROOT = Path(__file__).parents[2]
 
@@ -81,6 +82,20 @@ def test_every_command_has_json_and_quiet_and_an_example_that_it_takes(name):
     assert command.epilog in " ".join(shipgym(name, "--help").stdout.split())
 
 
+ABOUT = ("metavar", "default", "min", "max", "required", "nargs", "multiple", "hidden", "help")
+
+
+def test_commands_take_the_golden_options():
+    """Their names, defaults, bounds and help."""
+    told = []
+    for name, command in commands().items():
+        told.append(f"{name}: {command.help}\n{command.epilog}")
+        for one in command.params:
+            about = {name: getattr(one, name, None) for name in ABOUT}
+            told.append(" ".join([*one.opts, *one.secondary_opts, *map(str, about.values())]))
+    assert same_text("commands", "\n".join(told))
+
+
 @pytest.mark.parametrize(
     "words",
     [
@@ -137,6 +152,7 @@ def test_identify_writes_model_and_metrics(demo, tmp_path):
     assert "N_vvr" in answer.stdout
     assert "zigzag_15_15.csv" in answer.stdout
     assert "estimated, not given in the ship file: N_rdot" in answer.stderr
+    assert same_text("identify", answer.stdout + answer.stderr)
     names = ["metrics.json", "model.json", "report.html", "settings.json"]
     assert sorted(path.name for path in (tmp_path / "ship").iterdir()) == names
     assert load_model(tmp_path / "ship" / "model.json").coefficients["N_d"] > 0.0
@@ -234,6 +250,8 @@ def test_trials_writes_figures_that_work_offline(tmp_path):
     ):  # fmt: skip
         assert caption in page
     assert 'src="http' not in page
+    assert same_page("trials page", page)
+    assert same_text("trials", answer.stdout + answer.stderr)
 
 
 @pytest.mark.parametrize("model", ["marinr", "no_such.json"])
@@ -358,6 +376,11 @@ def test_what_cannot_be_read_or_written_is_one_line(error, code, said, monkeypat
     assert closed == ([1] if code == 1 else [])
     told = capsys.readouterr().err.replace("\n", "")
     assert told == (f"error: {said}" if said else "")
+
+
+def test_doctor_has_a_mark_for_each_state():
+    told = [doctor.Finding(f"what is {state}", state, "and why").line().plain for state in doctor.MARKS]
+    assert same_text("doctor", "\n".join(told))
 
 
 def test_doctor_names_what_is_missing_and_packages_of_one_name(monkeypatch):

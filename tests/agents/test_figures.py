@@ -1,5 +1,6 @@
 """Figures of the pages draw the numbers that they are given."""
 
+import json
 from types import SimpleNamespace
 
 import numpy as np
@@ -10,6 +11,7 @@ from agents.verification import figures
 from agents.verification.index_uncertainty import ManoeuvreUncertainty
 from shipgym import Trial
 from shipgym.manoeuvres import Criterion, IndexInterval
+from tests.golden.texts import flat, same_text
 
 
 def traces(figure, name):
@@ -21,6 +23,10 @@ def only(figure, name):
     return trace
 
 
+def same_figure(name, figure):
+    return same_text(f"figures/{name}", "\n".join(flat(json.loads(figure.to_json()), "figure")))
+
+
 def test_criteria_are_drawn_in_per_cent_of_their_limits():
     drawn = IndexInterval(3.6, np.array([3.6, 4.95, np.nan]), np.zeros(3, dtype=bool))
     figure = figures.criteria_figure(
@@ -29,6 +35,7 @@ def test_criteria_are_drawn_in_per_cent_of_their_limits():
             "stopping": Criterion(None, 15.0, None, "ship lengths", "5.3.4"),
         }
     )
+    assert same_figure("criteria", figure)
     first, second = traces(figure, "models drawn")
     np.testing.assert_allclose(first.x, [80.0, 110.0], rtol=1e-6)
     assert np.abs(np.array(first.y)).max() < 0.25
@@ -48,6 +55,7 @@ def test_tracks_are_drawn_east_to_the_right_in_ship_lengths_and_their_errors_alo
         cross_track=np.array([1.0, 2.0, 3.0]),
     )
     figure = figures.tracks_figure({"wheel-over": kept, "ilos": kept}, 100.0)
+    assert same_figure("tracks", figure)
     planned = only(figure, "waypoints")
     np.testing.assert_allclose((planned.x, planned.y), ([0.0, 4.0], [0.0, 3.0]))
     track, error = traces(figure, "ilos")
@@ -63,6 +71,7 @@ def test_manoeuvres_are_drawn_in_degrees_and_ship_lengths():
     paths = (np.stack([10.0 * t, 20.0 * t], axis=-1),)
     found = ManoeuvreUncertainty({}, np.zeros(21, dtype=bool), zigzag, headings, circle, paths)
     figure = figures.manoeuvres_figure(found, 50.0)
+    assert same_figure("manoeuvres", figure)
     np.testing.assert_allclose(only(figure, "rudder").y, -2.0 * t, rtol=1e-6)
     heading, track = traces(figure, "identified model")
     np.testing.assert_allclose(heading.y, t, rtol=1e-6)
@@ -78,6 +87,7 @@ def test_steps_and_costs_are_those_of_each_autopilot():
     t = np.arange(3.0)
     heading = np.radians([[0.0, 10.0, 20.0], [0.0, 12.0, 22.0], [0.0, 8.0, 18.0]])
     figure = figures.steps_figure(t, {"pid": (heading, -heading), "lq": (heading[:1], heading[:1])}, 20.0)
+    assert same_figure("steps", figure)
     above, below = [trace for trace in traces(figure, "pid") if trace.fill is None]
     np.testing.assert_allclose(above.y, [0.0, 10.0, 20.0], rtol=1e-6)
     np.testing.assert_allclose(below.y, [0.0, -10.0, -20.0], rtol=1e-6)
@@ -88,6 +98,7 @@ def test_steps_and_costs_are_those_of_each_autopilot():
     course = only(figure, "set course")
     assert (list(course.x), list(course.y)) == ([0.0, 2.0], [20.0, 20.0])
     boxes = figures.costs_figure({"pid": np.array([1.0, 2.0]), "lq": np.array([0.5])})
+    assert same_figure("costs over draws", boxes)
     assert [(box.name, list(box.x)) for box in boxes.data] == [("pid", [1.0, 2.0]), ("lq", [0.5])]
 
 
@@ -107,6 +118,7 @@ def result(**summary):
 
 def test_scores_are_drawn_with_their_intervals():
     figure = page_figures.scores_figure(result())
+    assert same_figure("scores", figure)
     assert [trace.name for trace in figure.data] == ["best-known", "pid"]
     pid = only(figure, "pid")
     assert (pid.x[0], pid.error_x.array[0], pid.error_x.arrayminus[0]) == (0.25, 0.25, 0.125)
@@ -131,6 +143,7 @@ def test_one_that_failed_stands_at_the_edge_and_does_not_flatten_the_scale():
 
 def test_costs_have_a_logarithmic_axis_where_they_differ_much():
     figure = page_figures.costs_figure(result(), "calm")
+    assert same_figure("costs of a task", figure)
     boxes = [(box.name, list(box.x)) for box in figure.data]
     assert boxes == [("best-known", [0.5, 25.0]), ("pid", [1.0, 2.0])]
     assert figure.layout.xaxis.type == "log"
@@ -146,6 +159,7 @@ def test_costs_have_a_logarithmic_axis_where_they_differ_much():
 def test_profiles_are_shares_in_per_cent_and_styles_differ():
     profile = {"thresholds": [0.0, 0.5, 1.0], "shares": {"pid": [1.0, 0.5, 0.25]}}
     figure = page_figures.profile_figure(profile, ["pid", "lq"])
+    assert same_figure("profile", figure)
     (curve,) = figure.data
     assert (curve.name, list(curve.x), list(curve.y)) == ("pid", [0.0, 0.5, 1.0], [100.0, 50.0, 25.0])
     names = ["best-known", *(f"c{k}" for k in range(2 * len(page_figures.COLOURS)))]
@@ -172,6 +186,7 @@ def episode(**changes):
 
 def test_tracks_are_drawn_with_the_corridor_beside_them():
     figure = page_figures.tracks_figure({"pid": episode()}, ["pid"])
+    assert same_figure("tracks in a corridor", figure)
     track = only(figure, "pid")
     assert len(track.x) == page_figures.SAMPLES + 1
     assert (track.x[0], track.x[-1], track.y[0], track.y[-1]) == (0.0, 50.0, 0.0, 100.0)
@@ -189,11 +204,13 @@ def test_tracks_are_drawn_with_the_corridor_beside_them():
 
 def test_histories_are_cross_track_errors_or_headings_and_rudders():
     figure = page_figures.histories_figure({"pid": episode()}, ["pid"])
+    assert same_figure("histories of a path", figure)
     error, rudder = traces(figure, "pid")
     assert (error.x[-1], set(error.y)) == (500.0, {7.0})
     np.testing.assert_allclose(rudder.y, 5.0, rtol=1e-6)
     assert sorted(shape.y0 for shape in figure.layout.shapes) == [-20.0, 20.0]
     figure = page_figures.histories_figure({"pid": episode(waypoints=None)}, ["pid"])
+    assert same_figure("histories of a course", figure)
     heading, _ = traces(figure, "pid")
     assert (heading.y[0], heading.y[-1]) == pytest.approx(tuple(np.degrees([3.0, 3.3])))
     course = only(figure, "ordered course")

@@ -15,6 +15,7 @@ from identification.estimators.methods import METHODS
 from identification.validation import selection
 from shipgym import InputError, ShipFile, list_structures, load_model
 from shipgym.trials.identify_table import OPTIONS
+from tests.golden.texts import same_text
 
 #: Every option of [identify], set to something that is not its default, of a method that has it.
 SETTINGS = {
@@ -170,6 +171,7 @@ def test_options_of_the_command_line_reach_the_settings(ship, demo, tmp_path):
         "--prior", "kijima", "--prior-strength", "0.5", "--hold-out", held, "--set", "window=9",
     )  # fmt: skip
     assert answer.exit_code == 0, answer.stderr
+    assert same_text("identify with options", answer.stdout + answer.stderr)
     found = settings_of(tmp_path / "out")
     told = {"method": "ls-svm", "C": 1e4, "preprocessing": "savgol", "repair": True, "window": 9}
     told |= {"uncertainty": "bootstrap", "prior": "kijima", "prior_strength": 0.5}
@@ -223,6 +225,7 @@ def test_compare_ranks_methods_and_writes_their_models(demo, tmp_path):
     again = shipgym("identify", demo, "--out", tmp_path / "again", "--methods", "ls,tls-svm,rm-svm")
     rows = [line.split()[0] for line in again.stdout.splitlines() if " stable " in line]
     assert rows == [row["method"] for row in told["ranking"]]
+    assert same_text("compare", again.stdout + again.stderr)
     for name in names:
         assert (tmp_path / "out" / name).read_bytes() == (tmp_path / "again" / name).read_bytes()
 
@@ -251,6 +254,7 @@ def test_without_a_structure_it_is_auto_but_for_what_needs_a_table(ship, monkeyp
     assert answer.exit_code == 0, answer.stderr
     assert "Structures and methods by how they predict each trial in turn" in answer.stdout
     assert "mmg by map was not fitted: trial" in answer.stdout
+    assert same_text("identify auto", answer.stdout + answer.stderr)
     told = json.loads((tmp_path / "out" / "metrics.json").read_text())["selection"]
     assert told["ranking"][0]["structure"] == load_model(tmp_path / "out" / "model.json").structure
     assert "No structure was named" in (tmp_path / "out" / "report.html").read_text()
@@ -309,6 +313,7 @@ def test_advise_tells_information_and_what_to_run_next(demo):
     assert information["zigzag_35_30_port.csv"] > information["zigzag_10_10.csv"] > 0.0
     table = shipgym("advise", demo, "--coefficient", "N_vvv", "--number", "1").stdout
     assert f"run next: {told['run_next'][0]}" in table
+    assert same_text("advise", table)
     assert shipgym("advise", demo, "--coefficient", "N_vv").exit_code == 2
 
 
@@ -318,6 +323,7 @@ def test_reduce_writes_the_smaller_model_and_its_path(ship, tmp_path):
     assert answer.exit_code == 0, answer.stderr
     told = json.loads((tmp_path / "out" / "reduction.json").read_text())
     assert f"{told['terms']['reduced']} of {told['terms']['full']} coefficients left" in answer.stdout
+    assert same_text("reduce", answer.stdout + answer.stderr)
     assert len(load_model(tmp_path / "out" / "model.json").coefficients) == told["terms"]["reduced"]
     assert (tmp_path / "out" / "report.html").exists()
     assert shipgym("reduce", path, "--out", tmp_path / "x", "--direction", "sideways").exit_code == 2

@@ -3,11 +3,13 @@ import re
 from dataclasses import replace
 from html.parser import HTMLParser
 from importlib.resources import files
+from pathlib import Path
 
 import numpy as np
 import pytest
 from jinja2 import UndefinedError
 
+from agents.cli import _print_result
 from agents.cli.standard_trials import StandardTrials
 from agents.cli.trials_page import _readable, write_page
 from agents.verification.figures import band, translucent
@@ -17,6 +19,8 @@ from shipgym.manoeuvres import IndexInterval, standard_manoeuvres
 from shipgym.pages import environment, fixed, number, percent
 from shipgym.plots import graph_objects
 from tests.agents.browser import COMMAND, Browser
+from tests.agents.conftest import DRAWS
+from tests.golden.texts import same_page, same_text
 
 PARTS = '{% import "shipgym.pages/parts.html" as parts with context %}'
 HOSTILE = "</script><script>alert(1)</script>\"'&{{ 7 * 7 }}"
@@ -108,6 +112,17 @@ def test_the_report_tells_what_the_metrics_hold(chain, page):
     for trial in chain[1].trials:
         assert trial.name in text
     assert "estimated" in text
+
+
+def test_the_report_is_the_golden_one(source):
+    """Its words, tables, and what its figures draw."""
+    assert same_page("report", source)
+
+
+def test_the_chain_prints_its_golden_tables(chain, capsys):
+    _print_result(chain[1], Path("report.html"), DRAWS)
+    shown = capsys.readouterr()
+    assert same_text("autopilot", shown.out + shown.err)
 
 
 def test_every_figure_has_a_caption_and_a_place(source):

@@ -4,7 +4,7 @@ from dataclasses import fields
 
 import pytest
 
-from agents.suites.suite import load_suite
+from agents.suites.suite import ENVIRONMENTS, load_suite
 from agents.training.plan import (
     Given,
     Plan,
@@ -27,6 +27,7 @@ from agents.training.settings import (
     read_settings_file,
 )
 from shipgym import InputError
+from tests.golden.texts import flat, same_text
 
 FREE = {"base": "none", "authority": 1.0}
 #: The least and the largest value that is allowed, and the nearest that is not.
@@ -118,6 +119,20 @@ def test_a_value_comes_from_the_nearest_table():
         del table["gamma"]
         with pytest.raises(InputError, match=f"settings of {algorithm}: field 'gamma' is missing"):
             make_settings(algorithm, table)
+
+
+@pytest.mark.parametrize("algorithm", ALGORITHMS)
+def test_tuned_settings_are_the_golden_ones(algorithm):
+    """From nothing, beside a base in each environment, and what differs from these in tasks of the suites."""
+    usual = {name: load_settings(algorithm, name).to_dict() for name in ENVIRONMENTS}
+    own = {}
+    for suite in ("shipgym-v1", "shipgym-v2"):
+        for task in load_suite(suite).tasks:
+            found = load_settings(algorithm, task.environment, task.name).to_dict()
+            as_usual = usual[task.environment]
+            own[task.name] = {name: value for name, value in found.items() if value != as_usual[name]}
+    told = {"from nothing": load_settings(algorithm, given=FREE).to_dict(), **usual, **own}
+    assert same_text(f"settings/{algorithm}", "\n".join(flat(told, "")))
 
 
 def test_settings_of_the_command_line_and_of_files(tmp_path):

@@ -13,6 +13,7 @@ from agents.cli import benchmark_tables, terminal
 from identification import progress
 from shipgym.manoeuvres import Criterion, IndexInterval
 from shipgym.pages.numbers import counted, degrees, fixed, number, percent
+from tests.golden.texts import same_text
 
 
 @pytest.mark.parametrize(
@@ -46,9 +47,11 @@ def test_decimals_shares_and_counts_of_pages():
 
 
 def lines(table):
-    """A table as text, without the spaces at the ends of lines."""
+    """A table as text, without the spaces at the ends of lines; the golden one of its title."""
     file = StringIO()
     Console(file=file, width=200, color_system=None).print(table)
+    size = f"{table.row_count} by {len(table.columns)}"
+    assert same_text(f"tables/{table.title.lower().replace('/', '-')} {size}", file.getvalue())
     return [line.rstrip() for line in file.getvalue().splitlines()]
 
 

@@ -17,10 +17,12 @@ from agents.cli import app
 from agents.controllers.designs import design_base
 from agents.rollouts.rollout import episode_costs
 from agents.training import training
-from agents.training.algorithms import make_agent, make_ships, set_deviation
+from agents.training.algorithms import make_agent, make_ships, sb3_arguments, set_deviation
 from agents.training.plan import EVALUATION_SEED, Given, make_plan, training_options
+from agents.training.settings import ALGORITHMS, load_settings
 from agents.training.training import train
 from shipgym.errors import InputError
+from tests.golden.texts import flat, same_text
 
 OFF_POLICY = {
     "base": "none",
@@ -110,6 +112,10 @@ def test_the_file_is_the_policy_of_the_lowest_cost_held_out(tmp_path):
     seeds = EVALUATION_SEED + np.arange(10)
     costs = episode_costs(load_agent(tmp_path / "run" / "agent.json"), plan.task.engine(10), seeds)
     assert costs.mean() == result.best_cost == min(row["cost"] for row in result.curve)
+    record = load_agent(tmp_path / "run" / "agent.json").training
+    learned_from = ("cost", "curve", "versions")  # which differ from computer to computer
+    told = {name: value for name, value in record.items() if name not in learned_from}
+    assert same_text("record of a training", "\n".join(flat(told, "")))
     progress = json.loads((tmp_path / "run" / "progress.json").read_text())
     assert progress["best_cost"] == result.best_cost
     assert progress["lq_cost"] == result.lq_cost
@@ -157,6 +163,17 @@ def test_agents_of_the_second_suite_learn_over_drawn_models_and_never_see_the_sh
 def test_the_learning_rate_falls_to_nothing_and_no_lower():
     agent = make_agent(tiny("ppo", schedule="linear"), None)
     assert agent.lr_schedule(-0.1) == 0.0 < agent.lr_schedule(0.1)
+
+
+def test_what_the_algorithms_are_given_is_as_golden():
+    """All keywords for two commands, the class of the activation by name, the rate at a third of the way."""
+    told = {}
+    for name in ALGORITHMS:
+        found = sb3_arguments(load_settings(name, given={"schedule": "linear"}), (2,))
+        found["learning_rate"] = found["learning_rate"](2.0 / 3.0)
+        found["policy_kwargs"]["activation_fn"] = found["policy_kwargs"]["activation_fn"].__name__
+        told[name] = found
+    assert same_text("arguments of the algorithms", "\n".join(flat(told, "")))
 
 
 def test_agents_have_the_settings():

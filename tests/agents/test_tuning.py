@@ -8,6 +8,7 @@ import pytest
 from typer.testing import CliRunner
 
 from agents.cli import app
+from agents.cli.tuning import _print_result
 from agents.engines.jobs import JobEngine
 from agents.training import tuning
 from agents.training.plan import Given, make_plan
@@ -24,6 +25,7 @@ from agents.training.tuning import (
     with_parameters,
 )
 from shipgym.errors import InputError
+from tests.golden.texts import flat, same_text
 
 optuna = pytest.importorskip("optuna", reason="optuna is not installed")
 
@@ -115,6 +117,33 @@ def test_settings_that_are_given_are_not_varied(trainings, tmp_path):
     )
     assert {trial.settings["gamma"] for trial in found.trials} == {0.9}
     assert not any("minibatches" in trial.parameters for trial in found.trials)
+
+
+@pytest.mark.parametrize("algorithm", ALGORITHMS)
+def test_what_is_varied_is_as_golden(algorithm):
+    """The ranges, and the settings of their middle."""
+    space = search_space(algorithm)
+    middle = {
+        name: one.choices[len(one.choices) // 2]
+        if isinstance(one, optuna.distributions.CategoricalDistribution)
+        else type(one.low)((one.low + one.high) / 2)
+        for name, one in space.items()
+    }
+    found = with_parameters(load_settings(algorithm), middle).to_dict()
+    told = [f"{name}: {one}" for name, one in space.items()] + list(flat(found, "settings"))
+    assert same_text(f"varied/{algorithm}", "\n".join(told))
+
+
+def test_trials_are_told_the_best_first(tmp_path, capsys):
+    varied = {"learning_rate": 0.00123456, "n_epochs": 7}
+    trials = (
+        Trial(0, {}, {}, 9.87654, ((100, 10.0),), "finished"),
+        Trial(1, varied, {}, None, (), "stopped early"),
+        Trial(2, varied | {"activation": "tanh"}, {}, 5.4321, ((100, 5.4321),), "finished"),
+        Trial(3, varied, {}, None, (), "diverged"),
+    )
+    _print_result(Tuning(trials, trials[2]), tmp_path)
+    assert same_text("tune", capsys.readouterr().out)
 
 
 @pytest.mark.parametrize("algorithm", ALGORITHMS)

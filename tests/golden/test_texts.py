@@ -13,6 +13,7 @@ from tests.golden import texts
         ("cost 1234.5", "cost 1235.6", True),
         ("cost 1234.5", "cost 1236.0", False),
         ("5 trials", "6 trials", False),
+        ("seed 900009", "seed 900010", False),
         ("a tls-svm of 3", "a tls-svm of -3", False),
         ("2.5e-03", "2.6e-03", True),
         ("2.5e-03", "2.7e-03", False),
@@ -37,6 +38,8 @@ def test_a_text_that_is_not_the_golden_one_is_told_with_its_lines(tmp_path, monk
     monkeypatch.setattr(texts, "TEXTS", tmp_path)
     monkeypatch.setenv(texts.VARIABLE, "write")
     assert texts.same_text("one", "a 1.0\nb 2.0")
+    with pytest.raises(AssertionError, match="-a 1"):
+        texts.same_text("one", "another of the same name")
     monkeypatch.delenv(texts.VARIABLE)
     with pytest.raises(AssertionError, match=r"-b 2\.0\n\+b 3\.0"):
         texts.same_text("one", "a 1.0\nb 3.0")
@@ -50,7 +53,10 @@ def test_the_text_of_a_page_has_its_rows_and_what_is_drawn():
         '{"height":300},{"responsive":true});</script>'
     )
     assert texts.page_text(page).splitlines() == [
-        "<class=good> It passes", "| a | 1.5", "figure plot-one",
-        "data[0].x 7 of 7: 0.000 1.000 3.000 4.000 60.000 mean 10.714", "data[0].y 1 of 1: 1.5000 mean 1.5000",
-        "layout.height 300",
-    ]  # fmt: skip
+        "<class=good> It passes",
+        "| a | 1.5",
+        "figure: plot-one",
+        "data[0].x: 7 of 7, 0 1 3 4 60, mean 10.714",
+        "data[0].y: 1 of 1, 1.5000, mean 1.5000",
+        "layout: height 300",
+    ]

@@ -1,8 +1,8 @@
 """Golden texts: what commands print, messages say and pages show, kept in results/texts.
 
-`SHIPGYM_GOLDEN=write python -m pytest TESTS` writes them anew. Words are compared exactly, numbers to a
-thousandth or one unit of their last printed decimal; spaces and ends of lines too, where all numbers are as
-long as they were and nothing was taken out.
+`SHIPGYM_GOLDEN=write python -m pytest TESTS` writes them anew. Words and whole numbers are compared exactly,
+others to a thousandth or one unit of their last printed decimal; spaces and ends of lines too, where all
+numbers are as long as they were and nothing was taken out.
 """
 
 from __future__ import annotations
@@ -24,6 +24,7 @@ import shipgym
 
 TEXTS = Path(__file__).parent / "results" / "texts"
 VARIABLE = "SHIPGYM_GOLDEN"
+WRITTEN: set[str] = set()  # names, each once: a second text of one name has to be the same
 
 RELATIVE = 1e-3
 NUMBER = re.compile(r"(?<![A-Za-z_\d.])[-−]?\d+(?:\.\d+)?(?:[eE][-+]?\d+)?(?![A-Za-z_\d])")  # noqa: RUF001
@@ -38,6 +39,7 @@ MASKS = {
 
 THINNED = 5  # of the numbers of a row that a page draws, the first and the last among them
 DIGITS = 5  # of the largest of a row
+LONGEST = 200  # characters of a text among data
 BLOCKS = {
     "button", "caption", "div", "figcaption", "figure", "h1", "h2", "h3", "h4", "header", "li", "option", "p",
     "section", "title", "tr",
@@ -50,8 +52,9 @@ def same_text(name: str, text: str, *masks: str) -> bool:
 
     `masks` are regular expressions of what differs from run to run, such as durations.
     """
-    path, found = TEXTS / f"{name}.txt", masked(text, *masks)
-    if os.environ.get(VARIABLE) == "write":
+    path, found = TEXTS / f"{re.sub('[^A-Za-z0-9/]+', '-', name)}.txt", masked(text, *masks)
+    if os.environ.get(VARIABLE) == "write" and name not in WRITTEN:
+        WRITTEN.add(name)
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(found, encoding="utf-8")
     golden = path.read_text(encoding="utf-8")
@@ -93,12 +96,13 @@ def parted(text: str) -> tuple[list[str], list[str]]:
 
 
 def close(golden: str, found: str) -> bool:
-    """Whether two printed numbers are the same but for rounding; whole ones to a thousandth."""
+    """Whether two printed numbers are the same but for rounding; whole ones have to be the same."""
     a, b = (float(one.replace("\N{MINUS SIGN}", "-")) for one in (golden, found))
     mantissa, _, exponent = golden.lower().partition("e")
     decimals = len(mantissa.partition(".")[2])
-    unit = 10.0 ** (int(exponent or 0) - decimals) if decimals or exponent else 0.0
-    return abs(a - b) <= max(RELATIVE * abs(a), 1.001 * unit)
+    if not decimals and not exponent:
+        return a == b
+    return abs(a - b) <= max(RELATIVE * abs(a), 1.001 * 10.0 ** (int(exponent or 0) - decimals))
 
 
 def page_text(page: str) -> str:
@@ -138,7 +142,9 @@ class _Shown(HTMLParser):
             self.line += data.split()
         elif self.code == "script":
             self._end_line()
-            self.lines += drawn(data)
+            for line in drawn(data):
+                if "layout" not in line or line not in self.lines:  # most of it all figures share
+                    self.lines.append(line)
 
     def _end_line(self) -> None:
         if self.line:
@@ -158,37 +164,51 @@ def drawn(script: str) -> Iterator[str]:
     elif script[:1] in "[{":
         yield from flat(json.loads(script), "data")
     elif re.fullmatch(r"[\w+/=]{40,}", script):
-        yield from flat(json.loads(gzip.decompress(base64.b64decode(script))), "packed")
+        text = gzip.decompress(base64.b64decode(script)).decode()
+        yield from flat(json.loads(text), "packed") if text[:1] in "[{" else ()
 
 
 def flat(content: Any, path: str) -> Iterator[str]:
-    """Lines of nested data: a path and its value each, of a row of numbers the length, a few, and the mean."""
+    """Lines of nested data: words and single numbers of a table in one, rows of numbers in one each."""
     if isinstance(content, dict) and "bdata" in content:
         content = np.frombuffer(base64.b64decode(content["bdata"]), content["dtype"]).tolist()
     if isinstance(content, dict):
+        single = {key: _word(value) for key, value in content.items() if not isinstance(value, dict | list)}
+        if single:
+            yield f"{path}: {', '.join(f'{key} {value}' for key, value in single.items())}"
         for key, value in content.items():
-            yield from flat(value, f"{path}.{key}")
+            if key not in single:
+                yield from flat(value, f"{path}.{key}" if path else str(key))
     elif (
         isinstance(content, list) and content and all(isinstance(one, int | float | None) for one in content)
     ):
-        row = np.array([np.nan if one is None else one for one in content], dtype=float)
-        known = row[np.isfinite(row)]
-        places = np.linspace(0, len(row) - 1, min(len(row), THINNED)).astype(int)
-        largest = float(np.abs(known).max(initial=0.0))
-        shown = [_rounded(one, largest) for one in [*row[places], known.mean() if len(known) else np.nan]]
-        yield f"{path} {len(row)} of {len(known)}: {' '.join(shown[:-1])} mean {shown[-1]}"
+        yield f"{path}: {_row(content)}"
     elif isinstance(content, list):
         for k, value in enumerate(content):
             yield from flat(value, f"{path}[{k}]")
-    elif isinstance(content, float):
-        yield f"{path} {_rounded(content, abs(content))}"
     else:
-        yield f"{path} {content}"
+        yield f"{path}: {_word(content)}"
+
+
+def _row(numbers: list[float | None]) -> str:
+    """How many numbers a row has and how many are known, some of them, and the mean."""
+    row = np.array([np.nan if one is None else one for one in numbers], dtype=float)
+    known = row[np.isfinite(row)]
+    places = np.linspace(0, len(row) - 1, min(len(row), THINNED)).astype(int)
+    largest = float(np.abs(known).max(initial=0.0))
+    whole = all(isinstance(one, int) for one in numbers)
+    shown = [str(numbers[place]) if whole else _rounded(row[place], largest) for place in places]
+    mean = _rounded(known.mean() if len(known) else np.nan, largest)
+    return f"{len(row)} of {len(known)}, {' '.join(shown)}, mean {mean}"
+
+
+def _word(value: Any) -> str:
+    return _rounded(value, abs(value)) if isinstance(value, float) else str(value)[:LONGEST]
 
 
 def _rounded(value: float, largest: float) -> str:
     """A number as one of a row has it whose largest has so many digits."""
     if not np.isfinite(value):
-        return "none"
-    decimals = DIGITS - 1 - int(np.floor(np.log10(largest))) if largest else 0
+        return str(value)
+    decimals = DIGITS - 1 - int(np.floor(np.log10(largest))) if 0.0 < largest < np.inf else 0
     return f"{round(value, decimals) + 0.0:.{max(decimals, 1)}f}"

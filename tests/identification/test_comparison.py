@@ -16,6 +16,7 @@ from identification.validation.comparison import COMPARISON_FILES
 from identification.validation.folds import held_out_rows
 from shipgym import InputError, ShipModel, Trial
 from shipgym.ships.structures import get_structure
+from tests.golden.texts import same_page
 
 
 @pytest.fixture(scope="module")
@@ -63,6 +64,11 @@ def test_it_is_written_with_every_model(comparison: Comparison, tmp_path: Path) 
     told = json.loads((tmp_path / "comparison.json").read_text())
     assert [row["method"] for row in told["ranking"]] == [s.method for s in comparison.standings]
     assert ShipModel.load(tmp_path / "model-ls.json").coefficients == comparison.results["ls"].coefficients
+
+
+def test_the_page_is_the_golden_one(comparison: Comparison) -> None:
+    """Ranking, errors by trial, refusals, settings that were left out, and what the figures draw."""
+    assert same_page("comparison", comparison_page(comparison))
 
 
 def test_no_name_or_message_becomes_html(comparison: Comparison) -> None:

@@ -24,6 +24,7 @@ from shipgym.ships.linear import nomoto
 from shipgym.ships.particulars import Particulars
 from shipgym.ships.scaling import scale_model
 from shipgym.ships.steering import SteeringGear
+from tests.golden.texts import same_page, same_text
 
 SHIP = Particulars(name="made up", length=7.0, speed=1.2)
 GEAR = SteeringGear(rudder_limit_deg=35.0, rudder_rate_deg_s=16.0, time_constant=0.0)
@@ -76,6 +77,11 @@ def fit(trials: list[Trial], **settings: Any) -> IdentificationResult:
 @pytest.fixture(scope="module")
 def corrected(trials: list[Trial], reference: ShipModel) -> IdentificationResult:
     return fit(trials, method="rm-svm", reference_model=reference, kernel_length=2.0, C=1e6)
+
+
+def test_the_report_of_a_kernel_ship_is_the_golden_one(corrected: IdentificationResult) -> None:
+    assert same_text("kernel summary", corrected.summary())
+    assert same_page("kernel", report_page(corrected))
 
 
 @pytest.fixture(scope="module")

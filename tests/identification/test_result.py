@@ -13,11 +13,13 @@ import pytest
 
 from identification import IdentificationResult, identify
 from identification.report.figures import rudder_at_windows
+from identification.report.page import report_page
 from identification.report.view import fit_view, short_names
 from identification.result import FILES
 from identification.validation.diagnostics import cross_correlation
 from shipgym import ShipFile, ShipModel, Trial
 from shipgym.ships.particulars import ADDED_MASSES
+from tests.golden.texts import same_page, same_text
 
 ROOT = Path(__file__).parents[2]
 SAVE = """
@@ -156,6 +158,11 @@ def test_cross_correlation_finds_the_delay() -> None:
     assert found.max() == pytest.approx(1.0, abs=0.01)
     assert np.abs(np.delete(found, 12)).max() < 4.0 / np.sqrt(4000)
     assert not cross_correlation(noise, np.ones(4000), lags).any()
+
+
+def test_the_report_and_the_summary_are_the_golden_ones(truncated: IdentificationResult) -> None:
+    assert same_page("identification", report_page(truncated))
+    assert same_text("identification summary", truncated.summary())
 
 
 def test_the_summary_prints_each_coefficient_with_its_error(truncated: IdentificationResult) -> None:

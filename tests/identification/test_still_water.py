@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -23,6 +24,7 @@ from shipgym.ships.simulate import open_loop
 from shipgym.trials.identify_table import Options
 from shipgym.trials.resampling import Log
 from shipgym.trials.trial_import import Conventions, to_project_conventions
+from tests.golden.texts import flat, same_text
 
 NORTH, EAST = 0.3, -0.4  # m/s
 CURRENT = Weather(Current(0.5, np.degrees(np.arctan2(EAST, NORTH))))
@@ -76,6 +78,8 @@ def test_a_current_is_found_and_taken_out(mariner: ShipModel, logs: list[Trial])
         "the water meanwhile",
     ]
     assert figure.layout.annotations[0].text.startswith("turn: 0.5")
+    drawn = list(flat(json.loads(figure.to_json()), "figure"))
+    assert same_text("current taken out", "\n".join([*sea_sentences(report), *drawn]))
     told = sea_sentences(report)[0]
     assert told.startswith("turn, zigzag, held out: current of 0.5")
     assert told.endswith("which differs from zero; removed")

@@ -21,6 +21,11 @@ from shipgym.plots import (
     turning_figure,
     zigzag_figure,
 )
+from tests.golden.texts import flat, same_text
+
+
+def same_figure(name, figure):
+    return same_text(f"plots/{name}", "\n".join(flat(json.loads(figure.to_json()), "figure")))
 
 
 def values(figure, axis, trace=0):
@@ -43,6 +48,7 @@ def test_angles_are_drawn_in_degrees_and_speeds_in_metres_per_second(circle):
 
 def test_measured_lines_are_dark_and_lines_share_one_entry_of_the_legend(circle):
     figure = history_figure({"measured": circle, "predicted": circle}, ["psi", "r", "u"])
+    assert same_figure("histories", figure)
     assert [trace.showlegend for trace in figure.data] == [True, True, False, False, False, False]
     assert {trace.line.color for trace in figure.data if trace.name == "measured"} == {"#1f2a37"}
 
@@ -58,7 +64,8 @@ def test_without_any_of_the_channels_there_is_no_figure(circle):
 
 
 def test_a_path_has_north_up_and_one_scale(circle):
-    figure = path_figure({"turn": circle})
+    figure = path_figure({"turn": circle, "measured": circle})
+    assert same_figure("paths", figure)
     assert values(figure, "x") == pytest.approx(circle["y"], abs=1e-3)
     assert values(figure, "y") == pytest.approx(circle["x"], abs=1e-3)
     assert figure.layout.yaxis.scaleanchor == "x"
@@ -73,6 +80,7 @@ def test_a_trial_without_position_has_no_path():
 def test_a_zigzag_is_drawn_as_the_change_of_heading_with_its_rudder():
     run = zigzag(load_model("mariner"), 20.0, 20.0, duration=200.0, dt=1.0)
     figure = zigzag_figure(run)
+    assert same_figure("zigzag", figure)
     assert values(figure, "y", 0)[0] == 0.0
     assert values(figure, "y", 1).max() == pytest.approx(20.0, abs=0.1)
 
@@ -91,6 +99,7 @@ def test_without_plotly_the_message_says_what_to_install(monkeypatch, circle):
 def test_a_turning_circle_is_drawn_with_its_indices():
     trial = turning_circle(load_model("mariner"), -35.0, dt=1.0)
     indices, figure = turning_indices(trial), turning_figure(trial)
+    assert same_figure("turning circle", figure)
     marks = {trace.name.rsplit(" ", 2)[0]: trace for trace in figure.data}
     assert np.ptp(np.asarray(marks["advance"].y, dtype=float)) == pytest.approx(indices.advance_lengths)
     assert np.ptp(np.asarray(marks["transfer"].x, dtype=float)) == pytest.approx(indices.transfer_lengths)
@@ -108,6 +117,7 @@ def test_the_loop_of_a_spiral_is_marked_where_it_is():
         trial, np.array([10, 1, -1, -10, 1, 5, 10.0]), np.array([1, 0.5, -0.5, -1, -0.7, 0.7, 1.0]), "direct"
     )
     assert [trace.name for trace in spiral_figure(spiral).data] == ["there", "and back"]
+    assert same_figure("spiral", spiral_figure(wide))
     loop = spiral_figure(wide).data[-1]
     assert loop.name == "loop, 3.00 deg wide"
     assert values(spiral_figure(wide), "x", 2) == pytest.approx([0.0, 3.0])
@@ -125,8 +135,11 @@ def test_every_manoeuvre_has_its_figure():
     }
     known = standard_manoeuvres(ship)
     for name, title in axes.items():
-        assert manoeuvre_figure(known[name].sail(ship)).layout.yaxis.title.text == title
+        figure = manoeuvre_figure(known[name].sail(ship))
+        assert figure.layout.yaxis.title.text == title
+        assert same_figure(f"tanker, {name}".replace("/", "-"), figure)
     excited = excitation_figure(prbs_rudder(ship, duration=200))
+    assert same_figure("excitation", excited)
     assert excited.layout.yaxis.title.text == "rudder order, deg"
 
 
