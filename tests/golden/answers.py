@@ -1,0 +1,94 @@
+"""What public functions answer, as plain numbers and words: results, and the messages of refusals."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import fields, is_dataclass
+from typing import Any
+
+import numpy as np
+
+import shipgym
+from shipgym.trials.trial import Trial
+from tests.golden.store import Floats, numbers_in
+
+REFUSED = (shipgym.InputError, shipgym.ManoeuvreError, shipgym.UnstableModelError)
+MOST = 20  # numbers of an array that are kept whole; of longer ones samples and two means are
+
+
+def plain(value: Any) -> Any:
+    """Nested tables and lists of numbers and words, of whatever a function returned or, asked now, answers."""
+    if value is None or isinstance(value, str | bool | int | float):
+        return value
+    if callable(value) and not isinstance(value, type):
+        return asked(value)
+    if isinstance(value, complex):
+        return [value.real, value.imag]
+    if isinstance(value, Trial):
+        facts = {
+            name: getattr(value, name) for name in ("name", "kind", "use", "length", "over_ground", "notes")
+        }
+        facts |= {"derived": sorted(value.derived), "repaired": dict(value.repaired)}
+        return plain({**{name: value[name] for name in ("t", *value.channels)}, **facts})
+    if isinstance(value, np.ndarray | np.generic):
+        return thinned(np.asarray(value))
+    if is_dataclass(value) and not isinstance(value, type):
+        return plain({one.name: getattr(value, one.name) for one in fields(value)})
+    if hasattr(value, "_asdict"):
+        return plain(value._asdict())
+    if isinstance(value, Mapping):
+        return {str(key): plain(one) for key, one in value.items()}
+    if isinstance(value, Iterable):
+        return [plain(one) for one in value]
+    return str(value)
+
+
+def thinned(values: np.ndarray[Any, Any]) -> list[Any]:
+    """The elements of an array; of a long one its size, two means, and samples."""
+    if values.dtype.kind not in "fiubc":
+        return [str(one) for one in values.reshape(-1)[:: max(values.size // MOST, 1)]]
+    flat = values.astype(np.complex128).reshape(-1)
+    flat = np.concatenate([flat.real, flat.imag]) if np.iscomplexobj(values) else flat.real
+    if flat.size <= MOST:
+        return list(map(float, flat))
+    known = flat[np.isfinite(flat)]
+    means = [known.mean(), np.sqrt(np.mean(known**2))] if known.size else []
+    samples = flat[np.linspace(0, flat.size - 1, MOST // 2).round().astype(int)]
+    return [float(flat.size), float(known.size), *map(float, means), *map(float, samples)]
+
+
+def asked(question: Callable[[], Any]) -> Any:
+    """The plain answer, or the message of a refusal."""
+    try:
+        return plain(question())
+    except REFUSED as error:
+        return f"{type(error).__name__}: {error}"
+
+
+def refused(question: Callable[[Any], Any], values: Iterable[Any]) -> list[int]:
+    """Of each value, tried around a limit, whether it is refused."""
+    found = []
+    for value in values:
+        try:
+            question(value)
+            found.append(0)
+        except REFUSED:
+            found.append(1)
+    return found
+
+
+def numbers(answers: Mapping[str, Any]) -> dict[str, Floats]:
+    """The numbers of answers, by their place."""
+    return numbers_in(answers)
+
+
+def words(answers: Any, place: str = "") -> list[str]:
+    """The words of answers, each with its place, in lines."""
+    if isinstance(answers, str):
+        return [f"{place}: {answers}"]
+    pairs: Iterable[tuple[Any, Any]] = ()
+    if isinstance(answers, Mapping):
+        pairs = answers.items()
+    elif isinstance(answers, list):
+        pairs = enumerate(answers)
+    return [line for key, one in pairs for line in words(one, f"{place}.{key}" if place else str(key))]

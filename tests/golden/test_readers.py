@@ -1,0 +1,14 @@
+"""Logs of every kind become the trials, and refusals have the words, that they once had."""
+
+import pytest
+
+from tests.golden import readers
+from tests.golden.answers import words
+from tests.golden.record import beyond_tolerance
+from tests.golden.texts import same_text
+
+
+@pytest.mark.parametrize("case", readers.cases())
+def test_logs_are_read_as_they_were(case):
+    assert beyond_tolerance("readers", case) == []
+    assert same_text(f"readers {case}", "\n".join(words(readers.answers(case))))
