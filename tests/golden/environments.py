@@ -35,7 +35,7 @@ class Case:
     Attributes
     ----------
     env : str
-        Its id without package and version.
+        Its id without the package, and without the version if that is the first.
     options : dict
         Its keywords.
     single : bool
@@ -63,7 +63,7 @@ class Case:
     @property
     def id(self) -> str:
         """Its id."""
-        return f"shipgym/{self.env}-v0"
+        return f"shipgym/{self.env}" if "-v" in self.env else f"shipgym/{self.env}-v0"
 
 
 def longer(name: str, stretch: float) -> Any:
@@ -133,14 +133,18 @@ def cases() -> dict[str, Case]:
 
 def record(name: str, steps: int | None = None) -> dict[str, Floats]:
     """The values of a case over some steps; by default over as many as can be compared."""
-    case = cases()[name]
+    return recorded_case(cases()[name], STEPS, EVERY, steps)
+
+
+def recorded_case(case: Case, longest: int, every: int, steps: int | None = None) -> dict[str, Floats]:
+    """The values of a case over some steps, by default over as many of the longest as can be compared."""
     if steps is None:
-        history = sailed(case, STEPS)
-        steps = comparable_steps(history, sailed(case, STEPS, STRETCH))
+        history = sailed(case, longest)
+        steps = comparable_steps(history, sailed(case, longest, STRETCH))
         history = {key: values[:steps] for key, values in history.items()}
     else:
         history = sailed(case, steps)
-    return {"steps": vector(steps)} | summary(history)
+    return {"steps": vector(steps)} | summary(history, every)
 
 
 def sailed(case: Case, steps: int, stretch: float = 0.0) -> dict[str, Floats]:
@@ -201,7 +205,7 @@ def told(shown: Any, names: list[str], env: Any) -> dict[str, Any]:
 
 def comparable_steps(history: Mapping[str, Floats], perturbed: Mapping[str, Floats]) -> int:
     """Steps until a difference has grown too large in anything that is double precision."""
-    steps = STEPS
+    steps = len(next(iter(history.values())))
     for name, values in history.items():
         if "seen " in name:
             continue
@@ -212,12 +216,12 @@ def comparable_steps(history: Mapping[str, Floats], perturbed: Mapping[str, Floa
     return steps
 
 
-def summary(history: Mapping[str, Floats]) -> dict[str, Floats]:
+def summary(history: Mapping[str, Floats], every: int) -> dict[str, Floats]:
     """Mean and root mean square of each row, and samples, each of another row than the one before."""
     found = {}
     for name, values in history.items():
         steps, rows = values.shape
-        when = np.arange(EVERY - 1, steps, EVERY)
+        when = np.arange(every - 1, steps, every)
         if not len(when):
             when = np.array([steps - 1])
         sums = [values.mean(axis=0), np.sqrt((values**2).mean(axis=0))]
