@@ -38,6 +38,8 @@ def plain(value: Any) -> Any:
         return plain(value._asdict())
     if isinstance(value, Mapping):
         return {str(key): plain(one) for key, one in value.items()}
+    if isinstance(value, set | frozenset):
+        return [plain(one) for one in sorted(value, key=str)]
     if isinstance(value, Iterable):
         return [plain(one) for one in value]
     return str(value)
