@@ -17,7 +17,7 @@ MOST = 20  # numbers of an array that are kept whole; of longer ones samples and
 
 
 def plain(value: Any) -> Any:
-    """Nested tables and lists of numbers and words, of whatever a function returned or, asked now, answers."""
+    """Nested tables and lists of numbers and words: of a result, or of what a function answers now."""
     if value is None or isinstance(value, str | bool | int | float):
         return value
     if callable(value) and not isinstance(value, type):

@@ -154,6 +154,8 @@ def log_csv() -> Answers:
     csv("rate.csv", {name: s[name] for name in ("t", "u", "r", "delta")}, digits=10)
     csv("holes.csv", own_names(psi=blank(psi % (2 * np.pi), 0, 1, 40, 41, 42, 120), u=blank(s["u"], 7, 480)))
     csv("semicolons.csv", {"t": s["t"], "u": [f"{one:.4f}".replace(".", ",") for one in s["u"]]}, ";")
+    north = {"t": s["t"], "lat": s["x"] / 110_574.0, "lon": s["y"] / 111_320.0, "psi": psi}
+    csv("equator.csv", north, digits=10)
     plain_columns = {name: name for name in ("t", "lat", "lon", "sog", "cog", "psi", "delta")}
     knots = {"sog": {"column": "sog", "unit": "kn"}, "cog": {"column": "cog", "unit": "deg"}}
     over_ground = {**g, "sog": g["sog"] / KNOT, "cog": g["cog"] / DEGREE}
@@ -173,6 +175,7 @@ def log_csv() -> Answers:
         "centre of gravity": lambda: read("cg.csv", origin="cg", xg=4.2),
         "position": lambda: read("position.csv"),
         "rate": lambda: read("rate.csv"),
+        "equator": lambda: read("equator.csv"),
         "holes": lambda: read("holes.csv", repair="interpolate"),
         "semicolons": lambda: read("semicolons.csv"),
         "over ground": lambda: read("gnss.csv", {**plain_columns, **knots}),
