@@ -2,17 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
-from dataclasses import fields, is_dataclass
+import tempfile
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import chdir, contextmanager
+from dataclasses import dataclass, fields, is_dataclass
+from functools import cache
 from typing import Any
 
 import numpy as np
 
 import shipgym
-from shipgym.trials.trial import Trial
+from shipgym.manoeuvres.standard import FAMILIES
+from shipgym.ships.structures import EQUATIONS, PRINTED, SHIPPED_EQUATIONS, STRUCTURES
+from shipgym.trials.trial import KINDS, Trial
 from tests.golden.store import Floats, numbers_in
 
 REFUSED = (shipgym.InputError, shipgym.ManoeuvreError, shipgym.UnstableModelError)
+SHIPPED_FAMILIES = ("zigzags", "circles", "spirals", "pull-outs", "stops")
+SHIPPED_KINDS = ("zigzag", "turning-circle", "spiral", "pull-out", "straight", "captive", "random")
 MOST = 20  # numbers of an array that are kept whole; of longer ones samples and two means are
 
 
@@ -79,11 +86,6 @@ def refused(question: Callable[[Any], Any], values: Iterable[Any]) -> list[int]:
     return found
 
 
-def numbers(answers: Mapping[str, Any]) -> dict[str, Floats]:
-    """The numbers of answers, by their place."""
-    return numbers_in(answers)
-
-
 def words(answers: Any, place: str = "") -> list[str]:
     """The words of answers, each with its place, in lines."""
     if isinstance(answers, str):
@@ -94,3 +96,47 @@ def words(answers: Any, place: str = "") -> list[str]:
     elif isinstance(answers, list):
         pairs = enumerate(answers)
     return [line for key, one in pairs for line in words(one, f"{place}.{key}" if place else str(key))]
+
+
+@contextmanager
+def as_shipped() -> Iterator[None]:
+    """An empty folder, and nothing registered but what is shipped, whatever was registered before."""
+    tables = (STRUCTURES, PRINTED), (EQUATIONS, SHIPPED_EQUATIONS), (FAMILIES, SHIPPED_FAMILIES)
+    before, kinds = [dict(table) for table, _ in tables], KINDS[:]
+    for table, shipped in tables:
+        for name in table.keys() - set(shipped):
+            del table[name]
+    KINDS[:] = SHIPPED_KINDS
+    with tempfile.TemporaryDirectory() as folder, chdir(folder):
+        try:
+            yield
+        finally:
+            KINDS[:] = kinds
+            for (table, _), whole in zip(tables, before, strict=True):
+                table.clear()
+                table.update(whole)
+
+
+@dataclass(frozen=True, eq=False)
+class Questions:
+    """A section whose cases ask many things at once: each function returns answers by name."""
+
+    functions: Mapping[str, Callable[[], Mapping[str, Any]]]
+
+    def cases(self) -> list[str]:
+        """Names of the cases."""
+        return list(self.functions)
+
+    @cache  # noqa: B019 - there are a few, which live as long as the program
+    def answers(self, case: str) -> Any:
+        """All answers of a case, asked once."""
+        with as_shipped():
+            return plain(self.functions[case]())
+
+    def record(self, case: str) -> dict[str, Floats]:
+        """The numbers of the answers."""
+        return numbers_in(self.answers(case))
+
+    def told(self, case: str) -> str:
+        """The words of the answers, in lines."""
+        return "\n".join(words(self.answers(case)))

@@ -5,9 +5,7 @@ from __future__ import annotations
 import copy
 import json
 import math
-import tempfile
 from collections.abc import Callable, Mapping
-from contextlib import chdir
 from dataclasses import replace
 from functools import cache, partial
 from pathlib import Path
@@ -45,9 +43,8 @@ from shipgym.ships.particulars import BOUNDS, Particulars, clarke_added_masses
 from shipgym.ships.ship_model import ShipModel
 from shipgym.ships.steering import SteeringGear
 from shipgym.trials.trial import Trial
-from tests.golden.answers import asked, numbers, plain, refused
+from tests.golden.answers import Questions, asked, plain, refused
 from tests.golden.ships import more_ships
-from tests.golden.store import Floats
 
 Answers = dict[str, Any]
 HULL = Particulars(
@@ -174,7 +171,14 @@ def tables() -> Answers:
         name: np.array([getattr(m, name) for m in at]) for name in ("u", "v", "r", "p", "phi", "delta", "n")
     }
     p = HULL.completed()
-    for name, table in structures.STRUCTURES.items():
+    formulas = {"u": "du, |n| u, n^2", "v": "v, r, n delta", "r": "v, |v| r, delta^3, dn"}
+    own = {
+        f"own {unit}": term_table.Structure(
+            "own", "own", {q: terms.read_terms(t) for q, t in (formulas | more).items()}, unit, "acceleration"
+        )
+        for unit, more in (("prime", {"p": "p, phi, n p"}), ("service", {"q": "r, delta, n r"}))
+    }
+    for name, table in (structures.STRUCTURES | own).items():
         shaft = 1.9 if "n" in table.command_names else 0.0
         values = dict(
             zip(table.coefficient_names, random.uniform(-1.0, 1.0, len(table.coefficient_names)), strict=True)
@@ -780,7 +784,7 @@ def simulated() -> Answers:
         "weather": lambda: other.simulate(rolled, 1.0, weather="rough", seed=4),
         "prime": lambda: simulate.simulate(ship, swing[:, None], 2.0, kind="random"),
         "tanker": lambda: model("tanker").simulate(
-            np.stack([swing, -0.9 + 0.0 * swing], axis=1), 3.0, water_depth=30.0
+            np.stack([swing, -0.9 + 0.0 * swing], axis=1), 2.0, water_depth=30.0
         ),
         "kvlcc2": lambda: model("kvlcc2").simulate(np.stack([swing, 1.7 + 0.0 * swing], axis=1), 3.0),
         "open loop": lambda: simulate.open_loop(
@@ -1184,35 +1188,20 @@ def without_facts(frame: Any) -> Any:
     return other
 
 
-QUESTIONS: dict[str, Callable[[], Answers]] = {
-    "reference ships": reference_ships,
-    "tables": tables,
-    "terms": terms_and_refusals,
-    "particulars": particulars,
-    "linear forms": linear_forms,
-    "masses and scales": masses_and_scales,
-    "towed": towed,
-    "simulated": simulated,
-    "files": files,
-    "kernels": kernels,
-    "checked": checked,
-    "own equations": own_equations,
-    "exchanged": exchanged,
-}
-
-
-def cases() -> list[str]:
-    """Names of the cases."""
-    return list(QUESTIONS)
-
-
-@cache
-def answers(case: str) -> Answers:
-    """All answers of a case, asked in an empty folder."""
-    with tempfile.TemporaryDirectory() as folder, chdir(folder):
-        return plain(QUESTIONS[case]())
-
-
-def record(case: str) -> dict[str, Floats]:
-    """The numbers of the answers."""
-    return numbers(answers(case))
+QUESTIONS = Questions(
+    {
+        "reference ships": reference_ships,
+        "tables": tables,
+        "terms": terms_and_refusals,
+        "particulars": particulars,
+        "linear forms": linear_forms,
+        "masses and scales": masses_and_scales,
+        "towed": towed,
+        "simulated": simulated,
+        "files": files,
+        "kernels": kernels,
+        "checked": checked,
+        "own equations": own_equations,
+        "exchanged": exchanged,
+    }
+)

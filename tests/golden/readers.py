@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import tempfile
 from collections.abc import Callable, Mapping
-from contextlib import chdir
 from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 from functools import cache, partial, reduce
@@ -38,7 +36,7 @@ from shipgym.trials.resampling import Log
 from shipgym.trials.scale import check_scale
 from shipgym.trials.ship_file import ShipFile
 from shipgym.trials.trial import Trial
-from tests.golden.answers import asked, numbers, plain, refused
+from tests.golden.answers import Questions, asked, plain, refused
 from tests.golden.store import Floats
 
 CORPUS = Path(__file__).parents[1] / "corpus"
@@ -249,6 +247,7 @@ def refusals() -> Answers:
     far = np.where(np.isin(np.arange(n), [20, 77]), g["lat"] + 0.2, g["lat"])
     tried("outlier", {"t": s["t"], "lat": far, "lon": g["lon"], "psi": psi})
     tried("outlier repaired", {"t": s["t"], "lat": far, "lon": g["lon"], "psi": psi}, repair="interpolate")
+    tried("beyond the pole", {"t": s["t"], "lat": g["lat"] - 57.0, "lon": g["lon"], "psi": psi})
     tried("two ships", {"t": s["t"], "lat": g["lat"] + 0.2 * (np.arange(n) % 2), "lon": g["lon"], "psi": psi})
     tried("berth", {"t": s["t"], "sog": 0.01 * g["sog"], "cog": g["cog"], "psi": psi})
     tried("course as heading", {"t": s["t"], "sog": g["sog"], "cog": g["cog"], "psi": g["cog"] + 0.001})
@@ -1269,38 +1268,23 @@ def scales() -> Answers:
     }
 
 
-QUESTIONS: dict[str, Callable[[], Answers]] = {
-    "log": log_csv,
-    "refusals": refusals,
-    "clocks": clocks,
-    "derivatives": derivatives,
-    "one clock": one_clock,
-    "late channels": late_channels,
-    "ways": ways,
-    "plausible": plausible,
-    "nmea": nmea_logs,
-    "kinds of files": kinds_of_files,
-    "instruments": instruments,
-    "guessed": guessed,
-    "parts": parts,
-    "ship files": ship_files,
-    "trials": trials,
-    "scales": scales,
-}
-
-
-def cases() -> list[str]:
-    """Names of the cases."""
-    return list(QUESTIONS)
-
-
-@cache
-def answers(case: str) -> Answers:
-    """All answers of a case, asked in an empty folder."""
-    with tempfile.TemporaryDirectory() as folder, chdir(folder):
-        return plain(QUESTIONS[case]())
-
-
-def record(case: str) -> dict[str, Floats]:
-    """The numbers of the answers."""
-    return numbers(answers(case))
+QUESTIONS = Questions(
+    {
+        "log": log_csv,
+        "refusals": refusals,
+        "clocks": clocks,
+        "derivatives": derivatives,
+        "one clock": one_clock,
+        "late channels": late_channels,
+        "ways": ways,
+        "plausible": plausible,
+        "nmea": nmea_logs,
+        "kinds of files": kinds_of_files,
+        "instruments": instruments,
+        "guessed": guessed,
+        "parts": parts,
+        "ship files": ship_files,
+        "trials": trials,
+        "scales": scales,
+    }
+)

@@ -2,13 +2,12 @@
 
 import pytest
 
-from tests.golden import models
-from tests.golden.answers import words
+from tests.golden.models import QUESTIONS
 from tests.golden.record import beyond_tolerance
 from tests.golden.texts import same_text
 
 
-@pytest.mark.parametrize("case", models.cases())
+@pytest.mark.parametrize("case", QUESTIONS.cases())
 def test_ships_are_what_they_were(case):
     assert beyond_tolerance("models", case) == []
-    assert same_text(f"models {case}", "\n".join(words(models.answers(case))))
+    assert same_text(f"models {case}", QUESTIONS.told(case))
