@@ -501,20 +501,6 @@ def linear_forms() -> Answers:
         },
     )
     oscillating = linear.nomoto_of(np.array([[-0.02, -3.0], [0.01, -0.02]]), B)
-    tf = conversions.transfer_function
-
-    def spaces(name: str = "mariner", **given: Any) -> Any:
-        system = conversions.state_space(model(name), **given)
-        return [
-            system.A,
-            system.B,
-            system.C,
-            system.D,
-            system.state_labels,
-            system.input_labels,
-            system.output_labels,
-            system.name,
-        ]
 
     ships = {
         "first": lambda: conversions.nomoto1_ship(0.07, 31.0, HULL, GEAR, "one"),
@@ -541,16 +527,6 @@ def linear_forms() -> Answers:
         "si": conversions.si_matrices(A, B, 151.0, 6.9),
         "length": lambda: conversions.prime_matrices(A, B, 0.0, 6.9),
         "speed": lambda: conversions.si_matrices(A, B, 7.0, -1.0),
-        "spaces": [
-            lambda: spaces(),
-            lambda: spaces(heading=True, gear=True),
-            lambda: spaces(gear=True, speed=5.0),
-            lambda: spaces("kvlcc2", gear=True),
-            lambda: spaces("nomoto2"),
-        ],
-        "transfer": [lambda k=k: [tf(form, k).num[0][0], tf(form, k).den[0][0]] for k in (1, 2)],
-        "order": lambda: tf(form, 3),
-        "no poles": lambda: tf(oscillating),
         "ships": {
             name: lambda make=make: [
                 (ship := make()).coefficients,
