@@ -217,7 +217,7 @@ def read_json(path: Path, what: str, remedy: str) -> Mapping[str, Any]:
     `check_content` refuses.
     """
     text = read_text(path, f"{what} (JSON)", LARGEST_JSON)
-    return check_table(parse_json(text, f"{path}:", remedy), f"{path}:")
+    return check_table(parse_json(text, f"{path}:", remedy), str(path))
 
 
 def parse_json(text: str, where: str, remedy: str) -> Any:

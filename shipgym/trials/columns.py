@@ -84,7 +84,7 @@ def choose_columns(table: Table, columns: Mapping[str, Any] | None, part: bool =
                 f"{quoted(table.header)}. Name the column of each channel in [columns] (or columns=...)"
             )
         columns = named
-    chosen = parse_columns(columns, f"{table.path}: columns:")
+    chosen = parse_columns(columns, f"{table.path}: columns")
     if part:
         chosen = {channel: column for channel, column in chosen.items() if column.name in table.header}
     time = chosen.pop("t", Column("t", "s"))

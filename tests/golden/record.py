@@ -27,7 +27,7 @@ if str(ROOT) not in sys.path:
 for library in ("OMP", "OPENBLAS", "MKL"):
     os.environ.setdefault(f"{library}_NUM_THREADS", "1")
 
-from tests.golden import chains, environments, seas, ships, voyages  # noqa: E402 - the folder above has to be found first
+from tests.golden import chains, environments, indices, models, readers, seas, ships, voyages  # noqa: E402 - the folder above has to be found first
 from tests.golden.store import Deviation, Floats, Values, compare, load, save  # noqa: E402
 
 RESULTS = Path(__file__).parent / "results"
@@ -58,6 +58,9 @@ SECTIONS = {
     "seas": Section(seas.cases, seas.record, {"": 1e-9}),
     "derivatives": Section(ships.all_ships, ships.record_derivatives, {"": 1e-9}),
     "manoeuvres": Section(ships.shipped, ships.record_manoeuvres, {"": 1e-9}),
+    "readers": Section(readers.QUESTIONS.cases, readers.QUESTIONS.record, {"": 1e-6}),
+    "models": Section(models.QUESTIONS.cases, models.QUESTIONS.record, {"": 1e-6}),
+    "indices": Section(indices.QUESTIONS.cases, indices.QUESTIONS.record, {"": 1e-6}),
     "demo": Section(lambda: ["mariner"], chains.record_demo, {"": 1e-6}),
     "pretrained": Section(lambda: chains.TASKS, chains.record_pretrained, {"": 1e-6}),
     "identification": Section(lambda: chains.METHODS, chains.record_identification, chains.TOLERANCES),
