@@ -15,6 +15,8 @@ from unittest.mock import patch
 import numpy as np
 
 from agents import LQ, PID, WheelOver
+from agents.engines.jobs import HERE
+from agents.verification import chain
 from agents.verification import standards as asked
 from agents.verification.chain import verify
 from agents.verification.figures import (
@@ -30,13 +32,15 @@ from agents.verification.page import headline, verification_view
 from agents.verification.refusal import lost_control, rudder_effect, simpler_structures, why_refused
 from agents.verification.result import Verification, verification_metrics
 from agents.verification.tracks import Track, keep_track, track_task
-from shipgym import ShipFile, ShipModel, load_model
+from shipgym import InputError, ShipFile, ShipModel, load_model
 from tests.golden.chains import SHIP_FILE
 from tests.golden.store import Floats, numbers_in, vector
 
 #: Commands are in single precision.
 TOLERANCES = {"": 1e-5}
 STEP_DEG = 20.0
+#: Progress of the verification.
+TOLD: list[tuple[str, int, int]] = []
 
 
 @cache
@@ -63,8 +67,9 @@ def made_up(size: float = 0.03, count: int = 2) -> list[ShipModel]:
 @cache
 def verified() -> Verification:
     """What is found of her, with two ships in place of the draws."""
+    guests = [PID.from_model(model(), damping=1.3)]
     with patch.object(ShipModel, "sample", lambda self, n, seed: made_up(count=n)):
-        return verify(model(), 2, 3, designs=("pid", "lq", "wheel-over"))
+        return verify(model(), 2, 3, lambda *one: TOLD.append(one), HERE, guests, ("pid", "lq", "wheel-over"))
 
 
 @cache
@@ -221,4 +226,41 @@ def said() -> str:
     lines += [str(simpler_structures(ranking, "a")), str(view["gains"])]
     lines += [f"{name}: {', '.join(view[name])}" for name in ("criteria", "designs", "linear", "learned")]
     lines += [f"{name}: {view[name]}" for name in ("best", "certain", "draws", "seed")]
-    return "\n".join(lines)
+    return "\n".join([*lines, *_decided()])
+
+
+def _decided() -> list[str]:
+    """Progress, and what becomes of designs that lose control or cannot be made, and of guests."""
+    found, fit = verified(), fits()["as in the trials"]
+    ranking = [
+        {"structure": name, "coefficients": count, "stable": True, "ran_away": 0}
+        for name, count in (("abkowitz", 40), ("nomoto", 4))
+    ]
+    fit.metrics = {"selection": {"ranking": ranking}}
+    fit.model = replace(fit.model, provenance={"structure": "abkowitz"})
+    lines = [str(one) for one in TOLD]
+    for lost in (("pid", "pid-2"), ("pid", "lq", "pid-2")):
+        worse = [
+            replace(one, episodes=replace(one.episodes, terminated=np.full(2, one.key in lost)))
+            for one in found.pilots
+        ]
+        after, refusal = chain._decided(replace(found, pilots=tuple(worse)), fit)
+        lines += [f"lost {lost}: {refusal}", str(after.refused)]
+    controllers, guides, refused = chain._designed(model(), ["lq", "lq", "turn-rate", "los", "wheel-over"])
+    lines += [f"{[one.kind for one in controllers]} {[one.kind for one in guides]} {refused}"]
+    for call in (
+        lambda: chain._designed(model(), ["los"]),
+        lambda: chain._check_fits(guides[0], model(), "agent 'los'"),
+        lambda: chain._check_fits(PID.from_model(load_model("kvlcc2")), model(), "agent 'pid'"),
+    ):
+        try:
+            lines.append(str(call()))
+        except InputError as error:
+            lines.append(str(error))
+    result = chain.examined(SimpleNamespace(), _identified(fit), [], verified)
+    return [*lines, f"{result.stable} {result.instability} {result.refusal} {sorted(result.metrics)}"]
+
+
+def _identified(fit: Any) -> Any:
+    """A fit with what the chain asks of it."""
+    return SimpleNamespace(**vars(fit), diagnostics={}, predictions={}, stable=True)
