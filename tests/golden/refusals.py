@@ -87,7 +87,12 @@ def of_controllers() -> Iterator[str]:
             {"wave_period": 2.01},
         ],
         "lq": [{"rudder_weight": 0.0}, {"rate_weight_s2": 0.0}, {"integral_lengths": 0.0}, {"dt": -1.0}],
-        "lq-scheduled": [{"speeds": [5.0]}, {"speeds": [5.0, 5.0]}, {"speeds": [0.0, 5.0]}],
+        "lq-scheduled": [
+            {"speeds": [0.05, 5.0]},
+            {"speeds": [5.0]},
+            {"speeds": [5.0, 5.0]},
+            {"speeds": [0.0, 5.0]},
+        ],
         "lqg": [
             {"noise": 0.0},
             {"disturbance_deg": 0.0},
@@ -120,6 +125,20 @@ def of_controllers() -> Iterator[str]:
             {"autopilot": PID.from_model(MARINER)},
         ],
     }
+    small = {
+        "pid": ("dt", "integral_lengths", "frequency", "damping"),
+        "lq": ("rudder_weight", "rate_weight_s2", "integral_lengths"),
+        "pid-filtered": ("reference_share", "tracking_lengths", "largest_turn_rate_deg_s"),
+        "lqg": ("noise", "disturbance_deg"),
+        "turn-rate": ("dt", "frequency", "rate_deg_min"),
+        "mpc": ("horizon_lengths",),
+        "lq-adaptive": ("forgetting_lengths", "redesign_lengths", "noise"),
+        "los": ("lookahead_lengths", "integral_lengths"),
+        "wheel-over": ("lookahead_lengths", "radius_lengths", "reach_lengths", "crab_share"),
+        "preview-mpc": ("horizon_lengths", "deviation_deg"),
+    }
+    for kind, names_ in small.items():
+        tried[kind] += [{name: 0.05} for name in names_]
     for kind, settings in tried.items():
         for one in settings:
             shown = {name: value if isinstance(value, float | list) else "..." for name, value in one.items()}
@@ -326,6 +345,10 @@ def of_policies() -> Iterator[str]:
         {"runaway_deg": 180.0},
         {"back_deg": 10.0},
         {"back_deg": 0.0},
+        {"back_deg": 0.05},
+        {"out_lengths": 0.05},
+        {"turn_lengths": 0.05},
+        {"runaway_deg": 5.05},
         {"out_lengths": -0.1},
         {"calm_lengths": 0.0},
         {"turn_lengths": -1.0},
@@ -335,7 +358,8 @@ def of_policies() -> Iterator[str]:
     yield from refused(
         "shield",
         lambda: Shielded(policy, policy, 1.0),
-        lambda: Shielded(policy, base, 0.0),  # type: ignore[arg-type]
+        lambda: Shielded(policy, base, 0.0),
+        lambda: Shielded(policy, base, 0.05),  # type: ignore[arg-type]
         lambda: Shielded.from_model(load_model("tanker"), policy),
         lambda: Shielded(SimpleNamespace(), base, 1.0).file_fields(),  # type: ignore[arg-type]
     )
@@ -446,6 +470,7 @@ def of_deployment() -> Iterator[str]:
         lambda: Helm(random_policy(action="rudder-shaft"), 0.0, Limits()),
         lambda: Helm(path_policy(), 0.0, Limits(), Route(places, 300.0)),
         lambda: Limits(silence_s=0.0),
+        lambda: Limits(silence_s=0.05),
     )
     yield f"limits: {Limits()}"
     yield from refused(
@@ -502,6 +527,7 @@ def of_rollouts() -> Iterator[str]:
         lambda: step_response(pid, MARINER, 60.1),
         lambda: step_response(pid, MARINER, -60.1),
         lambda: step_response(pid, MARINER, duration=0.0),
+        lambda: step_response(pid, MARINER, duration=0.05),
     )
     ended: list[tuple[bool, bool, bool | None]] = [
         (False, True, None),
