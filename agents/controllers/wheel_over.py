@@ -98,14 +98,14 @@ class WheelOver(Guided):
         if not arcs and None in (radius_lengths, reach_lengths):
             radius, reach = own_turn(model)
         given = {
-            "lookahead": (lookahead_lengths, asked.lookahead),
-            "turn_lookahead": (turn_lookahead_lengths, asked.lookahead),
-            "turn_radius": (radius_lengths, radius),
-            "turn_reach": (reach_lengths, reach),
+            "lookahead": ("lookahead_lengths", lookahead_lengths, asked.lookahead),
+            "turn_lookahead": ("turn_lookahead_lengths", turn_lookahead_lengths, asked.lookahead),
+            "turn_radius": ("radius_lengths", radius_lengths, radius),
+            "turn_reach": ("reach_lengths", reach_lengths, reach),
         }
         gains = {
-            name: length * check_number(own if value is None else value, f"{name}_lengths", above=0.0)
-            for name, (value, own) in given.items()
+            name: length * check_number(own if value is None else value, argument, above=0.0)
+            for name, (argument, value, own) in given.items()
         }
         gains["crab_share"] = check_number(crab_share, "crab_share", at_least=0.0, at_most=2.0)
         gains["path_radius"] = length * arcs

@@ -1,6 +1,7 @@
 """Model predictive control: LQ where no limit is near, the best plan within the limits where one is."""
 
 import json
+import pickle
 import sys
 from dataclasses import replace
 
@@ -36,6 +37,14 @@ def test_without_a_limit_in_reach_it_is_lq():
     error, rate, rudder = random.uniform(-1.0, 1.0, (3, 50)) * np.radians([[2.0], [0.05], [0.5]])
     shown = seen(error, rate, rudder)
     assert mpc.predict(shown)[0] == pytest.approx(lq.predict(shown)[0], abs=1e-6)
+
+
+def test_another_process_that_is_sent_it_plans_the_same():
+    """The solver is not sent but set up again there."""
+    mpc, far = MPC.from_model(SLOW), seen(np.array([0.5]), np.zeros(1), np.zeros(1))
+    order, _ = mpc.predict(far)  # which sets the solver up
+    again = pickle.loads(pickle.dumps(mpc))
+    assert again.predict(far)[0] == pytest.approx(order, abs=1e-6)
 
 
 def test_it_plans_two_ship_lengths_ahead_or_two_steps_at_least():

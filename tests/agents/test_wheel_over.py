@@ -94,3 +94,10 @@ def test_it_is_a_controller_and_a_file(tmp_path):
     assert (again.kind, again.gains) == ("wheel-over", guide.gains)
     with pytest.raises(InputError, match="crab_share: 3 found, expected"):
         WheelOver.from_model(MARINER, crab_share=3.0)
+
+
+def test_a_length_that_is_no_length_is_refused_by_the_name_that_it_was_given_by():
+    """Radius and reach are gains by other names than the arguments'."""
+    for name in ("lookahead_lengths", "turn_lookahead_lengths", "radius_lengths", "reach_lengths"):
+        with pytest.raises(InputError, match=f"^{name}: 0 found, expected a number > 0"):
+            WheelOver.from_model(MARINER, **{"radius_lengths": 3.0, "reach_lengths": 1.0} | {name: 0.0})

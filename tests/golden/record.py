@@ -27,7 +27,7 @@ if str(ROOT) not in sys.path:
 for library in ("OMP", "OPENBLAS", "MKL"):
     os.environ.setdefault(f"{library}_NUM_THREADS", "1")
 
-from tests.golden import chains, environments, indices, models, readers, seas, ships, voyages  # noqa: E402 - the folder above has to be found first
+from tests.golden import chains, controllers, environments, indices, models, policies, readers, rollouts, seas, ships, verification, voyages  # noqa: E402 - the folder above has to be found first
 from tests.golden.store import Deviation, Floats, Values, compare, load, save  # noqa: E402
 
 RESULTS = Path(__file__).parent / "results"
@@ -61,6 +61,11 @@ SECTIONS = {
     "readers": Section(readers.QUESTIONS.cases, readers.QUESTIONS.record, {"": 1e-6}),
     "models": Section(models.QUESTIONS.cases, models.QUESTIONS.record, {"": 1e-6}),
     "indices": Section(indices.QUESTIONS.cases, indices.QUESTIONS.record, {"": 1e-6}),
+    "controllers": Section(controllers.cases, controllers.record, controllers.TOLERANCES),
+    "policies": Section(policies.cases, policies.record, policies.TOLERANCES),
+    "bridge": Section(lambda: policies.BRIDGE, policies.record_bridge, policies.TOLERANCES),
+    "rollouts": Section(rollouts.cases, rollouts.record, rollouts.TOLERANCES),
+    "verification": Section(verification.cases, verification.record, verification.TOLERANCES),
     "demo": Section(lambda: ["mariner"], chains.record_demo, {"": 1e-6}),
     "pretrained": Section(lambda: chains.TASKS, chains.record_pretrained, {"": 1e-6}),
     "identification": Section(lambda: chains.METHODS, chains.record_identification, chains.TOLERANCES),
