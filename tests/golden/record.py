@@ -27,7 +27,20 @@ if str(ROOT) not in sys.path:
 for library in ("OMP", "OPENBLAS", "MKL"):
     os.environ.setdefault(f"{library}_NUM_THREADS", "1")
 
-from tests.golden import chains, controllers, environments, indices, models, policies, readers, rollouts, seas, ships, verification, voyages  # noqa: E402 - the folder above has to be found first
+from tests.golden import (  # noqa: E402 - the folder above has to be found first
+    chains,
+    controllers,
+    environments,
+    indices,
+    models,
+    policies,
+    readers,
+    rollouts,
+    seas,
+    ships,
+    verification,
+    voyages,
+)
 from tests.golden.store import Deviation, Floats, Values, compare, load, save  # noqa: E402
 
 RESULTS = Path(__file__).parent / "results"
