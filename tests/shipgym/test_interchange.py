@@ -1,6 +1,7 @@
 """To other libraries and back: nothing is lost, and their own programs say the same."""
 
 import json
+import re
 
 import gymnasium
 import numpy as np
@@ -84,8 +85,11 @@ def test_minari_has_the_observations_and_gives_the_episodes_back(tmp_path, monke
 def test_an_episode_that_ran_otherwise_is_no_dataset(tmp_path, monkeypatch, episodes):
     monkeypatch.setenv("MINARI_DATASETS_PATH", str(tmp_path))
     other = Episode(**(vars(episodes[0]) | {"rewards": episodes[0].rewards - 1.0}))
-    with pytest.raises(InputError, match=r"episodes\[0\]: cost .* when run again"):
+    with pytest.raises(InputError, match=r"episodes\[0\]: cost .* when run again") as refused:
         interchange.to_minari([other], "shipgym/mariner/other-v0", **CARD)
+    again, recorded = (float(word) for word in re.findall(r" (-?[\d.]+) ", str(refused.value)))
+    assert again == pytest.approx(-episodes[0].rewards.sum(), rel=1e-4)
+    assert recorded == pytest.approx(again + episodes[0].n_steps, rel=1e-4)
     unknown = Episode(**(vars(episodes[0]) | {"seed": None}))
     with pytest.raises(InputError, match=r"episodes\[1\]: no seed found"):
         interchange.to_minari([episodes[0], unknown], "shipgym/mariner/other-v0", **CARD)
