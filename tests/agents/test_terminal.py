@@ -82,6 +82,20 @@ def test_criteria_are_shown_with_verdict_and_paragraph():
     assert second.split()[1:3] == ["-", "-"]
 
 
+def test_criteria_are_told_with_their_notes_and_what_was_measured():
+    source, drawn = "MSC.137(76), annex, 5.3.1", interval(3.7, [3.0, 4.0, 5.0, np.nan], 1)
+    criteria = {
+        "advance": Criterion(3.7, 4.5, True, "ship lengths", source, drawn, "see there", True, 3.9, "turn"),
+        "overshoot": Criterion(9.5, 9.0, None, "deg", source, drawn, "", False, None, "zigzag"),
+        "stopping": Criterion(None, 15.0, None, "ship lengths", source, None, "no shaft"),
+    }
+    shown = "\n".join([*lines(terminal.criteria_table(criteria)), *terminal.criteria_notes(criteria)])
+    assert same_text("criteria with notes", shown)
+    narrow = StringIO()
+    Console(file=narrow, width=60, color_system=None).print(terminal.criteria_table(criteria))
+    assert same_text("criteria on a narrow terminal", narrow.getvalue())
+
+
 def test_indices_are_shown_with_what_the_draws_say():
     found = {"zigzag": {"overshoot": interval(7.777, np.linspace(7.0, 9.0, 41), 2), "period": interval(None)}}
     title, heading, first, second = lines(terminal.manoeuvre_table(found, "shallow water"))

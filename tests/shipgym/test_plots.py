@@ -21,7 +21,11 @@ from shipgym.plots import (
     turning_figure,
     zigzag_figure,
 )
+from shipgym.plots.style import Panel, panels
+from shipgym.plots.trials import AXES
 from tests.golden.texts import flat, same_text
+
+DERIVED = ("speed", "drift")  # channels that u and v give
 
 
 def same_figure(name, figure):
@@ -51,6 +55,25 @@ def test_measured_lines_are_dark_and_lines_share_one_entry_of_the_legend(circle)
     assert same_figure("histories", figure)
     assert [trace.showlegend for trace in figure.data] == [True, True, False, False, False, False]
     assert {trace.line.color for trace in figure.data if trace.name == "measured"} == {"#1f2a37"}
+
+
+def test_every_channel_is_drawn_in_its_unit():
+    t = np.arange(4000.0)  # so many that not all are drawn
+    channels = {name: 0.01 * (k + 1.0) + 1e-5 * t for k, name in enumerate(AXES) if name not in DERIVED}
+    figure = history_figure({"run": Trial(t, channels)}, [*AXES])
+    assert same_figure("every channel", figure)
+    factors = [values(figure, "y", k)[0] / (0.01 * (k + 1.0)) for k in (0, 2)]
+    assert factors == pytest.approx([1.0, np.degrees(1.0)], rel=1e-6)
+
+
+def test_titles_of_axes_stand_below_the_last_row_and_beside_the_first_column():
+    shown = [Panel([], f"x {k}", f"y {k}", f"panel {k}") for k in range(5)]
+    figure = panels(shown, 400, 2, outer=True)
+    assert same_figure("panels", figure)
+    below = [figure.layout[f"xaxis{k or ''}"].title.text for k in ("", 2, 3, 4, 5)]
+    beside = [figure.layout[f"yaxis{k or ''}"].title.text for k in ("", 2, 3, 4, 5)]
+    assert below == ["", "", "", "", "x 4"]
+    assert beside == ["y 0", "", "y 2", "", "y 4"]
 
 
 def test_a_channel_that_no_trial_has_is_left_out(circle):
