@@ -202,6 +202,11 @@ def test_missing_channel_is_named_with_the_remedy(mariner: ShipModel, cao_zigzag
         ({"method": "svm"}, r"method: 'svm' found, expected one of .*'tls-svm'.*Did you mean"),
         ({"samples": "cubic"}, "samples: 'cubic'"),
         ({"tank": 4}, "tank"),
+        ({"hold_out": ["turn"]}, "hold_out: 'turn' found, expected one of 'zigzag_15_15'"),
+        (
+            {"reference_model": "kvlcc2"},
+            "reference_model: 'kvlcc2' found with structure 'abkowitz', expected",
+        ),
     ],
 )
 def test_wrong_arguments_are_named(
