@@ -416,6 +416,8 @@ def said_by_ship() -> list[str]:
         for line in sentences("AGROR,-7.5,A,,V,B" if k < 20 else "AGROR,3.0,V,,V,B").splitlines():
             ship.hear(line)
         said.append(f"order {ship.order:.4f}")
+        if k == 28:  # to where latitude and longitude have odd degrees
+            ship.states[0, :2] += 133e3, 100e3
         ship.advance()
     return said
 
