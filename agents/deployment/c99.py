@@ -92,7 +92,8 @@ def ship_source(model: ShipModel, name: str | None = None, water_depth: float = 
     c = Translator(
         {**vessel.parts(), **sea_functions(True)}, name, {Motion: f"{name}_state", ShipInput: f"{name}_input"}
     )
-    numbers = iter([*model.ship_numbers(water_depth), *column])
+    longest = LONGEST_STEP * p["length"] / p["speed"]
+    numbers = iter([*model.ship_numbers(water_depth, longest), *column])
     kinds = {"SHIP": Ship, "COEFFICIENTS": vessel.coefficients, "SEA": SeaParameters}
     first = dict(zip(model.state_names, model.service_state.tolist(), strict=True))
     begin = {"n": model.service_shaft_speed, "shaft": model.service_shaft_speed, **first}
@@ -102,7 +103,7 @@ def ship_source(model: ShipModel, name: str | None = None, water_depth: float = 
         for kind in ("ship_input", "ship_state")
     )
     return _written(
-        "ship", f"Ship model '{model.name}'", name, inputs, outputs, LONGEST_STEP * p["length"] / p["speed"],
+        "ship", f"Ship model '{model.name}'", name, inputs, outputs, longest,
         constants={one: (c.type(kind), c.constant(kind, numbers)) for one, kind in kinds.items()},
         advance=c.function(advance, Motion, ShipInput, float, vessel.coefficients, Ship, SeaParameters)[0],
         lost=c.function(lost, Motion, Ship)[0], structures=c.structures, functions=c.functions, notes=notes,

@@ -198,7 +198,7 @@ def ship_columns(pool: Pool, windy: bool, task: Task, base: ShipModel, drawn: bo
         kind = (id(model.particulars), id(sea))
         if windy and kind not in known:
             known[kind] = weather_column(model, sea, task.substep(base), task.water_depth)
-        numbers = model.ship_numbers(task.water_depth)
+        numbers = model.ship_numbers(task.water_depth, task.substep(base))
         if drawn and model.particulars["length"] == base.particulars["length"]:
             numbers[Ship._fields.index("scale_speed")] = base.particulars["speed"]
         ship = Ship(*numbers[: len(Ship._fields)].tolist())

@@ -106,14 +106,16 @@ class ManoeuvringModel:
         """What is compiled of the ship: one for all models that differ in numbers only."""
         return self.dynamics.vessel(self.coefficients, self.steering.time_constant > 0.0)
 
-    def ship_numbers(self, water_depth: float = np.inf) -> Floats:
+    def ship_numbers(self, water_depth: float = np.inf, step: float = 0.0) -> Floats:
         """What her vessel reads of the ship, in the order of `vessel.layout`: `Ship`, then coefficients.
+
+        `step`, s, is that of her simulation, which a lag of her steering gear has to be long enough for.
 
         Raises InputError for water that is too shallow, and for particulars that the structure cannot use.
         """
         self.check_depth(water_depth)
         own = self.dynamics.numbers(self.coefficients, self.particulars, self.service_shaft_speed)
-        return np.concatenate([ship_of(self, water_depth), own])
+        return np.concatenate([ship_of(self, water_depth, step), own])
 
     @property
     def state_names(self) -> tuple[str, ...]:
@@ -274,11 +276,11 @@ def _within(values: Floats, low: float, high: float, what: str, expected: str, w
         raise InputError(f"{where}: row {row}: {what} {values[row]:g} found, expected {expected}")
 
 
-def ship_of(model: ManoeuvringModel, water_depth: float = np.inf) -> Ship:
-    """What every ship has beside her coefficients, as a record."""
+def ship_of(model: ManoeuvringModel, water_depth: float = np.inf, step: float = 0.0) -> Ship:
+    """What every ship has beside her coefficients, as a record, for simulations in steps of some seconds."""
     gear, p = model.steering, model.particulars
     return Ship(
         length=p["length"], speed=p["speed"], rudder_limit=gear.limit, rudder_rate=gear.rate,
-        gear_frequency=1.0 / gear.time_constant if gear.time_constant else 0.0,
+        gear_frequency=gear.frequency(step),
         shaft=float(model.service_shaft_speed), water_depth=water_depth, scale_speed=p["speed"],
     )  # fmt: skip

@@ -43,7 +43,7 @@ class Passage:
 
     def __init__(self, model: ManoeuvringModel, conditions: Conditions, dt: float) -> None:
         self.model, self.vessel, self.dt = model, model.vessel, dt
-        self.numbers = model.ship_numbers(conditions.water_depth)
+        self.numbers = model.ship_numbers(conditions.water_depth, dt)
         weather = as_weather(conditions.weather, "weather")
         self.windy = not weather.calm
         self.sea = np.zeros(0), np.zeros(0, dtype=np.uint64), np.zeros(0)

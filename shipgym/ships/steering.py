@@ -24,6 +24,8 @@ class SteeringGear:
 
         d(delta)/dt = clip((clip(order, -limit, limit) - delta) / time_constant, -rate, rate).
 
+    In simulations the lag is at least half a step (`frequency`).
+
     Parameters
     ----------
     rudder_limit_deg : float
@@ -74,3 +76,11 @@ class SteeringGear:
     def rate(self) -> float:
         """Largest rudder rate, rad/s."""
         return math.radians(self.rudder_rate_deg_s)
+
+    def frequency(self, step: float = 0.0) -> float:
+        """Inverse of the time constant in steps of some seconds, 1/s; 0 for a gear without lag.
+
+        A lag shorter than half a step is taken as half a step: the Runge-Kutta method does not follow it, and
+        is unstable where it is shorter than 0.36 of a step (Hairer & Wanner 1996, IV.2).
+        """
+        return 1.0 / max(self.time_constant, 0.5 * step) if self.time_constant else 0.0

@@ -1,9 +1,13 @@
 """The steering gear's limits, in degrees outside and radians inside."""
 
 import math
+from dataclasses import replace
 
+import gymnasium
+import numpy as np
 import pytest
 
+from shipgym import load_model
 from shipgym.errors import InputError
 from shipgym.ships.steering import SteeringGear
 
@@ -21,6 +25,43 @@ def test_solas_asks_for_the_default_rate():
         35.0 + 30.0
     ) / gear.rudder_rate_deg_s <= 28.0  # from 35 deg to 30 deg on the other side, SOLAS II-1/29
     assert gear.time_constant == 0.0
+
+
+def kvlcc2_with(lag):
+    ship = load_model("kvlcc2")
+    return replace(ship, steering=replace(ship.steering, time_constant=lag))
+
+
+@pytest.mark.parametrize("lag", [0.01, 0.3, 1.0, 6.0])
+@pytest.mark.parametrize("step", [0.5, 4.0])
+def test_the_rudder_settles_at_its_order_however_short_its_lag(lag, step):
+    """Runge-Kutta alone would chatter, or settle elsewhere, where a lag is shorter than 0.36 of a step."""
+    trial = kvlcc2_with(lag).simulate(np.tile([0.2, 1.5], (120, 1)), step)
+    delta = trial["delta"][trial.t >= 30.0 + 10.0 * lag]
+    np.testing.assert_allclose(delta[-20:], 0.2, rtol=1e-6)
+    assert np.all(np.diff(trial["delta"]) > -1e-12)
+
+
+def test_an_environment_follows_a_short_lag():
+    """In steps of two seconds; there, one of half a step and a shorter one are the same."""
+    rudders = []
+    for lag in (0.1, 1.0):
+        env = gymnasium.make("shipgym/CourseKeeping-v0", model=kvlcc2_with(lag))
+        env.reset(seed=0)
+        rudders.append([])
+        for _ in range(12):
+            env.step(np.array([0.4], dtype=np.float32))
+            rudders[-1].append(env.unwrapped.physical_state()["delta"])
+    assert rudders[0] == rudders[1]
+    assert rudders[0][-1] == pytest.approx(0.4 * math.radians(35.0), rel=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("step", "frequency"), [(0.0, 2.0), (0.9, 2.0), (1.0, 2.0), (1.6, 1.25), (10.0, 0.2)]
+)
+def test_a_lag_is_at_least_half_a_step(step, frequency):
+    assert SteeringGear(time_constant=0.5).frequency(step) == pytest.approx(frequency)
+    assert SteeringGear().frequency(step) == 0.0
 
 
 @pytest.mark.parametrize(
