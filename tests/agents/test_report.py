@@ -1,5 +1,6 @@
 import hashlib
 import re
+import sys
 from dataclasses import replace
 from html.parser import HTMLParser
 from importlib.resources import files
@@ -11,10 +12,10 @@ from jinja2 import UndefinedError
 
 from agents.cli import _print_result
 from agents.cli.standard_trials import StandardTrials
-from agents.cli.trials_page import _readable, write_page
+from agents.cli.trials_page import _readable, check_page, write_page
 from agents.verification.figures import band, translucent
 from agents.verification.page import write_report
-from shipgym import Trial, load_model
+from shipgym import InputError, Trial, load_model
 from shipgym.manoeuvres import IndexInterval, standard_manoeuvres
 from shipgym.pages import environment, fixed, number, percent
 from shipgym.plots import graph_objects
@@ -226,6 +227,13 @@ def test_hostile_names_of_models_and_manoeuvres_stay_text(tmp_path):
 )
 def test_an_index_is_told_in_words_with_its_unit(index, words):
     assert _readable(index) == words
+
+
+def test_a_page_that_cannot_be_drawn_is_refused_before_any_work(tmp_path, monkeypatch):
+    check_page(tmp_path / "trials.html")
+    monkeypatch.setitem(sys.modules, "plotly.graph_objects", None)
+    with pytest.raises(InputError, match="plotly is not installed"):
+        check_page(tmp_path / "trials.html")
 
 
 def test_a_figure_cannot_end_the_script_it_stands_in():
