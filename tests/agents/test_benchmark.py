@@ -1,6 +1,7 @@
 import json
 import sys
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from agents.benchmarking.contestants import Contestant, contestants, pretrained
 from agents.benchmarking.replays import EpisodeId, rerun
 from agents.benchmarking.results import BenchmarkResult, check_new
 from agents.benchmarking.run import _chosen, _run, checked_part, results_of
+from agents.benchmarking.summary import _place
 from agents.benchmarking.verification import verify
 from agents.cli import app
 from agents.cli.benchmark_tables import ranking_table
@@ -122,6 +124,20 @@ def test_a_contestant_that_fails_is_last_and_the_ranking_shows_it():
     found = result.summary["tasks"]["mariner-calm"]["broken"]
     assert "no finite number for 4 of 4 ships" in found["failure"]
     assert found["metrics"]["failed"]["mean"] == 1.0
+
+
+def test_places_are_by_tasks_then_score_then_cost():
+    def entry(tasks, score, cost):
+        return {"tasks": tasks, "score": {"value": score}, "relative_cost": cost}
+
+    dear, cheap, part, unknown = (
+        entry(2, 0.9, 5.0),
+        entry(2, 0.1, 1.0),
+        entry(1, 3.0, 0.5),
+        entry(2, None, None),
+    )
+    for by_score, order in ((True, [dear, cheap, unknown, part]), (False, [cheap, dear, unknown, part])):
+        assert sorted([part, unknown, cheap, dear], key=partial(_place, by_score=by_score)) == order
 
 
 def test_one_that_cannot_take_part_is_said_and_the_rest_go_on():

@@ -202,6 +202,12 @@ def test_a_changed_result_is_reported(result):
 def test_objects_are_replayed_where_they_are_given(result):
     episode = EpisodeId(Lazy.name, "mariner-calm", 0, FIRST)
     assert "given as an object" in rerun(result, [episode]).refused[Lazy.name, "mariner-calm"]
+
+    def fails(task):
+        raise KeyError("gain")
+
+    refused = rerun(result, [episode], {Lazy.name: fails}).refused
+    assert refused == {(Lazy.name, "mariner-calm"): "KeyError: 'gain'"}
     given = rerun(result, [episode], {Lazy.name: Lazy()})
     assert (given.refused, given.different) == ({}, ())
     assert not given.episodes[episode].actions.any()

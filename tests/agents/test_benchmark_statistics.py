@@ -33,6 +33,7 @@ def test_every_statistic_of_three_runs_and_seven_episodes_is_the_golden_one():
         "middle": interquartile_cost(one[1], draws, 1, 2).to_dict(),
         "middle of one run": interquartile_cost(other[1], draws, 1).to_dict(),
         "score": aggregate_score([one[0], one[1]], references, draws, [0, 1], 1).to_dict(),
+        "no score": aggregate_score([], [], draws, [], 1).to_dict(),
         "better": improvement(one, other, draws, (1, 2)).to_dict(),
         "worse": improvement(other, one, draws, (2, 1)).to_dict(),
         "nobody": improvement({}, other, draws, (0, 1)).to_dict(),

@@ -219,3 +219,4 @@ def test_a_plan_has_the_settings_of_its_algorithm():
     plan = make_plan(Given("ppo"))
     with pytest.raises(InputError, match="settings: PPOSettings found, expected SACSettings for sac"):
         Plan("sac", plan.task, plan.settings)
+    assert (plan.seed, plan.randomise, plan.threads) == (0, False, 1)  # where none are given
