@@ -202,8 +202,8 @@ def check_number(
 def check_whole(value: Any, where: str, *, at_least: int, at_most: float = math.inf, hint: str = "") -> int:
     """Return `value`, which must be a whole number from `at_least` to `at_most`."""
     if isinstance(value, bool) or not isinstance(value, Integral) or not at_least <= int(value) <= at_most:
-        expected = f"a whole number of at least {at_least}" + (f", {hint}" if hint else "")
-        expected += f" and at most {at_most}" if at_most < math.inf else ""
+        expected = f"a whole number of at least {at_least}"
+        expected += (f" and at most {at_most}" if at_most < math.inf else "") + (f", {hint}" if hint else "")
         raise InputError(f"{where}: {shown(value)} found, expected {expected}")
     return int(value)
 

@@ -9,6 +9,8 @@ from identification.search.search import MOST, Optimiser, Recorder
 from shipgym.arrays import Floats, Integers
 from shipgym.checks import check_whole
 
+LARGEST = 1e150  # value of a candidate that SciPy is told
+
 
 @dataclass(frozen=True)
 class GridSearch(Optimiser):
@@ -106,8 +108,8 @@ class DifferentialEvolution(Optimiser):
         check_whole(self.rounds, "rounds", at_least=1, at_most=MOST)
 
         def of_columns(x: Any, /) -> Any:
-            # a column for each candidate; SciPy takes no infinite values
-            return np.minimum(record(np.atleast_2d(x.T)), np.finfo(float).max)
+            # a column for each candidate; SciPy takes no infinite values, and squares them
+            return np.minimum(record(np.atleast_2d(x.T)), LARGEST)
 
         differential_evolution(
             of_columns, Bounds(low, high), maxiter=self.rounds, popsize=self.members, tol=0.0, atol=0.0,

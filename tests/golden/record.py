@@ -31,13 +31,17 @@ from tests.golden import (  # noqa: E402 - the folder above has to be found firs
     chains,
     controllers,
     environments,
+    estimators,
+    fits,
     indices,
     models,
     policies,
     readers,
+    regression,
     rollouts,
     seas,
     ships,
+    validation,
     verification,
     voyages,
 )
@@ -82,6 +86,10 @@ SECTIONS = {
     "demo": Section(lambda: ["mariner"], chains.record_demo, {"": 1e-6}),
     "pretrained": Section(lambda: chains.TASKS, chains.record_pretrained, {"": 1e-6}),
     "identification": Section(lambda: chains.METHODS, chains.record_identification, chains.TOLERANCES),
+    "estimators": Section(estimators.cases, estimators.record, estimators.TOLERANCES),
+    "regression": Section(regression.cases, regression.record, regression.TOLERANCES),
+    "validation": Section(validation.cases, validation.record, validation.TOLERANCES),
+    "fits": Section(fits.cases, fits.record, fits.TOLERANCES),
 }
 
 

@@ -144,16 +144,17 @@ def test_kalman_smoother_takes_a_heading_or_a_yaw_rate_alone(
     assert after < 0.7 * before
 
 
-def test_kalman_smoother_takes_positions_without_velocities(
-    mariner: ShipModel, record: Callable[..., Trial]
+@pytest.mark.parametrize("channels", [("x", "y"), ("v",)])
+def test_kalman_smoother_takes_positions_or_sway_alone(
+    mariner: ShipModel, record: Callable[..., Trial], channels: tuple[str, ...]
 ) -> None:
     run = zigzag(mariner, 20, 20, duration=200, dt=0.1)
     truth, noisy = (
-        Trial(one.t, {name: one[name] for name in ("x", "y", "psi", "r", "delta")}, name="positions")
+        Trial(one.t, {name: one[name] for name in (*channels, "psi", "r", "delta")}, name="some")
         for one in (record(run, 10), record(run, 10, 1.0, 5))
     )
     smoothed = smooth_kinematics(noisy)
-    for channel in ("x", "y"):
+    for channel in channels:
         before, after = (np.std(trial[channel] - truth[channel]) for trial in (noisy, smoothed))
         assert after < 0.7 * before
 

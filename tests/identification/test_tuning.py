@@ -98,8 +98,9 @@ def test_scouts_leave_a_barren_source() -> None:
     assert flat.evaluations > 4 + 10 * 8
 
 
-def test_values_that_are_not_numbers_are_never_the_best() -> None:
-    found = minimise(lambda x: np.where(x[:, 0] < 1.0, np.nan, sphere(x)), BOX)
+@pytest.mark.parametrize("optimiser", ["abc", DifferentialEvolution(rounds=9)])
+def test_values_that_are_not_numbers_are_never_the_best(optimiser: Any) -> None:
+    found = minimise(lambda x: np.where(x[:, 0] < 1.0, np.nan, sphere(x)), BOX, optimiser=optimiser)
     assert found.x[0] >= 1.0
     assert np.isfinite(found.value)
 

@@ -62,6 +62,8 @@ def test_whole_numbers_flags_and_texts():
     for wrong in (2, 3.0, True, "3", None):
         with pytest.raises(InputError, match=r"n: .* found, expected a whole number of at least 3, or None"):
             check_whole(wrong, "n", at_least=3, hint="or None")
+    with pytest.raises(InputError, match="expected a whole number of at least 3 and at most 5, even"):
+        check_whole(6, "n", at_least=3, at_most=5, hint="even")
     assert check_flag(False, "flag") is False
     for wrong in (0, "true", None):
         with pytest.raises(InputError, match=r"flag: .* found, expected true or false"):

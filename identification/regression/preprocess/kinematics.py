@@ -59,7 +59,7 @@ def _smooth_plane(trial: Trial, psi: Floats) -> dict[str, Floats]:
         process[:, axes[:, None], axes] = walk[:, 1:, 1:]
     transitions, start_variances = _plane_transitions(h, psi), (1e4, 1e4, 1e2, 1e2, 1.0, 1.0)
     motion = _Motion((*PLANE, "udot", "vdot"), transitions, process, start_variances)
-    return motion.smoothed(trial, names, "u" if "u" in trial else "x")
+    return motion.smoothed(trial, names, next(name for name in ("u", "x", "v") if name in trial))
 
 
 @dataclass(frozen=True, eq=False)
