@@ -21,6 +21,7 @@ from shipgym.trials.nmea import is_nmea, read_nmea
 
 #: Most bytes of an Excel or MATLAB file, most of what any is unpacked, and most values.
 LARGEST_PACKED, LARGEST_UNPACKED, MOST_CELLS = 32 * MIB, 256 * MIB, 5_000_000
+MOST_VARIABLES = 10_000  # of a MATLAB file
 _MATRIX, _COMPRESSED = 14, 15  # kinds of elements of a MATLAB file, and those of numbers
 _NUMBERS = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8", 12: "i8", 13: "u8"}
 _FIRST_NUMERIC = 6  # class of a matrix
@@ -127,7 +128,12 @@ def _read_matlab(path: Path) -> Table:
         raise InputError(f"{path}: MATLAB 7.3 (HDF5) found, expected an older format: save(..., '-v7')")
     with _damage_told(path, "MATLAB (.mat)", "save the vectors anew with save(..., '-v7')"):
         order, total, found = "<" if data[126:128] == b"IM" else ">", 0, {}
-        for kind, packed in _elements(data[128:], order):
+        for number, (kind, packed) in enumerate(_elements(data[128:], order)):
+            if number == MOST_VARIABLES:
+                raise InputError(
+                    f"{path}: over {MOST_VARIABLES} variables found, expected a few vectors: save('run.mat', "
+                    "'t', 'psi', '-v7')"
+                )
             content = packed
             if kind == _COMPRESSED:
                 content = zlib.decompressobj().decompress(packed, LARGEST_UNPACKED + 1 - total)
@@ -136,8 +142,8 @@ def _read_matlab(path: Path) -> Table:
             parts = [part for _, part in zip(range(4), _elements(content, order), strict=False)]
             if kind != _MATRIX or len(parts) < 4 or parts[3][0] not in _NUMBERS:
                 continue
-            (_, flags), (_, shape), (_, name), (number, values) = parts
-            array = np.frombuffer(values, f"{order}{_NUMBERS[number]}")
+            (_, flags), (_, shape), (_, name), (kind, values) = parts
+            array = np.frombuffer(values, f"{order}{_NUMBERS[kind]}")
             sizes = np.frombuffer(shape, f"{order}i4")
             numeric = struct.unpack(f"{order}I", flags[:4])[0] & 0xFF >= _FIRST_NUMERIC
             if numeric and np.count_nonzero(sizes != 1) == 1 and sizes.max() == array.size:

@@ -498,6 +498,17 @@ def test_of_a_matlab_file_numeric_vectors_of_the_commonest_length_are_read(tmp_p
         assert read_log(tmp_path / "log.mat").numbers("u").tolist() == [1.0, 2.0, 100.0]
 
 
+def test_a_matlab_file_of_a_million_variables_is_refused_at_once(tmp_path):
+    """Eight zeros are an empty one: a file of zeros would be read for half a minute."""
+    path = tmp_path / "log.mat"
+    path.write_bytes(b"MATLAB 5.0".ljust(124) + b"\x00\x01IM" + bytes(8 * 10_000))
+    with pytest.raises(InputError, match="no numeric vectors found"):
+        read_log(path)
+    path.write_bytes(path.read_bytes() + bytes(8_000_000))
+    with pytest.raises(InputError, match=r"log.mat: over 10000 variables found, expected a few vectors"):
+        read_log(path)
+
+
 def test_a_compressed_matlab_file_is_unpacked_within_bounds(tmp_path, monkeypatch):
     path = tmp_path / "log.mat"
     savemat(path, {"u": np.arange(50.0), "v": 2.0 * np.arange(50.0)}, do_compression=True)
