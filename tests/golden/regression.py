@@ -239,11 +239,13 @@ def _repairs(short: Trial) -> dict[str, Any]:
         outliers(bad.t, values, 5.0, step) for values in (r, delta) for step in (True, False)
     ]
     found["outliers, few"] = outliers(np.arange(5.0), [0.0, 0.0, 9.0, 0.0, 0.0])
-    ends = np.sin(np.arange(24) / 5.0)
+    ends, seconds = np.sin(np.arange(24) / 15.0), 2.0 * np.arange(24)
     ends[[0, -1]] += [0.9, -1.1]
+    gap = seconds + 5.0 * (np.arange(24) == 23)
     found["outliers, ends"] = [
-        outliers(np.arange(24.0), ends, 6.0, False),
-        outliers(np.arange(20.0), ends[4:], 6.0, False),
+        outliers(seconds, ends, 6.0, False),
+        outliers(gap, ends, 6.0, False),
+        outliers(seconds[:20], ends[4:], 6.0, False),
     ]
     wide[::4] += 0.02 * np.sign(np.sin(np.arange(len(wide[::4])) * 2.1))
     found["repair refused"] = [
