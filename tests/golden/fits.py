@@ -119,9 +119,10 @@ def records(name: str) -> tuple[Trial, ...]:
     if name == "with shaft":
         return tuple(t.with_channels({"n": 1.3 + 0.01 * np.sin(t.t / 40.0)}) for t in trials())
     if name == "varying shaft":
-        return tuple(t.with_channels({"n": np.linspace(1.0, 1.4, len(t)),
-        "u": t["u"] * np.linspace(0.3, 1.1, len(t))})
-                     for t in (one, two))  # fmt: skip
+        return tuple(
+            t.with_channels({"n": np.linspace(1.0, 1.4, len(t)), "u": t["u"] * np.linspace(0.3, 1.1, len(t))})
+            for t in (one, two)
+        )
     if name == "clean":
         turn = turning_circle(mariner(), 25.0, 240.0, 1.0)
         return clean_zigzag(), noisy(turn, 7, every=2, noise=0.2, name="runs/turn", use="validate")

@@ -43,7 +43,6 @@ from tests.golden.made_up import mariner, noisy, numbers_of, refused, sampled, t
 from tests.golden.store import Floats
 
 TOLERANCES = {"": 1e-6, "still water: ": 1e-5}
-#: Random signs and a search that ends early: what is smoothed is known to less.
 SHIP = Particulars(length=28.9, beam=9.6, draught=2.7, mass=417e3, speed=5.0, xg=-0.5, yaw_gyradius=7.2)
 BULKER = Particulars(
     length=160.9, beam=23.2, draught=7.5, block_coefficient=0.6, speed=7.7, frontal_area=400.0,
@@ -57,9 +56,13 @@ def parts(samples: Any) -> dict[str, Any]:
         f"{q} {k}": sampled(column, 5) for q, X in samples.features.items() for k, column in enumerate(X.T)
     }
     rows |= {q: sampled(target) for q, target in samples.targets.items()}
-    return rows | {"start": sampled(samples.start), "duration": sampled(samples.duration),
-    "window": samples.window,
-                   "trial": float(samples.trial.sum()), "rows": len(samples)}  # fmt: skip
+    return rows | {
+        "start": sampled(samples.start),
+        "duration": sampled(samples.duration),
+        "window": samples.window,
+        "trial": float(samples.trial.sum()),
+        "rows": len(samples),
+    }
 
 
 def record_samples() -> dict[str, Any]:
@@ -258,8 +261,11 @@ def _repairs(short: Trial) -> dict[str, Any]:
 @cache
 def logs() -> tuple[Trial, ...]:
     """A turn and two zigzags with velocities over ground, in a current of 0.3 m/s north and 0.4 m/s west."""
-    runs = [turning_circle(mariner(), 30.0, 420.0, 1.0), zigzag(mariner(), 20, 20, True, 240.0, 1.0),
-            zigzag(mariner(), 15, 10, False, 240.0, 1.0)]  # fmt: skip
+    runs = [
+        turning_circle(mariner(), 30.0, 420.0, 1.0),
+        zigzag(mariner(), 20, 20, True, 240.0, 1.0),
+        zigzag(mariner(), 15, 10, False, 240.0, 1.0),
+    ]
     found = []
     for k, run in enumerate(runs):
         one = noisy(run, 20 + k, every=2, noise=0.3, name=f"logs/{k}", use="validate" if k == 2 else "fit")
@@ -293,15 +299,22 @@ def record_still_water() -> dict[str, Any]:
     known = estimate_current([held], ship.length, ship["speed"], True, np.asarray(estimate.coefficients))
     found["known"] = [known.mean, known.covariance]
     u = through_water(turn, 0.3, -0.4)["u"]  # by a log
-    logged = turn.with_channels({"u": u, "n": np.linspace(1.4, 1.3, len(turn)),
-    "wind_udot": 1e-3 * np.cos(turn.t / 30.0),
-                                 "wind_vdot": -2e-3 * np.cos(turn.t / 50.0), "wind_rdot": np.zeros(len(turn)),
-                                 "wind_speed": np.full(len(turn), 7.0)})  # fmt: skip
+    logged = turn.with_channels(
+        {
+            "u": u,
+            "n": np.linspace(1.4, 1.3, len(turn)),
+            "wind_udot": 1e-3 * np.cos(turn.t / 30.0),
+            "wind_vdot": -2e-3 * np.cos(turn.t / 50.0),
+            "wind_rdot": np.zeros(len(turn)),
+            "wind_speed": np.full(len(turn), 7.0),
+        }
+    )
     logged = Trial(logged.t, logged.channels, derived=["v"], name="log", over_ground=True)
     estimate = estimate_current([logged], ship.length, ship["speed"], True)
     found["speed log"] = [estimate.mean, estimate.covariance, estimate.coefficients]
-    columns = first.with_(over_ground=False).with_channels({"current_north": np.full(len(first), 0.2),
-                                     "current_east": 0.1 + 0.002 * first.t})  # fmt: skip
+    columns = first.with_(over_ground=False).with_channels(
+        {"current_north": np.full(len(first), 0.2), "current_east": 0.1 + 0.002 * first.t}
+    )
     given = {"north": 0.2, "east": -0.3}
     asked: dict[str, tuple[Any, dict[str, Any]]] = {
         "auto": (logs(), {}), "given": ((first, held), {"current": given}),

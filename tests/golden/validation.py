@@ -177,8 +177,10 @@ def record_guard() -> dict[str, Any]:
     found["why"] = [warnings.why_unstable(gone), warnings._why_lost(linear), warnings._why_lost(wild)]
     diverged = {name: {**m, "diverged": True} for name, m in gone.metrics["trials"].items()}
     found["diverged"] = warnings.held_out_error(replace(gone, metrics={"trials": diverged}))
-    headless = {name: {**m, "rmse": {"psi": None}, "overshoot_1_deg": None, "overshoot_2_deg": None}
-                for name, m in gone.metrics["trials"].items()}  # fmt: skip
+    headless = {
+        name: {**m, "rmse": {"psi": None}, "overshoot_1_deg": None, "overshoot_2_deg": None}
+        for name, m in gone.metrics["trials"].items()
+    }
     found["headless"] = warnings.held_out_error(replace(gone, metrics={"trials": headless}))
     return found
 
@@ -282,8 +284,11 @@ def record_selection() -> dict[str, Any]:
         )
 
     found: dict[str, Any] = {}
-    given = {"usual": Options(structure="auto"), "ls": Options(structure="auto", method="ls", C=3.0),
-             "ship": Options(structure="auto", reference_model="tanker")}  # fmt: skip
+    given = {
+        "usual": Options(structure="auto"),
+        "ls": Options(structure="auto", method="ls", C=3.0),
+        "ship": Options(structure="auto", reference_model="tanker"),
+    }
     for name, options in given.items():
         chosen, told = select(identified, trials(), options)
         found[name] = [chosen.structure, chosen.method, chosen.reference_model, told]
@@ -292,8 +297,10 @@ def record_selection() -> dict[str, Any]:
     found["lost"] = select(identified, trials(), given["usual"])[1]
     errors = {}
     found["refused"] = [refused(lambda: select(identified, trials(), given["usual"]))]
-    found["methods"] = [[*methods_of(s, "tls-svm"), reference_of(s, None), reference_of(s, "tanker")]
-                        for s in ("nomoto", "grey-box", "mmg")]  # fmt: skip
+    found["methods"] = [
+        [*methods_of(s, "tls-svm"), reference_of(s, None), reference_of(s, "tanker")]
+        for s in ("nomoto", "grey-box", "mmg")
+    ]
     turns = in_turn(
         lambda held: SimpleNamespace(metrics={"trials": {n: len(held) for n in held}}), trials(), 2
     )
@@ -396,9 +403,14 @@ def record_design() -> dict[str, Any]:
     grown = model.with_coefficients(np.array(list((model.coefficients | {"c_r": 30.0}).values())))
     found["no sensitivity"] = zigzag_sensitivity(grown)
     for direction in ("backward", "forward"):
-        reduced = identify_reduced([one, two],
-        direction, 0.01, structure="steering7", particulars=mariner().particulars,
-                                   model_error=False)  # fmt: skip
+        reduced = identify_reduced(
+            [one, two],
+            direction,
+            0.01,
+            structure="steering7",
+            particulars=mariner().particulars,
+            model_error=False,
+        )
         found[f"reduced, {direction}"] = (
             reduced.to_dict() if direction == "backward" else [r.terms for r in reduced.reductions.values()]
         )
