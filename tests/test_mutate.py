@@ -55,7 +55,8 @@ def test_every_module_has_tests_that_stand_beside_it():
         test for module in modules for test in mutate.beside(module) if not (mutate.ROOT / test).is_file()
     }
     assert not missing
-    assert mutate.beside("shipgym/sea/wind.py") == ["tests/shipgym/test_wind.py"]
+    assert mutate.beside("shipgym/envs/sb3.py") == ["tests/shipgym/test_sb3.py"]
+    assert "tests/golden/test_seas.py" in mutate.beside("shipgym/sea/wind.py")
 
 
 def test_what_is_drawn_follows_from_the_seed():

@@ -15,6 +15,8 @@ _BOUNDS: dict[str, dict[str, Any]] = {
     "time_constant": {"at_least": 0.0},
 }
 
+SHORTEST_LAG = 0.45  # of a step of simulations
+
 
 @dataclass(frozen=True)
 class SteeringGear:
@@ -24,7 +26,7 @@ class SteeringGear:
 
         d(delta)/dt = clip((clip(order, -limit, limit) - delta) / time_constant, -rate, rate).
 
-    In simulations the lag is at least half a step (`frequency`).
+    In simulations the lag is at least 0.45 of a step (`frequency`).
 
     Parameters
     ----------
@@ -80,7 +82,7 @@ class SteeringGear:
     def frequency(self, step: float = 0.0) -> float:
         """Inverse of the time constant in steps of some seconds, 1/s; 0 for a gear without lag.
 
-        A lag shorter than half a step is taken as half a step: the Runge-Kutta method does not follow it, and
-        is unstable where it is shorter than 0.36 of a step (Hairer & Wanner 1996, IV.2).
+        A lag shorter than 0.45 of a step is taken as that: the Runge-Kutta method does not follow it, and is
+        unstable where it is shorter than 0.36 of a step (Hairer & Wanner 1996, IV.2).
         """
-        return 1.0 / max(self.time_constant, 0.5 * step) if self.time_constant else 0.0
+        return 1.0 / max(self.time_constant, SHORTEST_LAG * step) if self.time_constant else 0.0

@@ -268,7 +268,7 @@ def test_the_command_trains_and_resumes(tmp_path):
         (["train", "ppo", "--set", "base=tuned"], "base: 'tuned' found without a task of the suite"),
         (
             ["train", "ppo", "--set", "action_repeat=1000"],
-            "action_repeat: 1000 found, expected a whole number of at least 1, no longer than an episode",
+            "action_repeat: 1000 found, expected a whole number of at least 1 and at most 600, no longer",
         ),
         (["train", "ppo", "--option", "nois=1"], "Did you mean 'noise'?"),
         (["train", "ppo", "--task", "mariner-calm", "--sea", "rough"], "--task: found together with --sea"),

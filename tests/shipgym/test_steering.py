@@ -43,9 +43,9 @@ def test_the_rudder_settles_at_its_order_however_short_its_lag(lag, step):
 
 
 def test_an_environment_follows_a_short_lag():
-    """In steps of two seconds; there, one of half a step and a shorter one are the same."""
+    """In steps of two seconds; there, one of 0.45 of a step and a shorter one are the same."""
     rudders = []
-    for lag in (0.1, 1.0):
+    for lag in (0.1, 0.9):
         env = gymnasium.make("shipgym/CourseKeeping-v0", model=kvlcc2_with(lag))
         env.reset(seed=0)
         rudders.append([])
@@ -53,13 +53,13 @@ def test_an_environment_follows_a_short_lag():
             env.step(np.array([0.4], dtype=np.float32))
             rudders[-1].append(env.unwrapped.physical_state()["delta"])
     assert rudders[0] == rudders[1]
-    assert rudders[0][-1] == pytest.approx(0.4 * math.radians(35.0), rel=1e-5)
+    assert rudders[0][-1] == pytest.approx(0.4 * math.radians(35.0), rel=1e-4)
 
 
 @pytest.mark.parametrize(
-    ("step", "frequency"), [(0.0, 2.0), (0.9, 2.0), (1.0, 2.0), (1.6, 1.25), (10.0, 0.2)]
+    ("step", "frequency"), [(0.0, 2.0), (0.9, 2.0), (1.1, 2.0), (1.2, 1 / 0.54), (10.0, 1 / 4.5)]
 )
-def test_a_lag_is_at_least_half_a_step(step, frequency):
+def test_a_lag_is_at_least_nine_twentieths_of_a_step(step, frequency):
     assert SteeringGear(time_constant=0.5).frequency(step) == pytest.approx(frequency)
     assert SteeringGear().frequency(step) == 0.0
 
