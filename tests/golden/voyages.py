@@ -48,15 +48,11 @@ def cases() -> dict[str, Case]:
         "course random": Case(
             course, {"course_change_deg": 50.0, "change_interval_steps": 20, "model_uncertainty": "posterior"}
         ),
-        "course single": Case(
-            course, {**COSTS, **COURSES, "sea": [GUSTS, SMOOTH], "dt": 5.5, "noise": 1.4}, single=True
-        ),
-        "course shaft": Case("CourseKeepingShaft", {**COSTS, **COURSES, "ensemble": ["kvlcc2-l7"]}),
-        "course roll": Case("CourseKeepingRoll", {**COSTS, **COURSES, **NOISE, "sea": "rough"}),
-        "path": Case(path, {**COSTS, **LEGS, **RUDDER, **SHIPS, **NOISE, "sea": CHANGING_SEA}, swing=0.1),
-        "path roll": Case("PathFollowingRoll-v1", {**COSTS, **LEGS, **RUDDER, "sea": "rough"}, swing=0.1),
+        "course single": Case(course, {**COSTS, **COURSES, "dt": 5.5}, single=True),
+        "course roll": Case("CourseKeepingRoll", {**COSTS, **COURSES, "sea": "rough"}),
+        "path": Case(path, {**COSTS, **LEGS, **RUDDER, "noise": 0.7, "sea": [GUSTS, SMOOTH]}, swing=0.1),
         "path single": Case(path, {**COSTS, **LEGS, **RUDDER}, single=True, swing=0.7),
-        "path v0": Case(path_v0, {**COSTS, **LEGS, **NOISE, "acceptance": 0.8, "sea": SMOOTH}, swing=0.1),
+        "path v0": Case(path_v0, {**COSTS, **LEGS, "acceptance": 0.8}, swing=0.1),
         "path v0 discrete": Case("PathFollowingDiscrete", {**COSTS, **LEGS, "acceptance": 0.8}, swing=0.7),
     }
 
