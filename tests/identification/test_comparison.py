@@ -12,7 +12,7 @@ import pytest
 from identification import Comparison, compare_methods
 from identification.regression.samples import build_samples
 from identification.report.comparison import comparison_page
-from identification.validation.comparison import COMPARISON_FILES
+from identification.validation.comparison import COMPARISON_FILES, _pairs
 from identification.validation.folds import held_out_rows
 from shipgym import InputError, ShipModel, Trial
 from shipgym.ships.structures import get_structure
@@ -103,6 +103,17 @@ def test_what_cannot_be_compared_is_named(noisy_trials: list[Trial], mariner: Sh
         compare_methods(noisy_trials, ["ls"], folds=3, **options)
     with pytest.raises(InputError, match="expected structure 'grey-box'"):
         compare_methods(noisy_trials, ["rm-svm"], **options)
+
+
+def test_the_mmg_form_is_fitted_once_by_the_first_of_the_methods() -> None:
+    """Beside other structures, which each are by all of them; alone she is fitted as asked."""
+    asked = ["ls", "tls-svm"]
+    assert _pairs(["abkowitz", "mmg"], asked, True) == [
+        ("abkowitz", "ls"),
+        ("abkowitz", "tls-svm"),
+        ("mmg", "ls"),
+    ]
+    assert _pairs(["mmg"], asked, False) == [("mmg", "ls"), ("mmg", "tls-svm")]
 
 
 def test_a_single_trial_is_held_out_in_pieces_that_cover_it(

@@ -35,6 +35,13 @@ def shooter(mariner: ShipModel, cao_zigzag: Trial) -> Shooter:
     return Shooter(mariner, channels, np.abs(parameters(mariner)), free=False)
 
 
+def test_heading_is_compared_where_all_trials_have_it(mariner: ShipModel, cao_zigzag: Trial) -> None:
+    channels = {name: cao_zigzag[name] for name in cao_zigzag.channels if name != "psi"}
+    bare = Trial(cao_zigzag.t, channels)
+    assert compared_channels(mariner, [cao_zigzag, cao_zigzag]) == ("u", "v", "r", "psi")
+    assert compared_channels(mariner, [cao_zigzag, bare]) == ("u", "v", "r")
+
+
 def test_the_ship_itself_sails_every_segment_as_recorded(
     mariner: ShipModel, cao_zigzag: Trial, shooter: Shooter
 ) -> None:

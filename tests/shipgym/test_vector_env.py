@@ -156,7 +156,9 @@ def test_a_task_is_the_same_whatever_ship_is_drawn():
     for env in (plain, drawn):
         env.reset(seed=1)
     np.testing.assert_array_equal(plain.physical_state()["psi"], drawn.physical_state()["psi"])
-    np.testing.assert_array_equal(plain.unwrapped._engine.waypoints(4), drawn.unwrapped._engine.waypoints(4))
+    np.testing.assert_array_equal(plain.unwrapped.waypoints(4), drawn.unwrapped.waypoints(4))
+    np.testing.assert_array_equal(plain.unwrapped.waypoints(), plain.unwrapped.waypoints(0))
+    assert not np.array_equal(plain.unwrapped.waypoints(0), plain.unwrapped.waypoints(1))
 
 
 def test_workers_of_other_processes():
