@@ -20,6 +20,7 @@ from __future__ import annotations
 import argparse
 import ast
 import fnmatch
+import itertools
 import json
 import multiprocessing
 import os
@@ -54,6 +55,8 @@ ROOT = Path(__file__).parents[1]
 #: Kinds of statements that are not dropped.
 KEPT = {"import_name", "import_from", "return_stmt", "global_stmt", "nonlocal_stmt"}
 KEPT |= {"string", "strings", "keyword", "operator"}  # docstrings, pass, ...
+#: Seconds by which modules with faults are younger, each by others.
+LATER = itertools.count(1)
 
 
 class OwnOperator(Operator):
@@ -234,20 +237,26 @@ def copied(folder: Path) -> Path:
     return folder
 
 
+def written_at(path: Path, source: str, when: int) -> None:
+    """Write a module with a time of its own: by its whole seconds Python tells whether bytecode is of it."""
+    path.write_text(source, "utf-8")
+    os.utime(path, (when, when))
+
+
 def tried(fault: Fault, folders: SimpleQueue[Path], maps: Maps, limit_s: float) -> dict[str, object]:
     """Put one fault into a copy of the tree, run the tests beside it, and take it out again."""
     folder = folders.get()
     path = folder / fault.module
     source = path.read_text("utf-8")
-    changed = fault.applied(source)
+    changed, written = fault.applied(source), int(path.stat().st_mtime)
     try:
         lines = statement(source, fault.line)
         result = noticed(maps, folder, beside(fault.module), fault.module, lines, limit_s)
         begun = time.monotonic()
-        path.write_text(changed, "utf-8")
+        written_at(path, changed, written + next(LATER))
         found = result()
     finally:
-        path.write_text(source, "utf-8")
+        written_at(path, source, written)
         folders.put(folder)
     pairs = zip(source.splitlines(), changed.splitlines(), strict=False)
     before, after = next(((a.strip(), b.strip()) for a, b in pairs if a != b), ("", ""))

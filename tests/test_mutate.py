@@ -1,6 +1,8 @@
 """Faults are put where a module has them, and every module has tests that stand beside it."""
 
 import ast
+import subprocess
+import sys
 from pathlib import Path
 
 import covered_tests
@@ -72,6 +74,18 @@ def test_a_copy_of_the_tree_is_what_is_changed(tmp_path):
     assert (copy / name).read_bytes() == (mutate.ROOT / name).read_bytes()
     assert Path(copy / "pyproject.toml").is_file()
     assert not (copy / ".git").exists()
+
+
+def test_a_fault_is_gone_when_it_is_taken_out(tmp_path):
+    """Bytecode of a module with a fault, made within the same second, is not that of the module without."""
+    path = tmp_path / "module_with_a_fault.py"
+    command = [sys.executable, "-c", "import module_with_a_fault as m; print(m.X)"]
+    found = []
+    for text, later in (("X = 1\n", 0), ("X = 2\n", next(mutate.LATER)), ("X = 1\n", 0)):
+        mutate.written_at(path, text, 1_700_000_000 + later)
+        asked = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=True)
+        found.append(asked.stdout.strip())
+    assert found == ["1", "2", "1"]
 
 
 def test_tests_that_reach_a_line_come_first_and_the_cheapest_file_before_others(monkeypatch):
