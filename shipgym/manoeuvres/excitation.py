@@ -183,12 +183,12 @@ def shaft_of(model: ShipModel) -> float:
 
 
 def _steps(times: Floats, levels: tuple[float, float], lengths: tuple[float, ...], seed: Seed) -> Floats:
-    """Random levels of random lengths, both from a range; of the shape of the times."""
+    """Random levels of random lengths, both from a range; of the shape of the times, which begin with 0."""
     shortest, longest = lengths
     check_number(shortest, "shortest_s", above=0.0)
     check_number(longest, "longest_s", at_least=shortest, hint="shortest_s or more")
     rng = np.random.default_rng(seed)
-    most = int((times[-1] - times[0]) / shortest) + 2
+    most = int(times[-1] / shortest) + 2
     ends = np.cumsum(rng.uniform(shortest, longest, most))
     drawn: Floats = rng.uniform(*levels, most)
     return drawn[np.searchsorted(ends, times, side="right")]

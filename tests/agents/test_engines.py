@@ -20,7 +20,7 @@ import pytest
 
 from agents.engines import ray_engine
 from agents.engines.job import with_modules
-from agents.engines.jobs import JobError, WorkerDiedError, run_jobs
+from agents.engines.jobs import JobEngine, JobError, WorkerDiedError, run_jobs
 from agents.engines.ray_engine import check_answers
 from agents.engines.serialisation import pack, unpack
 from shipgym.errors import InputError
@@ -93,9 +93,13 @@ def test_results_are_the_same_wherever_they_were_computed(functions, tmp_path):
     expected = np.linalg.svd(np.random.default_rng(1).normal(size=(60, 40)), compute_uv=False)
     np.testing.assert_allclose(alone[1]["values"], expected, rtol=1e-12)
     two = run_jobs(functions.spectrum, jobs, workers=2, keep=tmp_path / "kept")
-    resumed = run_jobs(functions.spectrum, jobs, keep=tmp_path / "kept")
+    told = []
+    engine = JobEngine(keep=tmp_path / "kept")
+    engine.check()
+    resumed = engine.run(functions.spectrum, jobs, lambda *progress: told.append(progress))
     assert same(alone, two)
     assert same(alone, resumed)
+    assert told
 
 
 @pytest.mark.skipif(find_spec("ray") is None, reason="ray is not installed")

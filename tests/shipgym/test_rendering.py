@@ -3,6 +3,7 @@ from dataclasses import replace
 
 import gymnasium
 import numpy as np
+import pygame
 import pytest
 
 from shipgym import InputError
@@ -151,8 +152,10 @@ def test_a_window_opens_and_closes_without_a_screen(monkeypatch):
     for _ in range(3):
         env.step(np.zeros(1, dtype=np.float32))
     assert env.render() is None
+    assert pygame.display.get_init()
     env.close()
     env.close()
+    assert not pygame.display.get_init()
 
 
 def test_rows_of_a_vector_environment_have_their_own_pictures():
