@@ -47,5 +47,7 @@ def test_measured_velocities_and_short_records_stay():
     ship = load_model("mariner")
     run = zigzag(ship, duration=300.0, dt=1.0)
     assert with_start(ship, run) is run
-    short = as_derived(turning_circle(ship, 20.0, 300.0, 20.0), {"v": 0.5})
+    turn = turning_circle(ship, 20.0, 300.0, 1.0)
+    rare = Trial(turn.t[::20], {name: turn[name][::20] for name in turn.channels}, length=turn.length)
+    short = as_derived(rare, {"v": 0.5})
     assert with_start(ship, short) is short
