@@ -19,6 +19,7 @@ from agents.rollouts.rollout import episode_costs
 from agents.training import training
 from agents.training.algorithms import make_agent, make_ships, sb3_arguments, set_deviation
 from agents.training.plan import EVALUATION_SEED, Given, make_plan, training_options
+from agents.training.run_folder import other_versions
 from agents.training.settings import ALGORITHMS, load_settings
 from agents.training.training import train
 from shipgym.errors import InputError
@@ -247,7 +248,10 @@ def test_the_command_trains_and_resumes(tmp_path):
     before = learned(run)
     settings = written["configuration"]["settings"]
     settings |= {"hold": settings.pop("action_repeat"), "history": settings.pop("frame_stack")}
+    assert other_versions(run) == []
+    written["versions"]["numpy"] = "0.1"
     (run / "run.json").write_text(json.dumps(written))  # as older versions wrote it
+    assert other_versions(run) == [f"numpy {np.__version__} in place of 0.1"]
     code, printed = shipgym("train", "ppo", "--resume", "--out", run)
     assert (code, learned(run)) == (0, before)
     assert "resumed at step 768" in printed

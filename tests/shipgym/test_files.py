@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from shipgym.errors import InputError
-from shipgym.files import parse_json, parse_toml, read_bytes, read_json, read_toml, toml_value
+from shipgym.files import named_values, parse_json, parse_toml, read_bytes, read_json, read_toml, toml_value
 
 
 def said(read, *arguments):
@@ -100,3 +100,11 @@ def test_the_middle_of_an_endless_message_is_left_out():
     assert text.startswith("a.json: xxx")
     assert text.endswith("xxx: take another copy")
     assert len(text) < 2100
+
+
+def test_values_given_by_name_are_read_as_toml_has_them():
+    assert named_values(["a = 1e-3", "b=[2, 3]", "c=word"], "--set", "a=1") == {
+        "a": 1e-3, "b": [2, 3], "c": "word"
+    }  # fmt: skip
+    for wrong in ("a", "=1", " = "):
+        assert said(named_values, [wrong], "--set", "a=1").endswith("name=value, such as --set a=1")
