@@ -196,35 +196,30 @@ def record_steering() -> dict[str, Floats]:
     return found
 
 
+def under(model: ShipModel, *kinds: str) -> dict[str, Floats]:
+    """A ship under controllers of some kinds."""
+    return {
+        f"{kind} {name}": values
+        for kind in kinds
+        for name, values in of_controller(controller_class(kind).from_model(model)).items()
+    }
+
+
 def record_kvlcc2() -> dict[str, Floats]:
-    """A ship that is unstable on her course, with a shaft, under three kinds, and at two speeds."""
-    model = load_model("kvlcc2")
-    found = {}
-    for kind in ("pid", "lq-scheduled", "turn-rate"):
-        made = of_controller(controller_class(kind).from_model(model))
-        found |= {f"{kind} {name}": values for name, values in made.items()}
-    return found
+    """A ship that is hardly stable on her course, with a shaft."""
+    return under(load_model("kvlcc2"), "pid", "lq-scheduled", "turn-rate")
 
 
 def record_container() -> dict[str, Floats]:
-    """A ship that rolls, under LQ and LQG."""
-    model = load_model("container")
-    found = {}
-    for kind in ("lq", "lqg", "pid"):
-        made = of_controller(controller_class(kind).from_model(model))
-        found |= {f"{kind} {name}": values for name, values in made.items()}
-    return found
+    """A ship that rolls."""
+    return under(load_model("container"), "lq", "lqg", "pid")
 
 
 def record_second_order() -> dict[str, Floats]:
     """Ships whose yaw has a memory, or is of first order."""
     ship = load_model("mariner")
     model = nomoto2_ship(nomoto(ship), ship.particulars, ship.steering)
-    found = {}
-    for kind in ("lq", "mpc", "lq-scheduled", "pid"):
-        made = of_controller(controller_class(kind).from_model(model))
-        found |= {f"{kind} {name}": values for name, values in made.items()}
-    return found
+    return under(model, "lq", "mpc", "lq-scheduled", "pid")
 
 
 def record_functions() -> dict[str, Floats]:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
-from functools import cache
 from typing import Any
 
 import numpy as np
@@ -36,7 +34,7 @@ from identification.search.objectives import held_out_error, time_blocks, traini
 from identification.search.pattern_search import pattern_search
 from shipgym import Particulars, ShipModel, SteeringGear
 from shipgym.ships.kernel_boxes import Kernel
-from tests.golden.made_up import mariner, numbers_of, refused, regression, sampled, trials, words_of
+from tests.golden.made_up import Parts, mariner, refused, regression, sampled, trials
 from tests.golden.store import Floats
 
 #: Solvers of support vectors stop early, and robust weights when they hardly change.
@@ -367,29 +365,15 @@ def record_kernels() -> dict[str, Any]:
     }  # fmt: skip
 
 
-RECORDED: dict[str, Callable[[], dict[str, Any]]] = {
-    "lssvm": record_lssvm, "truncated": record_truncated, "tuned": record_tuned, "searches": record_searches,
-    "recursions": record_recursions, "support vectors": record_support_vectors, "methods": record_methods,
-    "kernels": record_kernels,
-}  # fmt: skip
-
-
-def cases() -> Iterable[str]:
-    """Kinds of estimators."""
-    return RECORDED
-
-
-@cache
-def content(case: str) -> dict[str, Any]:
-    """What a case comes to, numbers and texts."""
-    return RECORDED[case]()
-
-
-def record(case: str) -> dict[str, Floats]:
-    """The numbers of a case."""
-    return numbers_of(content(case))
-
-
-def texts(case: str) -> str:
-    """The texts of a case."""
-    return "\n".join(words_of(content(case)))
+PARTS = Parts(
+    {
+        "lssvm": record_lssvm,
+        "truncated": record_truncated,
+        "tuned": record_tuned,
+        "searches": record_searches,
+        "recursions": record_recursions,
+        "support vectors": record_support_vectors,
+        "methods": record_methods,
+        "kernels": record_kernels,
+    }
+)

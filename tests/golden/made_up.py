@@ -4,7 +4,7 @@ and their numbers."""
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import fields, is_dataclass
+from dataclasses import dataclass, fields, is_dataclass
 from functools import cache
 from typing import Any
 
@@ -62,6 +62,39 @@ def _plain(content: Any) -> Any:
     if isinstance(content, list | tuple | set | frozenset):
         return [_plain(value) for value in content]
     return content
+
+
+@dataclass(frozen=True, eq=False)
+class Parts:
+    """A golden section in parts, each a function that returns numbers and words, which is called once.
+
+    Attributes
+    ----------
+    functions : mapping
+        By the name of a case.
+    left_out : tuple of str
+        Parts of the names of what differs from computer to computer.
+    """
+
+    functions: Mapping[str, Callable[[], dict[str, Any]]]
+    left_out: tuple[str, ...] = ()
+
+    def cases(self) -> list[str]:
+        """Names of the cases."""
+        return list(self.functions)
+
+    @cache  # noqa: B019 - there are a few, which live as long as the program
+    def content(self, case: str) -> dict[str, Any]:
+        """What a case comes to, numbers and texts."""
+        return self.functions[case]()
+
+    def record(self, case: str) -> dict[str, Floats]:
+        """The numbers of a case."""
+        return numbers_of(self.content(case), left_out=self.left_out)
+
+    def texts(self, case: str) -> str:
+        """The texts of a case."""
+        return "\n".join(words_of(self.content(case), left_out=self.left_out))
 
 
 def refused(call: Callable[[], Any]) -> str:

@@ -86,9 +86,9 @@ SECTIONS = {
     "demo": Section(lambda: ["mariner"], chains.record_demo, {"": 1e-6}),
     "pretrained": Section(lambda: chains.TASKS, chains.record_pretrained, {"": 1e-6}),
     "identification": Section(lambda: chains.METHODS, chains.record_identification, chains.TOLERANCES),
-    "estimators": Section(estimators.cases, estimators.record, estimators.TOLERANCES),
-    "regression": Section(regression.cases, regression.record, regression.TOLERANCES),
-    "validation": Section(validation.cases, validation.record, validation.TOLERANCES),
+    "estimators": Section(estimators.PARTS.cases, estimators.PARTS.record, estimators.TOLERANCES),
+    "regression": Section(regression.PARTS.cases, regression.PARTS.record, regression.TOLERANCES),
+    "validation": Section(validation.PARTS.cases, validation.PARTS.record, validation.TOLERANCES),
     "fits": Section(fits.cases, fits.record, fits.TOLERANCES),
 }
 

@@ -3,7 +3,6 @@ records filtered and repaired."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
 from dataclasses import replace
 from functools import cache
 from typing import Any
@@ -39,8 +38,7 @@ from shipgym.manoeuvres.towing_tank import Tank, pure_surge, pure_sway, pure_yaw
 from shipgym.ships import get_structure, grey_box
 from shipgym.trials.identify_table import Options
 from shipgym.trials.navigation import rotate_to_body
-from tests.golden.made_up import mariner, noisy, numbers_of, refused, sampled, trials, words_of
-from tests.golden.store import Floats
+from tests.golden.made_up import Parts, mariner, noisy, refused, sampled, trials
 
 TOLERANCES = {"": 1e-6, "still water: ": 1e-5}
 SHIP = Particulars(length=28.9, beam=9.6, draught=2.7, mass=417e3, speed=5.0, xg=-0.5, yaw_gyradius=7.2)
@@ -481,29 +479,14 @@ def record_references() -> dict[str, Any]:
     return found
 
 
-RECORDED: dict[str, Callable[[], dict[str, Any]]] = {
-    "samples": record_samples, "rudder": record_rudder, "preprocessing": record_preprocessing,
-    "still water": record_still_water, "wind": record_wind, "forces": record_forces,
-    "references": record_references,
-}  # fmt: skip
-
-
-def cases() -> Iterable[str]:
-    """Parts of the way from trials to regressions."""
-    return RECORDED
-
-
-@cache
-def content(case: str) -> dict[str, Any]:
-    """What a case comes to, numbers and texts."""
-    return RECORDED[case]()
-
-
-def record(case: str) -> dict[str, Floats]:
-    """The numbers of a case."""
-    return numbers_of(content(case))
-
-
-def texts(case: str) -> str:
-    """The texts of a case."""
-    return "\n".join(words_of(content(case)))
+PARTS = Parts(
+    {
+        "samples": record_samples,
+        "rudder": record_rudder,
+        "preprocessing": record_preprocessing,
+        "still water": record_still_water,
+        "wind": record_wind,
+        "forces": record_forces,
+        "references": record_references,
+    }
+)

@@ -3,7 +3,7 @@ what is next."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import cache, partial
 from types import SimpleNamespace
@@ -47,9 +47,8 @@ from shipgym import Particulars, ShipModel, Trial, UnstableModelError
 from shipgym.manoeuvres import turning_circle, zigzag
 from shipgym.ships import get_structure
 from tests.golden.fits import LINEAR, fitted
-from tests.golden.made_up import mariner, numbers_of, refused, regression, sampled, trials, words_of
+from tests.golden.made_up import Parts, mariner, refused, regression, sampled, trials
 from tests.golden.regression import clean_zigzag
-from tests.golden.store import Floats
 
 TOLERANCES = {"": 1e-5}
 LEFT_OUT = ("sha256", "software", "version")
@@ -436,29 +435,15 @@ def run_away(_: ShipModel) -> Trial:
     raise UnstableModelError("gone", 3.0, {})
 
 
-RECORDED: dict[str, Callable[[], dict[str, Any]]] = {
-    "formulas": record_formulas, "priors": record_priors, "guard": record_guard,
-    "diagnostics": record_diagnostics,
-    "selection": record_selection, "comparison": record_comparison, "design": record_design,
-}  # fmt: skip
-
-
-def cases() -> Iterable[str]:
-    """What is looked at."""
-    return RECORDED
-
-
-@cache
-def content(case: str) -> dict[str, Any]:
-    """What a case comes to, numbers and texts."""
-    return RECORDED[case]()
-
-
-def record(case: str) -> dict[str, Floats]:
-    """The numbers of a case."""
-    return numbers_of(content(case), left_out=LEFT_OUT)
-
-
-def texts(case: str) -> str:
-    """The texts of a case."""
-    return "\n".join(words_of(content(case), left_out=LEFT_OUT))
+PARTS = Parts(
+    {
+        "formulas": record_formulas,
+        "priors": record_priors,
+        "guard": record_guard,
+        "diagnostics": record_diagnostics,
+        "selection": record_selection,
+        "comparison": record_comparison,
+        "design": record_design,
+    },
+    left_out=LEFT_OUT,
+)
