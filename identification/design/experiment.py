@@ -113,9 +113,9 @@ class Advice:
         return table
 
     def _candidates(self) -> Table:
-        title = f"Run next ({self.criterion}-optimal; least certain: {self.coefficient})"
+        shrunk = f" for {self.coefficient}" if self.criterion == "c" else ""
         headings = (f">gain, choice {k + 1}" for k in range(len(self.steps)))
-        table = lined_table(title, "candidate", *headings)
+        table = lined_table(f"Run next ({self.criterion}-optimal{shrunk})", "candidate", *headings)
         choices = list(zip(self.steps, self.chosen, strict=True))
         for name in sorted(self.steps[0], key=lambda name: self.steps[0][name], reverse=True):
             gains = (f"{gains[name]:.2f}{' *' if name == best else ''}" for gains, best in choices)

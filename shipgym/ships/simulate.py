@@ -67,7 +67,7 @@ class Passage:
         found = self.loop(name)(states, *arguments, *self.sea, self.numbers)
         reached = found[0] if isinstance(found, tuple) else found
         if reached < len(states) - 1:
-            raise unstable(self.model, since + self.dt * reached, states[reached])
+            raise unstable(self.model, since + self.dt * reached, states[reached], self.dt)
         return found
 
     def states(self, first: Floats, n_steps: int) -> Floats:
@@ -183,11 +183,14 @@ def _channels(model: ManoeuvringModel, states: Floats) -> dict[str, Floats]:
     return {name: column for name, column in columns if name in CHANNELS}
 
 
-def unstable(model: ManoeuvringModel, time_s: float, state: Floats) -> UnstableModelError:
-    """The error for a ship that ran away after a given time and physical state."""
+def unstable(
+    model: ManoeuvringModel, time_s: float, state: Floats, step: float = 0.0
+) -> UnstableModelError:
+    """The error for a ship that ran away after a given time and physical state, in steps of so many s."""
     last = dict(zip(model.state_names, state.tolist(), strict=False))
     heel = f", phi = {np.degrees(last['phi']):.3g} deg" if "phi" in last else ""
-    long = "" if time_s > 0.0 else ", or the step is far too long for it"
+    longest = LONGEST_STEP * model.travel_time
+    long = f", or steps of {step:g} s are too long: try {longest:.1g} s" if step > longest else ""
     return UnstableModelError(
         f"model {model.name!r} runs away after {time_s:.1f} s (u = {last['u']:.3g} m/s, "
         f"v = {last['v']:.3g} m/s, r = {np.degrees(last['r']):.3g} deg/s{heel}): it is unstable there{long}",

@@ -69,7 +69,7 @@ def _offset(value: Any, where: str) -> float | str:
     """An offset in rad, of one in degrees, or that it is to be estimated."""
     if value == _ESTIMATE:
         return _ESTIMATE
-    return DEGREE * check_number(value, where, at_least=-180.0, hint=f'or "{_ESTIMATE}"')
+    return DEGREE * check_number(value, where, at_least=-180.0, at_most=180.0, hint=f'or "{_ESTIMATE}"')
 
 
 NO_OFFSETS = Instruments()

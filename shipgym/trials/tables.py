@@ -25,6 +25,7 @@ MOST_VARIABLES = 10_000  # of a MATLAB file
 _MATRIX, _COMPRESSED = 14, 15  # kinds of elements of a MATLAB file, and those of numbers
 _NUMBERS = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8", 12: "i8", 13: "u8"}
 _FIRST_NUMERIC = 6  # class of a matrix
+_COMPLEX = 0x0800  # flag of a matrix
 
 
 def read_log(path: str | Path | Table) -> Table:
@@ -145,8 +146,12 @@ def _read_matlab(path: Path) -> Table:
             (_, flags), (_, shape), (_, name), (kind, values) = parts
             array = np.frombuffer(values, f"{order}{_NUMBERS[kind]}")
             sizes = np.frombuffer(shape, f"{order}i4")
-            numeric = struct.unpack(f"{order}I", flags[:4])[0] & 0xFF >= _FIRST_NUMERIC
+            about = struct.unpack(f"{order}I", flags[:4])[0]
+            numeric = about & 0xFF >= _FIRST_NUMERIC
             if numeric and np.count_nonzero(sizes != 1) == 1 and sizes.max() == array.size:
+                if about & _COMPLEX:
+                    where = f"{path}: variable {name.decode('ascii')!r}"
+                    raise InputError(f"{where}: complex numbers found, expected real ones; save real(...)")
                 found[name.decode("ascii")] = array.astype(np.float64)
         length = max(
             (one.size for one in found.values()), key=[v.size for v in found.values()].count, default=0

@@ -498,6 +498,12 @@ def test_of_a_matlab_file_numeric_vectors_of_the_commonest_length_are_read(tmp_p
         assert read_log(tmp_path / "log.mat").numbers("u").tolist() == [1.0, 2.0, 100.0]
 
 
+def test_complex_vectors_of_a_matlab_file_are_refused(tmp_path):
+    savemat(tmp_path / "log.mat", {"u": np.arange(3.0), "psi": np.exp(1j * np.arange(3.0))})
+    with pytest.raises(InputError, match=r"log.mat: variable 'psi': complex numbers found, expected real"):
+        read_log(tmp_path / "log.mat")
+
+
 def test_a_matlab_file_of_a_million_variables_is_refused_at_once(tmp_path):
     """Eight zeros are an empty one: a file of zeros would be read for half a minute."""
     path = tmp_path / "log.mat"
