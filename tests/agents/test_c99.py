@@ -295,6 +295,14 @@ def test_numbers_and_names_are_those_of_c():
         c_name("é")
 
 
+def test_things_of_one_name_are_numbered_from_the_second_on():
+    made = Translator({}, "ship")
+    taken = []
+    for _ in range(3):
+        taken.append(made._free("sine", taken))
+    assert taken == ["ship_sine", "ship_sine2", "ship_sine3"]
+
+
 def test_a_lambda_is_refused():
     double = lambda x: 2 * x  # noqa: E731
     with pytest.raises(InputError, match=r"line 1: 'double = lambda x: 2 \* x' found, which cannot be"):

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from agents import LQ, PID, load_agent
+from agents.controllers.controller import check_scales
 from agents.controllers.registry import BUILT_IN, controller_class
 from shipgym.errors import InputError
 from shipgym.ships import load_model
@@ -143,6 +144,12 @@ def changed(path, tmp_path, change):
     target = tmp_path / path.name
     target.write_text(json.dumps(content))
     return target
+
+
+def test_scales_of_observations_agree_within_a_millionth():
+    check_scales(["rudder"], [1.0 - 0.95e-6], [1.0], "agent", "hers is {}")
+    with pytest.raises(InputError, match="agent: the scale of 'rudder' is 0.999999, but hers is 1"):
+        check_scales(["rudder"], [1.0 - 1.05e-6], [1.0], "agent", "hers is {}")
 
 
 def test_there_is_a_file_of_every_kind():

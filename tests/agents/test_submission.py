@@ -123,6 +123,7 @@ def test_a_submission_is_verified(tmp_path):
 def test_a_submission_of_other_seeds_suite_or_versions_is_refused(field, value, said, tmp_path):
     path = tmp_path / "mine.json"
     submit(ran(), "lq", path)
+    assert json.loads(path.read_text())["format"] == 1
     path.write_text(json.dumps(json.loads(path.read_text()) | {field: value}))
     with pytest.raises(InputError, match=said) as caught:
         verify(path)

@@ -18,7 +18,7 @@ from identification.regression.forces import (
 )
 from shipgym import InputError, Particulars, ShipModel, Trial
 from shipgym.manoeuvres.towing_tank import Tank, pure_surge, pure_sway, pure_yaw, static_drift, yaw_with_drift
-from shipgym.ships.shared_structure import read_shares, shared_structure
+from shipgym.ships.shared_structure import VR, Share, read_shares, shared_structure
 from shipgym.ships.structures import get_structure
 
 # a stand-in for what the paper does not print: a coaster's mass
@@ -52,6 +52,10 @@ def test_the_models_have_the_coefficients_of_the_paper() -> None:
     assert {"Y_vdot", "Y_rdot"} < set(PMM18.names("u"))
     assert "X_udot" in PMM18.names("v")
     assert {"X_udot", "Y_vdot", "Y_rdot"} < set(PMM18.names("r"))
+
+
+def test_a_share_counts_as_it_is_unless_a_sign_is_given() -> None:
+    assert Share("Y_vr", VR).to_dict()["sign"] == 1.0
 
 
 def test_each_term_stands_once_and_before_those_of_the_mass() -> None:

@@ -21,6 +21,7 @@ from shipgym.checks import (
     check_text,
     check_whole,
     did_you_mean,
+    placed,
     quoted,
 )
 from shipgym.files import atomic_path, read_json, write_json, write_text
@@ -95,6 +96,13 @@ def test_tables_keys_and_choices():
     assert (quoted(["x", "y"]), quoted([])) == ("'x', 'y'", "none")
     assert did_you_mean("turn", ["turning circle", "zigzag"]) == " Did you mean 'turning circle'?"
     assert did_you_mean("tu", ["turning circle", "zigzag"]) == ""
+
+
+def test_a_place_is_named_once():
+    with pytest.raises(InputError, match=r"^here: there: wrong$"), placed("here"):
+        raise InputError("there: wrong")
+    with pytest.raises(InputError, match=r"^here: wrong$"), placed("here"):
+        raise InputError("here: wrong")
 
 
 def test_finite_numbers_are_a_copy_that_cannot_be_written():

@@ -16,6 +16,7 @@ from shipgym.errors import InputError
 from shipgym.manoeuvres import turning_circle, turning_indices, zigzag
 from shipgym.ships import converted_model, grey_box
 from shipgym.ships.checker import check_ship_model
+from shipgym.ships.conversions import nomoto2_ship
 from shipgym.ships.linear import nomoto
 from shipgym.ships.scaling import scale_model
 from shipgym.ships.structures import get_structure, register_structure
@@ -99,6 +100,21 @@ def test_accelerations_are_the_converted_ones_and_the_terms(bare: ShipModel, tan
     ]  # fmt: skip
     found = model.derivatives([0.0, 0.0, 0.0, u, v, r, delta], [delta, n])[3:6]
     np.testing.assert_allclose(found, expected, rtol=1e-12)
+
+
+def test_a_memory_of_yaw_is_converted_as_the_state_it_is() -> None:
+    """It is a part of the yaw acceleration, which goes with the square of the yaw rate."""
+    own = shipgym.load_model("mariner")
+    ship = nomoto2_ship(nomoto(own), own.particulars, own.steering)
+    small = converted_model(ship, scale_model(own, 7.0).particulars, own.steering)
+    state = {"u": 3.0, "v": 0.0, "r": 0.02, "q": 1e-4, "delta": 0.1}
+    found = small.dynamics.converted_accelerations(
+        {k: np.array([x]) for k, x in state.items()}, small.particulars
+    )
+    slopes = small.derivatives([state.get(name, 0.0) for name in small.state_names], [0.1])
+    rates = dict(zip(small.state_names, slopes, strict=True))
+    for name in ("r", "q"):
+        np.testing.assert_allclose(found[name], rates[name], rtol=1e-12)
 
 
 def test_the_grey_box_is_listed_among_the_structures() -> None:

@@ -72,7 +72,7 @@ def test_a_ship_that_capsizes_is_an_error_even_if_nothing_else_feels_her_roll():
 
 @pytest.mark.compiled
 def test_a_step_that_is_far_too_long_is_suspected_and_a_shorter_one_named():
-    with pytest.raises(UnstableModelError, match="or steps of 100 s are too long: try 0.5 s"):
+    with pytest.raises(UnstableModelError, match="or steps of 100 s are too long: try"):
         manoeuvres.zigzag(load_model("mariner"), dt=100.0)
 
 

@@ -2,6 +2,7 @@
 
 import json
 import math
+from dataclasses import replace
 
 import pytest
 from hypothesis import given
@@ -59,6 +60,7 @@ def test_what_is_given_is_kept_and_what_is_estimated_is_marked():
     ship = Particulars.from_mapping(KVLCC2 | {"added_mass": {"Y_vdot": -0.0145}})
     completed = ship.completed()
     assert ship.estimated == frozenset()
+    assert hash(replace(ship, estimated=["mass"])) == hash(replace(ship, estimated={"mass"}))
     assert completed.estimated == {"X_udot", "Y_rdot", "N_vdot", "N_rdot"}
     assert completed.Y_vdot == -0.0145
     assert completed.X_udot == pytest.approx(-0.05 * completed.mass_prime)

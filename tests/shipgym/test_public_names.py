@@ -19,18 +19,34 @@ PUBLIC = ("shipgym", "shipgym.manoeuvres", "shipgym.sea", "shipgym.ships", "iden
 
 
 def defaults():
-    """Default of each argument of what is public, by package, name and argument."""
+    """Default of each argument of what is public, methods of classes among it, by package, name, argument."""
     found = {}
     for package in map(importlib.import_module, PUBLIC):
         for name in sorted(set(package.__all__) - {"ShipVecEnv"}):  # which loads torch
             given = getattr(package, name)
             if not callable(given) or (inspect.isclass(given) and issubclass(given, Exception)):
                 continue
-            parameters = inspect.signature(given).parameters.values()
-            own = {p.name: p.default for p in parameters if isinstance(p.default, int | float | str | tuple)}
-            if own:
-                found[f"{package.__name__}.{name}"] = json.loads(json.dumps(own, default=repr))
+            for called, function in {f"{package.__name__}.{name}": given, **methods(package, name)}.items():
+                parameters = inspect.signature(function).parameters.values()
+                own = {
+                    p.name: p.default for p in parameters if isinstance(p.default, int | float | str | tuple)
+                }
+                if own:
+                    found[called] = json.loads(json.dumps(own, default=repr))
     return found
+
+
+def methods(package, name):
+    """Public methods of a class that are written in the project, by their full names."""
+    given = getattr(package, name)
+    if not inspect.isclass(given):
+        return {}
+    pairs = inspect.getmembers(given, inspect.isfunction)
+    return {
+        f"{package.__name__}.{name}.{key}": method
+        for key, method in pairs
+        if not key.startswith("_") and method.__module__.split(".")[0] in PUBLIC
+    }
 
 
 def test_defaults_are_those_that_users_have():
