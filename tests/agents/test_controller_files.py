@@ -148,7 +148,7 @@ def changed(path, tmp_path, change):
 
 def test_scales_of_observations_agree_within_a_millionth():
     check_scales(["rudder"], [1.0 - 0.95e-6], [1.0], "agent", "hers is {}")
-    with pytest.raises(InputError, match="agent: the scale of 'rudder' is 0.999999, but hers is 1"):
+    with pytest.raises(InputError, match=r"agent: the scale of 'rudder' is 0\.999999, but hers is 1"):
         check_scales(["rudder"], [1.0 - 1.05e-6], [1.0], "agent", "hers is {}")
 
 
