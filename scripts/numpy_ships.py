@@ -20,8 +20,7 @@ from numpy.typing import NDArray
 import shipgym
 from shipgym.engine import motion
 from shipgym.engine.motion import Motion, Push, Ship
-from shipgym.engine.parts import Part
-from shipgym.engine.specialise import named_globals
+from shipgym.engine.specialise import Part, named_globals
 
 Floats = NDArray[np.float64]
 Batch = tuple[Floats, ...]

@@ -11,7 +11,7 @@ import numpy as np
 from agents.deployment.c99 import render
 from agents.deployment.nmea import Link, readings, sentences
 from shipgym.checks import check_number
-from shipgym.engine.passages import SEA_CHANNELS
+from shipgym.engine.trajectories import SEA_CHANNELS
 from shipgym.errors import InputError
 from shipgym.sea.conditions import Weather
 from shipgym.ships import ShipModel

@@ -8,9 +8,9 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from shipgym.engine.parts import Part
 from shipgym.engine.record_code import intrinsic, new_array
 from shipgym.engine.records import LANES
+from shipgym.engine.specialise import Part
 
 
 def addresses(arrays: Sequence[NDArray[Any]]) -> list[int]:

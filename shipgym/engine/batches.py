@@ -4,15 +4,10 @@ from math import fabs
 from typing import Any
 
 from shipgym.engine.motion import Push, sail
-from shipgym.engine.passages import NO_LIMIT, replaced, with_gear
+from shipgym.engine.trajectories import NO_LIMIT, replaced, with_gear
 from shipgym.engine.places import (
-    common_ship,
-    load_coefficients,
-    load_motion,
-    load_ship,
-    ship_at,
-    store_motion,
-)
+    common_ship, load_coefficients, load_motion, load_ship, ship_at, store_motion,
+)  # fmt: skip
 from shipgym.engine.records import LANES
 
 SIGNATURE = "void(float64[:, ::1], float64[:, ::1], float64, int64, float64[:, ::1])"

@@ -109,20 +109,15 @@ def write_loop(content: bytes, path: Path) -> None:
         draft.chmod(0o644)  # others may use it
 
 
-def lock_of(path: Path) -> Path:
-    """The lock under which a loop's file is written: its name begins with a hash."""
-    return path.with_name(path.name.partition("-")[0] + ".lock")
-
-
 @contextmanager
 def locked(path: Path) -> Iterator[None]:
-    """One process compiles, the others wait; the lock of a process that was killed is free.
+    """One process compiles a loop's file, the others wait; the lock of a process that was killed is free.
 
     Where no lock can be had, in a folder that may only be read or on a disk without locks, each compiles.
     """
     from filelock import FileLock
 
-    lock = FileLock(path)
+    lock = FileLock(path.with_name(path.name.partition("-")[0] + ".lock"))  # the name begins with a hash
     with suppress(OSError, NotImplementedError):
         lock.acquire()
     try:

@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from shipgym.engine.cache_folder import lock_of, locked, usable_folder
+from shipgym.engine.cache_folder import locked, usable_folder
 from shipgym.engine.specialise import SEMANTICS, Parts, Specialisation, fingerprint, is_shipped
 from shipgym.errors import InputError
 
@@ -51,7 +51,7 @@ def compiled(loop: Any, signature: str, parts: Parts, what: str) -> Any:
     else:
         dispatcher._cache = disk = DiskCache(folder, tag, signature)
         if not disk.ready():
-            with locked(lock_of(disk.path)):
+            with locked(disk.path):
                 if not disk.ready():  # another process may have been first
                     _announce(what, folder)
                 _compile(dispatcher, signature, what)

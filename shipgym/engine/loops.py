@@ -5,14 +5,15 @@ from dataclasses import dataclass, field
 from functools import cache
 from typing import Any
 
-from shipgym.engine import batches, passages, trajectories
+from shipgym.engine import batches, trajectories
 from shipgym.engine.compiling import compiled
-from shipgym.engine.parts import Part
 from shipgym.engine.records import LANES
+from shipgym.engine.specialise import Part
 from shipgym.engine.vessel import Vessel
 from shipgym.sea.open_sea import sea_parts
 
-SEA = "float64[::1], uint64[::1], float64[::1]"  # state, random numbers, parameters
+VECTOR, TABLE = "float64[::1]", "float64[:, ::1]"
+SEA = f"{VECTOR}, uint64[::1], {VECTOR}"  # state, random numbers, parameters
 
 
 @dataclass(frozen=True)
@@ -28,41 +29,30 @@ class Loop:
 
 MEASURED_GEAR = {"HAS_LAG": False}
 LOOPS = {
-    "derivatives": Loop(
-        trajectories.derivatives,
-        "void(float64[:, ::1], float64[:, ::1], float64[::1], float64[::1], float64[:, ::1])",
-    ),
-    "meet": Loop(passages.meet, f"void(float64[:, ::1], {SEA})"),
-    "simulate": Loop(
-        trajectories.simulate, f"int64(float64[:, ::1], float64[:, ::1], float64, {SEA}, float64[::1])"
-    ),
+    "derivatives": Loop(trajectories.derivatives, f"void({TABLE}, {TABLE}, {VECTOR}, {VECTOR}, {TABLE})"),
+    "meet": Loop(trajectories.meet, f"void({TABLE}, {SEA})"),
+    "simulate": Loop(trajectories.simulate, f"int64({TABLE}, {TABLE}, float64, {SEA}, {VECTOR})"),
     "open_loop": Loop(
         trajectories.open_loop,
-        "int64(float64[:, ::1], float64[::1], float64[::1], float64[::1], float64[:, ::1], float64,"
-        " float64[::1])",
-        parts=MEASURED_GEAR,
+        f"int64({TABLE}, {VECTOR}, {VECTOR}, {VECTOR}, {TABLE}, float64, {VECTOR})", parts=MEASURED_GEAR,
     ),
     "zigzag": Loop(
         trajectories.zigzag,
-        "UniTuple(int64, 2)(float64[:, ::1], float64[::1], float64, float64, float64, float64, boolean,"
-        f" {SEA}, float64[::1])",
-        parts={"advanced": Part(passages.advanced, inline=False)},
+        f"UniTuple(int64, 2)({TABLE}, {VECTOR}, {', '.join(4 * ['float64'])}, boolean, {SEA}, {VECTOR})",
+        parts={"advanced": Part(trajectories.advanced, inline=False)},
     ),
     "steer_rate": Loop(
         trajectories.steer_rate,
-        "int64(float64[:, ::1], float64[::1], float64[::1], float64, float64, float64, float64, float64,"
-        f" {SEA}, float64[::1])",
+        f"int64({TABLE}, {VECTOR}, {VECTOR}, {', '.join(5 * ['float64'])}, {SEA}, {VECTOR})",
     ),
     "segments": Loop(
         batches.sail_segment,
-        "void(float64[::1], float64[::1], float64[::1], float64[:, ::1], int64[::1], float64[:, ::1])",
-        LANES,
-        shared=False,
+        f"void({VECTOR}, {VECTOR}, {VECTOR}, {TABLE}, int64[::1], {TABLE})", LANES, shared=False,
         parts=MEASURED_GEAR,
     ),
     "fleet": Loop(batches.advance_batch, batches.SIGNATURE, LANES, shared=False),
     "alike": Loop(batches.advance_batch, batches.SIGNATURE, LANES),
-}
+}  # fmt: skip
 
 
 @cache

@@ -124,33 +124,20 @@ def rates(motion: Motion, order: float, shaft: float, push: Push, coefficients: 
     if HAS_SEA:
         udot, vdot, rdot, pdot = udot + push.u, vdot + push.v, rdot + push.r, pdot + push.p
     return Rates(
-        psi=motion.r * upright(motion),
-        u=udot,
-        v=vdot,
-        r=rdot,
-        p=pdot,
-        phi=motion.p,
-        q=qdot,
-        delta=gear_rate(motion.delta, order, ship),
-        n=shaft_acceleration(motion.n, shaft, coefficients, ship),
-    )
+        psi=motion.r * upright(motion), u=udot, v=vdot, r=rdot, p=pdot, phi=motion.p, q=qdot,
+        delta=gear_rate(motion.delta, order, ship), n=shaft_acceleration(motion.n, shaft, coefficients, ship),
+    )  # fmt: skip
 
 
 def along(start: Motion, k: Rates, h: float, delta: float) -> Motion:
     """The state h seconds along the rates k, with the rudder at delta; what the ship lacks stays."""
     return Motion(
-        x=start.x,
-        y=start.y,
-        psi=start.psi + h * k.psi,
-        u=start.u + h * k.u,
-        v=start.v + h * k.v,
-        r=start.r + h * k.r,
-        p=start.p + h * k.p if HAS_ROLL else 0.0,
-        phi=start.phi + h * k.phi if HAS_ROLL else 0.0,
+        x=start.x, y=start.y, psi=start.psi + h * k.psi,
+        u=start.u + h * k.u, v=start.v + h * k.v, r=start.r + h * k.r,
+        p=start.p + h * k.p if HAS_ROLL else 0.0, phi=start.phi + h * k.phi if HAS_ROLL else 0.0,
         q=start.q + h * k.q if HAS_MEMORY else 0.0,
-        delta=delta,
-        n=start.n + h * k.n if HAS_SHAFT else start.n,
-    )
+        delta=delta, n=start.n + h * k.n if HAS_SHAFT else start.n,
+    )  # fmt: skip
 
 
 def stage(start: Motion, k: Rates, h: float, order: float, ship: Ship) -> Motion:
@@ -162,15 +149,11 @@ def weighted(a: Rates, b: Rates, c: Rates, d: Rates) -> Rates:
     """Runge and Kutta's sum of four slopes, six times their mean."""
     return Rates(
         psi=a.psi + 2.0 * (b.psi + c.psi) + d.psi,
-        u=a.u + 2.0 * (b.u + c.u) + d.u,
-        v=a.v + 2.0 * (b.v + c.v) + d.v,
-        r=a.r + 2.0 * (b.r + c.r) + d.r,
-        p=a.p + 2.0 * (b.p + c.p) + d.p,
-        phi=a.phi + 2.0 * (b.phi + c.phi) + d.phi,
+        u=a.u + 2.0 * (b.u + c.u) + d.u, v=a.v + 2.0 * (b.v + c.v) + d.v, r=a.r + 2.0 * (b.r + c.r) + d.r,
+        p=a.p + 2.0 * (b.p + c.p) + d.p, phi=a.phi + 2.0 * (b.phi + c.phi) + d.phi,
         q=a.q + 2.0 * (b.q + c.q) + d.q,
-        delta=a.delta + 2.0 * (b.delta + c.delta) + d.delta,
-        n=a.n + 2.0 * (b.n + c.n) + d.n,
-    )
+        delta=a.delta + 2.0 * (b.delta + c.delta) + d.delta, n=a.n + 2.0 * (b.n + c.n) + d.n,
+    )  # fmt: skip
 
 
 def way(motion: Motion) -> tuple[float, float]:

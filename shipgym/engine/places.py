@@ -28,13 +28,10 @@ PLACES = {
 
 def __getattr__(name: str) -> Any:
     """A function that raises an error naming who gives it."""
-    for giver, names in PLACES.items():
-        if name in names:
-            return _place(name, giver)
-    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    giver = next((giver for giver, names in PLACES.items() if name in names), None)
+    if giver is None:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 
-
-def _place(name: str, giver: str) -> Any:
     def place(*arguments: Any) -> Any:
         raise RuntimeError(f"{name} is a place that {giver} fill when a loop is compiled")
 

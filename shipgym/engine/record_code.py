@@ -8,8 +8,8 @@ from collections.abc import Callable, Iterator, Mapping
 from functools import partial, reduce
 from typing import Any
 
-from shipgym.engine.parts import Part
 from shipgym.engine.records import LANES, Record, Rows, field_types, is_list, is_record, is_table, leaves
+from shipgym.engine.specialise import Part
 
 Path = tuple[int, ...]
 #: LLVM instructions of a function: of Numba's context, a builder, types and values of the arguments.
@@ -122,10 +122,8 @@ def chooser(record: Record) -> Part:
         return yes if condition else no
 
     def generate(context: Any, builder: Any, kinds: Any, values: Any) -> Any:
-        from numba.core import types
-
         places = dict(_places(record))
-        flag = context.cast(builder, values[0], kinds[0], types.boolean)
+        flag = context.cast(builder, values[0], kinds[0], _types().boolean)
 
         def number(path: str, kind: Any) -> Any:
             return builder.select(
@@ -177,14 +175,13 @@ def _part(
 def intrinsic(generate: Generate, arity: int, answer: Answer = None) -> Any:
     """A function of its LLVM instructions; without an answer it returns nothing."""
     import numba.extending
-    from numba.core import types
 
     def typed(*kinds: Any) -> Any:
         def emit(context: Any, builder: Any, signature: Any, values: Any) -> Any:
             return generate(context, builder, signature.args, values)
 
-        given = [types.intp if isinstance(kind, types.Integer) else kind for kind in kinds]
-        return (types.void if answer is None else answer())(*given), emit
+        given = [_types().intp if isinstance(kind, _types().Integer) else kind for kind in kinds]
+        return (_types().void if answer is None else answer())(*given), emit
 
     forms = (
         lambda typing: typed(),
@@ -196,10 +193,15 @@ def intrinsic(generate: Generate, arity: int, answer: Answer = None) -> Any:
     return numba.extending.intrinsic(forms[arity])
 
 
-def _double() -> Any:
+def _types() -> Any:
+    """Numba's types; Numba is imported when something is compiled."""
     from numba.core import types
 
-    return types.float64
+    return types
+
+
+def _double() -> Any:
+    return _types().float64
 
 
 def _constant(context: Any, number: float) -> Any:
@@ -237,14 +239,13 @@ def _number(record: Any, path: str) -> Any:
 
 def _type(record: Record) -> Any:
     """Numba's type of a record whose numbers are floats."""
-    from numba.core import types
 
     def typed(path: str, kind: Any) -> Any:
         if is_table(kind):
-            return types.CPointer(types.float64)  # type: ignore[attr-defined]
-        return types.float64[::1] if is_list(kind) else types.float64
+            return _types().CPointer(_double())
+        return _double()[::1] if is_list(kind) else _double()
 
-    return _fold(record, typed, lambda one, kinds: types.Tuple.from_types(kinds, one))  # type: ignore[attr-defined]
+    return _fold(record, typed, lambda one, kinds: _types().Tuple.from_types(kinds, one))
 
 
 def _coded(context: Any, builder: Any, record: Record, number: OfNumber) -> Any:
@@ -263,39 +264,32 @@ def _places(record: Record, prefix: str = "", at: Path = ()) -> Iterator[tuple[s
 
 def _taken(context: Any, builder: Any, kind: Any, value: Any, at: Path) -> Any:
     """One number of a record as a float."""
-    from numba.core import types
-
     for i in at:
         value, kind = builder.extract_value(value, i), kind.types[i]
-    return context.cast(builder, value, kind, types.float64)
+    return context.cast(builder, value, kind, _double())
 
 
 def _entry(context: Any, builder: Any, kind: Any, array: Any, row: int, lanes: int, lane: Any) -> Any:
     """Pointer to the number of a row."""
-    from numba.core import types
-
-    word = context.get_value_type(types.intp)
+    word = context.get_value_type(_types().intp)
     index = word(row) if lanes == 1 else builder.add(lane, word(row * lanes), flags=("nsw",))
     return builder.gep(context.make_array(kind)(context, builder, array).data, [index], inbounds=True)
 
 
 def _rest(context: Any, builder: Any, kind: Any, array: Any, first: int) -> Any:
     """What follows in a vector."""
-    from numba.core import types
-
-    word = context.get_value_type(types.intp)
+    word = context.get_value_type(_types().intp)
     whole = context.make_array(kind)(context, builder, array)
     pointer, length = builder.gep(whole.data, [word(first)]), builder.sub(whole.nitems, word(first))
-    return new_array(context, builder, types.float64[::1], pointer, [length], [word(8)])
+    return new_array(context, builder, _double()[::1], pointer, [length], [word(8)])
 
 
 def new_array(context: Any, builder: Any, kind: Any, pointer: Any, shape: Any, strides: Any) -> Any:
     """An array that keeps nothing alive."""
-    from numba.core import types
     from numba.np.arrayobj import populate_array
     from numba.np.numpy_support import as_dtype
 
-    item = context.get_value_type(types.intp)(as_dtype(kind.dtype).itemsize)
+    item = context.get_value_type(_types().intp)(as_dtype(kind.dtype).itemsize)
     array = context.make_array(kind)(context, builder)
     populate_array(array, data=pointer, shape=shape, strides=strides, itemsize=item, meminfo=None)
     return array._getvalue()

@@ -16,7 +16,6 @@ from pathlib import Path
 from types import CodeType, FunctionType, ModuleType
 from typing import Any
 
-from shipgym.engine.parts import Part
 from shipgym.engine.records import is_record
 from shipgym.errors import InputError
 
@@ -30,6 +29,18 @@ INNER = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 SEMANTICS = {"error_model": "numpy", "fastmath": {"contract"}}
 #: Modules that write machine code, or say how it is written.
 GENERATORS = ("addresses", "compiling", "lean_numba", "record_code", "specialise")
+
+
+@dataclass(frozen=True)
+class Part:
+    """A function that is put in a place that a loop names, and how it is compiled."""
+
+    function: Callable[..., Any]  # a plain Python function on numbers and records
+    # whether it becomes part of the loop; if not, it is called, as befits what comes seldom
+    inline: bool = True
+    # makes what stands for it in compiled code, one of Numba's intrinsics, which depends on `key` alone
+    code: Callable[[], Any] | None = None
+    key: object = None
 
 
 @dataclass

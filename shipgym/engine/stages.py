@@ -11,24 +11,8 @@ from shipgym.engine.episodes import Tile, conclude_step
 from shipgym.engine.mathematics import clip
 from shipgym.engine.motion import HAS_SHAFT, Motion, Rates, arrival, rates, stage, way
 from shipgym.engine.places import (
-    common_sea,
-    common_ship,
-    load_course,
-    load_motion,
-    load_passed,
-    load_point,
-    load_sea,
-    load_slope,
-    load_sums,
-    point_of,
-    push,
-    row_sums,
-    sea_at,
-    ship_at,
-    store_passed,
-    store_point,
-    store_slope,
-    store_sums,
+    common_sea, common_ship, load_course, load_motion, load_passed, load_point, load_sea, load_slope,
+    load_sums, point_of, push, row_sums, sea_at, ship_at, store_passed, store_point, store_slope, store_sums,
     sum_accelerations,
 )  # fmt: skip
 

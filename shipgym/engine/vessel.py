@@ -6,10 +6,10 @@ from functools import cache, cached_property
 from typing import Any
 
 from shipgym.engine.motion import Motion, Ship
-from shipgym.engine.parts import Part
 from shipgym.engine.places import load_coefficients, load_ship
 from shipgym.engine.record_code import loader, row_reader, storer
 from shipgym.engine.records import LANES, Layout, Record, Rows
+from shipgym.engine.specialise import Part
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,21 +42,18 @@ class Vessel:
         `lanes` are those of a tile of states, 64, or 1 where states are vectors. With `shared` all lanes have
         the same ship: her numbers are a vector and not a tile.
         """
+        of_ships = 1 if shared else LANES
         return {
             **self.functions,
-            "HAS_ROLL": "phi" in self.state_names,
-            "HAS_SHAFT": "n" in self.state_names,
-            "HAS_MEMORY": "q" in self.state_names,
-            "HAS_LAG": self.lag,
-            "HAS_SEA": False,
+            "HAS_ROLL": "phi" in self.state_names, "HAS_SHAFT": "n" in self.state_names,
+            "HAS_MEMORY": "q" in self.state_names, "HAS_LAG": self.lag, "HAS_SEA": False,
             "load_motion": loader(self.motion, lanes),
             "store_motion": storer(self.motion, lanes),
-            "load_ship": loader(self.layout["ship"], 1 if shared else LANES),
-            "load_coefficients": loader(self.layout["coefficients"], 1 if shared else LANES),
-            "row_of": row_reader(1 if shared else LANES),
+            **{f"load_{name}": loader(rows, of_ships) for name, rows in self.layout.rows.items()},
+            "row_of": row_reader(of_ships),
             "common_ship": Part(read_ship if shared else nothing),
             "ship_at": Part(the_common if shared else ship_of_lane),
-        }
+        }  # fmt: skip
 
 
 @cache

@@ -9,10 +9,10 @@ from shipgym.engine.addresses import plan_at
 from shipgym.engine.compiling import compiled, plain_python
 from shipgym.engine.envelope import Envelope
 from shipgym.engine.motion import Motion, Ship
-from shipgym.engine.parts import Part
 from shipgym.engine.places import load_envelope, load_scale, load_sea_parameters
 from shipgym.engine.record_code import bounded_storer, chooser, loader, number_storer, storer, summer, zero
 from shipgym.engine.records import LANES, Layout, leaves
+from shipgym.engine.specialise import Part
 from shipgym.engine.vessel import Vessel, nothing, the_common
 from shipgym.instruments.sensor_set import SensorSet
 from shipgym.sea import open_sea
@@ -39,12 +39,9 @@ class Voyages:
     def state(self) -> Layout:
         """Rows of a tile of states; behind them the plan of an episode."""
         return Layout(
-            motion=(Motion, self.vessel.state_names),
-            sea=open_sea.sea_records(self.windy)[0],
-            course=episodes.Course,
-            memory=self.sensors.Memory,
-            state=self.task.State,
-        )
+            motion=(Motion, self.vessel.state_names), sea=open_sea.sea_records(self.windy)[0],
+            course=episodes.Course, memory=self.sensors.Memory, state=self.task.State,
+        )  # fmt: skip
 
     @cached_property
     def result(self) -> Layout:
@@ -56,12 +53,9 @@ class Voyages:
     def ship(self) -> Layout:
         """Rows of the numbers of a ship."""
         return Layout(
-            ship=Ship,
-            coefficients=self.vessel.coefficients,
-            envelope=Envelope,
-            sea=open_sea.sea_records(self.windy)[1],
-            scale=self.task.Observation,
-        )
+            ship=Ship, coefficients=self.vessel.coefficients, envelope=Envelope,
+            sea=open_sea.sea_records(self.windy)[1], scale=self.task.Observation,
+        )  # fmt: skip
 
     @cached_property
     def settings(self) -> Layout:
@@ -104,27 +98,23 @@ class Voyages:
             "store_ended": number_storer(rows["course"].row("ended")),
             "store_ran_away": number_storer(rows["course"].row("ran_away")),
             "store_observation": bounded_storer(result["observation"], bounds),
-            "no_reward": zero(self.task.Reward),
-            "total_reward": summer(self.task.Reward),
-            "read_rules": loader(settings["rules"], 1),
-            "read_sensor": loader(settings["sensor"], 1),
-            "read_settings": loader(settings["task"], 1),
-            "plan_of": plan_at(rows.n_rows),
-        }
+            "no_reward": zero(self.task.Reward), "total_reward": summer(self.task.Reward),
+            "read_rules": loader(settings["rules"], 1), "read_sensor": loader(settings["sensor"], 1),
+            "read_settings": loader(settings["task"], 1), "plan_of": plan_at(rows.n_rows),
+        }  # fmt: skip
 
     def _ships(self) -> dict[str, Any]:
         lanes = 1 if self.shared else LANES
         load = {name: loader(place, lanes) for name, place in self.ship.rows.items()}
         return {
             **self.vessel.parts(shared=self.shared),
-            "load_envelope": load["envelope"],
+            "load_envelope": load["envelope"], "load_scale": load["scale"],
             "load_sea_parameters": load["sea"],
-            "load_scale": load["scale"],
             "common_sea": Part(read_sea if self.shared else nothing),
             "sea_at": Part(the_common if self.shared else sea_of_lane),
             "common_view": Part(read_view if self.shared else nothing),
             "view_at": Part(the_common if self.shared else view_of_lane),
-        }
+        }  # fmt: skip
 
     def _functions(self) -> dict[str, Any]:
         task, sensors = self.task, self.sensors
@@ -134,15 +124,11 @@ class Voyages:
             "GROUP": 1 if plain_python() else episodes.GROUP,
             "HAS_NOISE": self.sensors.noise,
             "HAS_FILTER": self.sensors.filter,
-            "measure": Part(sensors.measure),
-            "readings": Part(sensors.readings),
-            "task_begin": Part(task.begin, inline=False),
-            "task_step": Part(task.step),
-            "observe": Part(task.observe),
-            "due": Part(task.due),
-            "on_event": Part(task.on_event, inline=False),
+            "measure": Part(sensors.measure), "readings": Part(sensors.readings),
+            "task_begin": Part(task.begin, inline=False), "on_event": Part(task.on_event, inline=False),
+            "task_step": Part(task.step), "observe": Part(task.observe), "due": Part(task.due),
             "worst_cost": Part(task.worst_cost),
-        }
+        }  # fmt: skip
 
     @cached_property
     def run(self) -> Any:

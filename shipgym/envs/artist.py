@@ -46,25 +46,17 @@ def scene(engine: Engine, lane: int, wake: Floats) -> Scene:
     """What a picture of one lane shows."""
     state = {name: float(values[lane]) for name, values in engine.physical_state().items()}
     particulars = engine.model.particulars
-    length = particulars["length"]
+    length, wind = particulars["length"], state.get("wind_speed", 0.0)
+    north, east = state.get("current_north", 0.0), state.get("current_east", 0.0)
     return Scene(
         x=state["x"], y=state["y"], heading=state["psi"], rudder=state["delta"], length=length,
         beam=particulars.get("beam") or USUAL_BEAM * length, rudder_limit=engine.model.steering.limit,
         wake=wake, course_order=state.get("set_point", state["psi"]), waypoints=engine.waypoints(lane),
         turn_radius=engine.path_metres("turn_radius"), corridor=engine.path_metres("corridor"),
-        wind=_wind(state), current=_current(state),
+        wind=(wind, state["wind_from"]) if wind else None,
+        current=(hypot(north, east), atan2(east, north)) if north or east else None,
         readouts=_readouts(engine, lane, state),
     )  # fmt: skip
-
-
-def _wind(state: dict[str, float]) -> tuple[float, float] | None:
-    speed = state.get("wind_speed", 0.0)
-    return (speed, state["wind_from"]) if speed else None
-
-
-def _current(state: dict[str, float]) -> tuple[float, float] | None:
-    north, east = state.get("current_north", 0.0), state.get("current_east", 0.0)
-    return (hypot(north, east), atan2(east, north)) if north or east else None
 
 
 def _readouts(engine: Engine, lane: int, state: dict[str, float]) -> dict[str, str]:

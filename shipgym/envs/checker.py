@@ -72,9 +72,8 @@ def _check_spaces(env: VectorEnv[Any, Any, Any], n_steps: int) -> None:
     for which in ("observation", "action"):
         single, batch = getattr(env, f"single_{which}_space"), getattr(env, f"{which}_space")
         expected = gymnasium.vector.utils.batch_space(single, env.num_envs)
-        _expect(
-            batch == expected, f"{which}_space is {batch}, expected {expected}: single_{which}_space batched"
-        )
+        what = f"{which}_space is {batch}, expected {expected}: single_{which}_space batched"
+        _expect(batch == expected, what)
 
 
 def _check_reset(env: VectorEnv[Any, Any, Any], n_steps: int) -> None:
@@ -95,11 +94,8 @@ def _check_steps(env: VectorEnv[Any, Any, Any], n_steps: int) -> None:
         _expect(len(answer) == 5, f"step returned {len(answer)} values, expected 5")
         observations, rewards, terminated, truncated, infos = answer
         _check_observations(env, observations, "step")
-        for name, array, kind in (
-            ("rewards", rewards, np.floating),
-            ("terminated", terminated, np.bool_),
-            ("truncated", truncated, np.bool_),
-        ):
+        for name, array in {"rewards": rewards, "terminated": terminated, "truncated": truncated}.items():
+            kind = np.floating if name == "rewards" else np.bool_
             found = (getattr(array, "shape", None), getattr(array, "dtype", None))
             right = found[0] == (env.num_envs,) and np.issubdtype(found[1], kind)
             _expect(right, f"step: {name} of shape and type {found}, expected ({env.num_envs},) {kind}")
@@ -122,9 +118,8 @@ def _check_infos(env: VectorEnv[Any, Any, Any], infos: Any, where: str) -> None:
             continue
         mask = infos.get(f"_{key}")
         right = isinstance(mask, np.ndarray) and mask.shape == (env.num_envs,) and mask.dtype == np.bool_
-        _expect(
-            right, f"{where}: infos['_{key}'] is {mask!r}, expected a mask of {env.num_envs} truth values"
-        )
+        expected = f"expected a mask of {env.num_envs} truth values"
+        _expect(right, f"{where}: infos['_{key}'] is {mask!r}, {expected}")
         if isinstance(value, dict):
             _check_infos(env, value, f"{where}, {key}")
         else:
@@ -134,13 +129,10 @@ def _check_infos(env: VectorEnv[Any, Any, Any], infos: Any, where: str) -> None:
 
 def _check_seeds(env: VectorEnv[Any, Any, Any], n_steps: int) -> None:
     listed = [SEED + i for i in range(env.num_envs)]
-    first, again, list_of_seeds, other = (
-        _rollout(env, seed, n_steps) for seed in (SEED, SEED, listed, SEED + 10_000)
-    )
+    seeds = (SEED, SEED, listed, SEED + 10_000)
+    first, again, of_list, other = (_rollout(env, seed, n_steps) for seed in seeds)
     _expect(_same(first, again), "reset with the same seed and the same actions gave another episode")
-    _expect(
-        _same(first, list_of_seeds), "reset(seed=s) gave another episode than reset(seed=[s, s + 1, ...])"
-    )
+    _expect(_same(first, of_list), "reset(seed=s) gave another episode than reset(seed=[s, s + 1, ...])")
     _expect(not _same(first[:1], other[:1]), "reset with another seed gave the same first observations")
 
 
@@ -206,9 +198,8 @@ def _check_final(env: VectorEnv[Any, Any, Any], infos: dict[str, Any], done: NDA
         _expect(np.array_equal(mask, done), f"infos['_{key}'] is {mask}, expected {done}: the ended rows")
     for i in np.flatnonzero(done):
         final = infos["final_obs"][i]
-        _expect(
-            final in env.single_observation_space, f"infos['final_obs'][{i}] is {final}, not an observation"
-        )
+        seen = final in env.single_observation_space
+        _expect(seen, f"infos['final_obs'][{i}] is {final}, not an observation")
 
 
 def _check_partial_reset(env: VectorEnv[Any, Any, Any], before: Any, done: NDArray[np.bool_]) -> Any:

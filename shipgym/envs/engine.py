@@ -28,23 +28,6 @@ Observation = NDArray[np.float32]
 N_FIXED = 22  # words of a loop's world before those of its outputs
 
 
-class Threads:
-    """Threads that share the tiles of an engine; the first share is done by the thread that asks."""
-
-    def __init__(self, tiles: int, threads: int) -> None:
-        count = min(threads, tiles)
-        bounds = np.linspace(0, tiles, count + 1).astype(int).tolist()
-        self.shares: list[tuple[int, int]] = list(pairwise(bounds))
-        self._pool = ThreadPoolExecutor(count - 1, "shipgym") if count > 1 else None
-
-    def run(self, loop: Any, worlds: Sequence[NDArray[np.int64]], asked: int) -> list[int]:
-        """What the loop returns for each share."""
-        if self._pool is None:
-            return [loop(worlds[0], asked)]
-        waiting = [self._pool.submit(loop, world, asked) for world in worlds[1:]]
-        return [loop(worlds[0], asked), *(share.result() for share in waiting)]
-
-
 class Engine(Lanes):
     """A task for many ships at once.
 
@@ -73,15 +56,10 @@ class Engine(Lanes):
     """
 
     def __init__(
-        self,
-        models: ShipModel | Sequence[ShipModel],
-        num_envs: int,
-        task: Task | None = None,
-        randomisation: Randomisation | None = None,
-        allow_unstable: bool = False,
-        threads: int = 1,
+        self, models: ShipModel | Sequence[ShipModel], num_envs: int, task: Task | None = None,
+        randomisation: Randomisation | None = None, allow_unstable: bool = False, threads: int = 1,
         model_index: int | None = None,
-    ) -> None:
+    ) -> None:  # fmt: skip
         self.remade: Callable[..., Engine] = partial(
             Engine, models, num_envs, randomisation=randomisation, allow_unstable=allow_unstable,
             threads=threads,
@@ -107,13 +85,15 @@ class Engine(Lanes):
         own = self.pool if drawn else [(one, task.seas[0]) for one in fleet]
         made = voyages(model.vessel, task.definition, task.instruments(windy), windy, len(own) == 1)
         super().__init__(made, model, task, num_envs, own, drawn)
-        self._threads = Threads(len(self._states), threads)
-        self._connect()
+        self._connect(min(threads, len(self._states)))
         self._run = made.run  # compiled last, when nothing is left that may be refused
         self.reset(np.arange(num_envs))
 
-    def _connect(self) -> None:
-        """Tell the loops where the arrays are: a world for each thread."""
+    def _connect(self, threads: int) -> None:
+        """Tell the loops where the arrays are: a world for each thread, with its share of the tiles."""
+        # the first share is done by the thread that asks; others begin when there is one for them
+        self._threads = ThreadPoolExecutor(max(threads - 1, 1), "shipgym")
+        shares = list(pairwise(np.linspace(0, len(self._states), threads + 1).astype(int).tolist()))
         self._actions = np.zeros((self.task.n_commands, self.num_envs), np.float32)
         self._orders = self._actions.T
         self._which = np.zeros(self.num_envs, dtype=np.bool_)
@@ -123,10 +103,10 @@ class Engine(Lanes):
             [self._states, self._keys, self._settings, self._pool, self._ships, self._rows, self._which,
              self._actions]
         )  # fmt: skip
-        self._results = [np.zeros(self._voyages.result.n_rows * LANES) for _ in self._threads.shares]
+        self._results = [np.zeros(self._voyages.result.n_rows * LANES) for _ in shares]
         self._worlds = [
             np.array([*words, *[0] * 9, *share, *addresses([result])], dtype=np.int64)
-            for share, result in zip(self._threads.shares, self._results, strict=True)
+            for share, result in zip(shares, self._results, strict=True)
         ]
         self.show_anew()
 
@@ -158,7 +138,8 @@ class Engine(Lanes):
         if anew:
             self.show_anew()
         asked = episodes.STEP_AND_BEGIN if next_ones else episodes.STEP
-        counts = self._threads.run(self._run, self._worlds, asked)
+        waiting = [self._threads.submit(self._run, world, asked) for world in self._worlds[1:]]
+        counts = [self._run(self._worlds[0], asked), *(share.result() for share in waiting)]
         if episodes.REFUSED in counts:
             self._write_into(before)
             lane, which = np.argwhere(~np.isfinite(self._orders))[0]
@@ -185,8 +166,7 @@ class Engine(Lanes):
         An episode is a function of its key (`episode_keys`) and number under that key alone; keys, uint64,
         numbers and mask are of shape (num_envs,).
         """
-        which = np.zeros(self.num_envs, dtype=np.bool_)
-        which[:] = mask
+        which = np.array(np.broadcast_to(mask, self.num_envs), dtype=np.bool_)
         lanes = np.flatnonzero(which)
         for row, words in enumerate((keys, episodes)):
             all_words = np.broadcast_to(np.asarray(words).astype(np.uint64), (self.num_envs,))

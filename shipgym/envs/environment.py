@@ -52,9 +52,9 @@ def read_options(
     sensors = options.get("sensors")
     own = Task.option_names(definition, None if sensors is None else read_sensors(sensors))
     known = [*taken, "reward", *own, *Randomisation.names()]
-    unknown = [name for name in options if name not in known]
-    if unknown:
-        raise UnknownKeywordError(unknown[0], known)
+    for name in options:
+        if name not in known:
+            raise UnknownKeywordError(name, known)
     randomisation, rest = Randomisation.take_from(options)
     rest.pop("reward", None)
     if not isinstance(model, str | Path | ShipModel):
@@ -66,10 +66,7 @@ def read_options(
 def spaces(task: Task, model: ShipModel) -> tuple[gymnasium.spaces.Box, Space]:
     """Observation and action space of a task for a ship."""
     observed = task.observed(model)
-    low, high = (
-        np.array([getattr(quantity, bound) for quantity in observed], dtype=np.float32)
-        for bound in ("low", "high")
-    )
+    low, high = np.array([(quantity.low, quantity.high) for quantity in observed], dtype=np.float32).T
     actions: Space = gymnasium.spaces.Box(-1.0, 1.0, (task.n_commands,), dtype=np.float32)
     if task.action == "rudder-discrete":
         actions = gymnasium.spaces.Discrete(len(RUDDER_ORDERS))
@@ -173,7 +170,7 @@ class ShipsEnv:
         Raises InputError before the first `reset`.
         """
         if not self._begun:
-            refuse_step()
+            self._refuse_step()
         return {"asked": self._asked, "engine": self._engine.get_state(), **self._counters()}
 
     def set_state(self, state: Mapping[str, Any]) -> None:
@@ -186,7 +183,7 @@ class ShipsEnv:
             finite; nothing is changed then.
         """
         names = ("asked", "engine", *self._counters())
-        check_keys(check_table(state, "state"), names, "state", names)
+        check_table(state, "state", names, names)
         for name in self._counters():
             if np.asarray(state[name]).dtype.kind not in "biu":  # whole numbers
                 raise InputError(f"state: {name} {shown(state[name])} found, expected what `get_state` gave")
@@ -227,6 +224,10 @@ class ShipsEnv:
             self._asked = asked
         return given.get("state")
 
+    def _refuse_step(self) -> NoReturn:
+        """Raise the InputError of an environment that was not reset yet, or is closed."""
+        raise InputError("step: no episode has begun, or the environment was closed; call reset first")
+
     def _drawn_keys(self) -> NDArray[np.uint64]:
         """Keys of episodes from the environment's own random numbers."""
         return np.array([episode_key(self.np_random) for _ in range(self._engine.num_envs)], dtype=np.uint64)
@@ -246,8 +247,3 @@ def remade(kind: Any, arguments: dict[str, Any], state: Any, attributes: dict[st
     if state is not None:
         env.set_state(state)
     return env
-
-
-def refuse_step() -> NoReturn:
-    """The step of an environment that was not reset yet, or is closed: raises InputError."""
-    raise InputError("step: no episode has begun, or the environment was closed; call reset first")

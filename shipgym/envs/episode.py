@@ -1,26 +1,17 @@
 """One episode of an environment: what ship and agent did, to be kept, replayed and identified again."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from shipgym.arrays import Floats
 from shipgym.checks import (
-    check_finite,
-    check_flag,
-    check_number,
-    check_table,
-    check_text,
-    check_whole,
-    placed,
-    quoted,
-)
+    check_finite, check_flag, check_number, check_table, check_text, check_whole, placed, quoted,
+)  # fmt: skip
 from shipgym.envs.episode_file import from_file, to_file
 from shipgym.errors import InputError
 from shipgym.files import read_json, write_json
@@ -181,20 +172,15 @@ class Episode:
             channels[f"{key}_command"] = orders
             if key == "n":
                 channels.setdefault("n", orders)
-        return Trial(
-            self.t,
-            channels,
-            name=f"{self.environment} seed {self.seed} episode {self.number}" if name is None else name,
-            use=use,
-            length=self.length,
-        )
+        own = f"{self.environment} seed {self.seed} episode {self.number}"
+        return Trial(self.t, channels, name=own if name is None else name, use=use, length=self.length)
 
     def save(self, path: str | Path) -> None:
         """Write the episode as JSON, atomically; InputError where that fails."""
         write_json(to_file(vars(self)), Path(path), indent=None)
 
     @classmethod
-    def load(cls, path: str | Path) -> Episode:
+    def load(cls, path: str | Path) -> Self:
         """Read an episode that was saved; its numbers are the very same.
 
         Raises InputError, naming the file and the field at fault.

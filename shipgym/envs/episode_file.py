@@ -73,8 +73,7 @@ def from_file(content: Mapping[str, Any]) -> dict[str, Any]:
     for table, names in TABLES.items():
         if table == "path" and content[table] is None:
             continue
-        found = check_table(content[table], table)
-        check_keys(found, names, table, [key for key in names if key != "turn_radius"])
+        found = check_table(content[table], table, names, [key for key in names if key != "turn_radius"])
         values |= {name: found[key] for key, name in names.items() if key in found}
     values["rewards"] = check_array(content["rewards"], (None,), "rewards")
     values["actions"] = check_array(content["actions"], (None, None), "actions")

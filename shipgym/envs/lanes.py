@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from shipgym.arrays import Floats
-from shipgym.checks import check_keys, check_table, shown
+from shipgym.checks import check_table, shown
 from shipgym.engine.envelope import Envelope
 from shipgym.engine.episodes import Rules
 from shipgym.engine.motion import Ship
@@ -151,7 +151,7 @@ class Lanes:
     def check_state(self, state: Mapping[str, Any]) -> None:
         """Refuse a state that an engine made alike did not give; InputError says what differs."""
         own = self.get_state()
-        check_keys(check_table(state, "state"), tuple(own), "state", required=own)
+        check_table(state, "state", tuple(own), required=own)
         made_for = check_table(state["made_for"], "state: made_for")
         for name, expected in own["made_for"].items():
             if (found := made_for.get(name)) != expected:

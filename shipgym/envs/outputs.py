@@ -1,9 +1,8 @@
 """Output buffers: the arrays that a step writes and users are given."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
-from typing import Any
+from dataclasses import dataclass
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,10 +11,9 @@ STEP_OUTCOME = 3  # reward, terminated, truncated come before what is in `info`
 STEP_FLAGS = 2  # terminated, truncated come before the flags in `info`
 
 
+@dataclass(slots=True, eq=False)
 class Outputs:
     """One step's arrays, in one block of memory."""
-
-    __slots__ = ("flags", "observations", "outcomes", "terminated", "truncated", "words")
 
     observations: NDArray[np.float32]  # (num_envs, n_observed)
     outcomes: NDArray[np.float64]  # (n_outcomes, num_envs): reward, terminated, truncated, then `info`
@@ -24,7 +22,7 @@ class Outputs:
     truncated: NDArray[np.bool_]  # (num_envs,): a view of flags[1]
     words: NDArray[np.int64]  # (9,): addresses and shapes of the three, by turns
 
-    def take(self, other: Outputs) -> None:
+    def take(self, other: Self) -> None:
         """Copy what others hold."""
         for name in ("outcomes", "observations", "flags"):
             getattr(self, name)[:] = getattr(other, name)
@@ -49,13 +47,11 @@ class OutputPool:
         block = _Lease(self._size, np.uint8, given[0])
         block.given, block.free = given, self._free
         seen, outcomes, flags = self._shapes
-        outputs = Outputs()
-        outputs.outcomes = np.ndarray(outcomes, np.float64, block)
-        outputs.observations = np.ndarray(seen, np.float32, block, self._seen)
-        outputs.flags = np.ndarray(flags, np.bool_, block, self._flags)
-        outputs.terminated, outputs.truncated = outputs.flags[0], outputs.flags[1]
-        outputs.words = given[1]
-        return outputs
+        ends = np.ndarray(flags, np.bool_, block, self._flags)
+        return Outputs(
+            np.ndarray(seen, np.float32, block, self._seen), np.ndarray(outcomes, np.float64, block), ends,
+            ends[0], ends[1], given[1],
+        )  # fmt: skip
 
     def _new(self) -> tuple[bytearray, NDArray[np.int64]]:
         memory = bytearray(self._size)
@@ -77,6 +73,5 @@ class _Lease(np.ndarray[Any, Any]):
 
 def named_rows(outcomes: Any, flags: Any, names: Sequence[str], flag_names: Sequence[str]) -> dict[str, Any]:
     """Rows of outcomes and flags by name, without those that `step` answers."""
-    infos = dict(zip(names, outcomes[STEP_OUTCOME:], strict=True))
-    infos.update(zip(flag_names, flags[STEP_FLAGS:], strict=True))
-    return infos
+    rows = [*outcomes[STEP_OUTCOME:], *flags[STEP_FLAGS:]]  # a flag's own row behind that of its number
+    return dict(zip([*names, *flag_names], rows, strict=True))

@@ -53,15 +53,10 @@ class RecordEpisode(
     """
 
     def __init__(
-        self,
-        env: gymnasium.Env[Observation, Action],
-        folder: str | Path,
-        episode_trigger: Callable[[int], bool] | None = None,
-        *,
-        trials: bool = False,
-        name_prefix: str = "episode",
-        overwrite: bool = False,
-    ) -> None:
+        self, env: gymnasium.Env[Observation, Action], folder: str | Path,
+        episode_trigger: Callable[[int], bool] | None = None, *, trials: bool = False,
+        name_prefix: str = "episode", overwrite: bool = False,
+    ) -> None:  # fmt: skip
         gymnasium.utils.RecordConstructorArgs.__init__(
             self, folder=str(folder), episode_trigger=episode_trigger, trials=trials, name_prefix=name_prefix,
             overwrite=overwrite,
@@ -128,21 +123,18 @@ class _Recorded:
         self._parts: list[dict[str, float]] = []
         self._numbers = [_numbers(info)]
         self._outcome: dict[str, Any] = {}
-        waypoints, spec = getattr(ship, "waypoints", None), env.spec
+        waypoints, spec, seed = getattr(ship, "waypoints", None), env.spec, ship.np_random_seed
         self._facts: dict[str, Any] = {
             "environment": type(ship).__name__ if spec is None else spec.id,
             "arguments": {} if spec is None else plain(spec.kwargs),
-            "model": self._model.name,
-            "seed": _seed(ship),
-            "number": since_seed,
-            "dt": float(ship.dt),
-            "length": self._model.particulars["length"],
-            "beam": self._model.particulars["beam"],
+            "model": self._model.name, "number": since_seed, "dt": float(ship.dt),
+            "seed": None if seed is None or seed < 0 else int(seed),  # no seed of a generator put in by hand
+            "length": self._model.particulars["length"], "beam": self._model.particulars["beam"],
             "rudder_limit": math.radians(self._model.steering.rudder_limit_deg),
             "waypoints": None if waypoints is None else np.array(waypoints, dtype=float),
             "turn_radius": getattr(ship, "turn_radius", None),
             "corridor": getattr(ship, "corridor", None),
-        }
+        }  # fmt: skip
 
     def add(
         self, action: Any, reward: float, terminated: bool, truncated: bool, info: Mapping[str, Any]
@@ -160,15 +152,10 @@ class _Recorded:
         """All of it."""
         orders = self._model.command_names
         return Episode(
-            states=_columns(self._states),
-            actions=np.array(self._actions),
-            rewards=np.array(self.rewards),
+            states=_columns(self._states), actions=np.array(self._actions), rewards=np.array(self.rewards),
             commands={name: np.array([s[f"{name}_command"] for s in self._states[1:]]) for name in orders},
-            reward_parts=_columns(self._parts),
-            info=_columns(self._numbers),
-            **self._facts,
-            **self._outcome,
-        )
+            reward_parts=_columns(self._parts), info=_columns(self._numbers), **self._facts, **self._outcome,
+        )  # fmt: skip
 
 
 def _numbers(info: Mapping[str, Any]) -> dict[str, float]:
@@ -187,12 +174,6 @@ def _columns(rows: list[dict[str, float]]) -> dict[str, Floats]:
     """Values over time by name; a name that some step lacks is left out."""
     names = [name for name in rows[-1] if all(name in row for row in rows)]
     return {name: np.array([row[name] for row in rows], dtype=float) for name in names}
-
-
-def _seed(ship: Any) -> int | None:
-    """Seed of the environment's random numbers, None where its generator was put in by hand."""
-    seed = ship.np_random_seed
-    return None if seed is None or seed < 0 else int(seed)
 
 
 def _check_environment(env: Any) -> None:

@@ -10,11 +10,10 @@ from shipgym.tasks.source import kept_source
 
 #: Keywords of the variants by id, without the version.
 VARIANTS: dict[str, dict[str, Any]] = {
-    "": {},
-    "Discrete": {"action": "rudder-discrete"},
+    "": {}, "Discrete": {"action": "rudder-discrete"},
     "Shaft": {"action": "rudder-shaft", "model": "kvlcc2"},
     "Roll": {"roll": True, "roll_weight": 1.0, "model": "container"},
-}
+}  # fmt: skip
 #: Tasks by their names, a version in them where it is not the first.
 TASKS = ("CourseKeeping", "PathFollowing", "PathFollowing-v1")
 #: Identified models that are the defaults of ids of version 1, most by a method or of a ship of their own.
@@ -42,13 +41,11 @@ def environments() -> dict[str, dict[str, Any]]:
         for task in TASKS
         for variant, options in VARIANTS.items()
     }
-    for name in IDENTIFIED:
-        if name.startswith("shipgym/CourseKeeping"):  # the same task, on another model
-            found[name] = found[name.replace("-v1", "-v0")]
-    return {
-        name: options | ({"model": IDENTIFIED[name]} if name in IDENTIFIED else {})
-        for name, options in found.items()
-    }
+    for name, model in IDENTIFIED.items():
+        # course keeping has no version 1 of its own: the same task, on another model
+        same = name.replace("-v1", "-v0") if name.startswith("shipgym/CourseKeeping") else name
+        found[name] = {**found[same], "model": model}
+    return found
 
 
 def register_environments() -> None:

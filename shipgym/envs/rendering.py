@@ -1,7 +1,5 @@
 """Pictures of a voyage: a chart with path, wake and ship to scale, compass, rudder gauge and read-outs."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -60,6 +58,32 @@ class Scene:
     wind: tuple[float, float] | None = None  # speed, and direction it comes from
     current: tuple[float, float] | None = None  # speed, and direction it sets towards
     readouts: Mapping[str, str] = field(default_factory=dict)  # a quantity, and its value with the unit
+
+
+class _Chart:
+    """From metres north and east to pixels, north up, the ship in the middle."""
+
+    def __init__(self, scene: Scene) -> None:
+        self.metres = CHART_LENGTHS * scene.length / SIZE  # of a pixel
+        # of the grid: the largest of 1, 2, 5 times a power of ten that is not above a sixth of the chart
+        sixth = CHART_LENGTHS * scene.length / 6.0
+        power = 10.0 ** floor(log10(sixth))
+        self.spacing = power * max(step for step in (1.0, 2.0, 5.0) if step * power <= sixth)
+        self._centre = np.array([scene.x, scene.y])
+
+    def pixels(self, points: Any) -> Floats:
+        """Pixels to the right and down, of the shape of the points."""
+        north, east = np.moveaxis((np.asarray(points) - self._centre) / self.metres, -1, 0)
+        return np.stack([SIZE / 2.0 + east, SIZE / 2.0 - north], axis=-1)
+
+    def grid_lines(self, axis: int) -> Floats:
+        """Pixels of the lines of constant north (axis 0, down) or east (1, to the right)."""
+        half = 0.5 * SIZE * self.metres
+        first = floor((self._centre[axis] - half) / self.spacing)
+        lines = self.spacing * (first + np.arange(int(2.0 * half / self.spacing) + 3))
+        points = np.zeros((len(lines), 2)) + self._centre
+        points[:, axis] = lines
+        return self.pixels(points)[:, 1 - axis]
 
 
 class Renderer:
@@ -143,18 +167,18 @@ class Renderer:
             brush.circle(PATH, point, 5, 2)
 
     def _draw_ship(self, chart: _Chart, scene: Scene) -> None:
-        brush = self._brush
+        brush, ahead = self._brush, _direction(scene.heading)
         centre = np.array([scene.x, scene.y])
         if scene.course_order is not None:
-            ahead = centre + 1.6 * scene.length * _direction(scene.course_order)
-            brush.arrow(ORDER, chart.pixels(centre), chart.pixels(ahead))
-        bow = centre + 1.1 * scene.length * _direction(scene.heading)
+            order = centre + 1.6 * scene.length * _direction(scene.course_order)
+            brush.arrow(ORDER, chart.pixels(centre), chart.pixels(order))
+        bow, stern = centre + 1.1 * scene.length * ahead, centre - 0.5 * scene.length * ahead
         brush.line(HULL, chart.pixels(centre), chart.pixels(bow))
-        stern = centre - 0.5 * scene.length * _direction(scene.heading)
         # a rudder to starboard puts its trailing edge to starboard of the stern
         blade = stern - 0.22 * scene.length * _direction(scene.heading - scene.rudder)
         brush.line(RUDDER, chart.pixels(stern), chart.pixels(blade), 3)
-        outline = _turned(HULL_OUTLINE * [scene.length, scene.beam], scene.heading)
+        turned = np.array([ahead, [-ahead[1], ahead[0]]])  # forward and to starboard as north and east
+        outline = HULL_OUTLINE * [scene.length, scene.beam] @ turned
         brush.polygon(HULL, chart.pixels(centre + outline))
 
     def _draw_scale(self, chart: _Chart) -> None:
@@ -263,44 +287,8 @@ def _fine(points: Any) -> Any:
     return (FINER * np.asarray(points, dtype=float)).tolist()
 
 
-class _Chart:
-    """From metres north and east to pixels, north up, the ship in the middle."""
-
-    def __init__(self, scene: Scene) -> None:
-        self.metres = CHART_LENGTHS * scene.length / SIZE  # of a pixel
-        self.spacing = _round_number(CHART_LENGTHS * scene.length / 6.0)
-        self._centre = np.array([scene.x, scene.y])
-
-    def pixels(self, points: Any) -> Floats:
-        """Pixels to the right and down, of the shape of the points."""
-        north, east = np.moveaxis((np.asarray(points) - self._centre) / self.metres, -1, 0)
-        return np.stack([SIZE / 2.0 + east, SIZE / 2.0 - north], axis=-1)
-
-    def grid_lines(self, axis: int) -> Floats:
-        """Pixels of the lines of constant north (axis 0, down) or east (1, to the right)."""
-        half = 0.5 * SIZE * self.metres
-        first = floor((self._centre[axis] - half) / self.spacing)
-        lines = self.spacing * (first + np.arange(int(2.0 * half / self.spacing) + 3))
-        points = np.zeros((len(lines), 2)) + self._centre
-        points[:, axis] = lines
-        return self.pixels(points)[:, 1 - axis]
-
-
-def _round_number(value: float) -> float:
-    """The largest of 1, 2, 5 times a power of ten that is not above a value."""
-    power = 10.0 ** floor(log10(value))
-    return power * max(step for step in (1.0, 2.0, 5.0) if step * power <= value)
-
-
 def _direction(angle: float) -> Floats:
     return np.array([cos(angle), sin(angle)])
-
-
-def _turned(points: Floats, angle: float) -> Floats:
-    """Points forward and to starboard as north and east."""
-    rotation = np.array([[cos(angle), sin(angle)], [-sin(angle), cos(angle)]])
-    turned: Floats = points @ rotation
-    return turned
 
 
 def _on_circle(centre: Point, radius: float, bearing: float) -> Point:

@@ -1,10 +1,8 @@
 """The native vector environment as a `VecEnv` of stable-baselines3, which takes none of Gymnasium's."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, Self
 
 import gymnasium
 import numpy as np
@@ -44,7 +42,7 @@ class Row:
         return getattr(self._env, f"single_{name}" if name in SPACES else name)
 
     @property
-    def unwrapped(self) -> Row:
+    def unwrapped(self) -> Self:
         """The row itself."""
         return self
 
@@ -96,14 +94,9 @@ class ShipVecEnv(VecEnv):  # type: ignore[misc]  # stable-baselines3 is not type
     """
 
     def __init__(
-        self,
-        env: str | Vectors,
-        num_envs: int | None = None,
-        *,
-        seed: int | None = None,
-        info_names: Sequence[str] = (),
-        **options: Any,
-    ) -> None:
+        self, env: str | Vectors, num_envs: int | None = None, *, seed: int | None = None,
+        info_names: Sequence[str] = (), **options: Any,
+    ) -> None:  # fmt: skip
         self.vector_env: Any = _native(env, num_envs, options)
         self._ships: ShipVectorEnv = self.vector_env.unwrapped
         n = self.vector_env.num_envs

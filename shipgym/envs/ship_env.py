@@ -11,14 +11,7 @@ from numpy.typing import NDArray
 from shipgym.arrays import Floats
 from shipgym.engine.episodes import REFUSED
 from shipgym.envs.engine import Engine, as_numbers
-from shipgym.envs.environment import (
-    DEFAULT_MODEL,
-    DEFAULT_TASK,
-    ENV_OPTIONS,
-    ShipsEnv,
-    refuse_step,
-    rudder_orders,
-)
+from shipgym.envs.environment import DEFAULT_MODEL, DEFAULT_TASK, ENV_OPTIONS, ShipsEnv, rudder_orders
 from shipgym.envs.outputs import STEP_OUTCOME
 from shipgym.errors import InputError
 from shipgym.ships import ShipModel
@@ -58,13 +51,9 @@ class ShipEnv(ShipsEnv, gymnasium.Env[Observation, Any]):
     metadata: dict[str, Any] = {"render_modes": ["human", "rgb_array"], "render_fps": 30}  # noqa: RUF012 - Gymnasium declares it so
 
     def __init__(
-        self,
-        model: str | Path | ShipModel = DEFAULT_MODEL,
-        task: Any = DEFAULT_TASK,
-        render_mode: str | None = None,
-        allow_unstable: bool = False,
-        **options: Any,
-    ) -> None:
+        self, model: str | Path | ShipModel = DEFAULT_MODEL, task: Any = DEFAULT_TASK,
+        render_mode: str | None = None, allow_unstable: bool = False, **options: Any,
+    ) -> None:  # fmt: skip
         seen, commands = self._make(locals(), ENV_OPTIONS, self.metadata["render_modes"])
         self.observation_space, self.action_space = seen, commands  # type: ignore[assignment]
         self._names = self.task.info_names
@@ -153,7 +142,7 @@ class ShipEnv(ShipsEnv, gymnasium.Env[Observation, Any]):
             If the action is not a finite number for each command, or no episode has begun.
         """
         if not self._begun:
-            refuse_step()
+            self._refuse_step()
         self._order(action)
         if self._advance() == REFUSED:
             wrong = next(number for number in self._command.tolist() if not isfinite(number))

@@ -13,14 +13,7 @@ from numpy.typing import NDArray
 from shipgym.arrays import Floats
 from shipgym.checks import check_keys, quoted
 from shipgym.envs.engine import episode_keys
-from shipgym.envs.environment import (
-    DEFAULT_MODEL,
-    DEFAULT_TASK,
-    VECTOR_OPTIONS,
-    ShipsEnv,
-    refuse_step,
-    rudder_orders,
-)
+from shipgym.envs.environment import DEFAULT_MODEL, DEFAULT_TASK, VECTOR_OPTIONS, ShipsEnv, rudder_orders
 from shipgym.envs.outputs import named_rows
 from shipgym.errors import InputError
 from shipgym.ships import ShipModel
@@ -59,17 +52,11 @@ class ShipVectorEnv(ShipsEnv, VectorEnv[Observation, Any, Floats]):
     """
 
     def __init__(
-        self,
-        num_envs: int = 1,
-        model: str | Path | ShipModel = DEFAULT_MODEL,
-        task: Any = DEFAULT_TASK,
-        render_mode: str | None = None,
-        allow_unstable: bool = False,
-        autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
-        threads: int = 1,
-        max_episode_steps: int | None = None,
-        **options: Any,
-    ) -> None:
+        self, num_envs: int = 1, model: str | Path | ShipModel = DEFAULT_MODEL, task: Any = DEFAULT_TASK,
+        render_mode: str | None = None, allow_unstable: bool = False,
+        autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP, threads: int = 1,
+        max_episode_steps: int | None = None, **options: Any,
+    ) -> None:  # fmt: skip
         arguments = locals()
         mode = _mode(autoreset_mode)
         if max_episode_steps is not None:
@@ -135,20 +122,15 @@ class ShipVectorEnv(ShipsEnv, VectorEnv[Observation, Any, Floats]):
         for row in np.flatnonzero(mask).tolist():
             if (number := seeded[row]) is not None:
                 self._keys[row], episodes[row] = episode_keys(number), 0
-        self._keep_shown()
+        before = self._engine.shown
+        self._engine.show_anew()
+        self._engine.shown.take(before)  # rows that are not begun anew keep what they show
         self._begun = True
         self._engine.begin(self._keys, episodes, mask)
         self._draw(mask)
         shown, infos = self._engine.shown, self._infos()
         infos.update({name: mask.copy() for name in self._masks})
         return shown.observations, infos
-
-    def _keep_shown(self) -> None:
-        """Rows that are not begun anew keep what they show, in arrays of their own."""
-        before = self._engine.shown
-        self._engine.show_anew()
-        if self._keys is not None:
-            self._engine.shown.take(before)
 
     def _infos(self) -> Infos:
         """Rows of the last step's arrays by name, with their masks."""
@@ -174,9 +156,7 @@ class ShipVectorEnv(ShipsEnv, VectorEnv[Observation, Any, Floats]):
             raise InputError(f"seed: {len(seed)} found, expected one for each of {self.num_envs} rows")
         return seed
 
-    def step(  # type: ignore[override]
-        self, actions: Any
-    ) -> tuple[Observation, Floats, Flags, Flags, Infos]:
+    def step(self, actions: Any) -> tuple[Observation, Floats, Flags, Flags, Infos]:  # type: ignore[override]
         """One control interval of all rows.
 
         Parameters
@@ -200,7 +180,7 @@ class ShipVectorEnv(ShipsEnv, VectorEnv[Observation, Any, Floats]):
             episode has begun.
         """
         if not self._begun:
-            refuse_step()
+            self._refuse_step()
         engine = self._engine
         engine.order(rudder_orders(actions, (self.num_envs,), "actions") if self._discrete else actions)
         ended = engine.advance(self._some_over, anew=True)

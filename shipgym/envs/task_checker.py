@@ -11,8 +11,8 @@ from shipgym.arrays import Floats
 from shipgym.checks import Findings
 from shipgym.engine import episodes
 from shipgym.engine.compiling import plain as plain_loop
-from shipgym.engine.parts import Part
 from shipgym.engine.records import flat, leaves
+from shipgym.engine.specialise import Part
 from shipgym.envs.engine import Engine
 from shipgym.envs.environment import DEFAULT_MODEL, read_options
 from shipgym.errors import InputError
@@ -170,6 +170,3 @@ def _often_clipped(task: Task, seen: dict[str, list[float]]) -> Iterator[str]:
                 f"to {high:g} in {100.0 * part:.0f} % of the steps, and clipped; give it wider bounds "
                 "or a larger scale if more is to be seen"
             )
-
-
-__all__ = ["TaskCheck", "check_task"]

@@ -90,11 +90,9 @@ def notched(signal: float, turn: float, first: bool, memory: Notch) -> Notch:
         - (1.0 - 2.0 * WIDE * k + k * k) * per * memory.taken_2
     )
     return Notch(
-        signal,
-        pick(first, signal, memory.signal_1),
-        pick(first, 0.0, taken),
+        signal, pick(first, signal, memory.signal_1), pick(first, 0.0, taken),
         pick(first, 0.0, memory.taken_1),
-    )
+    )  # fmt: skip
 
 
 def readings(motion: Motion, sea: Sea, memory: Memory) -> Readings:

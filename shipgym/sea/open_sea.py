@@ -16,10 +16,10 @@ from typing import Any, NamedTuple
 
 from shipgym.engine.mathematics import sin_cos
 from shipgym.engine.motion import HAS_ROLL, HAS_SEA, Motion, Push
-from shipgym.engine.parts import Part
 from shipgym.engine.random import DRAW, S11, TO_UNIT, mix, normal
 from shipgym.engine.record_code import loader, storer
 from shipgym.engine.records import LANES, Layout
+from shipgym.engine.specialise import Part
 
 SLOWEST_ENCOUNTER = 0.1  # of the wave frequency: in a following sea the filter keeps turning
 LEAST = 1e-12

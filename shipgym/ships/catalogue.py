@@ -28,15 +28,11 @@ Form = Literal["published", "shipmmg"]
 def model_of(ship: ShipEquations, coefficients: Mapping[str, float] | None = None) -> ShipModel:
     """A ship with equations of her own as a model, some coefficients changed or none."""
     return ShipModel(
-        name=ship.name,
-        structure=ship.name,
-        particulars=ship.particulars,
-        steering=ship.steering,
-        coefficients={**ship.coefficients, **(coefficients or {})},
-        provenance={"source": ship.source},
+        name=ship.name, structure=ship.name, particulars=ship.particulars, steering=ship.steering,
+        coefficients={**ship.coefficients, **(coefficients or {})}, provenance={"source": ship.source},
         own_table=None if ship.name in SHIPPED_EQUATIONS else ship,
         service_shaft_speed=ship.service_shaft_speed,
-    )
+    )  # fmt: skip
 
 
 def container(rudder_limit_deg: float = 35.0) -> ShipModel:
@@ -56,13 +52,11 @@ def kvlcc2(form: Form = "published") -> ShipModel:
     model = kvlcc2_l7(form)
     scale = kvlcc2_file.FULL_SCALE
     return replace(
-        model,
-        name="kvlcc2",
+        model, name="kvlcc2",
         particulars=kvlcc2_file.particulars("KVLCC2", kvlcc2_file.Coefficients(**scale), 58.0, 7.973889),
         steering=replace(model.steering, rudder_rate_deg_s=2.34),
-        coefficients={**model.coefficients, **scale},
-        service_shaft_speed=1.77851,
-    )
+        coefficients={**model.coefficients, **scale}, service_shaft_speed=1.77851,
+    )  # fmt: skip
 
 
 def kvlcc2_l7(form: Form = "published") -> ShipModel:
@@ -145,11 +139,9 @@ def truth_of(model: str | Path | ShipModel) -> ShipModel:
 
 
 def grey_box(
-    reference: str | ShipModel,
-    equations: Mapping[str, str | tuple[Term, ...]] | None = None,
-    shaft: bool | None = None,
-    name: str = GREY_BOX,
-) -> GreyBox:
+    reference: str | ShipModel, equations: Mapping[str, str | tuple[Term, ...]] | None = None,
+    shaft: bool | None = None, name: str = GREY_BOX,
+) -> GreyBox:  # fmt: skip
     """A reference ship plus a table of terms, as a structure of a given name.
 
     The reference is a shipped model's name, the path of a model file, or a model. The terms, by equation `u`,
@@ -175,12 +167,9 @@ def fitted_box(ship: ShipModel) -> GreyBox:
 
 
 def converted_model(
-    reference: str | ShipModel | GreyBox,
-    particulars: Particulars,
-    steering: SteeringGear,
-    service_shaft_speed: float = 0.0,
-    name: str | None = None,
-) -> ShipModel:
+    reference: str | ShipModel | GreyBox, particulars: Particulars, steering: SteeringGear,
+    service_shaft_speed: float = 0.0, name: str | None = None,
+) -> ShipModel:  # fmt: skip
     """The bare reference ship as a model of another ship: a grey box whose terms are all zero.
 
     The reference is as in `grey_box`, or a grey box; particulars (with the service speed), steering gear,
@@ -192,12 +181,8 @@ def converted_model(
         box = grey_box(box)
         box = replace(box, shaft=box.shaft and service_shaft_speed > 0.0)
     return ShipModel(
-        name=particulars.name if name is None else name,
-        structure=box.name,
-        particulars=particulars,
-        steering=steering,
-        coefficients=dict.fromkeys(box.coefficient_names, 0.0),
-        own_table=box,
+        name=particulars.name if name is None else name, structure=box.name, particulars=particulars,
+        steering=steering, coefficients=dict.fromkeys(box.coefficient_names, 0.0), own_table=box,
         service_shaft_speed=service_shaft_speed,
         provenance={"source": box.source, "reference": box.ship.name},
-    )
+    )  # fmt: skip

@@ -1,11 +1,8 @@
 """What is wrong with a ship model: a battery that any model, a user's own included, can be put through."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -17,10 +14,7 @@ from shipgym.ships.grey_boxes import GreyBox
 from shipgym.ships.ship_model import ShipModel
 from shipgym.ships.simulate import orders
 from shipgym.ships.term_table import ANGULAR, EQUATION_NAMES, Structure
-
-if TYPE_CHECKING:
-    from shipgym.trials.trial import Trial
-
+from shipgym.trials.trial import Trial
 
 SAMPLES = 512
 #: Range of the states looked at, in service speed and service speed by length.
@@ -88,15 +82,10 @@ def _states(model: ShipModel) -> dict[str, Floats]:
 
     u = speed * drawn(*SURGE)
     return {
-        "u": u,
-        "delta": model.steering.limit * drawn(),
-        "v": SWAY * u * drawn(),
-        "r": YAW_RATE * u / length * drawn(),
-        "p": ROLL_RATE * u / length * drawn(),
-        "phi": HEEL * drawn(),
-        "q": MEMORY * (speed / length) ** 2 * drawn(),
-        "n": np.full(SAMPLES, model.service_shaft_speed),
-    }
+        "u": u, "delta": model.steering.limit * drawn(), "v": SWAY * u * drawn(),
+        "r": YAW_RATE * u / length * drawn(), "p": ROLL_RATE * u / length * drawn(), "phi": HEEL * drawn(),
+        "q": MEMORY * (speed / length) ** 2 * drawn(), "n": np.full(SAMPLES, model.service_shaft_speed),
+    }  # fmt: skip
 
 
 def _rates(model: ShipModel) -> list[str]:

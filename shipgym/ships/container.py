@@ -6,11 +6,11 @@ ship, J. Soc. Naval Architects of Japan 150; in the form of the function `contai
 """
 
 from math import copysign, fabs, pi, sqrt
-from typing import NamedTuple
+from typing import Any
 
 from shipgym.engine.mathematics import small_sin_cos
 from shipgym.engine.motion import Motion, Ship
-from shipgym.ships.equations import ShipEquations
+from shipgym.ships.equations import ShipEquations, record_of
 from shipgym.ships.particulars import Particulars
 from shipgym.ships.steering import SteeringGear
 
@@ -19,81 +19,27 @@ GRAVITY = 9.81
 RUDDER_AREA, ASPECT_RATIO, DIAMETER = 33.0376, 1.8219, 6.533  # m^2, -, m
 SHAFT_LIMIT, SLOW_SHAFT = 160.0 / 60.0, 0.3  # 1/s
 
-
-class Coefficients(NamedTuple):
-    """As published; without unit."""
-
+#: As published; without unit.
+Coefficients = record_of({
     # mass and added mass, their moments of inertia and lever arms
-    m: float = 0.00792
-    mx: float = 0.000238
-    my: float = 0.007049
-    Ix: float = 0.0000176
-    Jx: float = 0.0000034
-    Iz: float = 0.000456
-    Jz: float = 0.000419
-    lx: float = 0.0313
-    ly: float = 0.0313
-    alpha_y: float = 0.05
+    "m": 0.00792, "mx": 0.000238, "my": 0.007049, "Ix": 0.0000176, "Jx": 0.0000034, "Iz": 0.000456,
+    "Jz": 0.000419, "lx": 0.0313, "ly": 0.0313, "alpha_y": 0.05,
     # hull; the index f is heel
-    X_uu: float = -0.0004226
-    X_vr: float = -0.00311
-    X_vv: float = -0.00386
-    X_rr: float = 0.00020
-    X_ff: float = -0.00020
-    Y_v: float = -0.0116
-    Y_r: float = 0.00242
-    Y_p: float = 0.0
-    Y_f: float = -0.000063
-    Y_vvv: float = -0.109
-    Y_rrr: float = 0.00177
-    Y_vvr: float = 0.0214
-    Y_vrr: float = -0.0405
-    Y_vvf: float = 0.04605
-    Y_vff: float = 0.00304
-    Y_rrf: float = 0.009325
-    Y_rff: float = -0.001368
-    K_v: float = 0.0003026
-    K_r: float = -0.000063
-    K_p: float = -0.0000075
-    K_f: float = -0.000021
-    K_vvv: float = 0.002843
-    K_rrr: float = -0.0000462
-    K_vvr: float = -0.000588
-    K_vrr: float = 0.0010565
-    K_vvf: float = -0.0012012
-    K_vff: float = -0.0000793
-    K_rrf: float = -0.000243
-    K_rff: float = 0.00003569
-    N_v: float = -0.0038545
-    N_r: float = -0.00222
-    N_p: float = 0.000213
-    N_f: float = -0.0001424
-    N_vvv: float = 0.001492
-    N_rrr: float = -0.00229
-    N_vvr: float = -0.0424
-    N_vrr: float = 0.00156
-    N_vvf: float = -0.019058
-    N_vff: float = -0.0053766
-    N_rrf: float = -0.0038592
-    N_rff: float = 0.0024195
+    "X_uu": -0.0004226, "X_vr": -0.00311, "X_vv": -0.00386, "X_rr": 0.00020, "X_ff": -0.00020,
+    "Y_v": -0.0116, "Y_r": 0.00242, "Y_p": 0.0, "Y_f": -0.000063, "Y_vvv": -0.109, "Y_rrr": 0.00177,
+    "Y_vvr": 0.0214, "Y_vrr": -0.0405, "Y_vvf": 0.04605, "Y_vff": 0.00304, "Y_rrf": 0.009325,
+    "Y_rff": -0.001368,
+    "K_v": 0.0003026, "K_r": -0.000063, "K_p": -0.0000075, "K_f": -0.000021, "K_vvv": 0.002843,
+    "K_rrr": -0.0000462, "K_vvr": -0.000588, "K_vrr": 0.0010565, "K_vvf": -0.0012012, "K_vff": -0.0000793,
+    "K_rrf": -0.000243, "K_rff": 0.00003569,
+    "N_v": -0.0038545, "N_r": -0.00222, "N_p": 0.000213, "N_f": -0.0001424, "N_vvv": 0.001492,
+    "N_rrr": -0.00229, "N_vvr": -0.0424, "N_vrr": 0.00156, "N_vvf": -0.019058, "N_vff": -0.0053766,
+    "N_rrf": -0.0038592, "N_rff": 0.0024195,
     # propeller and rudder
-    t: float = 0.175
-    wp: float = 0.184
-    tau: float = 1.09
-    xp: float = -0.526
-    c_pv: float = 0.0
-    c_pr: float = 0.0
-    kappa: float = 0.631
-    epsilon: float = 0.921
-    c_RX: float = 0.71
-    a_H: float = 0.237
-    z_R: float = 0.033
-    x_R: float = -0.5
-    x_H: float = -0.48
-    gamma: float = 0.088
-    c_Rr: float = -0.156
-    c_Rrrr: float = -0.275
-    c_Rrrv: float = 1.96
+    "t": 0.175, "wp": 0.184, "tau": 1.09, "xp": -0.526, "c_pv": 0.0, "c_pr": 0.0, "kappa": 0.631,
+    "epsilon": 0.921, "c_RX": 0.71, "a_H": 0.237, "z_R": 0.033, "x_R": -0.5, "x_H": -0.48, "gamma": 0.088,
+    "c_Rr": -0.156, "c_Rrrr": -0.275, "c_Rrrv": 1.96,
+}, __name__)  # fmt: skip
 
 
 def hull(linear: float, v: float, r: float, f: float, vvv: float, rrr: float, vvr: float, vrr: float,
@@ -107,7 +53,7 @@ def hull(linear: float, v: float, r: float, f: float, vvv: float, rrr: float, vv
     )
 
 
-def accelerations(motion: Motion, c: Coefficients, ship: Ship) -> tuple[float, float, float, float, float]:
+def accelerations(motion: Motion, c: Any, ship: Ship) -> tuple[float, float, float, float, float]:
     """Accelerations in surge, sway, yaw and roll, body frame, origin midship."""
     u, v, r, p, phi = motion.u, motion.v, motion.r, motion.p, motion.phi
     n, L = motion.n, LENGTH
@@ -158,7 +104,7 @@ def accelerations(motion: Motion, c: Coefficients, ship: Ship) -> tuple[float, f
     return X * (1.0 / (c.m + c.mx)) * linear, vdot * linear, rdot * angular, pdot * angular, 0.0
 
 
-def shaft_acceleration(n: float, command: float, c: Coefficients, ship: Ship) -> float:
+def shaft_acceleration(n: float, command: float, c: Any, ship: Ship) -> float:
     """Lag of the shaft, faster at higher speed."""
     order = min(max(command, -SHAFT_LIMIT), SHAFT_LIMIT)
     return (order - n) * (n * (1.0 / 5.65) if n > SLOW_SHAFT else 1.0 / 18.83)
@@ -168,8 +114,7 @@ PUBLISHED = Coefficients()
 SHIP = ShipEquations(
     "container",
     "Son & Nomoto 1981, On the coupled motion of steering and rolling of a high speed container ship",
-    Coefficients,
-    accelerations,
+    Coefficients, accelerations,
     Particulars(
         name="Container ship S175", length=LENGTH, beam=25.40, draught=8.50,
         mass=PUBLISHED.m * (0.5 * 1025.0 * LENGTH**3), xg=0.0,
@@ -180,7 +125,5 @@ SHIP = ShipEquations(
         N_rdot=-PUBLISHED.Jz,
     ),
     SteeringGear(rudder_rate_deg_s=5.0, time_constant=1.0),
-    shaft_acceleration=shaft_acceleration,
-    service_shaft_speed=80.0 / 60.0,
-    rolls=True,
+    shaft_acceleration=shaft_acceleration, service_shaft_speed=80.0 / 60.0, rolls=True,
 )  # fmt: skip

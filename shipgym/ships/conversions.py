@@ -8,8 +8,6 @@ Of a ship with surge or roll the linear forms keep sway and yaw; from a linear f
 keeps her speed. From Nomoto's form sway cannot come back: two ships that drift otherwise may turn alike.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
@@ -20,14 +18,8 @@ from shipgym.arrays import Floats
 from shipgym.checks import check_number
 from shipgym.errors import InputError
 from shipgym.ships.linear import (
-    Nomoto,
-    StraightRunning,
-    linearise,
-    nomoto,
-    nomoto_of,
-    steering_state_space,
-    straight_running,
-)
+    Nomoto, StraightRunning, linearise, nomoto, nomoto_of, steering_state_space, straight_running,
+)  # fmt: skip
 from shipgym.ships.particulars import Particulars
 from shipgym.ships.ship_model import ShipModel
 from shipgym.ships.steering import SteeringGear
@@ -47,7 +39,7 @@ __all__ = [
 
 def state_space(
     model: ShipModel, heading: bool = False, gear: bool = False, speed: float | None = None
-) -> StateSpace:
+) -> "StateSpace":
     """A ship's steering about straight running as a linear system.
 
     States are v (q in a table with a memory of yaw), r, and psi and delta where `heading` and `gear` ask for
@@ -80,7 +72,7 @@ def state_space(
     )  # fmt: skip
 
 
-def transfer_function(form: Nomoto, order: int = 2) -> TransferFunction:
+def transfer_function(form: Nomoto, order: int = 2) -> "TransferFunction":
     """Nomoto's transfer function from rudder to yaw rate, both in rad.
 
     Order 2 is K (1 + T3 s) / ((1 + T1 s) (1 + T2 s)), order 1 is K / (1 + T s). Raises InputError for another
@@ -127,21 +119,16 @@ def nomoto2_ship(
     if product == 0.0 or form.K == 0.0:
         raise InputError(f"nomoto: {form} found, expected K, T1 and T2 other than 0")
     coefficients = {
-        "c_r": -(form.T1 + form.T2) / product,
-        "c_d": form.K * form.T3 / product,
-        "e_r": -1.0 / product,
-        "e_d": form.K / product,
-    }
+        "c_r": -(form.T1 + form.T2) / product, "c_d": form.K * form.T3 / product,
+        "e_r": -1.0 / product, "e_d": form.K / product,
+    }  # fmt: skip
     return ShipModel(name, "nomoto2", _ship(particulars), steering or SteeringGear(), coefficients)
 
 
 def linear_steering_ship(
-    A: ArrayLike,
-    B: ArrayLike,
-    particulars: Known,
-    steering: SteeringGear | None = None,
+    A: ArrayLike, B: ArrayLike, particulars: Known, steering: SteeringGear | None = None,
     name: str = "linear-steering",
-) -> ShipModel:
+) -> ShipModel:  # fmt: skip
     """The ship of d/dt (v, r) = A (v, r) + B delta at service speed, of structure `linear-steering`.
 
     A has shape (2, 2) and B (2, 1), SI units, delta positive to starboard, as `steering_state_space` gives

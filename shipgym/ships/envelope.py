@@ -4,10 +4,8 @@ Outside it the model extrapolates. The summary is a box and, because v and r go 
 manoeuvre, the smallest ellipsoid around the data.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -28,7 +26,7 @@ class Envelope:
     shape: Floats  # shape (4, 4); upper triangular W; a state z is inside where |W (z - centre)| <= 1
 
     @classmethod
-    def from_samples(cls, u: ArrayLike, v: ArrayLike, r: ArrayLike, delta: ArrayLike) -> Envelope:
+    def from_samples(cls, u: ArrayLike, v: ArrayLike, r: ArrayLike, delta: ArrayLike) -> Self:
         """Envelope of samples, each of shape (n_samples,), SI units.
 
         A channel that hardly moves is given a thousandth of the ellipsoid's mean width, so that the

@@ -19,8 +19,8 @@ import numpy as np
 from shipgym.arrays import Floats
 from shipgym.checks import check_number, check_text
 from shipgym.engine.motion import Motion, Ship
-from shipgym.engine.parts import Part
 from shipgym.engine.records import Record, field_types, is_record
+from shipgym.engine.specialise import Part
 from shipgym.engine.vessel import Vessel, vessel_of
 from shipgym.errors import InputError
 from shipgym.python_files import load_file

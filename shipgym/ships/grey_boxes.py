@@ -14,8 +14,8 @@ import numpy as np
 
 from shipgym.arrays import Floats
 from shipgym.engine.motion import Motion, Ship
-from shipgym.engine.parts import Part
 from shipgym.engine.records import Record
+from shipgym.engine.specialise import Part
 from shipgym.engine.vessel import Vessel, vessel_of
 from shipgym.errors import InputError
 from shipgym.ships.manoeuvring_model import ManoeuvringModel
@@ -125,12 +125,10 @@ class GreyBox(Structure):
         """Functions of the reference ship, of the terms with their record of coefficients, and their sum."""
         reference = self.ship.vessel
         parts = {
-            **reference.functions,
-            "accelerations": Part(accelerations),
-            "reference_accelerations": reference.functions["accelerations"],
-            "KNOWS_SHAFT": self.shaft,
+            **reference.functions, "accelerations": Part(accelerations),
+            "reference_accelerations": reference.functions["accelerations"], "KNOWS_SHAFT": self.shaft,
             **functions,
-        }
+        }  # fmt: skip
         parts.pop("shaft_acceleration", None)  # the shaft turns as commanded
         record = _coefficients(reference.coefficients, terms)
         named = tuple(parts.items()), lag, tuple(summed.items())
@@ -175,14 +173,6 @@ class GreyBox(Structure):
         return {**super().to_dict(), "shaft": self.shaft, "reference": self.ship.to_dict()}
 
 
-class GreyBoxCoefficients(NamedTuple):
-    """Stands for the record of a grey box's coefficients."""
-
-    known: Ship  # the reference ship
-    reference: Any  # her coefficients
-    terms: Any  # coefficients of the terms
-
-
 KNOWS_SHAFT = False  # whether the reference ship's shaft turns with the target's
 
 
@@ -194,9 +184,7 @@ def term_accelerations(motion: Motion, c: Any, ship: Ship) -> Any:
     """A part: the sum of the terms."""
 
 
-def accelerations(
-    motion: Motion, c: GreyBoxCoefficients, ship: Ship
-) -> tuple[float, float, float, float, float]:
+def accelerations(motion: Motion, c: Any, ship: Ship) -> tuple[float, float, float, float, float]:
     """The reference ship's at the converted state, converted back, and the terms."""
     fast = c.known.speed / ship.speed
     quick = fast * ship.length / c.known.length
@@ -209,16 +197,14 @@ def accelerations(
     udot, vdot, rdot, _, _ = term_accelerations(motion, c.terms, ship)
     linear, angular = 1.0 / (fast * quick), 1.0 / (quick * quick)
     return (
-        udot + linear * surge,
-        vdot + linear * sway,
-        rdot + angular * yaw,
-        angular * roll,
+        udot + linear * surge, vdot + linear * sway, rdot + angular * yaw, angular * roll,
         angular * memory / quick,
-    )
+    )  # fmt: skip
 
 
 @cache
 def _coefficients(reference: Record, terms: Record) -> Record:
+    """The record of a grey box's coefficients: the known ship, hers, and those of the terms."""
     fields = [("known", Ship), ("reference", reference), ("terms", terms)]
     record: Record = NamedTuple("GreyBoxCoefficients", fields)  # type: ignore[misc]
     return record

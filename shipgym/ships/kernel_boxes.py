@@ -18,9 +18,9 @@ from shipgym.arrays import Floats
 from shipgym.engine import stages
 from shipgym.engine.mathematics import two_to
 from shipgym.engine.motion import Motion, Ship, accelerations
-from shipgym.engine.parts import Part
 from shipgym.engine.places import row_of
 from shipgym.engine.records import Record, table_of
+from shipgym.engine.specialise import Part
 from shipgym.engine.stages import Point, Sums
 from shipgym.engine.vessel import Vessel
 from shipgym.errors import InputError

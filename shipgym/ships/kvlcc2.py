@@ -7,73 +7,33 @@ another point and has another law for the wake.
 """
 
 from math import copysign, fabs, pi, sqrt
-from typing import NamedTuple
+from typing import Any
 
 from shipgym.engine.mathematics import arctan2, exponential, small_sin_cos
 from shipgym.engine.motion import Motion, Ship
-from shipgym.ships.equations import ShipEquations
+from shipgym.ships.equations import ShipEquations, record_of
 from shipgym.ships.particulars import Particulars
 from shipgym.ships.steering import SteeringGear
 
 PACKAGE_FORM = False  # a switch, compiled in
 
-
-class Coefficients(NamedTuple):
-    """As published; without unit but for the scale."""
-
+#: As published; without unit but for the scale.
+Coefficients = record_of({
     # added mass and hull
-    mx: float = 0.022
-    my: float = 0.223
-    Jz: float = 0.011
-    R_0: float = 0.022
-    X_vv: float = -0.040
-    X_vr: float = 0.002
-    X_rr: float = 0.011
-    X_vvvv: float = 0.771
-    Y_v: float = -0.315
-    Y_r: float = 0.083
-    Y_vvv: float = -1.607
-    Y_vvr: float = 0.379
-    Y_vrr: float = -0.391
-    Y_rrr: float = 0.008
-    N_v: float = -0.137
-    N_r: float = -0.049
-    N_vvv: float = -0.030
-    N_vvr: float = -0.294
-    N_vrr: float = 0.055
-    N_rrr: float = -0.013
+    "mx": 0.022, "my": 0.223, "Jz": 0.011, "R_0": 0.022,
+    "X_vv": -0.040, "X_vr": 0.002, "X_rr": 0.011, "X_vvvv": 0.771,
+    "Y_v": -0.315, "Y_r": 0.083, "Y_vvv": -1.607, "Y_vvr": 0.379, "Y_vrr": -0.391, "Y_rrr": 0.008,
+    "N_v": -0.137, "N_r": -0.049, "N_vvv": -0.030, "N_vvr": -0.294, "N_vrr": 0.055, "N_rrr": -0.013,
     # propeller and rudder
-    t_P: float = 0.220
-    t_R: float = 0.387
-    a_H: float = 0.312
-    x_R: float = -0.5
-    x_H: float = -0.464
-    C_1: float = 2.0
-    C_2_starboard: float = 1.6
-    C_2_port: float = 1.1
-    x_P: float = -0.48
-    x_P_package: float = -0.69
-    k_0: float = 0.2931
-    k_1: float = -0.2753
-    k_2: float = -0.1385
-    l_R: float = -0.710
-    gamma_minus: float = 0.395
-    gamma_plus: float = 0.640
-    epsilon: float = 1.09
-    kappa: float = 0.50
-    f_alpha: float = 2.747
+    "t_P": 0.220, "t_R": 0.387, "a_H": 0.312, "x_R": -0.5, "x_H": -0.464, "C_1": 2.0, "C_2_starboard": 1.6,
+    "C_2_port": 1.1, "x_P": -0.48, "x_P_package": -0.69, "k_0": 0.2931, "k_1": -0.2753, "k_2": -0.1385,
+    "l_R": -0.710, "gamma_minus": 0.395, "gamma_plus": 0.640, "epsilon": 1.09, "kappa": 0.50,
+    "f_alpha": 2.747,
     # 1 for the form of shipmmg
-    PACKAGE_FORM: float = 0.0
-    # scale: those of the 7 m model
-    L: float = 7.0  # m
-    d: float = 0.46  # m
-    volume: float = 3.27  # m^3
-    xG: float = 0.25  # m forward of midship
-    D_P: float = 0.216  # m
-    H_R: float = 0.345  # m
-    A_R: float = 0.0539  # m^2
-    w_P0: float = 0.40
-
+    "PACKAGE_FORM": 0.0,
+    # scale, of the 7 m model, in m, m^2 and m^3; xG is forward of midship
+    "L": 7.0, "d": 0.46, "volume": 3.27, "xG": 0.25, "D_P": 0.216, "H_R": 0.345, "A_R": 0.0539, "w_P0": 0.40,
+}, __name__)  # fmt: skip
 
 FULL_SCALE = {
     "L": 320.0, "d": 20.8, "volume": 312_600.0, "xG": 11.2, "D_P": 9.86, "H_R": 15.8, "A_R": 112.5,
@@ -81,7 +41,7 @@ FULL_SCALE = {
 }  # fmt: skip
 
 
-def wake(drift: float, turn: float, c: Coefficients) -> float:
+def wake(drift: float, turn: float, c: Any) -> Any:
     """Wake fraction at the propeller."""
     if PACKAGE_FORM:
         angle = drift - c.x_P_package * turn
@@ -91,7 +51,7 @@ def wake(drift: float, turn: float, c: Coefficients) -> float:
     return 1.0 - (1.0 - c.w_P0) * (1.0 + (1.0 - exponential(-c.C_1 * fabs(angle))) * (side - 1.0))
 
 
-def accelerations(motion: Motion, c: Coefficients, ship: Ship) -> tuple[float, float, float, float, float]:
+def accelerations(motion: Motion, c: Any, ship: Ship) -> tuple[float, float, float, float, float]:
     """Accelerations in surge, sway and yaw, body frame, origin midship, from forces per density."""
     u, v, r, n = motion.u, motion.v, motion.r, motion.n
     if PACKAGE_FORM:
@@ -143,7 +103,7 @@ def accelerations(motion: Motion, c: Coefficients, ship: Ship) -> tuple[float, f
     return udot, vdot, rdot, 0.0, 0.0
 
 
-def particulars(name: str, c: Coefficients, beam: float, speed: float) -> Particulars:
+def particulars(name: str, c: Any, beam: float, speed: float) -> Particulars:
     """Of the ship at a scale: beam in m, service speed in m/s."""
     to_prime = c.d / c.L  # added masses are given by rho L^2 d / 2
     return Particulars(

@@ -7,20 +7,14 @@ Davidson & Schiff 1946, Turning and course-keeping qualities, Trans. SNAME 54; L
 Naval Architecture III, chapter IX, section 4 (the criterion C).
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from shipgym.arrays import Floats
 from shipgym.errors import InputError
 from shipgym.ships.inertia import inertia
-
-if TYPE_CHECKING:
-    from shipgym.ships.ship_model import ShipModel
-
+from shipgym.ships.ship_model import ShipModel
 
 STEP = 1e-4  # of the finite differences, prime system; the error is its square
 SLOWEST, FASTEST = 0.75, 1.25  # speed of straight running over service speed where surge is to be believed
@@ -157,8 +151,7 @@ def _rates(model: ShipModel, states: Floats) -> Floats:
     commands = np.broadcast_to(model.service_command, (*states.shape[:-1], len(model.command_names))).copy()
     rudder = states[..., model.state_names.index("delta")]
     commands[..., 0] = np.clip(rudder, -0.5 * np.pi, 0.5 * np.pi)  # a search may go beyond any rudder
-    time = model.particulars["length"] / model.particulars["speed"]
-    return np.asarray(model.derivatives(states, commands) * time / _scales(model))
+    return np.asarray(model.derivatives(states, commands) * model.travel_time / _scales(model))
 
 
 def linearise(model: ShipModel, at: StraightRunning, side: int = 0) -> tuple[Floats, Floats]:

@@ -54,11 +54,9 @@ class ManoeuvringModel:
                 f"missing: {', '.join(missing) or 'none'}; unknown: {', '.join(unknown) or 'none'}"
             )
         ordered = {name: float(self.coefficients[name]) for name in names}
-        wrong = [name for name, value in ordered.items() if not np.isfinite(value)]
-        if wrong:
-            raise InputError(
-                f"coefficients of {self.name!r}: {wrong[0]} is {ordered[wrong[0]]}, expected a number"
-            )
+        for name, value in ordered.items():
+            if not np.isfinite(value):
+                raise InputError(f"coefficients of {self.name!r}: {name} is {value}, expected a number")
         object.__setattr__(self, "coefficients", ordered)
         if self.dynamics.scales and "n" in self.command_names and not self.service_shaft_speed > 0:
             raise InputError(
@@ -187,18 +185,14 @@ class ManoeuvringModel:
     def to_dict(self) -> dict[str, Any]:
         """What a model file holds, ready for JSON (format in `shipgym.ships.model_file`)."""
         return {
-            "format": FORMAT,
-            "name": self.name,
-            "structure": self.dynamics.to_dict(),
-            "normalisation": self.dynamics.normalisation,
-            "coefficients": self.coefficients,
+            "format": FORMAT, "name": self.name, "structure": self.dynamics.to_dict(),
+            "normalisation": self.dynamics.normalisation, "coefficients": self.coefficients,
             "covariance": None if self.covariance is None else self.covariance.tolist(),
-            "particulars": self.particulars.to_dict(),
-            "steering": self.steering.to_dict(),
+            "particulars": self.particulars.to_dict(), "steering": self.steering.to_dict(),
             "service_shaft_speed": self.service_shaft_speed,
             "envelope": None if self.envelope is None else self.envelope.to_dict(),
             "provenance": self.provenance,
-        }
+        }  # fmt: skip
 
     def check_depth(self, water_depth: float) -> None:
         """InputError for water that is too shallow, or shallow water and a ship that knows none."""
@@ -270,9 +264,7 @@ def check_units(model: ManoeuvringModel, orders: Floats, where: str = "commands"
 
 
 def _within(values: Floats, low: float, high: float, what: str, expected: str, where: str) -> None:
-    wrong = np.flatnonzero((values < low) | (values > high))
-    if len(wrong):
-        row = int(wrong[0])
+    for row in np.flatnonzero((values < low) | (values > high))[:1]:
         raise InputError(f"{where}: row {row}: {what} {values[row]:g} found, expected {expected}")
 
 

@@ -47,10 +47,8 @@ def mariner(service_speed: float = 7.7175) -> ShipModel:
         X_udot=-42e-5, Y_vdot=-748e-5, Y_rdot=-9.354e-5, N_vdot=4.646e-5, N_rdot=-43.8e-5,
     )  # fmt: skip
     return ShipModel(
-        name="mariner",
-        structure="abkowitz",
-        particulars=particulars,
+        name="mariner", structure="abkowitz", particulars=particulars,
         steering=SteeringGear(rudder_limit_deg=40.0, rudder_rate_deg_s=5.0, time_constant=1.0),
         coefficients={name: coefficients[name] for name in get_structure("abkowitz").coefficient_names},
         provenance={"source": "Chislett & Strom-Tejsen 1965, in the form of the MSS toolbox (Fossen 1994)"},
-    )
+    )  # fmt: skip

@@ -27,7 +27,6 @@ KVLCC2 = kvlcc2.Coefficients()
 SLOWEST = 0.02  # of service speed, below which v' and r' lose their meaning
 LEAST_SPEED, MOST_SPEED = 0.01, 4.0  # over service speed, for which the power law of the damping holds
 
-
 #: What the general form has beyond the standard method, with the values that make it the standard one.
 BEYOND = {
     "thrust": 1.0,  # factor on the open-water thrust coefficient
@@ -175,9 +174,6 @@ class MMGEquations(ShipEquations):
 
 
 SHIP = MMGEquations(
-    MMG,
-    kvlcc2.SHIP.source + "; general form",
-    Coefficients, accelerations,
-    PARTICULARS,
+    MMG, kvlcc2.SHIP.source + "; general form", Coefficients, accelerations, PARTICULARS,
     kvlcc2.SHIP.steering, service_shaft_speed=kvlcc2.SHIP.service_shaft_speed,
 )  # fmt: skip

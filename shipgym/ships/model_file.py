@@ -27,26 +27,15 @@ Format 1:
 import hashlib
 import json
 from collections.abc import Callable, Collection, Mapping
-from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
 
 from shipgym.checks import (
-    check_array,
-    check_choice,
-    check_flag,
-    check_format,
-    check_keys,
-    check_number,
-    check_table,
-    check_text,
-    placed,
-    quoted,
-    shown,
-)
+    check_array, check_choice, check_flag, check_format, check_keys, check_number, check_table, check_text,
+    quoted, shown,
+)  # fmt: skip
 from shipgym.errors import InputError
-from shipgym.files import read_json
 from shipgym.ships.envelope import CHANNELS, Envelope
 from shipgym.ships.equations import ShipEquations
 from shipgym.ships.grey_boxes import GreyBox
@@ -65,14 +54,10 @@ FIELDS = (
     "format", "name", "structure", "normalisation", "coefficients", "covariance", "particulars",
     "steering", "service_shaft_speed", "envelope", "provenance", "sha256",
 )  # fmt: skip
+STRUCTURE_FIELDS = (
+    "name", "source", "normalisation", "quantity", "equations", "shaft", "reference", "shares", "kernel",
+)  # fmt: skip
 REQUIRED = ("format", "name", "structure", "coefficients", "particulars", "steering")
-
-
-def load(path: Path, make: Callable[..., Model]) -> Model:
-    """Read and validate a model file."""
-    fields = read_json(path, "model file", "identify the model again or take another copy")
-    with placed(str(path)):
-        return read_model(fields, str(path), make)
 
 
 def read_model(fields: Mapping[str, Any], where: str, make: Callable[..., Model]) -> Model:
@@ -89,11 +74,9 @@ def read_model(fields: Mapping[str, Any], where: str, make: Callable[..., Model]
             f"{where}: normalisation {fields['normalisation']!r} found, expected {normalisation!r}"
         )
     coefficients = _coefficients(fields["coefficients"], dynamics, f"{where}: coefficients")
-    covariance = fields.get("covariance")
-    provenance = fields.get("provenance")
+    covariance, provenance = fields.get("covariance"), fields.get("provenance")
     model = make(
-        name=check_text(fields["name"], f"{where}: name"),
-        structure=dynamics.name,
+        name=check_text(fields["name"], f"{where}: name"), structure=dynamics.name,
         particulars=Particulars.from_dict(check_table(fields["particulars"], f"{where}: particulars")),
         steering=SteeringGear.from_mapping(fields["steering"], f"{where}: steering"),
         coefficients=coefficients,
@@ -104,7 +87,7 @@ def read_model(fields: Mapping[str, Any], where: str, make: Callable[..., Model]
         service_shaft_speed=check_number(
             fields.get("service_shaft_speed", 0.0), f"{where}: service_shaft_speed", at_least=0.0
         ),
-    )
+    )  # fmt: skip
     found = numbers_hash(model)
     if fields.get("sha256", found) != found:
         raise InputError(
@@ -127,11 +110,7 @@ def numbers_hash(model: ManoeuvringModel) -> str:
 
 def _dynamics(value: Any, where: str, make: Callable[..., ManoeuvringModel]) -> Structure | ShipEquations:
     """A table of terms, or the equations of a ship that has her own, by name."""
-    table = check_table(value, where)
-    keys = (
-        "name", "source", "normalisation", "quantity", "equations", "shaft", "reference", "shares", "kernel",
-    )  # fmt: skip
-    check_keys(table, keys, where)
+    table = check_table(value, where, STRUCTURE_FIELDS)
     if {"shares", "kernel", "equations"} & table.keys():
         for name in ("source", "name"):
             check_text(table.get(name), f"{where}.{name}")
@@ -164,11 +143,10 @@ def _dynamics(value: Any, where: str, make: Callable[..., ManoeuvringModel]) -> 
 
 def _kernel(value: Any, where: str) -> Kernel:
     """The radial basis functions of a kernel."""
-    table = check_table(value, where)
     shapes: dict[str, tuple[int | None, ...]] = {
         "offset": (4,), "scale": (4,), "centres": (None, 4), "basis": (None, None),
     }  # fmt: skip
-    check_keys(table, shapes, where)
+    table = check_table(value, where, shapes)
     return Kernel(*(check_array(table.get(name), shapes[name], f"{where}.{name}") for name in shapes))
 
 
@@ -178,18 +156,15 @@ def _check_lists(
     """Check lists of terms or shares by equation: their texts, powers of symbols, and the sign of a share."""
     shares = what == "shares"
     texts = ("coefficient", "name") if shares else ("name",)
-    table = check_table(value, where)
-    check_keys(table, equations, where)
-    for equation, listed in table.items():
+    for equation, listed in check_table(value, where, equations).items():
         if not isinstance(listed, list) or not 0 < len(listed) <= MOST_TERMS:
             raise InputError(f"{where}.{equation}: expected a list of {what}, 1 to {MOST_TERMS}")
         for i, entry in enumerate(listed):
             place = f"{where}.{equation}[{i}]"
-            term = check_table(entry, place)
-            check_keys(term, (*texts, "powers", *(("sign",) if shares else ())), place)
+            term = check_table(entry, place, (*texts, "powers", *(("sign",) if shares else ())))
             for name in texts:
                 check_text(term.get(name), f"{place}.{name}")
-            check_keys(check_table(term.get("powers"), f"{place}.powers"), symbols, f"{place}.powers")
+            check_table(term.get("powers"), f"{place}.powers", symbols)
             if shares:
                 check_number(term.get("sign"), f"{place}.sign", at_least=-1.0, at_most=1.0)
 
@@ -219,8 +194,7 @@ def read_envelope(value: Any, where: str) -> Envelope | None:
     """The envelope that `Envelope.to_dict` wrote; None for null. InputError names the field at fault."""
     if value is None:
         return None
-    table = check_table(value, where)
-    check_keys(table, ("channels", "low", "high", "centre", "shape"), where)
+    table = check_table(value, where, ("channels", "low", "high", "centre", "shape"))
     if table.get("channels") != list(CHANNELS):
         raise InputError(f"{where}.channels: {table.get('channels')!r} found, expected {list(CHANNELS)}")
     shapes = {"low": (4,), "high": (4,), "centre": (4,), "shape": (4, 4)}

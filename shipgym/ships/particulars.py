@@ -1,13 +1,11 @@
 """Particulars of a ship, and what can be estimated from them."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, fields, replace
-from typing import Any
+from typing import Any, Self
 
-from shipgym.checks import check_keys, check_number, check_table, check_text
+from shipgym.checks import check_number, check_table, check_text
 from shipgym.errors import InputError
 from shipgym.files import shipped_toml
 
@@ -107,21 +105,19 @@ class Particulars(Mapping[str, Any]):
         return len(FIELDS)
 
     @classmethod
-    def from_mapping(cls, mapping: Mapping[str, Any], where: str = "particulars") -> Particulars:
+    def from_mapping(cls, mapping: Mapping[str, Any], where: str = "particulars") -> Self:
         """Make particulars from the keys of the ship file's ``[ship]``.
 
         Added masses stand there or in a table ``added_mass``; ``estimated`` is as :meth:`to_dict` writes it;
         None stands for a value that is not known. Raises InputError, beginning with `where`, for an unknown
         key, a missing length, a wrong type or a value that no ship has.
         """
-        table = dict(check_table(mapping, where))
-        added = dict(check_table(table.pop("added_mass", None) or {}, f"{where} added_mass"))
-        check_keys(table, (*FIELDS, "added_mass", "estimated"), where)
-        check_keys(added, ADDED_MASSES, f"{where} added_mass")
+        table = dict(check_table(mapping, where, (*FIELDS, "added_mass", "estimated")))
+        added = check_table(table.pop("added_mass", None) or {}, f"{where} added_mass", ADDED_MASSES)
         twice = table.keys() & added.keys()
         if twice:
             raise InputError(f"{where} added_mass: {min(twice)} is given twice, expected it in one place")
-        values = table | added
+        values = {**table, **added}
         estimated = values.pop("estimated", None) or ()
         names = isinstance(estimated, list | tuple | set | frozenset)
         if not names or not all(name in FIELDS for name in estimated):
@@ -131,15 +127,13 @@ class Particulars(Mapping[str, Any]):
         return cls(**_checked(values, where), estimated=frozenset(estimated))
 
     @classmethod
-    def from_dict(cls, mapping: Mapping[str, Any], where: str = "particulars") -> Particulars:
+    def from_dict(cls, mapping: Mapping[str, Any], where: str = "particulars") -> Self:
         """Read what :meth:`to_dict` wrote; the same as :meth:`from_mapping`."""
         return cls.from_mapping(mapping, where)
 
     def to_dict(self) -> dict[str, Any]:
         """Return the values by name, ready for JSON, None where not known; :meth:`from_mapping` reads it."""
-        known = {name: getattr(self, name) for name in FIELDS}
-        later = {name for name in LATER if known[name] is None}
-        found = {name: value for name, value in known.items() if name not in later}
+        found = {name: value for name, value in self.items() if value is not None or name not in LATER}
         return {**found, "estimated": sorted(self.estimated)}
 
     def require(self, name: str) -> float:
@@ -164,7 +158,7 @@ class Particulars(Mapping[str, Any]):
         """Yaw inertia about MIDSHIP by rho L^5 / 2: that about the centre of gravity and m xg^2."""
         return self.mass_prime * ((self.require("yaw_gyradius") / self.length) ** 2 + self.xg_prime**2)
 
-    def completed(self) -> Particulars:
+    def completed(self) -> "Particulars":
         """Return particulars with mass, inertia and added masses estimated where absent, and marked so.
 
         Water density 1025 kg/m3, centre of gravity at midship, yaw gyradius L/4, mass from the block
@@ -255,14 +249,11 @@ def _check_known(ship: Particulars, name: str, remedy: str) -> None:
 
 
 _ESTIMATES: Estimates = {  # in this order
-    "water_density": lambda ship: 1025.0,
-    "xg": lambda ship: 0.0,
+    "water_density": lambda ship: 1025.0, "xg": lambda ship: 0.0,
     "yaw_gyradius": lambda ship: 0.25 * ship.length,
-    "block_coefficient": _block_coefficient,
-    "mass": _mass,
-    "X_udot": lambda ship: -0.05 * ship.mass_prime,
+    "block_coefficient": _block_coefficient, "mass": _mass, "X_udot": lambda ship: -0.05 * ship.mass_prime,
     **{name: _clarke(name) for name in ("Y_vdot", "Y_rdot", "N_vdot", "N_rdot")},
-}
+}  # fmt: skip
 
 
 def _checked(values: Mapping[str, Any], where: str) -> dict[str, Any]:

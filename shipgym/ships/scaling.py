@@ -65,15 +65,14 @@ def scale_model(
     scale = np.array(list(factors.values()))
     origin = {"from_length": model.particulars.length, "from_speed": model.particulars["speed"]}
     return replace(
-        model,
+        model, steering=gear,
         particulars=_particulars(model.particulars, size, float(speed), water_density),
-        steering=gear,
         coefficients={name: value * factors[name] for name, value in model.coefficients.items()},
         covariance=None if model.covariance is None else model.covariance * np.outer(scale, scale),
         envelope=_envelope(model.envelope, np.array([fast, fast, quick, 1.0])),
         provenance=(model.provenance or {}) | {"scaled": origin},
         service_shaft_speed=model.service_shaft_speed * fast / size,
-    )
+    )  # fmt: skip
 
 
 def _coefficient_factors(table: Structure, size: float, fast: float) -> dict[str, float]:

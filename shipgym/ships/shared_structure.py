@@ -6,8 +6,6 @@ machine for parameter estimation of a nonlinear manoeuvring model based on PMM t
 coefficients.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -105,11 +103,10 @@ class SharedStructure(Structure):
         Raises InputError if it is not positive, or the particulars do not tell the mass.
         """
         return total_inertia(
-            particulars,
-            self.added_mass(coefficients),
+            particulars, self.added_mass(coefficients),
             f"structure '{self.name}': the mass of the ship and the added mass of the coefficients are "
             "not positive together; expected derivatives X_udot, Y_vdot, N_rdot below 0",
-        )
+        )  # fmt: skip
 
     def term_numbers(
         self, coefficients: Mapping[str, float], particulars: Particulars, shaft_speed: float = 0.0
@@ -151,7 +148,7 @@ class SharedStructure(Structure):
         }
 
     @classmethod
-    def from_dict(cls, table: Mapping[str, Any]) -> SharedStructure:
+    def from_dict(cls, table: Mapping[str, Any]) -> "SharedStructure":
         """The table from a model file."""
         shares = {
             axis: tuple(

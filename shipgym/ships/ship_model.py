@@ -1,22 +1,21 @@
 """A ship as a manoeuvring model that is simulated, sampled from, saved and loaded."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from shipgym.checks import placed
 from shipgym.errors import InputError
-from shipgym.files import write_json
+from shipgym.files import read_json, write_json
 from shipgym.sea.conditions import Weather
 from shipgym.ships.equations import ShipEquations
 from shipgym.ships.grey_boxes import GreyBox
 from shipgym.ships.manoeuvring_model import ManoeuvringModel
-from shipgym.ships.model_file import load, numbers_hash, read_model
+from shipgym.ships.model_file import numbers_hash, read_model
 from shipgym.ships.simulate import Seed, simulate
 from shipgym.ships.term_table import Structure
 from shipgym.trials.trial import Trial
@@ -52,14 +51,9 @@ class ShipModel(ManoeuvringModel):
     """
 
     def simulate(
-        self,
-        commands: ArrayLike,
-        dt: float,
-        state: ArrayLike | None = None,
-        water_depth: float = np.inf,
-        weather: Weather | str | None = None,
-        seed: Seed = 0,
-    ) -> Trial:
+        self, commands: ArrayLike, dt: float, state: ArrayLike | None = None, water_depth: float = np.inf,
+        weather: Weather | str | None = None, seed: Seed = 0,
+    ) -> Trial:  # fmt: skip
         """Simulate with commands held over each step (classical Runge-Kutta).
 
         Parameters
@@ -93,7 +87,7 @@ class ShipModel(ManoeuvringModel):
         """
         return simulate(self, commands, dt, state, water_depth, weather=weather, seed=seed)
 
-    def sample(self, n: int, seed: int | np.random.Generator) -> list[ShipModel]:
+    def sample(self, n: int, seed: int | np.random.Generator) -> list[Self]:
         """N models whose coefficients are drawn from the identified covariance; the same for the same seed.
 
         Raises InputError if the model has no covariance.
@@ -129,12 +123,15 @@ class ShipModel(ManoeuvringModel):
         write_json({**self.to_dict(), "sha256": numbers_hash(self)}, Path(path))
 
     @classmethod
-    def load(cls, path: str | Path) -> ShipModel:
+    def load(cls, path: str | Path) -> Self:
         """Read a model file; InputError, naming the file and the field at fault."""
-        return load(Path(path), cls)
+        file = Path(path)
+        fields = read_json(file, "model file", "identify the model again or take another copy")
+        with placed(str(file)):
+            return read_model(fields, str(file), cls)
 
     @classmethod
-    def from_dict(cls, fields: Mapping[str, Any], where: str = "model") -> ShipModel:
+    def from_dict(cls, fields: Mapping[str, Any], where: str = "model") -> Self:
         """The model of what `to_dict` gave, or a model file holds.
 
         Raises InputError, naming the field at fault, after `where`.

@@ -9,8 +9,8 @@ from numpy.typing import ArrayLike
 from shipgym.arrays import Floats
 from shipgym.checks import check_whole
 from shipgym.engine.loops import ship_loop
-from shipgym.engine.passages import SEA_CHANNELS
 from shipgym.engine.records import leaves
+from shipgym.engine.trajectories import SEA_CHANNELS
 from shipgym.errors import InputError, UnstableModelError
 from shipgym.sea.conditions import Weather
 from shipgym.sea.open_sea import Sea
@@ -81,15 +81,10 @@ class Passage:
 
 
 def simulate(
-    model: ManoeuvringModel,
-    commands: ArrayLike,
-    dt: float,
-    state: ArrayLike | None = None,
-    water_depth: float = np.inf,
-    kind: str | None = None,
-    weather: Weather | str | None = None,
+    model: ManoeuvringModel, commands: ArrayLike, dt: float, state: ArrayLike | None = None,
+    water_depth: float = np.inf, kind: str | None = None, weather: Weather | str | None = None,
     seed: Seed = 0,
-) -> Trial:
+) -> Trial:  # fmt: skip
     """Simulate a ship with commands held over each step (see `ShipModel.simulate`)."""
     held = checked_orders(model, commands)
     if not (np.isfinite(dt) and dt > 0.0):
@@ -183,9 +178,7 @@ def _channels(model: ManoeuvringModel, states: Floats) -> dict[str, Floats]:
     return {name: column for name, column in columns if name in CHANNELS}
 
 
-def unstable(
-    model: ManoeuvringModel, time_s: float, state: Floats, step: float = 0.0
-) -> UnstableModelError:
+def unstable(model: ManoeuvringModel, time_s: float, state: Floats, step: float = 0.0) -> UnstableModelError:
     """The error for a ship that ran away after a given time and physical state, in steps of so many s."""
     last = dict(zip(model.state_names, state.tolist(), strict=False))
     heel = f", phi = {np.degrees(last['phi']):.3g} deg" if "phi" in last else ""
@@ -194,6 +187,5 @@ def unstable(
     return UnstableModelError(
         f"model {model.name!r} runs away after {time_s:.1f} s (u = {last['u']:.3g} m/s, "
         f"v = {last['v']:.3g} m/s, r = {np.degrees(last['r']):.3g} deg/s{heel}): it is unstable there{long}",
-        time_s,
-        last,
-    )
+        time_s, last,
+    )  # fmt: skip

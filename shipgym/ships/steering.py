@@ -1,19 +1,16 @@
 """The steering gear: how the rudder follows its order."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
-from typing import Any
+from typing import Any, Self
 
-from shipgym.checks import check_keys, check_number, check_table
+from shipgym.checks import check_number, check_table
 
 _BOUNDS: dict[str, dict[str, Any]] = {
     "rudder_limit_deg": {"above": 0.0, "at_most": 90.0},
-    "rudder_rate_deg_s": {"above": 0.0},
-    "time_constant": {"at_least": 0.0},
-}
+    "rudder_rate_deg_s": {"above": 0.0}, "time_constant": {"at_least": 0.0},
+}  # fmt: skip
 
 SHORTEST_LAG = 0.45  # of a step of simulations
 
@@ -49,18 +46,16 @@ class SteeringGear:
 
     def __post_init__(self) -> None:
         for name, bounds in _BOUNDS.items():
-            object.__setattr__(
-                self, name, check_number(getattr(self, name), f"steering gear {name}", **bounds)
-            )
+            value = check_number(getattr(self, name), f"steering gear {name}", **bounds)
+            object.__setattr__(self, name, value)
 
     @classmethod
-    def from_mapping(cls, mapping: Mapping[str, Any], where: str = "steering gear") -> SteeringGear:
+    def from_mapping(cls, mapping: Mapping[str, Any], where: str = "steering gear") -> Self:
         """A steering gear from keys of the ship file's ``[steering]``, which are this class's fields.
 
         Raises InputError, beginning with `where`, for an unknown key or a value out of bounds.
         """
-        table = check_table(mapping, where)
-        check_keys(table, _BOUNDS, where)
+        table = check_table(mapping, where, _BOUNDS)
         for name, value in table.items():
             check_number(value, f"{where} {name}", **_BOUNDS[name])
         return cls(**table)

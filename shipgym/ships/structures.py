@@ -17,12 +17,6 @@ Read = TypeVar("Read")
 USUAL = {"source": "own", "normalisation": "si", "quantity": "acceleration"}  # where a table does not say
 
 
-def _printed() -> dict[str, Structure]:
-    tables = shipped_toml("shipgym.ships", "structures.toml")
-    papers = tables.pop("papers")
-    return {name: _read_printed(name, USUAL | table, papers) for name, table in tables.items()}
-
-
 def _read_printed(name: str, table: dict[str, Any], papers: Mapping[str, str]) -> Structure:
     """A structure of `structures.toml`, whose terms are formulas, letters or shares of coefficients."""
     source = table.pop("source").format(**papers)
@@ -40,7 +34,9 @@ def _by_axis(texts: Mapping[str, str], read: Callable[[str], Read]) -> dict[str,
     return {axis: read(text) for axes, text in texts.items() for axis in axes.split()}
 
 
-STRUCTURES = _printed()
+_TABLES = shipped_toml("shipgym.ships", "structures.toml")
+_PAPERS = _TABLES.pop("papers")
+STRUCTURES = {name: _read_printed(name, USUAL | table, _PAPERS) for name, table in _TABLES.items()}
 PRINTED = frozenset(STRUCTURES)
 
 SHIPPED_EQUATIONS: dict[str, ShipEquations] = {
@@ -79,12 +75,9 @@ def get_dynamics(name: str) -> Structure | ShipEquations:
 
 
 def register_structure(
-    name: str,
-    equations: Mapping[str, str | Sequence[Term]],
-    source: str = "own",
-    normalisation: str = "si",
+    name: str, equations: Mapping[str, str | Sequence[Term]], source: str = "own", normalisation: str = "si",
     quantity: str = "acceleration",
-) -> Structure:
+) -> Structure:  # fmt: skip
     """Register a table of terms by name, so that it works wherever a structure does.
 
     Models and their files carry their table, so only the process that identifies has to register it.

@@ -6,11 +6,11 @@ The source's rudder is positive to port; here it is turned.
 """
 
 from math import copysign, fabs
-from typing import NamedTuple
+from typing import Any
 
 from shipgym.engine.mathematics import arctan2
 from shipgym.engine.motion import Motion, Ship
-from shipgym.ships.equations import ShipEquations
+from shipgym.ships.equations import ShipEquations, record_of
 from shipgym.ships.particulars import Particulars
 from shipgym.ships.steering import SteeringGear
 
@@ -18,57 +18,26 @@ LENGTH, DRAUGHT = 304.8, 18.46  # m
 SHAFT_LIMIT, SHAFT_LAG = 80.0 / 60.0, 50.0  # 1/s, s
 VERY_SHALLOW = 0.8  # T / (h - T) from which Y_uvz acts
 
-
-class Coefficients(NamedTuple):
-    """As published; the index z is by draught over water below the keel, c by the speed of the race."""
-
+#: As published; the index z is by draught over water below the keel, c by the speed of the race.
+Coefficients = record_of({
     # thrust
-    t: float = 0.22
-    c_un: float = 0.605
-    c_nn: float = 38.2
-    T_uu: float = -0.00695
-    T_un: float = -0.00063
-    T_nn: float = 0.0000354
+    "t": 0.22, "c_un": 0.605, "c_nn": 38.2, "T_uu": -0.00695, "T_un": -0.00063, "T_nn": 0.0000354,
     # hull and rudder
-    X_uu: float = -0.0377
-    X_vv: float = 0.3
-    X_ccdd: float = -0.093
-    X_ccbd: float = 0.152
-    Y_uv: float = -1.205
-    Y_vv: float = -2.400
-    Y_ccd: float = 0.208
-    Y_ccbbd: float = -2.16
-    Y_T: float = 0.04
-    N_uv: float = -0.451
-    N_vr: float = -0.300
-    N_ccd: float = -0.098
-    N_ccbbd: float = 0.688
-    N_T: float = -0.02
-    d11: float = 2.020
-    d22: float = -0.752
-    d33: float = -0.231
+    "X_uu": -0.0377, "X_vv": 0.3, "X_ccdd": -0.093, "X_ccbd": 0.152,
+    "Y_uv": -1.205, "Y_vv": -2.400, "Y_ccd": 0.208, "Y_ccbbd": -2.16, "Y_T": 0.04,
+    "N_uv": -0.451, "N_vr": -0.300, "N_ccd": -0.098, "N_ccbbd": 0.688, "N_T": -0.02,
+    "d11": 2.020, "d22": -0.752, "d33": -0.231,
     # mass and added mass by mass
-    m11: float = 1.050
-    m22: float = 2.020
-    m33: float = 0.1232
+    "m11": 1.050, "m22": 2.020, "m33": 0.1232,
     # shallow water
-    X_udotz: float = -0.05
-    Y_vdotz: float = -0.387
-    N_rdotz: float = -0.0045
-    X_uuz: float = -0.0061
-    X_vrz: float = 0.387
-    X_vvzz: float = 0.0125
-    Y_urz: float = 0.182
-    Y_vvz: float = -1.5
-    Y_uvz: float = -0.85
-    Y_ccbbdz: float = -0.191
-    N_urz: float = -0.047
-    N_vrz: float = -0.120
-    N_uvz: float = -0.241
-    N_ccbbdz: float = 0.344
+    "X_udotz": -0.05, "Y_vdotz": -0.387, "N_rdotz": -0.0045,
+    "X_uuz": -0.0061, "X_vrz": 0.387, "X_vvzz": 0.0125,
+    "Y_urz": 0.182, "Y_vvz": -1.5, "Y_uvz": -0.85, "Y_ccbbdz": -0.191,
+    "N_urz": -0.047, "N_vrz": -0.120, "N_uvz": -0.241, "N_ccbbdz": 0.344,
+}, __name__)  # fmt: skip
 
 
-def accelerations(motion: Motion, c: Coefficients, ship: Ship) -> tuple[float, float, float, float, float]:
+def accelerations(motion: Motion, c: Any, ship: Ship) -> tuple[float, float, float, float, float]:
     """Accelerations in surge, sway and yaw, body frame, origin midship."""
     u, v, r, n, L = motion.u, motion.v, motion.r, motion.n, LENGTH
     d = -motion.delta
@@ -98,15 +67,12 @@ def accelerations(motion: Motion, c: Coefficients, ship: Ship) -> tuple[float, f
     )  # fmt: skip
     # as products, because the masses are the same in all stages of a step
     return (
-        X * (1.0 / (c.m11 - c.X_udotz * z)),
-        Y * (1.0 / (c.m22 - c.Y_vdotz * z)),
-        N * (1.0 / (c.m33 - c.N_rdotz * z)),
-        0.0,
-        0.0,
-    )
+        X * (1.0 / (c.m11 - c.X_udotz * z)), Y * (1.0 / (c.m22 - c.Y_vdotz * z)),
+        N * (1.0 / (c.m33 - c.N_rdotz * z)), 0.0, 0.0,
+    )  # fmt: skip
 
 
-def shaft_acceleration(n: float, command: float, c: Coefficients, ship: Ship) -> float:
+def shaft_acceleration(n: float, command: float, c: Any, ship: Ship) -> float:
     """Lag of the shaft."""
     return (min(max(command, -SHAFT_LIMIT), SHAFT_LIMIT) - n) * (1.0 / SHAFT_LAG)
 
@@ -114,15 +80,11 @@ def shaft_acceleration(n: float, command: float, c: Coefficients, ship: Ship) ->
 SHIP = ShipEquations(
     "tanker",
     "van Berlekom & Goddard 1972, Maneuvering of large tankers",
-    Coefficients,
-    accelerations,
+    Coefficients, accelerations,
     Particulars(
         name="Esso 190 000 dwt tanker", length=LENGTH, beam=47.17, draught=DRAUGHT, mass=220_000.0 * 1025.0,
         block_coefficient=0.83, speed=8.225749013527, water_density=1025.0,
     ),
     SteeringGear(rudder_rate_deg_s=2.33, time_constant=1.0),
-    shaft_acceleration=shaft_acceleration,
-    service_shaft_speed=80.0 / 60.0,
-    shallow_water=True,
-    astern=True,
+    shaft_acceleration=shaft_acceleration, service_shaft_speed=80.0 / 60.0, shallow_water=True, astern=True,
 )  # fmt: skip

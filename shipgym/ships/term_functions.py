@@ -34,11 +34,6 @@ MADE = {
     **{VARIABLE[symbol]: f"fabs({CHANNEL[symbol]})" for symbol in SYMBOLS if symbol[0] == "|"},
 }
 MADE |= {f"{VARIABLE[symbol]}_": f"{VARIABLE[symbol]} * per_U" for symbol in VELOCITIES}
-NEEDED = {
-    "s": "u v", "U": "s", "per_U": "U", "du": "u", "dn": "n",
-    **{VARIABLE[symbol]: CHANNEL[symbol] for symbol in SYMBOLS if symbol[0] == "|"},
-    **{f"{VARIABLE[symbol]}_": f"{VARIABLE[symbol]} per_U" for symbol in VELOCITIES},
-}  # fmt: skip
 
 RATES = ("u", "v", "r", "p", "q")
 #: Where a table has no equation: the speed stays, and what drift or turn there is dies out within about a
@@ -158,5 +153,5 @@ def _factors(term: Term, speed_power: int) -> Powers:
 
 def _with_needed(names: set[str]) -> set[str]:
     """Names and what they are made from."""
-    more = {needed for name in names for needed in NEEDED.get(name, "").split()}
+    more = {word for name in names for word in re.findall(r"\w+", MADE[name]) if word in MADE}
     return names if more <= names else _with_needed(names | more)

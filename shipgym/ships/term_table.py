@@ -4,8 +4,6 @@ The same table serves identification (stacked over samples), simulation (compile
 the model file.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -15,16 +13,11 @@ import numpy as np
 
 from shipgym.arrays import Floats
 from shipgym.checks import check_choice, check_text, quoted
-from shipgym.engine.parts import Part
+from shipgym.engine.specialise import Part
 from shipgym.engine.vessel import Vessel, vessel_of
 from shipgym.errors import InputError
+from shipgym.ships import term_functions
 from shipgym.ships.particulars import ADDED_MASSES, Particulars
-from shipgym.ships.term_functions import (
-    Sum,
-    accelerations_function,
-    accelerations_source,
-    coefficients_record,
-)
 from shipgym.ships.terms import CHANNEL, MOST_TERMS, ROLL, SHAFT_SPEEDS, SPEEDS, SYMBOLS, TURN_RATES, Term
 
 FORCE_OF_EQUATION = {"u": "X", "v": "Y", "r": "N"}
@@ -120,14 +113,10 @@ class Structure:
                 "couples the two forces; make them the same, or write accelerations"
             )
 
-    @property
-    def prefixes(self) -> Mapping[str, str]:
-        """First letter of the coefficients of each equation: X, Y, N of forces, a to e of accelerations."""
-        return FORCE_OF_EQUATION if self.quantity == "force" else ACCELERATION_OF_EQUATION
-
     def names(self, equation: str) -> tuple[str, ...]:
-        """Names of the coefficients of one equation."""
-        return tuple(f"{self.prefixes[equation]}_{term.name}" for term in self.terms(equation))
+        """Names of the coefficients of one equation: X, Y or N of forces, a to e of accelerations, first."""
+        letters = FORCE_OF_EQUATION if self.quantity == "force" else ACCELERATION_OF_EQUATION
+        return tuple(f"{letters[equation]}_{term.name}" for term in self.terms(equation))
 
     @cached_property
     def coefficient_names(self) -> tuple[str, ...]:
@@ -201,19 +190,19 @@ class Structure:
 
     def vessel(self, coefficients: Mapping[str, float], lag: bool) -> Vessel:
         """What is compiled of a ship with this table; the coefficients are read at run time."""
-        parts = (("accelerations", Part(accelerations_function(self._source))),)
-        record = coefficients_record(len(self._terms))
+        parts = (("accelerations", Part(term_functions.accelerations_function(self._source))),)
+        record = term_functions.coefficients_record(len(self._terms))
         return vessel_of("a ship with a table of terms", self.state_names, record, parts, lag)
 
     @cached_property
     def _source(self) -> str:
         """Written once, however many models share the table."""
-        return accelerations_source(self._sums)
+        return term_functions.accelerations_source(self._sums)
 
     @property
-    def _sums(self) -> dict[str, Sum]:
+    def _sums(self) -> dict[str, term_functions.Sum]:
         return {
-            q: Sum(terms, tuple(self.speed_power(q, term) for term in terms), self.unit_speeds(q))
+            q: term_functions.Sum(terms, tuple(self.speed_power(q, t) for t in terms), self.unit_speeds(q))
             for q, terms in self.equations.items()
         }
 
@@ -325,14 +314,10 @@ class Structure:
         axes = [list(FORCE_OF_EQUATION).index(equation) for equation in self.equations]
         mobility = np.linalg.inv(mass[np.ix_(axes, axes)])
         counts = [len(terms) for terms in self.equations.values()]
-        ends = np.cumsum(counts).tolist()
-        blocks = [slice(end - count, end) for end, count in zip(ends, counts, strict=True)]
-        matrix = np.zeros((ends[-1], ends[-1]))
-        for i, rows in enumerate(blocks):
-            for j, columns in enumerate(blocks):
-                if mobility[i, j] != 0.0:  # only equations of the same terms are coupled
-                    matrix[rows, columns] = mobility[i, j] * np.eye(counts[i])
-        return matrix
+        # only equations of the same terms are coupled
+        return np.block(
+            [[mobility[i, j] * np.eye(n, m) for j, m in enumerate(counts)] for i, n in enumerate(counts)]
+        )
 
     def to_dict(self) -> dict[str, Any]:
         """The table as it stands in a model file."""
@@ -348,7 +333,7 @@ class Structure:
         return table
 
     @classmethod
-    def from_dict(cls, table: Mapping[str, Any]) -> Structure:
+    def from_dict(cls, table: Mapping[str, Any]) -> "Structure":
         """The table from a model file (validated by `shipgym.ships.model_file`)."""
         equations = {
             equation: tuple(Term(term["name"], tuple(term["powers"].items())) for term in terms)

@@ -92,12 +92,9 @@ def changed(state: State, steps: float, settings: Settings, random: Random) -> S
         change = radians(listed[number]) if number < len(listed) else 0.0
         wait = settings.change_interval_steps
     return State(
-        state.course + change,
-        steps + max(wait, 1.0),
-        state.changes + 1.0,
-        state.integral,
+        state.course + change, steps + max(wait, 1.0), state.changes + 1.0, state.integral,
         state.heading_error,
-    )
+    )  # fmt: skip
 
 
 def due(motion: Motion, state: State, interval: Interval, ship: Ship, settings: Settings) -> bool:

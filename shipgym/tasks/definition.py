@@ -14,6 +14,7 @@ import numpy as np
 from shipgym.checks import did_you_mean, quoted
 from shipgym.engine.places import reward_of_another, step_of_task
 from shipgym.engine.records import Record, field_types, is_record, leaves
+from shipgym.engine.specialise import is_shipped
 from shipgym.errors import InputError
 from shipgym.tasks.contract import Seen
 from shipgym.tasks.source import Configurable, annotated, check_namespace, keywords, read_source
@@ -21,16 +22,10 @@ from shipgym.tasks.source import Configurable, annotated, check_namespace, keywo
 RECORDS = ("Settings", "State", "Reward", "Observation")
 MOMENT = ("motion", "state", "interval", "ship", "settings")
 FUNCTIONS = {
-    "begin": ("ship", "settings", "random", "plan"),
-    "step": MOMENT,
-    "observe": ("readings", *MOMENT[1:]),
-    "due": MOMENT,
-    "on_event": (*MOMENT, "random", "plan"),
-    "worst_cost": ("settings",),
-    "plan_length": ("settings",),
-    "check": ("settings", "model"),
-    "listed": ("value",),
-}
+    "begin": ("ship", "settings", "random", "plan"), "step": MOMENT, "observe": ("readings", *MOMENT[1:]),
+    "due": MOMENT, "on_event": (*MOMENT, "random", "plan"), "worst_cost": ("settings",),
+    "plan_length": ("settings",), "check": ("settings", "model"), "listed": ("value",),
+}  # fmt: skip
 NEEDED = ("begin", "step", "observe")
 #: Names in `info` that are the engine's.
 TAKEN = ("reward", "terminated", "truncated", "envelope_distance", "extrapolating", "end")
@@ -120,7 +115,7 @@ class TaskDefinition(Configurable):
     @property
     def shipped(self) -> bool:
         """Whether its reward is one of the package's."""
-        return self.Reward.__module__.partition(".")[0] == __name__.partition(".")[0]
+        return is_shipped(self.Reward)
 
     @property
     def reward_source(self) -> str:
@@ -156,10 +151,6 @@ def read_definition(source: Any, reward: Any = None) -> TaskDefinition:
     reward : str, Path or module, optional
         The path of a file, or a module, whose reward takes the place of the task's.
 
-    Returns
-    -------
-    TaskDefinition
-
     Raises
     ------
     InputError
@@ -187,12 +178,10 @@ def _definition(namespace: Any, where: str) -> TaskDefinition:
     optional = [name for name in FUNCTIONS if name not in NEEDED]
     found = check_namespace(namespace, where, RECORDS, FUNCTIONS, optional)
     definition = TaskDefinition(
-        name=getattr(namespace, "NAME", None) or Path(where).stem,
-        source=where,
+        name=getattr(namespace, "NAME", None) or Path(where).stem, source=where,
         reported=tuple(getattr(namespace, "REPORTED", ())),
-        episode_steps=getattr(namespace, "EPISODE_STEPS", 600),
-        **found,
-    )
+        episode_steps=getattr(namespace, "EPISODE_STEPS", 600), **found,
+    )  # fmt: skip
     for path, seen in definition.seen.items():
         if seen is None or not (np.isfinite(seen.low) and np.isfinite(seen.high) and seen.low < seen.high):
             raise InputError(
@@ -219,6 +208,10 @@ def _check_names(definition: TaskDefinition) -> None:
             )
 
 
+#: `rewarded_step` with its places filled, one function for the same ones.
+_FILLED: dict[Any, FunctionType] = {}
+
+
 def rewarded_step(motion: Any, state: Any, interval: Any, ship: Any, settings: Any) -> Any:
     """What the task does in an interval, and what another's reward gives for it."""
     after, _, failed, arrived = step_of_task(motion, state, interval, ship, settings)
@@ -233,14 +226,6 @@ def _with_reward(definition: TaskDefinition, source: Any) -> TaskDefinition:
     found = check_namespace(namespace, where, ("Reward",), functions, ("worst_cost",))
     if name == "reward":
         places = {"__name__": __name__, "step_of_task": definition.step, "reward_of_another": found.pop(name)}
-        found["step"] = _filled(places)
+        step = FunctionType(rewarded_step.__code__, places, "rewarded_step")
+        found["step"] = _FILLED.setdefault(tuple(places.values()), step)
     return replace(definition, **found)
-
-
-_FILLED: dict[Any, FunctionType] = {}
-
-
-def _filled(places: dict[str, Any]) -> FunctionType:
-    """`rewarded_step` with its places filled, one function for the same ones."""
-    key = tuple(places.values())
-    return _FILLED.setdefault(key, FunctionType(rewarded_step.__code__, places, "rewarded_step"))

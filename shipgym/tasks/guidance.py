@@ -23,34 +23,17 @@ FURTHEST = 1e8  # m, of a waypoint from the origin: more than the way round the 
 
 
 class PathPosition(NamedTuple):
-    """Where ships stand on a leg of a path, arrays of one shape.
+    """Where ships stand on a leg of a path, arrays of one shape."""
 
-    Attributes
-    ----------
-    along : array
-        Distance run since the leg's first waypoint, m.
-    cross_track : array
-        Distance from the leg, m, positive to starboard of it.
-    course : array
-        Direction of the leg, rad.
-    to_go : array
-        Distance left to the leg's last waypoint, along the leg, m.
-    """
-
-    along: Floats
-    cross_track: Floats
-    course: Floats
-    to_go: Floats
+    along: Floats  # distance run since the leg's first waypoint, m
+    cross_track: Floats  # distance from the leg, m, positive to starboard of it
+    course: Floats  # direction of the leg, rad
+    to_go: Floats  # distance left to the leg's last waypoint, along the leg, m
 
 
 @dataclass(frozen=True, eq=False)
 class Path:
     """Straight legs from waypoint to waypoint.
-
-    Attributes
-    ----------
-    waypoints : array of shape (n_waypoints, 2)
-        North and east, m.
 
     Raises
     ------
@@ -58,7 +41,7 @@ class Path:
         For fewer than two waypoints, one that is not finite, or one that repeats the one before it.
     """
 
-    waypoints: Floats
+    waypoints: Floats  # shape (n_waypoints, 2); north and east, m
 
     def __post_init__(self) -> None:
         points = _waypoints(self.waypoints)
@@ -199,17 +182,13 @@ def _waypoints(given: Any) -> Floats:
         raise InputError(
             f"waypoints: shape {points.shape} found, expected at least 2 rows of north and east in m: (n, 2)"
         )
-    if not np.all(np.isfinite(points)):
-        row = int(np.argwhere(~np.isfinite(points))[0, 0])
+    for row in np.flatnonzero(~np.isfinite(points).all(axis=1))[:1]:
         raise InputError(f"waypoints: row {row} is {points[row].tolist()}, expected finite numbers in m")
-    if np.abs(points).max() > FURTHEST:
-        row = int(np.argwhere(np.abs(points) > FURTHEST)[0, 0])
+    for row in np.flatnonzero((np.abs(points) > FURTHEST).any(axis=1))[:1]:
         raise InputError(
             f"waypoints: row {row} is {points[row].tolist()}, expected m within {FURTHEST:g} of the origin"
         )
-    repeated = np.flatnonzero(np.all(np.diff(points, axis=0) == 0.0, axis=1))
-    if repeated.size:
-        row = int(repeated[0]) + 1
+    for row in np.flatnonzero(np.all(np.diff(points, axis=0) == 0.0, axis=1))[:1] + 1:
         raise InputError(
             f"waypoints: row {row} repeats {points[row].tolist()} of the row before, expected another point"
         )

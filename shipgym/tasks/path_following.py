@@ -175,19 +175,16 @@ def check(settings: Settings, model: Any) -> None:
 
 def check_path(settings: Any, model: Any) -> None:
     """Refuse lengths that do not go together, and a corridor that the ship fills; InputError names them."""
-    check_number(
-        settings.leg_lengths.largest, "leg_lengths: the largest", at_least=settings.leg_lengths.least
-    )
-    check_number(
-        settings.ground, "ground", above=settings.corridor, hint="in ship lengths, beyond the corridor"
-    )
+    lengths, corridor = settings.leg_lengths, settings.corridor
+    check_number(lengths.largest, "leg_lengths: the largest", at_least=lengths.least)
+    check_number(settings.ground, "ground", above=corridor, hint="in ship lengths, beyond the corridor")
     if model is None:
         return
     beam = model.particulars.get("beam")
-    width = 2.0 * settings.corridor * model.particulars["length"]
+    width = 2.0 * corridor * model.particulars["length"]
     if beam is not None and width <= beam:
         raise InputError(
-            f"corridor: {settings.corridor:g} ship lengths to each side is {width:.1f} m wide, expected "
+            f"corridor: {corridor:g} ship lengths to each side is {width:.1f} m wide, expected "
             f"more than the beam of {model.name!r}, {beam:.1f} m"
         )
 
@@ -400,13 +397,9 @@ def observe(
     course_error_sin, course_error_cos = over_ground(at.course, readings, ship)
     left = max(fabs(state.leg.turn) - at.turned, 0.0)
     return Observation(
-        helm=helm(at.course, state.integral, readings, interval, ship),
-        cross_track=at.cross,
-        course_error_sin=course_error_sin,
-        course_error_cos=course_error_cos,
-        next_turn_distance=state.leg.turn_at - at.way,
-        next_turn_angle=copysign(left, state.leg.turn),
-        second_turn_distance=state.leg.second_at - at.way,
-        second_turn_angle=state.leg.second_turn,
+        helm=helm(at.course, state.integral, readings, interval, ship), cross_track=at.cross,
+        course_error_sin=course_error_sin, course_error_cos=course_error_cos,
+        next_turn_distance=state.leg.turn_at - at.way, next_turn_angle=copysign(left, state.leg.turn),
+        second_turn_distance=state.leg.second_at - at.way, second_turn_angle=state.leg.second_turn,
         extras=extras(readings, interval, ship),
-    )
+    )  # fmt: skip

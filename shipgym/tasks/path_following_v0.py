@@ -202,11 +202,7 @@ def observe(
     at = fix(readings.x, readings.y, state, ship, settings)
     course_error_sin, course_error_cos = over_ground(at.course, readings, ship)
     return Observation(
-        helm=helm(at.course, state.integral, readings, interval, ship),
-        cross_track=at.cross,
-        course_error_sin=course_error_sin,
-        course_error_cos=course_error_cos,
-        turn_distance=state.to_go,
-        turn_angle=state.turn,
-        extras=extras(readings, interval, ship),
-    )
+        helm=helm(at.course, state.integral, readings, interval, ship), cross_track=at.cross,
+        course_error_sin=course_error_sin, course_error_cos=course_error_cos, turn_distance=state.to_go,
+        turn_angle=state.turn, extras=extras(readings, interval, ship),
+    )  # fmt: skip

@@ -29,12 +29,9 @@ def kept_source(source: Any) -> Any:
 
 
 def check_namespace(
-    namespace: Any,
-    where: str,
-    records: Sequence[str],
-    functions: Mapping[str, Sequence[str]],
+    namespace: Any, where: str, records: Sequence[str], functions: Mapping[str, Sequence[str]],
     optional: Sequence[str] = (),
-) -> dict[str, Any]:
+) -> dict[str, Any]:  # fmt: skip
     """Records and functions of a namespace by name, without optional ones that it lacks.
 
     `functions` has the arguments of each. Raises InputError naming the file, the name and what is expected.

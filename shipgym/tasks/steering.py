@@ -95,15 +95,9 @@ def helm(course: float, integral: float, readings: Readings, interval: Interval,
     """The ship against a course to steer, rad."""
     sine, cosine = sin_cos(course - readings.psi)
     return Helm(
-        sine,
-        cosine,
-        readings.r,
-        readings.v,
-        readings.u,
-        readings.delta,
-        interval.rudder_command * ship.rudder_limit,
-        integral,
-    )
+        sine, cosine, readings.r, readings.v, readings.u, readings.delta,
+        interval.rudder_command * ship.rudder_limit, integral,
+    )  # fmt: skip
 
 
 def extras(readings: Readings, interval: Interval, ship: Ship) -> Extras:

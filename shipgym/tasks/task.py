@@ -1,7 +1,5 @@
 """A task with its options: what is asked of an autopilot, in which sea, by which commands and sensors."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from functools import cached_property
@@ -151,9 +149,9 @@ class Task:
                 raise InputError(f"{where}: Settings.{name} found, which is a keyword already; rename it")
         return names
 
-    def changed(self, **options: Any) -> Task:
+    def changed(self, **options: Any) -> Self:
         """The same task with other options."""
-        return Task.of(self.definition, **{**self.options, **options})
+        return self.of(self.definition, **{**self.options, **options})
 
     @property
     def follows_path(self) -> bool:
@@ -207,7 +205,9 @@ class Task:
     def observed(self, model: ShipModel) -> tuple[Observed, ...]:
         """What is observed of a ship, in order."""
         ship = ship_of(model, self.water_depth)
-        shown = self._options(model)
+        shaft = self.action == "rudder-shaft"
+        speed = shaft and "n" in model.state_names
+        shown = ("", *["roll"] * self.roll, *["shaft"] * shaft, *["shaft speed"] * speed)
         return tuple(
             Observed(path.rpartition(".")[2], seen.low, seen.high, self.scale(path, ship), path)
             for path, seen in self.definition.seen.items()
@@ -217,12 +217,6 @@ class Task:
     def instruments(self, windy: bool) -> SensorSet:
         """What shows the ship, in weather or in calm water."""
         return self.sensors or shipped_sensors(windy, self.noise > 0.0, self.measurement == "filtered")
-
-    def _options(self, model: ShipModel) -> tuple[str, ...]:
-        """Options that show a quantity."""
-        shaft = self.action == "rudder-shaft"
-        speed = shaft and "n" in model.state_names
-        return ("", *["roll"] * self.roll, *["shaft"] * shaft, *["shaft speed"] * speed)
 
     def scale(self, path: str, ship: Ship) -> float:
         """Physical value of an observation of 1."""
@@ -266,7 +260,7 @@ class Task:
 
 def control_interval(model: ShipModel) -> float:
     """About a twentieth of the time to travel one ship length, as 1, 2 or 5 times a power of ten, s."""
-    return rounded_interval(model.particulars["length"] / model.particulars["speed"])
+    return rounded_interval(model.travel_time)
 
 
 def rounded_interval(length_time: float) -> float:

@@ -8,7 +8,7 @@ import numpy as np
 
 from shipgym.arrays import Flags, Floats
 from shipgym.checks import check_number, check_whole
-from shipgym.engine.passages import SEA_CHANNELS
+from shipgym.engine.trajectories import SEA_CHANNELS
 from shipgym.errors import InputError
 from shipgym.trials.trial import Trial
 from shipgym.trials.units import CHANNELS, DEGREE, check_channel

@@ -21,7 +21,7 @@ from agents.deployment.nmea import Line, Link, Reading, readings, sentences
 from agents.deployment.route import Route
 from agents.deployment.simulated import SimulatedShip, simulate_ship
 from agents.deployment.steering import MANUAL, STANDBY, STEERING, Helm, Limits, Sensors, steer
-from shipgym.engine.passages import SEA_CHANNELS
+from shipgym.engine.trajectories import SEA_CHANNELS
 from shipgym.errors import InputError
 from shipgym.ships import load_model
 from shipgym.tasks.task import Task

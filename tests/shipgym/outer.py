@@ -5,8 +5,7 @@ from typing import Any
 
 from numba import njit
 
-from shipgym.engine.parts import Part
-from shipgym.engine.specialise import Specialisation
+from shipgym.engine.specialise import Part, Specialisation
 
 
 def outer(function: Callable[..., Any]) -> Callable[..., Any]:

@@ -17,7 +17,6 @@ import shipgym
 from shipgym.engine import compiling, mathematics, specialise
 from shipgym.engine.compiling import explanation
 from shipgym.engine.loops import LOOPS, ship_loop
-from shipgym.engine.parts import Part
 from shipgym.engine.record_code import (
     bounded_storer,
     chooser,
@@ -29,7 +28,7 @@ from shipgym.engine.record_code import (
     zero,
 )
 from shipgym.engine.records import Layout, table_of
-from shipgym.engine.specialise import fingerprint
+from shipgym.engine.specialise import Part, fingerprint
 from shipgym.sea.open_sea import sea_parts
 from shipgym.ships.catalogue import kvlcc2, kvlcc2_l7
 from shipgym.ships.term_functions import Sum, accelerations_source
