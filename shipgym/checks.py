@@ -169,15 +169,9 @@ def data_only(value: Any, where: str, own: Any = None, named: bool = False) -> N
 
 
 def check_number(
-    value: Any,
-    where: str,
-    *,
-    above: float | None = None,
-    at_least: float | None = None,
-    below: float | None = None,
-    at_most: float | None = None,
-    hint: str = "",
-) -> float:
+    value: Any, where: str, *, above: float | None = None, at_least: float | None = None,
+    below: float | None = None, at_most: float | None = None, hint: str = "",
+) -> float:  # fmt: skip
     """Return `value` as float; it must be a finite number within the open and closed bounds.
 
     Truth values and numbers in quotes are refused. The InputError begins with `where`, the place, such as

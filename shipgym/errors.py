@@ -22,8 +22,7 @@ class InputError(ValueError):
 class UnstableModelError(RuntimeError):
     """A simulated ship left every physical range: its model runs away.
 
-    `time_s` is the simulated time at which it was noticed, s, and `state` the last state that was still
-    physical, by name in SI units.
+    `time_s`: simulated time at which it was noticed, s; `state`: the last physical one, by name in SI units.
     """
 
     def __init__(self, message: str, time_s: float, state: dict[str, float]) -> None:

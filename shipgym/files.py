@@ -50,8 +50,7 @@ MOUNTED = (EXDEV, EBUSY)  # what renaming onto a mount point fails with
 def atomic_path(path: Path) -> Iterator[Path]:
     """A temporary name beside a file, renamed to it when the block ends without an error.
 
-    Raises InputError if the folder does not exist or cannot be written, or there is something else than a
-    file, such as a device.
+    InputError if the folder does not exist or cannot be written, or what is there is no file, as a device.
     """
     draft = draft_name(path)
     try:
@@ -184,7 +183,7 @@ def read_bytes(path: Path, what: str, largest: int) -> bytes:
     except InputError:
         raise
     except FileNotFoundError:
-        near = did_you_mean(path.name, _names_beside(path))
+        near = did_you_mean(path.name, [other.name for other in path.parent.glob("*")])
         raise InputError(f"{path}: there is no such {what}.{near}") from None
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or error
@@ -239,10 +238,7 @@ def parse_toml(text: str, where: str) -> dict[str, Any]:
     """The tables of a TOML text within the limits of `check_content`; `where` begins messages: "a.toml:"."""
     if _LONG_KEY.search(text):
         raise InputError(f"{where} a dotted key of over {DEEPEST} parts found, expected shorter keys")
-    tables: dict[str, Any] = _parsed(
-        tomllib.loads, text, where, "not valid TOML: {}; correct that line", infinite=True
-    )
-    return tables
+    return dict(_parsed(tomllib.loads, text, where, "not valid TOML: {}; correct that line", infinite=True))
 
 
 def shipped_toml(package: str, name: str) -> dict[str, Any]:
@@ -331,10 +327,3 @@ def _unrepeated(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     if len(table) < len(pairs):
         raise KeyError(Counter(key for key, _ in pairs).most_common(1)[0][0])
     return table
-
-
-def _names_beside(path: Path) -> list[str]:
-    try:
-        return [other.name for other in path.parent.iterdir()]
-    except OSError:
-        return []

@@ -3,6 +3,7 @@
 import hashlib
 import sys
 from pathlib import Path
+from traceback import extract_tb
 from types import ModuleType
 
 from shipgym.errors import InputError
@@ -11,12 +12,7 @@ from shipgym.errors import InputError
 def load_file(path: Path, expected: str = "a Python file") -> ModuleType:
     """A Python file as a module, executed once however often it is asked for while it stays the same.
 
-    `expected` says what the file is to be, for the message where there is none.
-
-    Raises
-    ------
-    InputError
-        If there is none, or it cannot be executed.
+    `expected` says what it is to be, for messages. InputError if there is none, or it cannot be executed.
     """
     if not path.is_file():
         raise InputError(f"{path}: no such file, expected {expected}")
@@ -37,16 +33,8 @@ def load_file(path: Path, expected: str = "a Python file") -> ModuleType:
         del sys.modules[name]
         if isinstance(error, InputError):
             raise InputError(f"{path}: {error}") from None
-        line = _line_in(resolved, error)
-        raise InputError(f"{path}{line}: cannot be executed: {type(error).__name__}: {error}") from error
+        passed = (one.lineno for one in extract_tb(error.__traceback__) if one.filename == str(resolved))
+        line = [getattr(error, "lineno", None), *passed][-1]  # the last one in the file
+        place = f"{path}, line {line}" if line else path
+        raise InputError(f"{place}: cannot be executed: {type(error).__name__}: {error}") from error
     return module
-
-
-def _line_in(path: Path, error: Exception) -> str:
-    """The last line of a file that an error passed through."""
-    traceback, line = error.__traceback__, getattr(error, "lineno", None)
-    while traceback is not None:
-        if traceback.tb_frame.f_code.co_filename == str(path):
-            line = traceback.tb_lineno
-        traceback = traceback.tb_next
-    return f", line {line}" if line else ""

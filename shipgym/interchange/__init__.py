@@ -1,7 +1,4 @@
-"""To other libraries and back: pandas, xarray and Minari; parameter sets of MSS and shipmmg.
-
-The public names stand in `__init__.pyi`; each is imported when it is first used.
-"""
+"""To pandas, xarray, Minari, MSS and shipmmg, and back; the public names stand in `__init__.pyi`."""
 
 from lazy_loader import attach_stub
 

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
-from shipgym.checks import check_keys, check_number, check_table
+from shipgym.checks import check_number, check_table
 from shipgym.errors import InputError
 from shipgym.ships.catalogue import kvlcc2_l7
 from shipgym.ships.conversions import nomoto, nomoto1_ship
@@ -97,6 +97,5 @@ def from_shipmmg(
 
 def _numbers(parameters: Mapping[str, Any], table: str, names: tuple[str, ...]) -> dict[str, float]:
     """The fields of one dataclass, all of them numbers."""
-    given = check_table(parameters.get(table), table)
-    check_keys(given, names, table, names)
+    given = check_table(parameters.get(table), table, names, names)
     return {name: check_number(given[name], f"{table}: {name}") for name in names}

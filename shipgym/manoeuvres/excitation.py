@@ -23,15 +23,10 @@ SHAFT_STEPS = 5.0, 15.0  # of shaft-speed steps, L / U0
 
 
 def prbs_rudder(
-    model: ShipModel,
-    amplitude_deg: float = 10.0,
-    seed: Seed = 0,
-    clock_s: float | None = None,
-    duration: float = 600.0,
-    dt: float = 0.1,
-    water_depth: float = np.inf,
+    model: ShipModel, amplitude_deg: float = 10.0, seed: Seed = 0, clock_s: float | None = None,
+    duration: float = 600.0, dt: float = 0.1, water_depth: float = np.inf,
     weather: Weather | str | None = None,
-) -> Trial:
+) -> Trial:  # fmt: skip
     """Simulate a pseudo-random binary rudder: from one side to the other at multiples of a clock period.
 
     Parameters
@@ -75,16 +70,11 @@ def prbs_rudder(
 
 
 def multi_sine_rudder(
-    model: ShipModel,
-    amplitude_deg: float = 10.0,
-    seed: Seed = 0,
-    longest_period_s: float | None = None,
-    shortest_period_s: float | None = None,
-    duration: float = 600.0,
-    dt: float = 0.1,
-    water_depth: float = np.inf,
+    model: ShipModel, amplitude_deg: float = 10.0, seed: Seed = 0,
+    longest_period_s: float | None = None, shortest_period_s: float | None = None,
+    duration: float = 600.0, dt: float = 0.1, water_depth: float = np.inf,
     weather: Weather | str | None = None,
-) -> Trial:
+) -> Trial:  # fmt: skip
     """Simulate a multi-sine rudder: all harmonics of 1 / duration in a band, of equal amplitude.
 
     The phases, of the seed, are the draw with the smallest crest among 32; the amplitude is the largest
@@ -101,7 +91,7 @@ def multi_sine_rudder(
     slack = 1e-9
     harmonics = np.arange(np.ceil(period / longest - slack), np.floor(period / shortest + slack) + 1.0)
     harmonics = harmonics[harmonics >= 1.0]
-    if len(harmonics) == 0:
+    if not len(harmonics):
         raise InputError(
             f"duration: {duration:g} s found, expected at least one whole period in the band of "
             f"{shortest:g} to {longest:g} s; sail longer or widen the band"
@@ -116,16 +106,11 @@ def multi_sine_rudder(
 
 
 def random_rudder_steps(
-    model: ShipModel,
-    largest_deg: float = 20.0,
-    seed: Seed = 0,
-    shortest_s: float | None = None,
-    longest_s: float | None = None,
-    duration: float = 600.0,
-    dt: float = 0.1,
-    water_depth: float = np.inf,
+    model: ShipModel, largest_deg: float = 20.0, seed: Seed = 0,
+    shortest_s: float | None = None, longest_s: float | None = None,
+    duration: float = 600.0, dt: float = 0.1, water_depth: float = np.inf,
     weather: Weather | str | None = None,
-) -> Trial:
+) -> Trial:  # fmt: skip
     """Simulate rudder steps of random angle and length, both evenly distributed.
 
     Angles are up to `largest_deg` to either side, degrees, each held for `shortest_s` to `longest_s`, s, by
@@ -140,18 +125,11 @@ def random_rudder_steps(
 
 
 def shaft_speed_steps(
-    model: ShipModel,
-    lowest_ratio: float = 0.5,
-    highest_ratio: float = 1.1,
-    seed: Seed = 0,
-    shortest_s: float | None = None,
-    longest_s: float | None = None,
-    rudder_deg: float = 0.0,
-    duration: float = 1200.0,
-    dt: float = 0.1,
-    water_depth: float = np.inf,
+    model: ShipModel, lowest_ratio: float = 0.5, highest_ratio: float = 1.1, seed: Seed = 0,
+    shortest_s: float | None = None, longest_s: float | None = None, rudder_deg: float = 0.0,
+    duration: float = 1200.0, dt: float = 0.1, water_depth: float = np.inf,
     weather: Weather | str | None = None,
-) -> Trial:
+) -> Trial:  # fmt: skip
     """Simulate steps of the ordered shaft speed, of random speed and length, both evenly distributed.
 
     Orders are `lowest_ratio` to `highest_ratio` of the shaft speed at service speed, ahead and at most 1.5,
@@ -205,9 +183,8 @@ def _durations(
     model: ShipModel, given: tuple[float | None, ...], usual: tuple[float, ...]
 ) -> tuple[float, ...]:
     """The given durations, or the usual ones in times to travel one ship length; s."""
-    return tuple(
-        count * model.travel_time if own is None else own for own, count in zip(given, usual, strict=True)
-    )
+    pairs = zip(given, usual, strict=True)
+    return tuple(count * model.travel_time if own is None else own for own, count in pairs)
 
 
 def _times(duration: float, dt: float) -> Floats:

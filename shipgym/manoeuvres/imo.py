@@ -101,8 +101,7 @@ def imo_assessment(
     are drawn from the covariance of an identified ship, by default 100, and none for a ship without one.
 
     Returns the criteria `advance`, `tactical_diameter`, `initial_turning`, `overshoot_1_10_10`,
-    `overshoot_2_10_10`, `overshoot_1_20_20` and `stopping`. Raises InputError if draws are asked for and the
-    model has no covariance.
+    `overshoot_2_10_10`, `overshoot_1_20_20` and `stopping`. Raises InputError for draws without covariance.
     """
     usual = 0 if model.covariance is None else DRAWS
     count = int(check_number(usual if n_draws is None else n_draws, "n_draws", at_least=0))
@@ -151,15 +150,14 @@ def with_measured(
 
     `trials`: as recorded; those of another rudder angle, heading or approach speed count for nothing.
     """
-    found: dict[str, list[float]] = {}
+    most: dict[str, float] = {}
     for trial in trials:
         for name, value in _measured(model, trial).items():
-            found.setdefault(name, []).append(value)
+            most[name] = max(value, most.get(name, value))
     decided = dict(criteria)
-    for name, values in found.items():
-        if name in criteria:
-            worst_one, passed = max(values), max(values) <= criteria[name].limit
-            decided[name] = replace(criteria[name], measured=worst_one, decided=True, passed=passed, note="")
+    for name in most.keys() & criteria.keys():
+        passed = most[name] <= criteria[name].limit
+        decided[name] = replace(criteria[name], measured=most[name], decided=True, passed=passed, note="")
     return decided
 
 

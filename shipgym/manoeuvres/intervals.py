@@ -30,8 +30,7 @@ class IndexInterval:
     def interval(self) -> tuple[float, float] | None:
         """The 95 % interval: quantiles of 2.5 and 97.5 per cent of the draws that have a value.
 
-        It says nothing of those that ran away or never got so far: see their counts. None where no draw has
-        a value.
+        It says nothing of those that ran away or never got so far: see their counts. None without any.
         """
         low, high = self.quantiles(*LEVELS)
         return None if low is None or high is None else (low, high)
@@ -56,12 +55,9 @@ class IndexInterval:
     def to_dict(self) -> dict[str, Any]:
         """Value, interval and counts, as JSON knows them."""
         return {
-            "value": self.value,
-            "interval_95": self.interval,
-            "draws": len(self.values),
-            "ran_away": self.n_ran_away,
-            "never_reached": self.n_never_reached,
-        }
+            "value": self.value, "interval_95": self.interval, "draws": len(self.values),
+            "ran_away": self.n_ran_away, "never_reached": self.n_never_reached,
+        }  # fmt: skip
 
     def __str__(self) -> str:
         text = "-" if self.value is None else f"{self.value:.4g}"
@@ -77,11 +73,9 @@ class IndexInterval:
 
 
 def index_intervals(
-    model: ShipModel,
-    manoeuvre: str | Evaluation = "zigzag 20/20, starboard first",
-    n_draws: int = 200,
-    seed: int | np.random.Generator = 0,
-) -> dict[str, IndexInterval]:
+    model: ShipModel, manoeuvre: str | Evaluation = "zigzag 20/20, starboard first",
+    n_draws: int = 200, seed: int | np.random.Generator = 0,
+) -> dict[str, IndexInterval]:  # fmt: skip
     """Indices of a manoeuvre with their 95 % intervals over the estimated covariance of a model.
 
     Parameters
@@ -129,11 +123,9 @@ def index_intervals(
 
 
 def intervals_of(
-    own: Mapping[str, Mapping[str, float | None]],
-    draws: Sequence[ShipModel],
-    evaluations: Mapping[str, Evaluation],
-    progress: Callable[[int], None] | None = None,
-) -> dict[str, dict[str, IndexInterval]]:
+    own: Mapping[str, Mapping[str, float | None]], draws: Sequence[ShipModel],
+    evaluations: Mapping[str, Evaluation], progress: Callable[[int], None] | None = None,
+) -> dict[str, dict[str, IndexInterval]]:  # fmt: skip
     """Indices of several manoeuvres over the same draws, by manoeuvre and index.
 
     `own` are those of the model itself, `evaluations` give them from a ship; both by manoeuvre. Without draws
@@ -178,8 +170,6 @@ def worst(runs: Sequence[IndexInterval]) -> IndexInterval:
     It has no value where one of the manoeuvres has none.
     """
     own = [run.value for run in runs if run.value is not None]
-    return IndexInterval(
-        value=max(own) if len(own) == len(runs) else None,
-        values=np.max([run.values for run in runs], axis=0),
-        ran_away=np.any([run.ran_away for run in runs], axis=0),
-    )
+    ran_away = np.any([run.ran_away for run in runs], axis=0)
+    values = np.max([run.values for run in runs], axis=0)
+    return IndexInterval(max(own) if len(own) == len(runs) else None, values, ran_away)

@@ -33,13 +33,9 @@ class PullOutIndices:
 
 
 def pull_out(
-    model: ShipModel,
-    rudder_deg: float = 20.0,
-    dt: float | None = None,
-    water_depth: float = np.inf,
-    weather: Weather | str | None = None,
-    seed: Seed = 0,
-) -> Trial:
+    model: ShipModel, rudder_deg: float = 20.0, dt: float | None = None,
+    water_depth: float = np.inf, weather: Weather | str | None = None, seed: Seed = 0,
+) -> Trial:  # fmt: skip
     """Simulate a pull-out: a steady turn, then the rudder amidships until the motion is steady again.
 
     The ship is at service speed and the matching shaft speed, the rudder of the turn in degrees, negative to
@@ -78,10 +74,10 @@ def pull_out_indices(trial: Trial) -> PullOutIndices:
 def standard_pull_outs(model: ShipModel, water_depth: float = np.inf) -> dict[str, Manoeuvre]:
     """Pull-outs from turns to both sides."""
     angle = min(TURN_DEG, model.steering.rudder_limit_deg)
+    turn = partial(pull_out, water_depth=water_depth)
     return {
         f"pull-out from {side}": Manoeuvre(
-            partial(pull_out, rudder_deg=sign * angle, water_depth=water_depth),
-            pull_out_indices, PullOutIndices, CAPTION,
+            partial(turn, rudder_deg=sign * angle), pull_out_indices, PullOutIndices, CAPTION
         )
         for side, sign in SIDES
-    }  # fmt: skip
+    }

@@ -80,6 +80,8 @@ FAMILIES: dict[str, Family] = {}
 def register_manoeuvre(name: str, variants: Variants, title: str = "", kind: str | None = None) -> None:
     """Make a family of manoeuvres known to `standard_manoeuvres`, `index_intervals` and `shipgym trials`.
 
+    Raises InputError if a family of that name is registered already.
+
     Parameters
     ----------
     name : str
@@ -91,11 +93,6 @@ def register_manoeuvre(name: str, variants: Variants, title: str = "", kind: str
         Heading on pages; by default the name.
     kind : str, optional
         A further ``kind`` that trials and ship files may name, such as ``"zigzag"``.
-
-    Raises
-    ------
-    InputError
-        If a family of that name is registered already.
     """
     check_text(name, "manoeuvre: name")
     if name in FAMILIES:
@@ -114,6 +111,8 @@ def families_of(model: ShipModel, water_depth: float = np.inf) -> dict[str, dict
 def standard_manoeuvres(model: ShipModel, water_depth: float = np.inf) -> dict[str, Manoeuvre]:
     """The registered manoeuvres that suit a ship, from service speed, in deep water by default.
 
+    Raises InputError for water that is too shallow, or for shallow water with a deep-water model.
+
     Parameters
     ----------
     model : ShipModel
@@ -128,11 +127,6 @@ def standard_manoeuvres(model: ShipModel, water_depth: float = np.inf) -> dict[s
         spiral, and a reverse spiral where the ship is unstable on a straight course; with a shaft an inertia
         stop and an acceleration, and a crash stop where her equations hold for a shaft astern; and what was
         registered besides (`register_manoeuvre`).
-
-    Raises
-    ------
-    InputError
-        For water that is too shallow, or for shallow water with a deep-water model.
     """
     families = families_of(model, water_depth).values()
     return {name: manoeuvre for family in families for name, manoeuvre in family.items()}
@@ -140,5 +134,4 @@ def standard_manoeuvres(model: ShipModel, water_depth: float = np.inf) -> dict[s
 
 def standard_time(model: ShipModel) -> tuple[float, float]:
     """Duration and step of a standard zigzag or turning circle, s."""
-    travel = model.particulars["length"] / model.particulars["speed"]
-    return LENGTHS * travel, travel / STEPS_PER_LENGTH
+    return LENGTHS * model.travel_time, model.travel_time / STEPS_PER_LENGTH

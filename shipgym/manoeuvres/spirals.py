@@ -4,6 +4,7 @@ Direct spiral of Dieudonne and reverse spiral of Bech as described in IMO MSC/Ci
 """
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
 from itertools import pairwise
@@ -43,8 +44,7 @@ class Spiral:
     """Steady turns at a sequence of rudder angles."""
 
     trial: Trial  # the manoeuvre
-    # shape (n_points,); of each steady turn, in the order in which they were sailed; degrees and degrees per
-    # second
+    # shape (n_points,); of each steady turn, in the order in which they were sailed; deg and deg/s
     rudder_deg: Floats
     yaw_rate_deg_s: Floats
     # {"direct", "reverse"}; whether the rudder was set and the yaw rate observed, or the other way round
@@ -64,13 +64,9 @@ class SpiralIndices:
 
 
 def direct_spiral(
-    model: ShipModel,
-    rudder_deg: Sequence[float] = DIRECT_RUDDER_DEG,
-    dt: float | None = None,
-    water_depth: float = np.inf,
-    weather: Weather | str | None = None,
-    seed: Seed = 0,
-) -> Spiral:
+    model: ShipModel, rudder_deg: Sequence[float] = DIRECT_RUDDER_DEG, dt: float | None = None,
+    water_depth: float = np.inf, weather: Weather | str | None = None, seed: Seed = 0,
+) -> Spiral:  # fmt: skip
     """Simulate a direct spiral (Dieudonne): rudder angles there and back, each held until the turn is steady.
 
     The angles, degrees, go from one side to the other; they are sailed in this order and then back to the
@@ -87,21 +83,16 @@ def direct_spiral(
 
 
 def reverse_spiral(
-    model: ShipModel,
-    yaw_rate_deg_s: Sequence[float] | None = None,
-    dt: float | None = None,
-    water_depth: float = np.inf,
-    weather: Weather | str | None = None,
-    seed: Seed = 0,
-) -> Spiral:
+    model: ShipModel, yaw_rate_deg_s: Sequence[float] | None = None, dt: float | None = None,
+    water_depth: float = np.inf, weather: Weather | str | None = None, seed: Seed = 0,
+) -> Spiral:  # fmt: skip
     """Simulate a reverse spiral (Bech): a helmsman keeps a sequence of yaw rates, each until it is steady.
 
     It also finds the turns at which an unstable ship would not stay by itself. The helmsman is a
     proportional-integral controller, designed from the rudder's effect on the ship.
 
     The yaw rates, degrees per second, go from one side to the other, by default from 0.2 to -0.2 times U0 /
-    L; the rudder of each point is the mean of what the helmsman ordered. Other arguments and errors are those
-    of `direct_spiral`.
+    L; the rudder of each point is the mean of what the helmsman ordered. Otherwise as `direct_spiral`.
     """
     voyage = Voyage(model, dt, Conditions(water_depth, weather, seed))
     usual = [float(np.degrees(rate / voyage.length_time)) for rate in REVERSE_RATES]
@@ -232,12 +223,9 @@ def standard_spirals(model: ShipModel, water_depth: float = np.inf) -> dict[str,
     """A direct spiral, and a reverse one where the ship is unstable on a straight course."""
     angles = [a for a in DIRECT_RUDDER_DEG if abs(a) <= model.steering.rudder_limit_deg]
     direct = partial(direct_spiral, rudder_deg=angles, water_depth=water_depth)
-    reverse = partial(reverse_spiral, water_depth=water_depth)
     spirals = {"direct spiral": Manoeuvre(direct, spiral_indices, SpiralIndices, DIRECT_CAPTION)}
-    try:
-        stable = is_course_stable(model)
-    except InputError:  # there is no straight course at all
-        stable = False
-    if not stable:
-        spirals["reverse spiral"] = Manoeuvre(reverse, spiral_indices, SpiralIndices, REVERSE_CAPTION)
-    return spirals
+    with suppress(InputError):  # there may be no straight course at all
+        if is_course_stable(model):
+            return spirals
+    reverse = partial(reverse_spiral, water_depth=water_depth)
+    return spirals | {"reverse spiral": Manoeuvre(reverse, spiral_indices, SpiralIndices, REVERSE_CAPTION)}

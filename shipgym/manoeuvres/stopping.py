@@ -51,14 +51,9 @@ class AccelerationIndices:
 
 
 def stopping(
-    model: ShipModel,
-    shaft_speed: float = 0.0,
-    speed_ratio: float = 0.1,
-    dt: float | None = None,
-    water_depth: float = np.inf,
-    weather: Weather | str | None = None,
-    seed: Seed = 0,
-) -> Trial:
+    model: ShipModel, shaft_speed: float = 0.0, speed_ratio: float = 0.1, dt: float | None = None,
+    water_depth: float = np.inf, weather: Weather | str | None = None, seed: Seed = 0,
+) -> Trial:  # fmt: skip
     """Simulate a stop from service speed, the rudder amidships, until the ship is slow enough.
 
     A shaft ordered astern needs equations that hold there: of the reference ships only those of `tanker`
@@ -70,15 +65,10 @@ def stopping(
     `speed_ratio` of the surge speed at service, 0 for dead in the water, which only a shaft astern brings
     about; other arguments are as in `pull_out`.
 
-    Raises
-    ------
-    InputError
-        For a ship whose propeller is not in its equations, an order astern where they do not hold, an order
-        that does not slow the ship down, or dead in the water without an order astern.
-    ManoeuvreError
-        If the ship is still faster after 300 times the time to travel one ship length; with the trial so far.
-    UnstableModelError
-        If the ship runs away.
+    Raises InputError for a ship whose propeller is not in its equations, an order astern where they do not
+    hold, an order that does not slow the ship down, or dead in the water without an order astern;
+    ManoeuvreError, with the trial so far, if the ship is still faster after 300 times the time to travel one
+    ship length; UnstableModelError if the ship runs away.
     """
     order = _stopping_order(model, shaft_speed, speed_ratio)
     voyage = Voyage(model, dt, Conditions(water_depth, weather, seed))
@@ -135,10 +125,9 @@ def stopping_indices(
 ) -> StoppingIndices:
     """Stopping distance of a measured or simulated stop, from the first sample, that of the order, on.
 
-    The trial has u, v, x, y and psi. The ship counts as stopped at `speed_ratio` of the surge speed at the
-    start, by default at the end of the trial; `length` is that between perpendiculars, m, by default the
-    trial's own. Raises InputError if a channel or the length is missing, ManoeuvreError if the speed is never
-    reached.
+    The trial has u, v, x, y and psi. She counts as stopped at `speed_ratio` of the surge speed at the start,
+    by default at the end of the trial; `length`, between perpendiculars, m, is by default the trial's own.
+    Raises InputError if a channel or the length is missing, ManoeuvreError if the speed is never reached.
     """
     require(trial, ("u", "v", "x", "y", "psi"), "a stopping trial")
     lpp, u = ship_length(trial, length), trial["u"]
@@ -150,25 +139,14 @@ def stopping_indices(
         float(np.interp(end, trial.t, values - values[0]))
         for values in (trial["x"], trial["y"], trial["psi"], distance_sailed(trial))
     )
-    ahead, aside = rotate_to_body(x, y, trial["psi"][0])
-    return StoppingIndices(
-        track_reach_lengths=sailed / lpp,
-        head_reach_lengths=float(ahead) / lpp,
-        side_reach_lengths=float(aside) / lpp,
-        heading_change_deg=float(np.degrees(psi)),
-        time_s=end - float(trial.t[0]),
-    )
+    ahead, aside = (float(way) / lpp for way in rotate_to_body(x, y, trial["psi"][0]))
+    return StoppingIndices(sailed / lpp, ahead, aside, float(np.degrees(psi)), end - float(trial.t[0]))
 
 
 def acceleration(
-    model: ShipModel,
-    start_ratio: float = 0.25,
-    duration: float | None = None,
-    dt: float | None = None,
-    water_depth: float = np.inf,
-    weather: Weather | str | None = None,
-    seed: Seed = 0,
-) -> Trial:
+    model: ShipModel, start_ratio: float = 0.25, duration: float | None = None, dt: float | None = None,
+    water_depth: float = np.inf, weather: Weather | str | None = None, seed: Seed = 0,
+) -> Trial:  # fmt: skip
     """Simulate a straight-line acceleration: from a slow speed with the shaft ordered to service speed.
 
     A helmsman keeps the yaw rate at zero, so that an unstable ship stays straight.
@@ -225,9 +203,8 @@ def standard_stops(model: ShipModel, water_depth: float = np.inf) -> dict[str, M
     """Inertia stop and acceleration of a ship with a shaft; a crash stop where she can go astern."""
     if "n" not in model.command_names:
         return {}
-    stop, crash, faster = (
-        partial(sail, water_depth=water_depth) for sail in (stopping, crash_stop, acceleration)
-    )
+    sails = (stopping, crash_stop, acceleration)
+    stop, crash, faster = (partial(sail, water_depth=water_depth) for sail in sails)
     found = {"inertia stop": Manoeuvre(stop, stopping_indices, StoppingIndices, STOP_CAPTION)}
     if goes_astern(model):
         found["crash stop"] = Manoeuvre(crash, stopping_indices, StoppingIndices, CRASH_CAPTION)

@@ -23,8 +23,6 @@ __all__ = [
     "yaw_with_drift",
 ]  # fmt: skip
 
-FORCES = ("X", "Y", "N")
-
 
 @dataclass(frozen=True)
 class Tank:
@@ -39,8 +37,7 @@ class Tank:
     noise: float = 0.0
     seed: int = 0  # of the noise
     # whether the inertia of the ship herself (mass times acceleration, centripetal terms included) stays in
-    # the forces, as the balance of a planar motion mechanism feels it; otherwise they are those of the water
-    # alone
+    # the forces, as the balance of a planar motion mechanism feels it; else those of the water alone
     model_inertia: bool = True
     water_depth: float = np.inf  # m, for ships that know shallow water
 
@@ -50,23 +47,12 @@ class Tank:
         if self.shaft_speed is not None:
             check_number(self.shaft_speed, "tank shaft_speed", above=0.0, hint="ahead")
         check_number(self.rudder_deg, "tank rudder_deg", at_least=-90.0, at_most=90.0)
-        check_number(self.cycles, "tank cycles", at_least=1)
-        check_number(self.samples, "tank samples", at_least=8)
-        check_number(self.noise, "tank noise", at_least=0.0)
-        check_number(self.seed, "tank seed", at_least=0)
+        for name, least in (("cycles", 1), ("samples", 8), ("noise", 0.0), ("seed", 0)):
+            check_number(getattr(self, name), f"tank {name}", at_least=least)
 
     def carriage_speed(self, model: ShipModel) -> float:
         """Speed of the carriage, m/s."""
         return float(model.particulars["speed"] if self.speed is None else self.speed)
-
-
-@dataclass(frozen=True, eq=False)
-class _Motion:
-    """A prescribed motion: time, and velocities and accelerations (u, v, r) of shape (n_samples, 3)."""
-
-    t: Floats
-    velocity: Floats
-    acceleration: Floats
 
 
 def static_drift(
@@ -90,7 +76,7 @@ def static_drift(
     t = hold_s / tank.samples * np.arange(len(drift), dtype=float)
     speed, none = tank.carriage_speed(model), np.zeros(len(t))
     velocity = np.stack([speed * np.cos(drift), -speed * np.sin(drift), none], axis=-1)
-    return _tow(model, tank, _Motion(t, velocity, np.zeros_like(velocity)), "static drift")
+    return _tow(model, tank, t, velocity, np.zeros_like(velocity), "static drift")
 
 
 def pure_surge(
@@ -125,12 +111,9 @@ def pure_yaw(
 
 
 def yaw_with_drift(
-    model: ShipModel,
-    amplitude_deg_s: float,
-    drift_deg: float,
-    period_s: float | None = None,
-    tank: Tank | None = None,
-) -> Trial:
+    model: ShipModel, amplitude_deg_s: float, drift_deg: float,
+    period_s: float | None = None, tank: Tank | None = None,
+) -> Trial:  # fmt: skip
     """Oscillate a ship in yaw at a drift angle at midship, v = -U sin(drift); otherwise as `pure_surge`."""
     tank = tank or Tank()
     rate = float(np.radians(check_number(amplitude_deg_s, "amplitude_deg_s", above=0.0)))
@@ -142,13 +125,9 @@ def yaw_with_drift(
 
 
 def _oscillate(
-    model: ShipModel,
-    tank: Tank,
-    period_s: float | None,
-    mean: tuple[float, float, float],
-    amplitude: tuple[float, float, float],
-    name: str,
-) -> Trial:
+    model: ShipModel, tank: Tank, period_s: float | None,
+    mean: tuple[float, float, float], amplitude: tuple[float, float, float], name: str,
+) -> Trial:  # fmt: skip
     """Velocities (u, v, r) that swing about their mean as a cosine."""
     usual = 10.0 * model.particulars["length"] / tank.carriage_speed(model)
     period = check_number(usual if period_s is None else period_s, "period_s", above=0.0)
@@ -156,41 +135,39 @@ def _oscillate(
     frequency = 2.0 * np.pi / period
     velocity = np.array(mean) + np.outer(np.cos(frequency * t), amplitude)
     acceleration = -frequency * np.outer(np.sin(frequency * t), amplitude)
-    return _tow(model, tank, _Motion(t, velocity, acceleration), name)
+    return _tow(model, tank, t, velocity, acceleration, name)
 
 
-def _tow(model: ShipModel, tank: Tank, motion: _Motion, name: str) -> Trial:
-    """The measured motion and forces: inertia times (the ship's own acceleration - the prescribed one)."""
-    limit = model.steering.rudder_limit_deg
-    check_number(
-        tank.rudder_deg, "tank rudder_deg", at_least=-limit, at_most=limit, hint="the rudder's limit"
-    )
+def _tow(model: ShipModel, tank: Tank, t: Floats, velocity: Floats, acceleration: Floats, name: str) -> Trial:
+    """The measured motion and forces: inertia times (the ship's own acceleration - the prescribed one).
+
+    Time, and prescribed velocities and accelerations (u, v, r) of shape (n_samples, 3).
+    """
+    most = model.steering.rudder_limit_deg
+    check_number(tank.rudder_deg, "tank rudder_deg", at_least=-most, at_most=most, hint="the rudder's limit")
     if tank.shaft_speed is not None and "n" not in model.command_names:
         raise InputError(
             f"tank shaft_speed: {tank.shaft_speed:g} found, but {model.name!r} has no shaft; leave it"
         )
     shaft = model.service_shaft_speed if tank.shaft_speed is None else tank.shaft_speed
-    psi = integral(motion.t, motion.velocity[:, 2])
-    columns = dict(zip("uvr", motion.velocity.T, strict=True)) | {"psi": psi}
-    columns |= {"delta": np.full(len(psi), np.radians(tank.rudder_deg)), "n": np.full(len(psi), shaft)}
+    psi = integral(t, velocity[:, 2])
+    columns = {"psi": psi, **dict(zip("uvr", velocity.T, strict=True))}
+    columns |= {"delta": np.full(len(t), np.radians(tank.rudder_deg)), "n": np.full(len(t), shaft)}
     rates = model.rates(columns, tank.water_depth)
-    own = np.stack([rates.get(axis, np.zeros(len(psi))) for axis in "uvrp"], axis=-1)
-    own[:, :3] -= motion.acceleration
+    own = np.stack([rates.get(axis, np.zeros(len(t))) for axis in "uvrp"], axis=-1)
+    own[:, :3] -= acceleration
     forces = own @ inertia(model, tank.water_depth).T
     if not tank.model_inertia:
-        forces += rigid_body_forces(rigid_inertia(model), motion.velocity.T, motion.acceleration.T).T
+        forces += rigid_body_forces(rigid_inertia(model), velocity.T, acceleration.T).T
     noise = tank.noise * np.sqrt((forces**2).mean(axis=0))
     forces += noise * np.random.default_rng(tank.seed).standard_normal(forces.shape)
     north, east = rotate_to_body(columns["u"], columns["v"], -psi)
-    channels = {
-        "x": integral(motion.t, north),
-        "y": integral(motion.t, east),
-        **{key: columns[key] for key in ("psi", "u", "v", "r", "delta")},
-        **({"n": columns["n"]} if "n" in model.command_names else {}),
-        **dict(zip(FORCES, forces.T, strict=True)),
-    }
+    if "n" not in model.command_names:
+        del columns["n"]
+    channels = {"x": integral(t, north), "y": integral(t, east), **columns}
+    channels |= zip("XYN", forces.T, strict=True)
     title = f"{model.name}, {name}"
-    return Trial(motion.t, channels, name=title, kind="captive", length=model.particulars["length"])
+    return Trial(t, channels, name=title, kind="captive", length=model.particulars["length"])
 
 
 def rigid_body_forces(
@@ -198,24 +175,10 @@ def rigid_body_forces(
 ) -> Floats:
     """Forces X, Y and moment N that accelerate a ship without water, about midship (Fossen 2011, 3.3).
 
-    All in SI units, or all in the prime system.
-
-    Parameters
-    ----------
-    rigid : sequence of float
-        Mass, its static moment and the yaw inertia.
-    velocity, acceleration : array of shape (3, n_samples)
-        In surge, sway and yaw.
-
-    Returns
-    -------
-    array of shape (3, n_samples)
+    All in SI units, or all in the prime system: `rigid` is mass, its static moment and the yaw inertia;
+    forces, and velocity and acceleration in surge, sway and yaw, have the shape (3, n_samples).
     """
-    mass, static, yaw = rigid
-    u, v, r = velocity
-    udot, vdot, rdot = acceleration
-    aside = vdot + u * r
-    ahead = udot - v * r
-    return np.array(
-        [mass * ahead - static * r * r, mass * aside + static * rdot, yaw * rdot + static * aside]
-    )
+    m, static, yaw = rigid
+    (u, v, r), (udot, vdot, rdot) = velocity, acceleration
+    ahead, aside = udot - v * r, vdot + u * r
+    return np.array([m * ahead - static * r * r, m * aside + static * rdot, yaw * rdot + static * aside])

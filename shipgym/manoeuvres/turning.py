@@ -5,7 +5,7 @@ from functools import partial
 
 import numpy as np
 
-from shipgym.arrays import Flags, Floats
+from shipgym.arrays import Floats
 from shipgym.manoeuvres.execution import (
     execute_time,
     number_of_steps,
@@ -45,14 +45,9 @@ class TurningIndices:
 
 
 def turning_circle(
-    model: ShipModel,
-    rudder_deg: float = 35.0,
-    duration: float = 900.0,
-    dt: float = 0.1,
-    water_depth: float = np.inf,
-    weather: Weather | str | None = None,
-    seed: Seed = 0,
-) -> Trial:
+    model: ShipModel, rudder_deg: float = 35.0, duration: float = 900.0, dt: float = 0.1,
+    water_depth: float = np.inf, weather: Weather | str | None = None, seed: Seed = 0,
+) -> Trial:  # fmt: skip
     """Simulate a turning circle from straight ahead at service speed, without an approach run.
 
     The rudder is ordered at the start, degrees, negative to port; `duration` and `dt`, the time between
@@ -75,18 +70,15 @@ def turning_indices(trial: Trial, length: float | None = None) -> TurningIndices
     ahead, aside, turned = (values[after] for values in track_from_order(trial, lpp))
     side = 1.0 if turned[-1] >= 0.0 else -1.0
     turned, aside = side * turned, side * aside
-    steady = turned >= turned[-1] - np.pi / 2
-    ratio, drift, diameter = (
-        _steady(trial, after, steady, side, lpp) if turned[-1] > 1.5 * np.pi else (None,) * 3
-    )
-    return TurningIndices(
-        advance_lengths=reached(turned, np.pi / 2, ahead),
-        transfer_lengths=reached(turned, np.pi / 2, aside),
-        tactical_diameter_lengths=reached(turned, np.pi, aside),
-        steady_diameter_lengths=diameter,
-        steady_speed_ratio=ratio,
-        steady_drift_deg=drift,
-    )
+    advance, transfer = (reached(turned, np.pi / 2, way) for way in (ahead, aside))
+    ways = advance, transfer, reached(turned, np.pi, aside)
+    if turned[-1] <= 1.5 * np.pi:  # no steady turn yet
+        return TurningIndices(*ways, None, None, None)
+    u, v, r = (trial[name][after] for name in ("u", "v", "r"))
+    speed, steady = np.hypot(u, v), turned >= turned[-1] - np.pi / 2
+    diameter = 2.0 * speed[steady].mean() / (side * r[steady].mean()) / lpp
+    drift = side * np.degrees(np.arctan2(-v[steady], u[steady]).mean())
+    return TurningIndices(*ways, float(diameter), float(speed[steady].mean() / speed[0]), float(drift))
 
 
 def track_from_order(trial: Trial, length: float) -> tuple[Floats, Floats, Floats]:
@@ -95,15 +87,6 @@ def track_from_order(trial: Trial, length: float) -> tuple[Floats, Floats, Float
     x0, y0, psi0 = (float(np.interp(start, trial.t, trial[name])) for name in ("x", "y", "psi"))
     ahead, aside = rotate_to_body(trial["x"] - x0, trial["y"] - y0, psi0)
     return ahead / length, aside / length, trial["psi"] - psi0
-
-
-def _steady(trial: Trial, after: Flags, steady: Flags, side: float, lpp: float) -> tuple[float, float, float]:
-    """Speed ratio, drift angle in degrees and diameter in ship lengths of the steady turn."""
-    u, v, r = (trial[name][after] for name in ("u", "v", "r"))
-    speed = np.hypot(u, v)
-    drift = side * np.degrees(np.arctan2(-v[steady], u[steady]).mean())
-    diameter = 2.0 * speed[steady].mean() / (side * r[steady].mean()) / lpp
-    return float(speed[steady].mean() / speed[0]), float(drift), float(diameter)
 
 
 def full_rudder_deg(model: ShipModel) -> float:
@@ -115,12 +98,10 @@ def standard_circles(model: ShipModel, water_depth: float = np.inf) -> dict[str,
     """Turning circles with full rudder to both sides."""
     duration, dt = standard_time(model)
     full = full_rudder_deg(model)
+    turn = partial(turning_circle, duration=duration, dt=dt, water_depth=water_depth)
     return {
         f"turning circle {full:.0f} deg to {side}": Manoeuvre(
-            partial(
-                turning_circle, rudder_deg=sign * full, duration=duration, dt=dt, water_depth=water_depth
-            ),
-            turning_indices, TurningIndices, CAPTION,
+            partial(turn, rudder_deg=sign * full), turning_indices, TurningIndices, CAPTION
         )
         for side, sign in SIDES
-    }  # fmt: skip
+    }

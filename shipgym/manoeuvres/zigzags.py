@@ -34,18 +34,11 @@ class ZigzagIndices:
 
 
 def zigzag(
-    model: ShipModel,
-    rudder_deg: float = 20.0,
-    heading_deg: float = 20.0,
-    port_first: bool = False,
-    duration: float = 600.0,
-    dt: float = 0.1,
-    switch: Literal["inside", "step"] = "inside",
-    water_depth: float = np.inf,
-    must_reverse: bool = True,
-    weather: Weather | str | None = None,
+    model: ShipModel, rudder_deg: float = 20.0, heading_deg: float = 20.0, port_first: bool = False,
+    duration: float = 600.0, dt: float = 0.1, switch: Literal["inside", "step"] = "inside",
+    water_depth: float = np.inf, must_reverse: bool = True, weather: Weather | str | None = None,
     seed: Seed = 0,
-) -> Trial:
+) -> Trial:  # fmt: skip
     """Simulate a zigzag from straight ahead at service speed, without an approach run.
 
     The trial has the rudder ordered from each sample on in `delta_command`.
@@ -91,19 +84,15 @@ def zigzag(
     _, turns = passage.run("zigzag", states, rudder, *first, dt, switch == "inside")
     trial = as_trial(model, dt, states, orders(model, rudder), kind="zigzag")
     if must_reverse and turns == 0:
-        raise _never_reversed(f"zigzag {rudder_deg:g}/{heading_deg:g} of {model.name!r}", trial, heading_deg)
+        gained = np.degrees(np.sign(rudder[0]) * (trial["psi"] - trial["psi"][0])).max()
+        raise ManoeuvreError(
+            f"zigzag {rudder_deg:g}/{heading_deg:g} of {model.name!r}: the heading changed by at most "
+            f"{gained:.3g} deg to the side of the rudder in {trial.duration:g} s, expected "
+            f"{heading_deg:g} deg, where the rudder is reversed; sail longer, or order more rudder or less "
+            "heading",
+            trial,
+        )
     return trial
-
-
-def _never_reversed(what: str, trial: Trial, heading_deg: float) -> ManoeuvreError:
-    side = np.sign(trial["delta_command"][0])
-    gained = np.degrees(side * (trial["psi"] - trial["psi"][0])).max()
-    return ManoeuvreError(
-        f"{what}: the heading changed by at most {gained:.3g} deg to the side of the rudder in "
-        f"{trial.duration:g} s, expected {heading_deg:g} deg, where the rudder is reversed; sail longer, or "
-        "order more rudder or less heading",
-        trial,
-    )
 
 
 def zigzag_indices(
@@ -111,10 +100,9 @@ def zigzag_indices(
 ) -> ZigzagIndices:
     """Overshoots, initial turning and period of a measured or simulated zigzag.
 
-    The trial has psi and delta (or delta_command), and u and v for the distance; `length` is that between
-    perpendiculars, m, by default the trial's own; `heading_deg` is the heading change at which the rudder had
-    to be reversed, degrees, by default `switch_heading_deg`. Raises InputError if a channel or the length is
-    missing.
+    The trial has psi and delta (or delta_command), and u and v for the distance; `length`, between
+    perpendiculars, m, is by default the trial's own; `heading_deg` is the heading change at which the rudder
+    had to be reversed, degrees, by default `switch_heading_deg`. InputError for a missing channel or length.
     """
     start, turns = reversals(trial)
     if not turns:
@@ -125,12 +113,9 @@ def zigzag_indices(
         _overshoot_deg(trial, start, turn, end, threshold)
         for turn, end in zip(turns[:2], ends[:2], strict=True)
     ]
-    return ZigzagIndices(
-        overshoot_1_deg=overshoots[0],
-        overshoot_2_deg=overshoots[1] if len(overshoots) > 1 else None,
-        initial_turning_lengths=_initial_turning(trial, start, threshold, ship_length(trial, length)),
-        period_s=float(turns[2] - turns[0]) if len(turns) > 2 else None,
-    )
+    first, second, *_ = [*overshoots, None]
+    lengths = _initial_turning(trial, start, threshold, ship_length(trial, length))
+    return ZigzagIndices(first, second, lengths, turns[2] - turns[0] if len(turns) > 2 else None)
 
 
 def _initial_turning(trial: Trial, start: float, threshold_deg: float | None, length: float) -> float | None:
@@ -170,19 +155,16 @@ def switch_heading_deg(trial: Trial) -> float | None:
 def _heading_change(trial: Trial, start: float, times: Sequence[float] | Floats) -> Floats:
     """Heading at some times less the mean heading up to the start, rad."""
     approach = trial["psi"][trial.t <= start].mean()
-    change: Floats = np.interp(times, trial.t, trial["psi"]) - approach
-    return change
+    return np.asarray(np.interp(times, trial.t, trial["psi"]) - approach)
 
 
-def _overshoot_deg(
-    trial: Trial, start: float, turn: float, end: float, threshold: float | None
-) -> float | None:
-    """Heading beyond the threshold after the reversal at time `turn`; None if still growing at `end`."""
+def _overshoot_deg(trial: Trial, start: float, turn: float, end: float, switch: float | None) -> float | None:
+    """Heading beyond that of the switch after the reversal at time `turn`; None if still growing at `end`."""
     window = (trial.t >= turn) & (trial.t <= end)
-    if threshold is None or window.sum() < 3:
+    if switch is None or window.sum() < 3:
         return None
     change = _heading_change(trial, start, trial.t[window])
-    beyond = np.degrees(change * np.sign(change[0])) - threshold
+    beyond = np.degrees(change * np.sign(change[0])) - switch
     if np.argmax(beyond) == len(beyond) - 1:
         return None
     return float(beyond.max())
@@ -191,12 +173,10 @@ def _overshoot_deg(
 def standard_zigzags(model: ShipModel, water_depth: float = np.inf) -> dict[str, Manoeuvre]:
     """Zigzags 10/10 and 20/20 to both sides; one that never reverses has no indices."""
     duration, dt = standard_time(model)
+    sail = partial(zigzag, duration=duration, dt=dt, water_depth=water_depth, must_reverse=False)
     return {
         f"zigzag {angle:.0f}/{angle:.0f}, {side} first": Manoeuvre(
-            partial(
-                zigzag, rudder_deg=angle, heading_deg=angle, port_first=sign < 0.0, duration=duration, dt=dt,
-                water_depth=water_depth, must_reverse=False,
-            ),
+            partial(sail, rudder_deg=angle, heading_deg=angle, port_first=sign < 0.0),
             zigzag_indices, ZigzagIndices, CAPTION,
         )
         for angle in STANDARD_DEG

@@ -30,14 +30,10 @@ def render(template: str, **data: Any) -> str:
 def environment() -> Environment:
     """What all templates share: escaping, the ways to write a number, and plotly.js."""
     made = Environment(
-        autoescape=True,
-        undefined=StrictUndefined,
-        loader=FunctionLoader(_source),
-        finalize=lambda value: NONE if value is None else value,
-        extensions=["jinja2.ext.do"],
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
+        autoescape=True, undefined=StrictUndefined, loader=FunctionLoader(_source),
+        finalize=lambda value: NONE if value is None else value, extensions=["jinja2.ext.do"],
+        trim_blocks=True, lstrip_blocks=True,
+    )  # fmt: skip
     made.filters |= {
         "counted": counted, "degrees": degrees, "fixed": fixed, "number": number, "percent": percent,
         "plotted": plotted, "sentence": sentence,
@@ -60,9 +56,8 @@ def plotly_script() -> Markup:
     file is that of the npm package plotly.js-cartesian-dist-min 4.1.1: plotly's Python package has the whole
     only, with which a page that works offline would be 5.5 MB.
     """
-    return Markup(
-        _source("shipgym.pages/plotly/plotly-cartesian.min.js")[0].replace("</script", "<\\/script")
-    )
+    source, *_ = _source("shipgym.pages/plotly/plotly-cartesian.min.js")
+    return Markup(source.replace("</script", "<\\/script"))
 
 
 def plotted(plot: Figure) -> dict[str, Any]:

@@ -1,7 +1,4 @@
-"""Figures of trials and manoeuvres, made with plotly from the extra ``report``; nothing else needs it.
-
-The public names stand in `__init__.pyi`; each is imported when it is first used.
-"""
+"""Figures made with plotly, from the extra ``report``; the public names stand in `__init__.pyi`."""
 
 from lazy_loader import attach_stub
 

@@ -46,16 +46,14 @@ def turning_figure(trial: Trial, length: float | None = None, height: int = 480)
     ahead, aside, turned = track_from_order(trial, lpp)
     side = 1.0 if turned[-1] >= 0.0 else -1.0
     lines = [line(aside, ahead, "path", MODEL, 2.0)]
-    advance, transfer, diameter = (
-        indices.advance_lengths, indices.transfer_lengths, indices.tactical_diameter_lengths,
-    )  # fmt: skip
+    advance, transfer = indices.advance_lengths, indices.transfer_lengths
     if advance is not None and transfer is not None:
         far = side * transfer
         lines += [
             _dimension([far, far], [0.0, advance], f"advance {advance:.2f} L", PALETTE[1]),
             _dimension([0.0, far], [advance, advance], f"transfer {transfer:.2f} L", PALETTE[2]),
         ]
-    if diameter is not None:
+    if (diameter := indices.tactical_diameter_lengths) is not None:
         level, name = float(np.interp(np.pi, side * turned, ahead)), f"tactical diameter {diameter:.2f} L"
         lines.append(_dimension([0.0, side * diameter], [level, level], name, PALETTE[3]))
     ahead_axis = axis("ahead, ship lengths", zero=True, scaleanchor="x", scaleratio=1)

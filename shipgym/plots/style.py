@@ -58,14 +58,9 @@ class Panel(NamedTuple):
 
 
 def panels(
-    shown: Sequence[Panel],
-    height: int,
-    columns: int = 1,
-    *,
-    outer: bool = False,
-    grid: Mapping[str, Any] | None = None,
-    **changes: Any,
-) -> Figure:
+    shown: Sequence[Panel], height: int, columns: int = 1, *,
+    outer: bool = False, grid: Mapping[str, Any] | None = None, **changes: Any,
+) -> Figure:  # fmt: skip
     """A figure of panels in the shared style, row by row.
 
     Its height is in pixels; with `outer`, titles of axes stand below the last row and beside the first column
@@ -98,18 +93,14 @@ def layout(height: int, *, titled: bool = False, left: int = 62, **changes: Any)
     below the legend; `changes` are entries of a plotly layout that replace these.
     """
     shared = {
-        "height": height,
-        "template": "none",
-        "font": {"family": FONT, "size": 12, "color": INK},
-        "paper_bgcolor": "white",
-        "plot_bgcolor": "white",
+        "height": height, "template": "none", "font": {"family": FONT, "size": 12, "color": INK},
+        "paper_bgcolor": "white", "plot_bgcolor": "white",
         "margin": {"l": left, "r": 18, "t": 64 if titled else 36, "b": 46},
         "legend": {
             "orientation": "h", "x": 0.0, "y": 1.0, "yref": "container", "yanchor": "top",
             "font": {"size": 12},
         },
-        "hoverlabel": {"font": {"family": FONT, "size": 12}},
-        "hovermode": "x unified",
+        "hoverlabel": {"font": {"family": FONT, "size": 12}}, "hovermode": "x unified",
     }  # fmt: skip
     return shared | changes
 
@@ -139,9 +130,7 @@ def line_styles(labels: Iterable[str]) -> dict[str, dict[str, Any]]:
     """Line of each label: measurements thin and dark, the others by the palette in their order."""
     labels = list(labels)
     others = [label for label in labels if label != "measured"]
-    styles = {
-        label: {"colour": PALETTE[index % len(PALETTE)], "width": 2.0} for index, label in enumerate(others)
-    }
+    styles = {label: {"colour": PALETTE[k % len(PALETTE)], "width": 2.0} for k, label in enumerate(others)}
     return styles | {label: {"colour": MEASURED, "width": 1.5} for label in labels if label == "measured"}
 
 

@@ -46,8 +46,7 @@ def history_figure(
 ) -> Figure:
     """Time histories: a panel for each channel, "speed" or "drift", a line for each trial by its label.
 
-    The trial called "measured" is drawn dark; channels that no trial has are left out. Raises InputError if
-    none is left.
+    The trial called "measured" is drawn dark; channels that no trial has are left out; InputError if all are.
     """
     shown = [name for name in channels if any(quantity(trial, name) is not None for trial in trials.values())]
     if not shown:

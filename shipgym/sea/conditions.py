@@ -10,7 +10,6 @@ from typing import Any, Literal
 from shipgym.checks import (
     check_choice,
     check_flag,
-    check_keys,
     check_number,
     check_table,
     check_text,
@@ -27,24 +26,18 @@ SPREADINGS = ("cosine-squared", "long-crested")
 
 @dataclass(frozen=True)
 class Current:
-    """A current that is the same everywhere, steady or slowly varying.
+    """A current that is the same everywhere, steady or slowly varying; InputError for values that none has.
 
     Parameters
     ----------
     speed : float
         Mean, m/s.
     towards_deg : float or None
-        Direction it flows to, degrees clockwise from north. None: drawn anew for each episode of an
-        environment.
+        Direction it flows to, degrees clockwise from north; None: drawn for each episode of an environment.
     variation : float
         Standard deviation of each of the north and east components about the mean, m/s; 0 is steady.
     time_constant : float
         Of the first-order Gauss-Markov process of the variation, s.
-
-    Raises
-    ------
-    InputError
-        For values that no current has.
     """
 
     speed: float
@@ -53,9 +46,8 @@ class Current:
     time_constant: float = 600.0
 
     def __post_init__(self) -> None:
-        _numbers(self, "current", speed=(0.0, 10.0), variation=(0.0, 5.0))
+        _check(self, "current", "towards_deg", speed=(0.0, 10.0), variation=(0.0, 5.0))
         check_number(self.time_constant, "current time_constant", above=0.0, hint="in s")
-        _direction(self, "current", "towards_deg")
 
     @property
     def calm(self) -> bool:
@@ -65,15 +57,14 @@ class Current:
 
 @dataclass(frozen=True)
 class Wind:
-    """A mean wind with gusts.
+    """A mean wind with gusts; InputError for values that no wind has.
 
     Parameters
     ----------
     speed : float
         Mean over an hour, 10 m above the sea, m/s.
     from_deg : float or None
-        Direction it comes from, degrees clockwise from north. None: drawn anew for each episode of an
-        environment.
+        Direction it comes from, degrees clockwise from north; None: drawn for each episode of an environment.
     gust : bool
         Whether the speed varies about its mean.
     spectrum : {"harris", "davenport", "norsok"}
@@ -81,11 +72,6 @@ class Wind:
     coefficients : str or WindTable
         "blendermann" (type of ship guessed from its fullness), "blendermann-" and a type of
         `BLENDERMANN`, "isherwood", or a table of your own.
-
-    Raises
-    ------
-    InputError
-        For values that no wind has.
     """
 
     speed: float
@@ -95,8 +81,7 @@ class Wind:
     coefficients: str | WindTable = "blendermann"
 
     def __post_init__(self) -> None:
-        _numbers(self, "wind", speed=(0.0, 75.0))
-        _direction(self, "wind", "from_deg")
+        _check(self, "wind", "from_deg", speed=(0.0, 75.0))
         check_choice(self.spectrum, GUST_SPECTRA, "wind spectrum")
         check_coefficients(self.coefficients, "wind coefficients")
         check_flag(self.gust, "wind gust")
@@ -109,7 +94,7 @@ class Wind:
 
 @dataclass(frozen=True)
 class Waves:
-    """An irregular sea.
+    """An irregular sea; InputError for values that none has, such as waves steeper than they can be.
 
     Parameters
     ----------
@@ -118,8 +103,7 @@ class Waves:
     peak_period : float
         Tp, period of the peak of the spectrum, s.
     from_deg : float or None
-        Direction the waves come from, degrees clockwise from north. None: drawn anew for each episode of an
-        environment.
+        Where they come from, degrees clockwise from north; None: drawn for each episode of an environment.
     spectrum : {"jonswap", "pierson-moskowitz"}
         Of a growing or of a fully developed sea.
     peak_enhancement : float
@@ -127,11 +111,6 @@ class Waves:
     spreading : {"cosine-squared", "long-crested"}
         How the energy is spread over directions about the mean: (2 / pi) cos^2 within 90 degrees to either
         side, as wind seas are (DNV-RP-C205, section 3.5.8), or not at all, as in a tank or a swell.
-
-    Raises
-    ------
-    InputError
-        For values that no sea has, such as waves steeper than they can be.
     """
 
     significant_height: float
@@ -142,9 +121,8 @@ class Waves:
     spreading: Literal["cosine-squared", "long-crested"] = "cosine-squared"
 
     def __post_init__(self) -> None:
-        _numbers(self, "waves", significant_height=(0.0, 20.0), peak_enhancement=(1.0, 20.0))
+        _check(self, "waves", "from_deg", significant_height=(0.0, 20.0), peak_enhancement=(1.0, 20.0))
         check_number(self.peak_period, "waves peak_period", above=0.0, at_most=40.0, hint="in s")
-        _direction(self, "waves", "from_deg")
         check_choice(self.spectrum, WAVE_SPECTRA, "waves spectrum")
         check_choice(self.spreading, SPREADINGS, "waves spreading")
         length = 9.80665 * self.peak_period**2 / (2.0 * math.pi)
@@ -235,12 +213,8 @@ class Weather:
         state = _find_sea_state(name)
         if state.wind_speed == 0.0:
             return cls(current=current, name=state.name)
-        return cls(
-            current=current,
-            wind=Wind(state.wind_speed, from_deg),
-            waves=Waves(state.significant_height, state.peak_period, from_deg),
-            name=state.name,
-        )
+        waves = Waves(state.significant_height, state.peak_period, from_deg)
+        return cls(current, Wind(state.wind_speed, from_deg), waves, state.name)
 
     @property
     def calm(self) -> bool:
@@ -276,11 +250,9 @@ class Weather:
     def from_dict(cls, mapping: Mapping[str, Any], where: str = "weather") -> Weather:
         """Read what :meth:`to_dict` wrote; absent parts are off.
 
-        Raises InputError, beginning with `where`, for an unknown key, a missing value or one that no weather
-        has.
+        InputError, beginning with `where`, for an unknown key, a missing value or one that no weather has.
         """
-        table = check_table(mapping, where)
-        check_keys(table, ("name", *_PARTS), where)
+        table = check_table(mapping, where, ("name", *_PARTS))
         parts = {part: _part(kind, table.get(part), f"{where} {part}") for part, kind in _PARTS.items()}
         return cls(**parts, name=table.get("name", "weather"))
 
@@ -292,8 +264,7 @@ _NEEDED = {Current: ("speed",), Wind: ("speed",), Waves: ("significant_height", 
 def _part(kind: type[Any], content: Any, where: str) -> Any:
     if content is None:
         return None
-    values = dict(check_table(content, where))
-    check_keys(values, tuple(kind.__dataclass_fields__), where, _NEEDED[kind])
+    values = dict(check_table(content, where, tuple(kind.__dataclass_fields__), _NEEDED[kind]))
     if isinstance(values.get("coefficients"), Mapping):
         values["coefficients"] = WindTable.from_dict(values["coefficients"], f"{where} coefficients")
     return kind(**values)
@@ -303,24 +274,18 @@ def _find_sea_state(name: str | int) -> SeaState:
     for state in _SEA_STATES:
         if not isinstance(name, bool) and name in (state.name, state.code):
             return state
-    names = [state.name for state in _SEA_STATES]
     codes = ", ".join(str(state.code) for state in _SEA_STATES)
-    hint = did_you_mean(name, names) if isinstance(name, str) else ""
+    hint = did_you_mean(name, sea_states()) if isinstance(name, str) else ""
     raise InputError(
-        f"sea state: {name!r} found, expected one of {quoted(names)}, or their WMO codes {codes}; "
+        f"sea state: {name!r} found, expected one of {quoted(sea_states())}, or their WMO codes {codes}; "
         f"for another sea give Weather(wind=Wind(...), waves=Waves(...)).{hint}"
     )
 
 
-def _numbers(part: Any, where: str, **bounds: tuple[float, float]) -> None:
-    for name, (low, high) in bounds.items():
-        value = check_number(getattr(part, name), f"{where} {name}", at_least=low, at_most=high)
-        object.__setattr__(part, name, value)
-
-
-def _direction(part: Any, where: str, name: str) -> None:
-    value = getattr(part, name)
-    if value is not None:
-        hint = "degrees clockwise from north"
-        value = check_number(value, f"{where} {name}", at_least=-360.0, at_most=360.0, hint=hint)
+def _check(part: Any, where: str, direction: str, **bounds: tuple[float, float]) -> None:
+    """Make numbers of a part's fields, which must be within their bounds, and of its direction, if any."""
+    given = {} if getattr(part, direction) is None else {direction: (-360.0, 360.0)}
+    for name, (low, high) in (bounds | given).items():
+        hint = "degrees clockwise from north" if name == direction else ""
+        value = check_number(getattr(part, name), f"{where} {name}", at_least=low, at_most=high, hint=hint)
         object.__setattr__(part, name, value)

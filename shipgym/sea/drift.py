@@ -1,14 +1,13 @@
 """Mean second-order wave forces on a ship, over the direction of the waves."""
 
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from shipgym.arrays import Floats
 from shipgym.sea.conditions import Waves
-from shipgym.sea.estimates import GRAVITY, waterplane_coefficient, weather_particulars
+from shipgym.sea.estimates import GRAVITY, weather_particulars
 from shipgym.sea.harmonics import Harmonics, circle, cosine_series, mirrored, sine_series
 from shipgym.sea.waves import draught_attenuation, frequencies, over_directions, slow_drift, wave_spectrum
 from shipgym.ships.particulars import Particulars
@@ -23,12 +22,10 @@ _NARROWEST = 2.0  # beam by draught, likewise
 class WaveDrift:
     """Mean wave drift over the direction of the waves, and its slow variation.
 
-    The force at any time is the mean one times (1 + s), s a Gauss-Markov process with the time constant and
-    standard deviation given here.
+    The force at any time is the mean one times (1 + s), s the Gauss-Markov process that is given here.
     """
 
-    # shape (points,); where the waves come from, seen from the bow: 0 ahead, pi / 2 from starboard; 0 to
-    # below 2 pi, rad
+    # shape (points,), 0 to below 2 pi; where waves come from, seen from the bow, pi / 2 from starboard; rad
     chi: Floats
     # shape (points,); mean surge and sway force, N. Waves from starboard push to port: Y < 0
     X: Floats
@@ -41,9 +38,8 @@ class WaveDrift:
 
     def harmonics(self, n: int = 8) -> Harmonics:
         """Fourier series up to the n-th harmonic, for kernels; there is no heeling moment (K is 0)."""
-        return Harmonics(
-            cosine_series(self.X, n), sine_series(self.Y, n), sine_series(self.N, n), np.zeros(n)
-        )
+        Y, N = (sine_series(curve, n) for curve in (self.Y, self.N))
+        return Harmonics(cosine_series(self.X, n), Y, N, np.zeros(n))
 
 
 def wave_drift(waves: Waves, particulars: Particulars, speed: float | None = None) -> WaveDrift:
@@ -67,33 +63,22 @@ def wave_drift(waves: Waves, particulars: Particulars, speed: float | None = Non
     density = ship.require("water_density")
     mean = density * GRAVITY * float(np.trapezoid(share * spectrum, omega))  # 2 * rho g / 2 * ...
     Y, N = sway * ship.length * mean, yaw * ship.length**2 * mean
-    slow = slow_drift(waves, ship)
+    curves = (mirrored(X), mirrored(Y, -1.0), mirrored(N, -1.0))
+    X, Y, N = (over_directions(curve, waves) for curve in curves)
     used = {"block_coefficient", "water_density"}
-    return WaveDrift(
-        chi,
-        over_directions(mirrored(X), waves),
-        over_directions(mirrored(Y, -1.0), waves),
-        over_directions(mirrored(N, -1.0), waves),
-        *slow,
-        tuple(sorted(ship.estimated & used)),
-    )
+    return WaveDrift(chi, X, Y, N, *slow_drift(waves, ship), tuple(sorted(ship.estimated & used)))
 
 
-class Waterline(NamedTuple):
-    """Half of a waterline of the form y = (B / 2) (1 - |2 x / L|^p), from bow to stern."""
+def waterline(ship: Particulars) -> tuple[Floats, Floats]:
+    """Half of a waterline y = (B / 2) (1 - |2 x / L|^p) from bow to stern, the same fore and aft.
 
-    # shape (points,); m, forward of midship and outward
-    x: Floats
-    y: Floats
-
-
-def waterline(ship: Particulars) -> Waterline:
-    """Waterline with the ship's waterplane coefficient p / (p + 1), the same fore and aft."""
-    cwp = waterplane_coefficient(ship)
+    Points x forward of midship and y outward, m. The waterplane coefficient, waterplane area by length *
+    beam, is p / (p + 1) and estimated as (1 + 2 CB) / 3 (Schneekluth & Bertram 1998, section 1.6).
+    """
+    cwp = (1.0 + 2.0 * ship.require("block_coefficient")) / 3.0
     power = cwp / (1.0 - cwp)
     xi = np.cos(np.linspace(0.0, np.pi, _WATERLINE_POINTS))
-    half_beam = 0.5 * ship.require("beam")
-    return Waterline(0.5 * ship.length * xi, half_beam * (1.0 - np.abs(xi) ** power))
+    return 0.5 * ship.length * xi, 0.5 * ship.require("beam") * (1.0 - np.abs(xi) ** power)
 
 
 def end_angle(ship: Particulars) -> float:
@@ -116,9 +101,9 @@ def reflection_coefficients(chi: ArrayLike, ship: Particulars) -> tuple[Floats, 
     along its inward normal. `chi`, rad, is where they come from, seen from the bow. Returns Y by rho g a^2 L
     / 2 and N about midship by rho g a^2 L^2 / 2.
     """
-    line = waterline(ship)
-    x, half = (0.5 * (ends[1:] + ends[:-1]) for ends in line)  # middle of each part
-    dx, dy = np.diff(line.x), np.diff(line.y)
+    line = np.array(waterline(ship))
+    x, half = 0.5 * (line[:, 1:] + line[:, :-1])  # middle of each part
+    dx, dy = np.diff(line)
     length = np.hypot(dx, dy)
     Y, N = np.zeros(np.shape(chi)), np.zeros(np.shape(chi))
     for side in (1.0, -1.0):
@@ -161,8 +146,7 @@ def _radiated(omega: Floats, chi: Floats, ship: Particulars, speed: float) -> Fl
     scale = 3859.2 * ship.require("water_density") * GRAVITY * B**2 / L * CB**1.34 * _PITCH_GYRADIUS**2
     with np.errstate(over="ignore", under="ignore"):
         shape = np.exp(b1 * np.log(w) + b1 / d1 * (1.0 - w**d1))
-    resistance: Floats = scale * a1 * a2 * shape
-    return resistance
+    return np.asarray(scale * a1 * a2 * shape)
 
 
 def _amplitudes(
@@ -173,13 +157,9 @@ def _amplitudes(
     waves = GRAVITY / (2.0 * omega)  # group velocity, m/s
     overtaking = np.where(waves > 0, (speed - waves) / (speed / Fr if Fr > 0.0 else 1.0), 0.0)
     ahead1, ahead2 = (0.87 / CB) ** ((1.0 + Fr) * c) * (1.0 + 2.0 * c) / 3.0, _speed_factor(np.array(Fr))
-    faster = speed > waves
-    astern1 = np.where(
-        faster & (overtaking >= 0.12), (0.87 / CB) ** (1.0 + np.maximum(overtaking, 0.0)), 0.87 / CB
-    )
-    astern2 = np.where(
-        faster, _speed_factor(np.maximum(overtaking, 0.0)), 0.0072 * (2.0 * speed / waves - 1.0)
-    )
+    faster, over = speed > waves, np.maximum(overtaking, 0.0)
+    astern1 = np.where(faster & (overtaking >= 0.12), (0.87 / CB) ** (1.0 + over), 0.87 / CB)
+    astern2 = np.where(faster, _speed_factor(over), 0.0072 * (2.0 * speed / waves - 1.0))
     part = np.clip(chi / (0.5 * np.pi) - 1.0, 0.0, 1.0)
     a1 = ((1.0 - part) * ahead1 + part * astern1) / slender
     a2 = (1.0 - part) * ahead2 + part * astern2
@@ -200,10 +180,8 @@ def _reflected(omega: Floats, chi: Floats, ship: Particulars, speed: float) -> F
         return np.where(length <= 2.5 * L, 1.0 - np.exp(-4.0 * np.pi * (T_ / length - T_ / (2.5 * L))), 0.0)
 
     def flat(angle: Floats) -> Floats:
-        part: Floats = np.sin(E + angle) ** 2 + 2.0 * omega * speed / GRAVITY * (
-            c - np.cos(E) * np.cos(E + angle)
-        )
-        return part
+        met = c - np.cos(E) * np.cos(E + angle)
+        return np.asarray(np.sin(E + angle) ** 2 + 2.0 * omega * speed / GRAVITY * met)
 
     blunt = (0.87 / CB) ** ((1.0 + 4.0 * np.sqrt(Fr)) * np.where(chi <= E, c, 0.0))
     root = np.sqrt(np.abs(c))
@@ -213,5 +191,4 @@ def _reflected(omega: Floats, chi: Floats, ship: Particulars, speed: float) -> F
     )  # fmt: skip
     aft = depth(stern) * (np.where(chi >= E, flat(-chi), 0.0) + np.where(chi >= np.pi - E, flat(chi), 0.0))
     scale = 2.25 / 4.0 * ship.require("water_density") * GRAVITY * ship.require("beam")
-    resistance: Floats = scale * (bow - aft)
-    return resistance
+    return np.asarray(scale * (bow - aft))

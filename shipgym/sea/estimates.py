@@ -50,11 +50,6 @@ def house_area(ship: Particulars) -> float:
     return _HOUSE_LENGTH * _HOUSE_HEIGHT * ship.length**2
 
 
-def waterplane_coefficient(ship: Particulars) -> float:
-    """Waterplane area by length * beam, (1 + 2 CB) / 3 (Schneekluth & Bertram 1998, section 1.6)."""
-    return (1.0 + 2.0 * ship.require("block_coefficient")) / 3.0
-
-
 def _lateral_centroid(ship: Particulars) -> float:
     house_at = -0.42 * ship.length if ship.require("block_coefficient") >= 0.75 else 0.0
     return house_at * house_area(ship) / ship.require("lateral_area")

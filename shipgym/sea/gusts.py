@@ -70,9 +70,8 @@ def gust_filter(wind: Wind) -> GaussMarkov:
     """First-order process with the variance of the gusts (m/s)^2 and the same most energetic frequency.
 
     f S(f) of a Gauss-Markov process is largest at f = 1 / (2 pi T); Harris's at sqrt(3) V / 1800 m,
-    Davenport's at sqrt(3) V / 1200 m, so T = 165.4 m / V and 110.3 m / V; NORSOK's is found by search. How
-    far the filter's spectrum is from the full one is stated in `docs/weather.md`. Without gusts the standard
-    deviation is 0.
+    Davenport's at sqrt(3) V / 1200 m, so T = 165.4 m / V and 110.3 m / V; NORSOK's is found by search.
+    `docs/weather.md` says how far the filter is from the full spectra. Without gusts the deviation is 0.
     """
     if not wind.gust or wind.calm:
         return GaussMarkov(1.0, 0.0)

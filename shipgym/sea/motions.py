@@ -54,8 +54,7 @@ def roll_response(omega: ArrayLike, chi: ArrayLike, particulars: Particulars, sp
 class WaveMotion:
     """Variance of wave-induced heading and roll over the direction of the waves."""
 
-    # shape (points,); where the waves come from, seen from the bow: 0 ahead, pi / 2 from starboard; 0 to
-    # below 2 pi, rad
+    # shape (points,), 0 to below 2 pi; where waves come from, seen from the bow, pi / 2 from starboard; rad
     chi: Floats
     # shape (points,); rad2
     heading_variance: Floats

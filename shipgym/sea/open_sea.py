@@ -159,11 +159,8 @@ def push(motion: Motion, sea: Sea, p: SeaParameters) -> Push:
     return Push(
         surge + drift * cosine_series(bow, p.drift_surge),
         sway + drift * sine_series(bow, beam, p.drift_sway),
-        yaw + drift * sine_series(bow, beam, p.drift_yaw),
-        roll,
-        sea.current_north,
-        sea.current_east,
-    )
+        yaw + drift * sine_series(bow, beam, p.drift_yaw), roll, sea.current_north, sea.current_east,
+    )  # fmt: skip
 
 
 def from_bow(sine: float, cosine: float, sea: Sea) -> tuple[float, float]:
@@ -308,12 +305,9 @@ def sea_records(windy: bool) -> tuple[Any, Any]:
 def sea_functions(windy: bool) -> dict[str, Any]:
     """What takes the place of the functions that loops name for the sea."""
     return {
-        "HAS_SEA": windy,
-        "push": Part(push),
-        "evolve": Part(evolve),
-        "begin_sea": Part(begin_sea, inline=False),
-        "encounter_frequency": Part(encounter_frequency),
-    }
+        "HAS_SEA": windy, "push": Part(push), "evolve": Part(evolve),
+        "begin_sea": Part(begin_sea, inline=False), "encounter_frequency": Part(encounter_frequency),
+    }  # fmt: skip
 
 
 def sea_parts(windy: bool, lanes: int = LANES) -> dict[str, Any]:
@@ -322,9 +316,7 @@ def sea_parts(windy: bool, lanes: int = LANES) -> dict[str, Any]:
     `lanes` are those of a tile of states, 64, or 1 where they are vectors.
     """
     state, parameters = (Layout(sea=kind)["sea"] for kind in sea_records(windy))
-    return {
-        **sea_functions(windy),
-        "load_sea": loader(state, lanes),
-        "store_sea": storer(state, lanes),
+    return sea_functions(windy) | {
+        "load_sea": loader(state, lanes), "store_sea": storer(state, lanes),
         "load_sea_parameters": loader(parameters, 1),
-    }
+    }  # fmt: skip

@@ -17,8 +17,7 @@ from shipgym.ships.particulars import Particulars
 class WaveFilter(NamedTuple):
     """h(s) = gain s / (s^2 + 2 damping w0 s + w0^2), driven by white noise of unit intensity.
 
-    Its output has unit variance: gain^2 = 4 damping w0. At sea w0 is the frequency of encounter, and the
-    gain follows it.
+    Its output has unit variance: gain^2 = 4 damping w0. At sea w0, and so the gain, is that of encounter.
     """
 
     peak_frequency: float  # w0 for a ship at rest, rad/s
@@ -72,9 +71,9 @@ def wave_spectrum(waves: Waves, omega: ArrayLike) -> Floats:
     return jonswap(omega, waves.significant_height, waves.peak_period, waves.gamma)
 
 
-def frequencies(waves: Waves, points: int = 400) -> Floats:
+def frequencies(waves: Waves) -> Floats:
     """Frequencies for integrals over the spectrum, from 0.4 to 12 times that of the peak, rad/s."""
-    return 2.0 * np.pi / waves.peak_period * np.geomspace(0.4, 12.0, points)
+    return 2.0 * np.pi / waves.peak_period * np.geomspace(0.4, 12.0, 400)
 
 
 def over_directions(curve: Floats, waves: Waves) -> Floats:
@@ -106,8 +105,7 @@ def wave_filter(waves: Waves) -> WaveFilter:
 
     The relative damping is fitted by least squares to the spectrum of unit variance; it depends on the peak
     enhancement alone. Saelid, Jenssen & Balchen 1983 (Design and analysis of a dynamic positioning system
-    based on Kalman filtering and optimal control, IEEE Trans. Automatic Control 28); Fossen 2011, section
-    8.2.
+    based on Kalman filtering and optimal control, IEEE Trans. Automatic Control 28); Fossen 2011, 8.2.
     """
     peak = 2.0 * np.pi / waves.peak_period
     damping = _fitted_damping(waves.gamma)

@@ -8,7 +8,7 @@ import numpy as np
 from shipgym.arrays import Floats
 from shipgym.engine.records import flat
 from shipgym.errors import InputError
-from shipgym.sea.conditions import Current, Waves, Weather, Wind
+from shipgym.sea.conditions import Waves, Weather, Wind
 from shipgym.sea.drift import wave_drift
 from shipgym.sea.estimates import GRAVITY, weather_particulars
 from shipgym.sea.gusts import GaussMarkov, gust_filter
@@ -58,7 +58,9 @@ def weather_column(
     """
     sea, current, wind, waves = CALM, weather.current, weather.wind, weather.waves
     if current is not None and not current.calm:
-        sea = _with_current(sea, current, step)
+        varying = _filter(GaussMarkov(current.time_constant, current.variation), step)
+        towards = _direction(current.towards_deg)
+        sea = sea._replace(current_speed=current.speed, current_towards=towards, current=varying)
     if wind is not None and not wind.calm:
         sea = _with_wind(sea, model, wind, step, mobility_matrix(model, water_depth))
     if waves is not None and not waves.calm:
@@ -77,30 +79,17 @@ def _filter(process: GaussMarkov, step: float) -> Filter:
     return Filter(float(np.exp(-step / process.time_constant)), shock, process.standard_deviation)
 
 
-def _with_current(sea: SeaParameters, current: Current, step: float) -> SeaParameters:
-    return sea._replace(
-        current_speed=current.speed,
-        current_towards=_direction(current.towards_deg),
-        current=_filter(GaussMarkov(current.time_constant, current.variation), step),
-    )
-
-
 def _with_wind(
     sea: SeaParameters, model: ManoeuvringModel, wind: Wind, step: float, mobility: Floats
 ) -> SeaParameters:
-    forces = wind_curves(model.particulars, wind.coefficients).harmonics(HARMONICS)
-    X, Y, N, K = (0.5 * AIR_DENSITY * series for series in forces)
-    surge, sway, yaw, roll = _accelerations(mobility, Harmonics(X, Y, N, K))
+    areas = wind_curves(model.particulars, wind.coefficients).harmonics(HARMONICS)
+    forces = Harmonics(*(0.5 * AIR_DENSITY * series for series in areas))
+    surge, sway, yaw, roll = _accelerations(mobility, forces)
     return sea._replace(
-        wind_speed=wind.speed,
-        wind_from=_direction(wind.from_deg),
-        gust=_filter(gust_filter(wind), step),
-        wind_surge=Cosines(*surge),
-        wind_sway=Sines(*sway),
-        wind_yaw=Sines(*yaw),
-        wind_roll=Sines(*roll),
+        wind_speed=wind.speed, wind_from=_direction(wind.from_deg), gust=_filter(gust_filter(wind), step),
+        wind_surge=Cosines(*surge), wind_sway=Sines(*sway), wind_yaw=Sines(*yaw), wind_roll=Sines(*roll),
         still_air=-float(surge.sum()),  # of the wind she makes herself, at angle 0
-    )
+    )  # fmt: skip
 
 
 def _with_waves(
@@ -110,19 +99,14 @@ def _with_waves(
     drift, motion = wave_drift(waves, model.particulars), wave_motion(waves, model.particulars)
     surge, sway, yaw, heel = _accelerations(mobility, drift.harmonics(HARMONICS))
     return sea._replace(
-        waves_from=_direction(waves.from_deg),
-        wave_frequency=spectrum.peak_frequency,
-        wave_number=spectrum.peak_frequency**2 / GRAVITY,
-        wave_damping=spectrum.damping,
+        waves_from=_direction(waves.from_deg), wave_frequency=spectrum.peak_frequency,
+        wave_number=spectrum.peak_frequency**2 / GRAVITY, wave_damping=spectrum.damping,
         wave_ringing=float(np.sqrt(1.0 - spectrum.damping**2)),
         drift=_filter(GaussMarkov(drift.time_constant, drift.standard_deviation), step),
-        drift_surge=Cosines(*surge),
-        drift_sway=Sines(*sway),
-        drift_yaw=Sines(*yaw),
-        drift_roll=Sines(*heel),
+        drift_surge=Cosines(*surge), drift_sway=Sines(*sway), drift_yaw=Sines(*yaw), drift_roll=Sines(*heel),
         heading_variance=Cosines(*motion.heading_variance_harmonics(HARMONICS)),
         roll_variance=Cosines(*motion.roll_variance_harmonics(HARMONICS)),
-    )
+    )  # fmt: skip
 
 
 def _accelerations(mobility: Floats, forces: Harmonics) -> tuple[Floats, Floats, Floats, Floats]:
@@ -141,8 +125,13 @@ def mobility_matrix(model: ManoeuvringModel, water_depth: float = np.inf) -> Flo
     equation of roll, or a ship of the user's that rolls, has that inertia which the roll period and the
     metacentric height tell. Raises InputError that names what mass and added mass lack.
     """
+    if isinstance(model.dynamics, Structure):
+        weather_particulars(model.particulars)  # says what is missing
     mass = np.zeros((4, 4))
-    mass[:3] = _inertia(model, water_depth)
+    try:
+        mass[:3] = inertia(model, water_depth)
+    except InputError as error:
+        raise InputError(f"weather without the particulars it needs: {error}") from None
     axes = [0, 1, 2, 3] if "phi" in model.state_names else [0, 1, 2]
     if isinstance(model.dynamics, Structure):
         axes = ["uvrp".index(equation) for equation in model.dynamics.equations if equation in "uvrp"]
@@ -153,15 +142,6 @@ def mobility_matrix(model: ManoeuvringModel, water_depth: float = np.inf) -> Flo
     matrix = np.zeros((4, 4))
     matrix[np.ix_(axes, axes)] = np.linalg.inv(mass[np.ix_(axes, axes)])
     return matrix
-
-
-def _inertia(model: ManoeuvringModel, water_depth: float) -> Floats:
-    if isinstance(model.dynamics, Structure):
-        weather_particulars(model.particulars)  # says what is missing
-    try:
-        return inertia(model, water_depth)
-    except InputError as error:
-        raise InputError(f"weather without the particulars it needs: {error}") from None
 
 
 def roll_inertia(model: ManoeuvringModel) -> float:

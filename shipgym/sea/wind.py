@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from shipgym.arrays import Floats
-from shipgym.checks import check_keys, check_number, check_table, did_you_mean, quoted
+from shipgym.checks import check_number, check_table, did_you_mean, quoted
 from shipgym.errors import InputError
 from shipgym.files import shipped_toml
 from shipgym.sea.estimates import house_area, weather_particulars
@@ -55,6 +55,8 @@ def coefficient_names() -> tuple[str, ...]:
 class WindTable:
     """Measured or computed wind coefficients of your own ship.
 
+    Raises InputError for angles that do not rise from 0 to 180, or rows of another length.
+
     Parameters
     ----------
     angles_deg : tuple of float
@@ -69,11 +71,6 @@ class WindTable:
     CK : tuple of float, optional
         Heeling moment about the waterline to lee by lateral area and its mean height (area by length
         overall); none is taken where it is not given.
-
-    Raises
-    ------
-    InputError
-        For angles that do not rise from 0 to 180, or rows of another length.
     """
 
     angles_deg: tuple[float, ...]
@@ -107,10 +104,8 @@ class WindTable:
     @classmethod
     def from_dict(cls, mapping: Mapping[str, Any], where: str = "wind table") -> WindTable:
         """Read a table as it stands in JSON; InputError for an unknown or missing row."""
-        table = check_table(mapping, where)
         needed = ("angles_deg", "CX", "CY", "CN")
-        check_keys(table, (*needed, "CK"), where, needed)
-        return cls(**table)
+        return cls(**check_table(mapping, where, (*needed, "CK"), needed))
 
 
 def _row(values: Any, where: str) -> tuple[float, ...]:
@@ -161,15 +156,9 @@ def blendermann_coefficients(
 
 
 def isherwood_coefficients(
-    length: float,
-    beam: float,
-    lateral_area: float,
-    frontal_area: float,
-    perimeter: float,
-    bow_to_centroid: float,
-    masts: float,
-    superstructure_area: float,
-) -> tuple[Floats, Floats, Floats]:
+    length: float, beam: float, lateral_area: float, frontal_area: float, perimeter: float,
+    bow_to_centroid: float, masts: float, superstructure_area: float,
+) -> tuple[Floats, Floats, Floats]:  # fmt: skip
     """Isherwood's coefficients every 10 degrees from 0 (ahead) to 180 (astern), three arrays of shape (19,).
 
     Lengths in m, projected areas above the water in m2; `length` is overall, `perimeter` that of the lateral
@@ -211,9 +200,8 @@ class WindCurves:
         For n = 8 the largest difference from the curve is below 1.5 % of its largest value for Blendermann's
         coefficients and below 9 % for Isherwood's, whose tables have kinks (`tests/shipgym/test_wind.py`).
         """
-        return Harmonics(
-            cosine_series(self.X, n), sine_series(self.Y, n), sine_series(self.N, n), sine_series(self.K, n)
-        )
+        lateral = (sine_series(curve, n) for curve in (self.Y, self.N, self.K))
+        return Harmonics(cosine_series(self.X, n), *lateral)
 
 
 def wind_curves(particulars: Particulars, coefficients: str | WindTable = "blendermann") -> WindCurves:
@@ -230,17 +218,11 @@ def wind_curves(particulars: Particulars, coefficients: str | WindTable = "blend
     CX, CY, CN, heel = _coefficients(ship, coefficients, folded)
     frontal, lateral = ship.require("frontal_area"), ship.require("lateral_area")
     length = ship.require("length_overall")
+    used = {"length_overall", "frontal_area", "lateral_area", "lateral_centroid", "lateral_centroid_height"}
     return WindCurves(
-        angle,
-        X=frontal * CX,
-        Y=side * lateral * CY,
-        N=side * lateral * length * CN,
-        K=side * lateral * heel,
-        estimated=tuple(sorted(ship.estimated & set(_USED))),
-    )
-
-
-_USED = ("length_overall", "frontal_area", "lateral_area", "lateral_centroid", "lateral_centroid_height")
+        angle, X=frontal * CX, Y=side * lateral * CY, N=side * lateral * length * CN,
+        K=side * lateral * heel, estimated=tuple(sorted(ship.estimated & used)),
+    )  # fmt: skip
 
 
 def _coefficients(
@@ -250,10 +232,9 @@ def _coefficients(
     length, lateral = ship.require("length_overall"), ship.require("lateral_area")
     height = ship.require("lateral_centroid_height")
     if isinstance(coefficients, WindTable):
-        degrees = np.degrees(angle)
         table = coefficients
         rows = (table.CX, table.CY, table.CN, table.CK or (0.0,) * len(table.angles_deg))
-        CX, CY, CN, CK = (np.interp(degrees, table.angles_deg, row) for row in rows)
+        CX, CY, CN, CK = (np.interp(np.degrees(angle), table.angles_deg, row) for row in rows)
         return CX, CY, CN, CK * lateral / length
     if coefficients == "isherwood":
         CX, CY, CN = (np.interp(angle, np.radians(np.arange(0, 181, 10)), row) for row in _isherwood(ship))
@@ -268,13 +249,9 @@ def _isherwood(ship: Particulars) -> tuple[Floats, Floats, Floats]:
     """Isherwood's regression with an outline estimated from the lateral area."""
     length, lateral = ship.require("length_overall"), ship.require("lateral_area")
     return isherwood_coefficients(
-        length=length,
-        beam=ship.require("beam"),
-        lateral_area=lateral,
-        frontal_area=ship.require("frontal_area"),
+        length, ship.require("beam"), lateral, ship.require("frontal_area"),
         # along the deck, up and down the sides of a rectangle of the same area, and of the house
         perimeter=length + 2.0 * lateral / length + 2.0 * 0.07 * ship.length,
-        bow_to_centroid=0.5 * length - ship.require("lateral_centroid"),
-        masts=_ISHERWOOD_MASTS,
+        bow_to_centroid=0.5 * length - ship.require("lateral_centroid"), masts=_ISHERWOOD_MASTS,
         superstructure_area=min(house_area(ship), 0.9 * lateral),
-    )
+    )  # fmt: skip

@@ -52,15 +52,12 @@ def parse_columns(columns: Mapping[str, Any], where: str = "columns") -> dict[st
     parsed: dict[str, Column] = {}
     for channel, entry in check_table(columns, where).items():
         check_channel(channel, where)
-        place, unit, clock = f"{where} {channel}", si_unit(channel), {}
+        place, name, unit, clock = f"{where} {channel}", entry, si_unit(channel), {}
         if isinstance(entry, Mapping):
             check_keys(entry, ("column", "unit", *(("date", "zone") if channel == "t" else ())), place)
             clock = {key: check_text(entry[key], place) for key in ("date", "zone") if key in entry}
             zone_seconds(clock.get("zone", "UTC"), f"{place} zone")
-            name = entry.get("column")
-            unit = entry.get("unit", unit)
-        else:
-            name = entry
+            name, unit = entry.get("column"), entry.get("unit", unit)
         if not isinstance(name, str):
             example = f'{{ column = "name", unit = "{si_unit(channel)}" }}'
             raise InputError(f"{place}: {entry!r} found, expected the name of a column or {example}")

@@ -78,12 +78,9 @@ class Table:
 
 
 def column_table(
-    path: Path,
-    columns: Mapping[str, npt.NDArray[Any]],
-    rows: Sequence[int],
-    words: str = "row {line}",
+    path: Path, columns: Mapping[str, npt.NDArray[Any]], rows: Sequence[int], words: str = "row {line}",
     **more: Any,
-) -> Table:
+) -> Table:  # fmt: skip
     """A table of whole columns, and the place in the file of each row; `more` are other fields of `Table`."""
     return Table(path, tuple(columns), columns.__getitem__, rows, words, **more)
 

@@ -46,18 +46,16 @@ def cut_log(cut: Any, log: Log, where: str) -> list[slice]:
     return found
 
 
-def _seconds(moment: float | str, log: Log, where: str) -> float:
+def _seconds(when: float | str, log: Log, where: str) -> float:
     """A moment on the time of the log, s; a time of the day is that next to its beginning."""
-    if not isinstance(moment, str):
-        return float(moment)
+    if not isinstance(when, str):
+        return float(when)
     try:
-        (seconds,), dated = read_clock([moment])
+        (seconds,), dated = read_clock([when])
     except ValueError:
-        raise InputError(f"{where} cut: {moment!r} found, {_EXPECTED}") from None
+        raise InputError(f"{where} cut: {when!r} found, {_EXPECTED}") from None
     if log.start is None:
-        raise InputError(
-            f"{where} cut: {moment!r} found, but the log has no clock; write seconds of its time"
-        )
+        raise InputError(f"{where} cut: {when!r} found, but the log has no clock; write seconds of its time")
     if dated:
         return float(seconds - log.start)
     after = float((seconds - log.start) % DAY)

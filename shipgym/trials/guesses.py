@@ -59,9 +59,8 @@ def _guess(table: Table, channel: str, name: str) -> Guess:
     limit, unit = large.get(channel) or large.get(quantity) or (np.inf, "")
     if largest <= limit:
         unit = next(iter(UNITS[quantity]))
-    return Guess(
-        channel, name, unit, f"from its size, up to {largest:.4g}" if values.size else "from its content"
-    )
+    reason = f"from its size, up to {largest:.4g}" if values.size else "from its content"
+    return Guess(channel, name, unit, reason)
 
 
 def guess_trial(path: str | Path) -> tuple[list[Guess], str, Trial]:

@@ -10,15 +10,7 @@ from dataclasses import dataclass, field
 from numbers import Real
 from typing import Any, Self
 
-from shipgym.checks import (
-    check_choice,
-    check_keys,
-    check_number,
-    check_table,
-    check_text,
-    did_you_mean,
-    quoted,
-)
+from shipgym.checks import check_choice, check_number, check_table, check_text, did_you_mean, quoted
 from shipgym.errors import InputError
 from shipgym.files import shipped_toml
 
@@ -136,11 +128,8 @@ class Options:
 
     def settings(self) -> dict[str, Any]:
         """The settings of the method that were given."""
-        return {
-            name: value
-            for name, option in OPTIONS.items()
-            if option.setting and (value := getattr(self, name)) is not None
-        }
+        given = {name: getattr(self, name) for name, option in OPTIONS.items() if option.setting}
+        return {name: value for name, value in given.items() if value is not None}
 
     def own(self) -> dict[str, Any]:
         """The options of `identify` itself."""
@@ -154,18 +143,14 @@ def _is(value: Any, *kinds: type) -> bool:
     return isinstance(value, kinds) and not (isinstance(value, str) and not value.strip())
 
 
-def _is_number(value: Any) -> bool:
-    return _is(value, Real)
-
-
 #: How each kind of value is recognised in a file; the words stand in messages.
 KINDS: dict[str, Callable[[Any], bool]] = {
     TEXT: lambda value: _is(value, str),
     FLAG: lambda value: _is(value, bool),
-    NUMBER: _is_number,
+    NUMBER: lambda value: _is(value, Real),
     WHOLE: lambda value: _is(value, int),
     TEXTS: lambda value: isinstance(value, list) and all(_is(one, str) for one in value),
-    TWO_NUMBERS: lambda value: isinstance(value, list) and len(value) == 2 and all(map(_is_number, value)),
+    TWO_NUMBERS: lambda value: isinstance(value, list) and [_is(one, Real) for one in value] == [True] * 2,
     WHOLE_OR_TEXT: lambda value: _is(value, int, str),
     TEXT_OR_TABLE: lambda value: _is(value, str, Mapping),
 }
@@ -177,8 +162,7 @@ def check_options(table: Any, where: str) -> dict[str, Any]:
     Raises InputError, which begins with `where` (``"ship.toml: [identify]"``), for an unknown option, a value
     of another kind or out of bounds.
     """
-    options = check_table(table, where)
-    check_keys(options, OPTIONS, where)
+    options = check_table(table, where, OPTIONS)
     for name, value in options.items():
         option = OPTIONS[name]
         if option.kind == TEXT:

@@ -111,10 +111,8 @@ def straight_parts(t: Floats, channels: Mapping[str, Floats]) -> Flags:
 
 def correct_offsets(log: Log, tools: Instruments) -> None:
     """Take the offsets of heading and rudder out of the channels."""
-    channels = log.channels
-    for (key, name), offset in zip(
-        _OFFSETS.items(), (tools.heading_offset, tools.rudder_offset), strict=True
-    ):
+    channels, offsets = log.channels, (tools.heading_offset, tools.rudder_offset)
+    for (key, name), offset in zip(_OFFSETS.items(), offsets, strict=True):
         if name not in channels:
             continue
         if isinstance(offset, str):
@@ -160,13 +158,14 @@ def to_midship(log: Log, tools: Instruments) -> None:
     """
     t, channels = log.t, log.channels
     north, east, water = (channels.pop(name, None) for name in ("ground_north", "ground_east", "stw"))
-    moved = bool(tools.forward or tools.starboard)
+    moved, whole = bool(tools.forward or tools.starboard), {"u", "v"} <= channels.keys()
+    if water is not None:
+        channels["u"] = water
     if "psi" not in channels:
         if north is not None or moved:
             raise InputError(
                 f"{log.where}: positions or velocities of GNSS found without a heading, expected a column psi"
             )
-        channels |= {} if water is None else {"u": water}
         return
     psi, r = channels["psi"], channels["r"]
     if moved and {"x", "y"} <= channels.keys():
@@ -175,15 +174,14 @@ def to_midship(log: Log, tools: Instruments) -> None:
     if north is not None and east is not None:
         u, v = rotate_to_body(north, east, psi)
         ground = (u + tools.starboard * r, v - tools.forward * r) if moved else (u, v)
-    elif {"x", "y"} <= channels.keys() and not {"u", "v"} <= channels.keys():
+    elif {"x", "y"} <= channels.keys() and not whole:
         ground = rotate_to_body(time_derivative(t, channels["x"]), time_derivative(t, channels["y"]), psi)
     else:
-        channels |= {} if water is None else {"u": water}
         return
     if water is not None:
         current, note = set_and_drift(psi, water, ground)
         c, s = np.cos(psi), np.sin(psi)
-        channels["u"], ground = water, (water, ground[1] - (c * current[1] - s * current[0]))
+        ground = water, ground[1] - (c * current[1] - s * current[0])
         log.notes.append(note)
     for name, values in zip(("u", "v"), ground, strict=True):
         if name not in channels:
@@ -204,6 +202,6 @@ def set_and_drift(psi: Floats, water: Floats, ground: tuple[Floats, Floats]) -> 
     size, toward = float(np.hypot(*current)), math.degrees(math.atan2(current[1], current[0])) % 360.0
     return current, (
         f"set and drift by the speed log against the ground: {size:.2f} m/s ({size * 3.6 / 1.852:.2f} kn) "
-        "toward "
-        f"{toward:03.0f} deg, {np.std(values - rows @ current):.2f} m/s unexplained; removed from the sway"
+        f"toward {toward:03.0f} deg, {np.std(values - rows @ current):.2f} m/s unexplained; removed from "
+        "the sway"
     )

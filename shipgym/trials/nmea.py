@@ -168,9 +168,8 @@ def _absolute_wind(chosen: dict[str, Series]) -> None:
     theoretical = chosen.pop("wind_from", None), chosen.pop("wind_speed", None)
 
     def at(clock: Floats, name: str) -> Floats:
-        return np.interp(
-            clock, chosen[name][0], np.unwrap(chosen[name][2]) if name != "sog" else chosen[name][2]
-        )
+        times, _, values = chosen[name]
+        return np.interp(clock, times, values if name == "sog" else np.unwrap(values))
 
     if "psi" not in chosen:
         return

@@ -37,8 +37,7 @@ NO_RUDDER = (
 def check_ranges(channels: Mapping[str, Floats], source: Source) -> None:
     """Refuse values beyond :data:`LIMITS`, and name the unit that would make them plausible.
 
-    The channels are in SI units, of shape (n_samples,), nan where there is no value; the source is the file,
-    for messages.
+    The channels are in SI units, of shape (n_samples,), nan where there is none; the source is for messages.
     """
     for channel, limit in LIMITS.items():
         if channel not in channels:

@@ -76,24 +76,18 @@ def on_one_clock(series: Series, where: str) -> Log:
     clocks = [clock for clock, _ in series.values()]
     if all(clock is clocks[0] for clock in clocks):
         return Log(clocks[0], {name: values for name, (_, values) in series.items()}, where, [])
-    motion = {name: series[name][0] for name in series if name in MOTION} or dict(
-        zip(series, clocks, strict=True)
-    )
+    names = [name for name in series if name in MOTION] or list(series)
+    motion = {name: series[name][0] for name in names}
     t = max(motion.values(), key=lambda clock: float(np.median(np.diff(clock))))
     inside, notes = np.ones(t.size, dtype=bool), []
     for name, clock in motion.items():
-        steps = np.diff(clock)
-        holes = steps > HOLE_STEPS * max(float(np.median(steps)), float(np.median(np.diff(t))))
+        step = np.diff(clock)
+        holes = step > HOLE_STEPS * max(float(np.median(step)), float(np.median(np.diff(t))))
         after = np.clip(np.searchsorted(clock, t), 1, clock.size - 1)
-        inside &= (
-            (t >= clock[0])
-            & (t <= clock[-1])
-            & ~(holes[after - 1] & (t > clock[after - 1]) & (t < clock[after]))
-        )
+        in_hole = holes[after - 1] & (t > clock[after - 1]) & (t < clock[after])
+        inside &= (t >= clock[0]) & (t <= clock[-1]) & ~in_hole
         if holes.any():
-            notes.append(
-                f"{name} has {holes.sum()} holes, of up to {steps.max():.4g} s; nothing is put there"
-            )
+            notes.append(f"{name} has {holes.sum()} holes, of up to {step.max():.4g} s; nothing is put there")
     t = t[inside]
     if t.size < _FEWEST:
         raise InputError(

@@ -21,7 +21,8 @@ class Sensor:
     """One sensor, in the SI unit of its channel. The default is a perfect one.
 
     The reading at time t is the signal at t - latency_s, plus drift and white noise, now and then an outlier,
-    rounded to the resolution.
+    rounded to the resolution. Raises InputError for a negative or infinite number, a probability above 1, or
+    a drift without correlation time.
 
     Attributes
     ----------
@@ -39,11 +40,6 @@ class Sensor:
         Standard deviation of what an outlier adds.
     latency_s : float
         Age of the signal at the time its reading is logged, s.
-
-    Raises
-    ------
-    InputError
-        For a negative or infinite number, a probability above 1, or a drift without correlation time.
     """
 
     noise: float = 0.0
@@ -102,24 +98,18 @@ SEA_TRIAL: Mapping[str, Sensor] = MappingProxyType(
 
 @dataclass(frozen=True)
 class Sensors:
-    """The sensors of a ship and her logger.
+    """The sensors of a ship and her logger; InputError for an unknown channel, or a number out of range.
 
     Attributes
     ----------
     by_channel : mapping of str to Sensor
         Channels without a sensor are logged as they are. By default those of a sea trial (`SEA_TRIAL`).
     sampling_s : float or None
-        Time between logged samples, s, which lie on straight lines between those of the trial; None: as in
-        the trial.
+        Time between logged samples, s, on straight lines between those of the trial; None: as in the trial.
     dropout_probability : float
         Of each sample to begin a gap in the log.
     dropout_samples : float
         Mean length of a gap, samples. A gap leaves the samples out of the measured trial.
-
-    Raises
-    ------
-    InputError
-        For an unknown channel, or a number out of range.
     """
 
     by_channel: Mapping[str, Sensor] = field(default_factory=lambda: SEA_TRIAL)
@@ -148,14 +138,11 @@ class Sensors:
         """
         check_whole(seed, "seed", at_least=0)
         t = self._sampled(trial)
-        readings = {
-            name: self.by_channel.get(name, PERFECT).read(
-                t, trial.t, values, np.random.default_rng([seed, CHANNELS.index(name)])
-            )
-            if name not in ORDERS
-            else orders_at(t, trial.t, values)
-            for name, values in on_board(trial).items()
-        }
+        readings = {}
+        for name, values in on_board(trial).items():
+            rng = np.random.default_rng([seed, CHANNELS.index(name)])
+            sensor, signal = self.by_channel.get(name, PERFECT), (t, trial.t, values)
+            readings[name] = orders_at(*signal) if name in ORDERS else sensor.read(*signal, rng)
         kept = self._logged(len(t), np.random.default_rng([seed, CHANNELS.index(WEATHER[0])]))
         if kept.sum() < FEWEST_SAMPLES:
             raise InputError(

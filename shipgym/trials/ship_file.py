@@ -176,10 +176,8 @@ def _entry(
             for one in paths:
                 check_readable(one, "CSV file")
     conventions = _conventions(words, sensors, particulars, where)
-    columns = {**shared["columns"], **columns}
-    return TrialEntry(
-        " + ".join(files), paths, table.get("cut"), kind, use, columns or None, conventions, where
-    )
+    name, columns = " + ".join(files), {**shared["columns"], **columns}
+    return TrialEntry(name, paths, table.get("cut"), kind, use, columns or None, conventions, where)
 
 
 def _conventions(

@@ -32,8 +32,7 @@ def read_log(path: str | Path | Table) -> Table:
     """The table in a file, whose kind its ending says; without one of these it is CSV, or NMEA 0183.
 
     Excel: the first sheet, names of columns in its first row; MATLAB: its numeric vectors of one length.
-    Raises InputError for a file that is missing, too large, damaged or of no such kind, and where the library
-    for it is not installed.
+    InputError for a file that is missing, too large, damaged, of no such kind, or whose library is missing.
     """
     if isinstance(path, Table):
         return path
@@ -84,14 +83,13 @@ def _check_unpacked(path: Path, size: int) -> None:
 def _read_excel(path: Path) -> Table:
     data = read_bytes(path, "workbook of Excel", LARGEST_PACKED)
     with _damage_told(path, "Excel (.xlsx)", "save the sheet anew as .xlsx or as CSV"):
-        with zipfile.ZipFile(io.BytesIO(data)) as parts:
-            _check_unpacked(path, sum(part.file_size for part in parts.infolist()))
+        parts = zipfile.ZipFile(io.BytesIO(data))
+        _check_unpacked(path, sum(part.file_size for part in parts.infolist()))
         book = import_module("openpyxl").load_workbook(io.BytesIO(data), read_only=True, data_only=True)
         sheet = book.worksheets[0]
         if (sheet.max_row or 0) * (sheet.max_column or 0) > MOST_CELLS:
             raise InputError(f"{path}: more than {MOST_CELLS} cells found, expected fewer; save it as CSV")
-        with zipfile.ZipFile(io.BytesIO(data)) as parts:
-            _, merged, after = parts.read(sheet._worksheet_path).partition(b'<mergeCell ref="')
+        _, merged, after = parts.read(sheet._worksheet_path).partition(b'<mergeCell ref="')
         if merged:
             cells = after.partition(b'"')[0].decode("ascii", "replace")
             raise InputError(
@@ -153,9 +151,8 @@ def _read_matlab(path: Path) -> Table:
                     where = f"{path}: variable {name.decode('ascii')!r}"
                     raise InputError(f"{where}: complex numbers found, expected real ones; save real(...)")
                 found[name.decode("ascii")] = array.astype(np.float64)
-        length = max(
-            (one.size for one in found.values()), key=[v.size for v in found.values()].count, default=0
-        )
+        lengths = [values.size for values in found.values()]
+        length = max(lengths, key=lengths.count, default=0)
         if not length:
             raise InputError(
                 f"{path}: no numeric vectors found, expected one for each channel; a struct is not read: "

@@ -41,7 +41,8 @@ class Trial:
     forces ``X`` ahead and ``Y`` to starboard (N) and the yaw moment ``N`` about midship (N m). Simulated in
     weather: first-order motion in waves ``psi_wave``, ``r_wave``, ``phi_wave`` and ``p_wave``, which is not
     in psi, r, phi and p, the current ``current_north`` and ``current_east`` (m/s) and the wind
-    ``wind_speed`` (m/s) and ``wind_from`` (rad).
+    ``wind_speed`` (m/s) and ``wind_from`` (rad). Raises InputError for unknown channels, lengths that differ,
+    values that are not finite, or time that goes back.
 
     Parameters
     ----------
@@ -68,11 +69,6 @@ class Trial:
         By default where one of them was derived, as it is from positions.
     notes : sequence of str, optional
         Remarks of the reader: what it corrected, left out or found amiss.
-
-    Raises
-    ------
-    InputError
-        For unknown channels, lengths that differ, values that are not finite, or time that goes back.
     """
 
     t: Floats
@@ -87,41 +83,26 @@ class Trial:
     notes: tuple[str, ...]
 
     def __init__(
-        self,
-        t: npt.ArrayLike,
-        channels: Mapping[str, npt.ArrayLike],
-        *,
-        name: str = "trial",
-        kind: str | None = None,
-        use: str = "fit",
-        derived: Collection[str] = (),
-        length: float | None = None,
-        repaired: Mapping[str, int] | None = None,
-        raw: Trial | None = None,
-        over_ground: bool | None = None,
-        notes: Sequence[str] = (),
-    ) -> None:
+        self, t: npt.ArrayLike, channels: Mapping[str, npt.ArrayLike], *, name: str = "trial",
+        kind: str | None = None, use: str = "fit", derived: Collection[str] = (),
+        length: float | None = None, repaired: Mapping[str, int] | None = None, raw: Trial | None = None,
+        over_ground: bool | None = None, notes: Sequence[str] = (),
+    ) -> None:  # fmt: skip
         check_text(name, "trial: name")
         where = f"trial '{name}'"
         times = _frozen_array(t, f"{where}: t")
         _check_time(times, where)
         arrays = _frozen_channels(channels, times.shape, where)
-        if not arrays.keys() >= set(derived):
-            unknown = quoted(sorted(set(derived) - arrays.keys()))
-            raise InputError(f"{where}: derived: {unknown} found, expected some of {quoted(arrays)}")
+        if unknown := sorted(set(derived) - arrays.keys()):
+            raise InputError(f"{where}: derived: {quoted(unknown)} found, expected some of {quoted(arrays)}")
         vars(self).update(
-            t=times,
-            channels=MappingProxyType(arrays),
-            name=name,
+            t=times, channels=MappingProxyType(arrays), name=name, derived=frozenset(derived),
             kind=None if kind is None else check_choice(kind, KINDS, f"{where}: kind"),
             use=check_choice(use, USES, f"{where}: use"),
-            derived=frozenset(derived),
             length=None if length is None else check_number(length, f"{where}: length", above=0.0),
-            repaired=MappingProxyType(dict(repaired or {})),
+            repaired=MappingProxyType(dict(repaired or {})), notes=tuple(notes), _raw=raw,
             over_ground=bool({"u", "v"} & set(derived)) if over_ground is None else bool(over_ground),
-            notes=tuple(notes),
-            _raw=raw,
-        )
+        )  # fmt: skip
 
     def __setattr__(self, name: str, value: Any) -> None:
         raise AttributeError(f"a trial is immutable: {name} cannot be set; `with_` returns a changed copy")
@@ -180,20 +161,16 @@ class Trial:
     def with_(self, **changes: Any) -> Trial:
         """Return a copy with another ``name``, ``kind``, ``use``, ``length`` or ``over_ground``."""
         known = ("name", "kind", "use", "length", "over_ground")
-        unknown = changes.keys() - set(known)
-        if unknown:
+        if unknown := changes.keys() - set(known):
             raise InputError(
                 f"trial '{self.name}': cannot change {quoted(sorted(unknown))}, only {', '.join(known)}"
             )
         return Trial(self.t, self.channels, **(self._settings() | changes))
 
     def with_channels(
-        self,
-        channels: Mapping[str, npt.ArrayLike],
-        *,
-        t: npt.ArrayLike | None = None,
-        repaired: Mapping[str, int] | None = None,
-    ) -> Trial:
+        self, channels: Mapping[str, npt.ArrayLike], *,
+        t: npt.ArrayLike | None = None, repaired: Mapping[str, int] | None = None,
+    ) -> Trial:  # fmt: skip
         """Return a copy with some channels replaced, of which this trial is the raw one.
 
         With other times `t`, s, all channels are given. `repaired` counts filled values by channel, on top of
@@ -210,26 +187,18 @@ class Trial:
 
     @classmethod
     def from_csv(
-        cls,
-        path: str | Path | Table,
-        columns: Mapping[str, str | Mapping[str, str]] | None = None,
-        rudder_positive: str = "starboard",
-        velocity_frame: str = "body",
-        *,
-        origin: str = "midship",
-        xg: float | None = None,
-        repair: str | None = None,
-        name: str | None = None,
-        kind: str | None = None,
-        use: str = "fit",
-        length: float | None = None,
+        cls, path: str | Path | Table, columns: Mapping[str, str | Mapping[str, str]] | None = None,
+        rudder_positive: str = "starboard", velocity_frame: str = "body", *, origin: str = "midship",
+        xg: float | None = None, repair: str | None = None, name: str | None = None,
+        kind: str | None = None, use: str = "fit", length: float | None = None,
         sensors: Mapping[str, Any] | None = None,
-    ) -> Trial:
+    ) -> Trial:  # fmt: skip
         """Read a trial from a log and convert it to SI units and the project's signs.
 
         Channels that follow from others are derived where absent: ``r`` from ``psi``; ``u`` and ``v`` from
         ``sog`` and ``cog``, else from position; ``psi`` from ``r`` where there is no position (relative to
         the start). ``lat`` and ``lon`` become ``x`` and ``y``; ``stw``, speed through the water, is ``u``.
+        An InputError for anything wrong with file or arguments names file, line, column, value and remedy.
 
         Parameters
         ----------
@@ -253,17 +222,11 @@ class Trial:
             As in :class:`Trial`; the name is the file's by default.
         sensors : mapping, optional
             The table ``[sensors]`` of a ship file.
-
-        Raises
-        ------
-        InputError
-            For anything wrong with file or arguments, naming file, line, column, value and remedy.
         """
         table = read_log(path)
-        tools = Instruments.from_mapping(sensors or {}, f"{table.path}: sensors")
-        conventions = Conventions(
-            rudder_positive, velocity_frame, origin, xg, repair, f"{table.path}:", tools
-        )
+        where = f"{table.path}:"
+        tools = Instruments.from_mapping(sensors or {}, f"{where} sensors")
+        conventions = Conventions(rudder_positive, velocity_frame, origin, xg, repair, where, tools)
         name = table.path.name if name is None else name
         return read_trials([table], columns, conventions, name=name, kind=kind, use=use, length=length)[0]
 
@@ -280,8 +243,7 @@ class Trial:
     def to_csv(self, path: str | Path) -> None:
         """Write time and all channels in SI units; :meth:`from_csv` reads back the very same numbers.
 
-        The file, replaced where it exists, is never there in part. Raises InputError where it cannot be
-        written.
+        The file, replaced where it exists, is never there in part. InputError if it cannot be written.
         """
         names = ["t", *self.channels]
         rows = zip(*(self[name].tolist() for name in names), strict=True)
@@ -290,14 +252,9 @@ class Trial:
 
 
 def read_trials(
-    tables: Sequence[Table],
-    columns: Mapping[str, Any] | None,
-    conventions: Conventions,
-    cut: Any = None,
-    *,
-    name: str,
-    **facts: Any,
-) -> list[Trial]:
+    tables: Sequence[Table], columns: Mapping[str, Any] | None, conventions: Conventions, cut: Any = None,
+    *, name: str, **facts: Any,
+) -> list[Trial]:  # fmt: skip
     """The trials in the tables of one log: one, or those that `cut` makes of it (:func:`.cuts.cut_log`).
 
     `name`, `kind`, `use` and `length` are as in :class:`Trial`; a part is named by its seconds.

@@ -9,27 +9,16 @@ import numpy as np
 from shipgym.arrays import Flags, Floats
 from shipgym.checks import check_choice, check_number, quoted
 from shipgym.errors import InputError
-from shipgym.trials import plausibility
+from shipgym.trials import navigation, plausibility
 from shipgym.trials.clock_offsets import corrected_clocks
 from shipgym.trials.clock_texts import read_angles, read_clock, zone_seconds
 from shipgym.trials.columns import Column, Source, choose_columns
 from shipgym.trials.csv_reader import Table, is_number
 from shipgym.trials.derivatives import time_derivative
-from shipgym.trials.navigation import (
-    NO_OFFSETS,
-    Instruments,
-    correct_offsets,
-    local_metres,
-    rotate_to_body,
-    to_midship,
-)
 from shipgym.trials.resampling import Log, Series, have_own_clocks, on_one_clock, own_clock
 from shipgym.trials.units import QUANTITIES, si_factor
 
 RUDDER_SIGNS = ("starboard", "port")
-VELOCITY_FRAMES = ("body", "earth")
-ORIGINS = ("midship", "cg")
-REPAIRS = ("interpolate",)
 
 #: A run of more rows without a value that lasts more median time steps is too long to fill.
 LONGEST_HOLE_ROWS = 10
@@ -52,14 +41,14 @@ class Conventions:
     xg: float | None = None
     repair: str | None = None
     where: str = "conventions"
-    instruments: Instruments = NO_OFFSETS
+    instruments: navigation.Instruments = navigation.NO_OFFSETS
 
     def __post_init__(self) -> None:
         check_choice(self.rudder_positive, RUDDER_SIGNS, f"{self.where} rudder_positive")
-        check_choice(self.velocity_frame, VELOCITY_FRAMES, f"{self.where} velocity_frame")
-        check_choice(self.origin, ORIGINS, f"{self.where} origin")
+        check_choice(self.velocity_frame, ("body", "earth"), f"{self.where} velocity_frame")
+        check_choice(self.origin, ("midship", "cg"), f"{self.where} origin")
         if self.repair is not None:
-            check_choice(self.repair, REPAIRS, f"{self.where} repair")
+            check_choice(self.repair, ("interpolate",), f"{self.where} repair")
         if self.xg is not None:
             check_number(self.xg, f"{self.where} xg")
         elif self.origin == "cg":
@@ -155,10 +144,8 @@ def _recorded(table: Table, chosen: dict[str, Column], repair: str | None) -> _R
             raise InputError(
                 f"{table.path}: sog has {speed.size} values and cog {course.size}, expected both in a row"
             )
-        series |= {
-            "ground_north": (clock, speed * np.cos(course)),
-            "ground_east": (clock, speed * np.sin(course)),
-        }
+        series["ground_north"] = clock, speed * np.cos(course)
+        series["ground_east"] = clock, speed * np.sin(course)
     return _Recorded(series, source, filled, start)
 
 
@@ -216,10 +203,9 @@ def _local_positions(
     local, far = np.full((2, t.size), np.nan), here[:0]
     if here.size:
         plausibility.check_ranges({"lat": lat, "lon": lon}, source)
-        local[:, here] = local_metres(lat[here], lon[here], (lat[here[0]], lon[here[0]]))
-        far = plausibility.find_outliers(
-            t[here] * si_factor("t", chosen["t"].unit), local[:, here], source, here
-        )
+        local[:, here] = navigation.local_metres(lat[here], lon[here], (lat[here[0]], lon[here[0]]))
+        seconds = t[here] * si_factor("t", chosen["t"].unit)
+        far = plausibility.find_outliers(seconds, local[:, here], source, here)
         if far.size and repair is None:
             k = int(far[0])
             raise InputError(
@@ -262,16 +248,19 @@ def to_project_conventions(log: Log, conventions: Conventions) -> None:
     """
     channels, earth = log.channels, conventions.velocity_frame == "earth"
     log.over_ground = False if "stw" in channels else (earth and "u" in channels) or None
-    correct_offsets(log, conventions.instruments)
+    navigation.correct_offsets(log, conventions.instruments)
     if "psi" in channels and "r" not in channels:
         log.derive("r", time_derivative(log.t, channels["psi"]))
     if "r" in channels and not {"psi", "x", "y"} & channels.keys():
-        log.derive("psi", _antiderivative(log.t, channels["r"]))
+        from scipy.interpolate import make_interp_spline
+
+        turned = make_interp_spline(log.t, channels["r"], k=min(3, log.t.size - 1)).antiderivative()
+        log.derive("psi", np.asarray(turned(log.t) - turned(log.t[0]), dtype=np.float64))
     if earth:
         _earth_to_body(log)
     if conventions.origin == "cg":
         _cg_to_midship(log, conventions.xg or 0.0)
-    to_midship(log, conventions.instruments)
+    navigation.to_midship(log, conventions.instruments)
 
 
 def _earth_to_body(log: Log) -> None:
@@ -284,7 +273,8 @@ def _earth_to_body(log: Log) -> None:
             f'{log.where}: velocity_frame = "earth" found without a recorded {absent[0]}, expected u '
             "(north), v (east) and the heading psi; name their columns, or leave u and v out"
         )
-    channels["u"], channels["v"] = rotate_to_body(channels["u"], channels["v"], channels["psi"])
+    u, v, psi = (channels[name] for name in ("u", "v", "psi"))
+    channels["u"], channels["v"] = navigation.rotate_to_body(u, v, psi)
 
 
 def _cg_to_midship(log: Log, xg: float) -> None:
@@ -305,29 +295,20 @@ def _cg_to_midship(log: Log, xg: float) -> None:
         channels["N"] = channels["N"] + xg * channels["Y"]
 
 
-def _antiderivative(t: Floats, values: Floats) -> Floats:
-    from scipy.interpolate import make_interp_spline
-
-    spline = make_interp_spline(t, values, k=min(3, t.size - 1)).antiderivative()
-    return np.asarray(spline(t) - spline(t[0]), dtype=np.float64)
-
-
 def _repaired(values: Floats, source: Source, repair: str | None) -> tuple[Floats, Source]:
     """Refuse or fill missing values of shape (n_rows, n_columns), time first, and check the time."""
     names = list(source.columns)
     missing = ~np.isfinite(values)
     rows, columns = np.nonzero(missing)
     if rows.size and (repair is None or missing[:, 0].any()):
-        k = int(np.argmax(missing[:, 0])) if repair is not None else int(rows[0])
-        channel = names[0] if repair is not None else names[int(columns[0])]
+        k, c = (int(rows[0]), int(columns[0])) if repair is None else (int(np.argmax(missing[:, 0])), 0)
         remedy = (
             "time cannot be interpolated, remove the row"
-            if channel == "t"
+            if names[c] == "t"
             else 'repair = "interpolate" fills it from its neighbours, or remove the row'
         )
-        found = values[k, names.index(channel)]
         raise InputError(
-            f"{source.at(k, channel)}: no value ({found:g}) found, expected a number; {remedy} "
+            f"{source.at(k, names[c])}: no value ({values[k, c]:g}) found, expected a number; {remedy} "
             f"({np.unique(rows).size} of {len(values)} rows lack a value)"
         )
     _check_time(values, source)
@@ -353,15 +334,13 @@ def _check_holes(t: Floats, missing: Flags, channel: str, source: Source) -> Non
     """Refuse to fill a hole of many rows; the first and the last row are whole."""
     edges = np.flatnonzero(np.diff(missing))
     first, after = edges[::2] + 1, edges[1::2] + 1
-    long = (after - first > LONGEST_HOLE_ROWS) & (
-        t[after] - t[first - 1] > LONGEST_HOLE_STEPS * np.median(np.diff(t))
-    )
+    rows, span = after - first, t[after] - t[first - 1]
+    long = (rows > LONGEST_HOLE_ROWS) & (span > LONGEST_HOLE_STEPS * np.median(np.diff(t)))
     if long.any():
         i = int(np.argmax(long))
-        unit = source.columns["t"].unit
         raise InputError(
-            f"{source.at(int(first[i]), channel)}: {after[i] - first[i]} rows without a value, over "
-            f"{t[after[i]] - t[first[i] - 1]:g} {unit}, expected at most {LONGEST_HOLE_STEPS:g} time steps "
+            f"{source.at(int(first[i]), channel)}: {rows[i]} rows without a value, over "
+            f"{span[i]:g} {source.columns['t'].unit}, expected at most {LONGEST_HOLE_STEPS:g} time steps "
             "to interpolate over; split the file there, or leave out the rows or the column"
         )
 

@@ -34,7 +34,6 @@ INPUTS = tuple(name for name, row in _CHANNELS.items() if "log_only" in row)
 #: Names of the channels of a trial, without time.
 CHANNELS: tuple[str, ...] = tuple(name for name in QUANTITIES if name not in ("t", *INPUTS))
 
-
 #: Largest magnitude of each channel that can be a ship's, or a small model's; SI units.
 LIMITS: dict[str, float] = {
     name: row["largest"] * (UNITS[row["quantity"]][row["unit"]] if "unit" in row else 1.0)
