@@ -42,7 +42,6 @@ class Fit:
     @property
     def standard_errors(self) -> dict[str, float]:
         """Standard error of each coefficient, in its units."""
-        covariance = self.model.covariance
-        if covariance is None:
+        if (covariance := self.model.covariance) is None:
             return dict.fromkeys(self.coefficients, float("nan"))
         return dict(zip(self.coefficients, np.sqrt(np.diag(covariance)).tolist(), strict=True))

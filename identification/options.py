@@ -52,10 +52,10 @@ def _plain(value: Any) -> Any:
     if isinstance(value, Mapping):
         return {key: _plain(item) for key, item in value.items()}
     if is_dataclass(value) and not isinstance(value, type):
-        return {"kind": type(value).__name__, **{k: _plain(v) for k, v in asdict(value).items()}}
+        return {"kind": type(value).__name__} | _plain(asdict(value))
     if hasattr(value, "fit"):
         settings = value.get_params(deep=False) if hasattr(value, "get_params") else {}
-        return {"kind": type(value).__name__, **{k: _plain(v) for k, v in settings.items()}}
+        return {"kind": type(value).__name__} | _plain(settings)
     if isinstance(value, np.ndarray | np.generic):
         return _plain(value.tolist())
     if isinstance(value, list | tuple | set | frozenset):

@@ -39,14 +39,9 @@ MEMORY = 1.0  # of residuals, in the time to sail one ship length
 
 @single_threaded()
 def identify(
-    trials: Sequence[Trial],
-    structure: str | Structure = "abkowitz",
-    method: str = "tls-svm",
-    samples: str = "spline",
-    particulars: Given = None,
-    steering: SteeringGear | None = None,
-    **options: Any,
-) -> IdentificationResult:
+    trials: Sequence[Trial], structure: str | Structure = "abkowitz", method: str = "tls-svm",
+    samples: str = "spline", particulars: Given = None, steering: SteeringGear | None = None, **options: Any,
+) -> IdentificationResult:  # fmt: skip
     """Identify a manoeuvring model from recorded trials.
 
     Trials marked `validate` are predicted, and influence no coefficient.
@@ -114,12 +109,9 @@ def _identified_best(
     fitted = partial(_identified, particulars=particulars, steering=steering)
     chosen, found = select(fitted, [trial for trial in marked if trial.use == "fit"], options)
     best = fitted(trials, chosen)
-    return replace(
-        best,
-        model=replace(best.model, provenance={**(best.model.provenance or {}), "selection": found}),
-        metrics=best.metrics | {"selection": found},
-        settings=whole_call(options, marked, particulars, steering),
-    )
+    model = replace(best.model, provenance={**(best.model.provenance or {}), "selection": found})
+    call = whole_call(options, marked, particulars, steering)
+    return replace(best, model=model, metrics=best.metrics | {"selection": found}, settings=call)
 
 
 def _identified_with_kernel(
@@ -188,22 +180,17 @@ def _provenance(
     if searched := {q: m.chosen_ for q, m in fit.estimators.items() if hasattr(m, "chosen_")}:
         further["search"] = searched
     return {
-        "structure": name_of(options.structure),
-        "method": method,
-        "samples": options.samples,
-        "settings": provenance_settings(options, settings),
-        **further,
-        "software": f"shipgym {shipgym.__version__}",
-        "steps_per_window": problem.samples.window,
+        "structure": name_of(options.structure), "method": method, "samples": options.samples,
+        "settings": provenance_settings(options, settings), **further,
+        "software": f"shipgym {shipgym.__version__}", "steps_per_window": problem.samples.window,
         "ranks": {q: int(getattr(m, "rank_", len(m.coef_))) for q, m in fit.estimators.items()},
-        "guard": fit.report,
-        "stable": fit.stable,
+        "guard": fit.report, "stable": fit.stable,
         "trials": [
             {"name": trial.name, "sha256": trial.raw.sha256, "derived": sorted(trial.derived)}
             | ({"repaired": dict(trial.repaired)} if trial.repaired else {})
             for trial in problem.used
         ],
-    }
+    }  # fmt: skip
 
 
 def _scaled_covariance(
@@ -242,20 +229,16 @@ def _left_out(
     if count < FEWEST_TRIALS:
         return []
     if refined is None or refined.covariance is None:
-        without = [without_trial(fit.estimators, problem.samples, i) for i in range(count)]
-        return [
-            replace(
-                with_coefficients(fit.model, estimators),
-                covariance=_covariance(replace(fit, estimators=estimators), rows, blank, None, "analytic"),
-            )
-            for estimators, rows in without
-        ]
+        models = []
+        for estimators, rows in (without_trial(fit.estimators, problem.samples, i) for i in range(count)):
+            own = _covariance(replace(fit, estimators=estimators), rows, blank, None, "analytic")
+            models.append(replace(with_coefficients(fit.model, estimators), covariance=own))
+        return models
     values, most = np.array(list(fit.model.coefficients.values())), count / (count - 1)
+    changes = [np.linalg.solve(blank.acceleration_matrix, one.sum(axis=0)) for one in refined.influences]
     return [
         replace(fit.model.with_coefficients(values - most * change), covariance=most * covariance)
-        for change in (
-            np.linalg.solve(blank.acceleration_matrix, part.sum(axis=0)) for part in refined.influences
-        )
+        for change in changes
     ]
 
 
@@ -267,26 +250,18 @@ def _evaluated(
     provenance["steering"] = "estimated" if problem.call["steering"] is None else "given"
     trials = tuple(trial for trial in problem.trials if trial.use != "skip")
     predictions = {trial.name: predict(model, trial) for trial in trials}
-    lost = [name for name, predicted in predictions.items() if predicted is None]
-    if lost:
+    if lost := [name for name, predicted in predictions.items() if predicted is None]:
         provenance |= {"stable": False, "runs_away_on": lost}
     model, stable = replace(model, provenance=provenance), bool(provenance["stable"])
     reasons = [f"trial {name!r}, open loop" for name in lost] or provenance["guard"].get("rejected", [])
     bare = {"reference": bare_metrics(model, trials)} if isinstance(problem.table, GreyBox) else {}
+    metrics = {
+        "stable": stable, "instability": None if stable else f"runs away: {'; '.join(reasons)}",
+        "trials": {t.name: trial_metrics(model, t, predictions[t.name]) for t in trials}, **bare,
+    }  # fmt: skip
     return IdentificationResult(
-        model=model,
-        stable=stable,
-        metrics={
-            "stable": stable,
-            "instability": None if stable else f"runs away: {'; '.join(reasons)}",
-            "trials": {t.name: trial_metrics(model, t, predictions[t.name]) for t in trials},
-            **bare,
-        },
+        model=model, stable=stable, metrics=metrics, predictions=predictions, trials=trials,
         diagnostics=diagnose(fit.estimators, problem.samples, problem.table),
-        predictions=predictions,
-        trials=trials,
-        samples=problem.samples,
-        estimators=fit.estimators,
-        settings=problem.call,
+        samples=problem.samples, estimators=fit.estimators, settings=problem.call,
         searches={q: search for q, m in fit.estimators.items() if (search := getattr(m, "search_", None))},
-    )
+    )  # fmt: skip

@@ -75,9 +75,8 @@ class IdentificationResult(Fit):
                     else:  # an earlier one would describe another model
                         (folder / name).unlink(missing_ok=True)
         except OSError as error:
-            raise InputError(
-                f"{folder}: cannot be written ({error.strerror}); choose another folder"
-            ) from error
+            told = f"{folder}: cannot be written ({error.strerror}); choose another folder"
+            raise InputError(told) from error
 
     def _write(self, folder: Path) -> None:
         self.model.save(folder / "model.json")
@@ -86,9 +85,7 @@ class IdentificationResult(Fit):
         try:
             import plotly  # noqa: F401
         except ModuleNotFoundError:
-            warnings.warn(
-                "plotly is not installed, so report.html was not written: pip install 'shipgym[report]'",
-                stacklevel=3,
-            )
+            remedy = "pip install 'shipgym[report]'"
+            warnings.warn(f"plotly is not installed, so report.html was not written: {remedy}", stacklevel=3)
             return
         write_text(report_page(self), folder / "report.html")

@@ -81,20 +81,17 @@ class Advice:
         """Plain values, ready for JSON; of each trial's information the diagonal."""
         names = list(self.before)
         return {
-            "criterion": self.criterion,
-            "coefficient": self.coefficient,
+            "criterion": self.criterion, "coefficient": self.coefficient,
             "trials": {
                 trial.name: {
-                    "condition_number": trial.condition_number,
-                    "variance_inflation": trial.inflation,
+                    "condition_number": trial.condition_number, "variance_inflation": trial.inflation,
                     "information": dict(zip(names, np.diag(trial.information).tolist(), strict=True)),
                 }
                 for trial in self.trials
             },
             "relative_errors": {"now": self.before, "expected": self.after},
-            "gains": list(self.steps),
-            "run_next": list(self.chosen),
-        }
+            "gains": list(self.steps), "run_next": list(self.chosen),
+        }  # fmt: skip
 
     def __str__(self) -> str:
         return as_text(self._trials_so_far(), self._candidates(), self._errors())
@@ -152,25 +149,18 @@ def standard_candidates(model: ShipModel) -> dict[str, Manoeuvre]:
     times: dict[str, Any] = {"duration": DURATION * travel, "dt": travel / STEPS}
     limit = model.steering.rudder_limit_deg
     found: dict[str, Manoeuvre] = {}
-    for angle in (5.0, 10.0, 20.0, min(35.0, limit)):
-        if angle > limit:
-            continue
-        found[f"zigzag {angle:g}/{angle:g}"] = partial(
-            zigzag, rudder_deg=angle, heading_deg=angle, must_reverse=False, **times
-        )
+    for angle in [angle for angle in (5.0, 10.0, 20.0, min(35.0, limit)) if angle <= limit]:
+        own: dict[str, Any] = {"rudder_deg": angle, "heading_deg": angle, "must_reverse": False}
+        found[f"zigzag {angle:g}/{angle:g}"] = partial(zigzag, **own, **times)
         found[f"turning circle {angle:g}"] = partial(turning_circle, rudder_deg=angle, **times)
         found[f"binary rudder {angle:g}"] = partial(prbs_rudder, amplitude_deg=angle, **times)
     return found
 
 
 def advise(
-    model: ShipModel,
-    trials: Sequence[Trial],
-    candidates: Mapping[str, Manoeuvre] | None = None,
-    criterion: str = "c",
-    coefficient: str | None = None,
-    number: int = 1,
-) -> Advice:
+    model: ShipModel, trials: Sequence[Trial], candidates: Mapping[str, Manoeuvre] | None = None,
+    criterion: str = "c", coefficient: str | None = None, number: int = 1,
+) -> Advice:  # fmt: skip
     """Which manoeuvres to run next, chosen one after the other.
 
     Parameters
@@ -209,15 +199,14 @@ def advise(
     offers = _offers(model, standard_candidates(model) if candidates is None else candidates, noise)
     names = tuple(model.coefficients)
     total = np.sum([trial.information for trial in known], axis=0)
-    size = _size(model, total)
+    size = np.abs(np.array(list(model.coefficients.values())))
+    size = np.where(size > 0.0, size, _errors(total, np.ones(len(size))))  # the error itself of one that is 0
     before = dict(zip(names, _errors(total, size).tolist(), strict=True))
     worst = _most_felt(model, size * np.array(list(before.values()))) if coefficient is None else coefficient
-    steps: list[dict[str, float]] = []
-    chosen: list[str] = []
+    steps, chosen = list[dict[str, float]](), list[str]()
     for _ in range(number):
-        gains = _gains(total, offers, size, criterion, names.index(worst))
-        chosen.append(max(gains, key=lambda name: gains[name]))
-        steps.append(gains)
+        steps.append(_gains(total, offers, size, criterion, names.index(worst)))
+        chosen.append(max(steps[-1], key=lambda name: steps[-1][name]))
         total = total + offers[chosen[-1]]
     after = dict(zip(names, _errors(total, size).tolist(), strict=True))
     return Advice(criterion, worst, known, before, tuple(steps), tuple(chosen), after)
@@ -245,9 +234,8 @@ def _regression(model: ShipModel, trial: Trial) -> Samples:
     """Regression over windows of the same time, whatever the sampling."""
     window = max(round(WINDOW * model.travel_time / float(np.median(np.diff(trial.t)))), 1)
     window = min(window, max(len(trial) // 10, 1))
-    return build_samples(
-        [trial], table_of(model), model.particulars, "integral", window, shaft_speed=model.service_shaft_speed
-    )
+    ship, shaft = model.particulars, model.service_shaft_speed
+    return build_samples([trial], table_of(model), ship, "integral", window, shaft_speed=shaft)
 
 
 def _noise(model: ShipModel, regressions: Sequence[Samples]) -> dict[str, float]:
@@ -265,8 +253,7 @@ def _noise(model: ShipModel, regressions: Sequence[Samples]) -> dict[str, float]
 def _information_of(
     model: ShipModel, name: str, samples: Samples, noise: Mapping[str, float]
 ) -> TrialInformation:
-    condition: dict[str, float] = {}
-    inflation: dict[str, float] = {}
+    condition, inflation = dict[str, float](), dict[str, float]()
     for q, X in samples.features.items():
         scaled, condition[q] = scaled_features(X)
         factors = variance_inflation(scaled).tolist()
@@ -293,12 +280,6 @@ def _offers(
             "that can be simulated; give gentler manoeuvres"
         )
     return offers
-
-
-def _size(model: ShipModel, information: Floats) -> Floats:
-    """What each coefficient's error is compared with: its size, or, where it is 0, its error."""
-    size = np.abs(np.array(list(model.coefficients.values())))
-    return np.where(size > 0.0, size, _errors(information, np.ones(len(size))))
 
 
 def _covariance(information: Floats, size: Floats) -> Floats:

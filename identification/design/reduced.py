@@ -37,18 +37,13 @@ class ReducedIdentification:
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values, ready for JSON."""
+        equations = {}
+        for q, found in self.reductions.items():
+            path = [asdict(step) | {"relative_errors": _finite(step.relative_errors)} for step in found.path]
+            equations[q] = {"chosen": found.chosen, "path": path}
         return {
             "structure": self.structure.name,
-            "equations": {
-                q: {
-                    "chosen": found.chosen,
-                    "path": [
-                        asdict(step) | {"relative_errors": _finite(step.relative_errors)}
-                        for step in found.path
-                    ],
-                }
-                for q, found in self.reductions.items()
-            },
+            "equations": equations,
             "terms": {"full": len(self.full.coefficients), "reduced": len(self.reduced.coefficients)},
             "trials": {"full": self.full.metrics["trials"], "reduced": self.reduced.metrics["trials"]},
             "sensitivity": zigzag_sensitivity(self.reduced.model),
@@ -70,11 +65,6 @@ def identify_reduced(
         By how much the R2 of stretches held out may fall.
     **arguments
         Of `identify`.
-
-    Returns
-    -------
-    ReducedIdentification
-        The identification with all terms, and that with those that are needed.
 
     Raises
     ------

@@ -78,13 +78,9 @@ class Reduction:
 
 
 def backward_elimination(
-    X: ArrayLike,
-    y: ArrayLike,
-    names: Sequence[str],
-    tolerance: float = 1e-3,
-    threshold: float = 0.1,
+    X: ArrayLike, y: ArrayLike, names: Sequence[str], tolerance: float = 1e-3, threshold: float = 0.1,
     prefer: Sequence[str] = (),
-) -> Reduction:
+) -> Reduction:  # fmt: skip
     """Drop terms one by one as long as held-out data is explained equally well.
 
     Parameters
@@ -163,8 +159,7 @@ def forward_selection(
     check_number(tolerance, "tolerance", at_least=0.0)
     rest = features / np.sqrt(np.mean(features**2, axis=0))
     left, power = targets.copy(), float(targets @ targets)
-    chosen: list[int] = []
-    path: list[ReductionStep] = []
+    chosen, path = list[int](), list[ReductionStep]()
     while len(chosen) < min(most or len(labels), len(labels)):
         size = np.einsum("ij,ij->j", rest, rest)
         size[chosen] = 0.0
@@ -251,8 +246,7 @@ def sensitivity(
     check_number(change, "change", above=0.0, below=1.0)
     table_of(model)
     base = manoeuvre(model)
-    spans = {c: float(np.ptp(base[c])) for c in SENSED}
-    found = {}
+    spans, found = {c: float(np.ptp(base[c])) for c in SENSED if np.ptp(base[c]) > 0.0}, {}
     for name, value in model.coefficients.items():
         try:
             up, down = (
@@ -263,9 +257,7 @@ def sensitivity(
             found[name] = np.inf
             continue
         rows = min(len(up), len(down))
-        squares = [
-            np.mean((up[c][:rows] - down[c][:rows]) ** 2) / spans[c] ** 2 for c in SENSED if spans[c] > 0.0
-        ]
+        squares = [np.mean((up[c][:rows] - down[c][:rows]) ** 2) / spans[c] ** 2 for c in spans]
         found[name] = float(np.sqrt(np.mean(squares)) / (2.0 * change))
     return dict(sorted(found.items(), key=lambda item: item[1], reverse=True))
 
@@ -278,21 +270,15 @@ def _step(
     X, names = features[:, kept], tuple(labels[i] for i in kept)
     estimator = TruncatedLSSVM(selection="full", fit_intercept=False).fit(X, targets)
     left_out = targets - cross_val_predict(estimator, X, targets, cv=KFold(FOLDS))
-    deviation = np.sqrt(np.diag(estimator.covariance_))
-    size = np.abs(estimator.coef_)
+    deviation, size = np.sqrt(np.diag(estimator.covariance_)), np.abs(estimator.coef_)
     relative = np.divide(deviation, size, out=np.full(len(names), np.inf), where=size > 0.0)
-    residual = targets - X @ estimator.coef_
-    power = float(targets @ targets)
-    r_squared = 1.0 - float(residual @ residual) / power
-    return ReductionStep(
-        names,
-        changed,
-        dict(zip(names, estimator.coef_.tolist(), strict=True)),
-        dict(zip(names, relative.tolist(), strict=True)),
-        r_squared,
-        1.0 - float(left_out @ left_out) / power,
-        r_squared - before if changed else r_squared,
+    residual, power = targets - X @ estimator.coef_, float(targets @ targets)
+    r_squared, held_out = (1.0 - float(e @ e) / power for e in (residual, left_out))
+    coefficients, relative_errors = (
+        dict(zip(names, values.tolist(), strict=True)) for values in (estimator.coef_, relative)
     )
+    explained = r_squared - before if changed else r_squared
+    return ReductionStep(names, changed, coefficients, relative_errors, r_squared, held_out, explained)
 
 
 def _collinear(features: Floats, kept: Sequence[int]) -> set[int]:

@@ -39,9 +39,8 @@ class CoefficientHistory:
     def __getitem__(self, name: str) -> Floats:
         """The history of one coefficient, shape (n_rows,)."""
         if name not in self.names:
-            raise InputError(
-                f"coefficient history: no coefficient {name!r}, expected one of {', '.join(self.names)}"
-            )
+            expected = f"expected one of {', '.join(self.names)}"
+            raise InputError(f"coefficient history: no coefficient {name!r}, {expected}")
         return self.values[:, self.names.index(name)]
 
     @property
@@ -51,14 +50,9 @@ class CoefficientHistory:
 
 
 def coefficient_history(
-    source: Samples | Trial | Sequence[Trial],
-    structure: str | Structure,
-    particulars: Particulars,
-    method: str | Recursion = "rls",
-    *,
-    shaft_speed: float = 0.0,
-    **sampling: Any,
-) -> CoefficientHistory:
+    source: Samples | Trial | Sequence[Trial], structure: str | Structure, particulars: Particulars,
+    method: str | Recursion = "rls", *, shaft_speed: float = 0.0, **sampling: Any,
+) -> CoefficientHistory:  # fmt: skip
     """Run a recursive method over trials and keep every estimate.
 
     Parameters

@@ -9,7 +9,6 @@ from numpy.typing import ArrayLike
 from identification.estimators.decomposition import centre_and_scale
 from identification.estimators.linear import LinearRegressor, settings, validated
 from identification.estimators.robust import MAD
-from shipgym.arrays import Floats
 from shipgym.checks import check_number, check_whole
 
 ITERATIONS = 20_000
@@ -74,7 +73,8 @@ class LinearSupportVectorMachine(LinearRegressor):
         self.coef_ = estimator.coef_ * size / scale
         self.intercept_ = mean + size * float(np.sum(estimator.intercept_)) - float(centre @ self.coef_)
         error = (y - X @ self.coef_ - self.intercept_) / size
-        self.weights_ = _huber_weights(error)
+        usual, errors = MAD * float(np.median(np.abs(error))), np.abs(error)
+        self.weights_ = np.divide(usual, errors, out=np.ones(len(errors)), where=errors > usual)
         moment = (scaled.T * self.weights_) @ scaled
         inverse = np.linalg.pinv(moment, hermitian=True) / scale / scale[:, None]
         self.inverse_moment_ = inverse
@@ -83,8 +83,3 @@ class LinearSupportVectorMachine(LinearRegressor):
         unscaled = scaled * scale
         self.covariance_ = variance * inverse @ (unscaled.T @ unscaled) @ inverse
         return self
-
-
-def _huber_weights(error: Floats) -> Floats:
-    scale, size = MAD * float(np.median(np.abs(error))), np.abs(error)
-    return np.where(size > scale, scale / np.where(size > scale, size, 1.0), 1.0)

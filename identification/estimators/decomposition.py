@@ -39,9 +39,8 @@ class Decomposition:
     @property
     def numerical_rank(self) -> int:
         """Number of directions above rounding, at least 1."""
-        s = self.singular_values
-        threshold = max(self.n_samples, len(self.scale)) * np.finfo(float).eps * s[0]
-        return max(int(np.sum(s > threshold)), 1)
+        rounding = max(self.n_samples, len(self.scale)) * np.finfo(float).eps * self.singular_values[0]
+        return max(int(np.sum(self.singular_values > rounding)), 1)
 
     def filters(self, C: ArrayLike, rank: int) -> Floats:
         """Factors s / (s^2 + 1/C) of the first directions, 0 beyond `rank` and for what is lost in rounding.
@@ -56,8 +55,7 @@ class Decomposition:
 
     def coefficients(self, filters: Floats) -> Floats:
         """Coefficients of the features as given, shape (n_features,)."""
-        scaled: Floats = self.directions.T @ (filters * self.projections)
-        return scaled / self.scale
+        return np.asarray(self.directions.T @ (filters * self.projections) / self.scale)
 
 
 def triangle(X: Floats, y: Floats, fit_intercept: bool, weights: Floats | None = None) -> Floats:
@@ -101,8 +99,7 @@ def decompose_triangle(
 ) -> Decomposition:
     """Decompose the features of a regression of which the `triangle` is known."""
     first = int(fit_intercept)
-    n_features = len(R) - 1 - first
-    inner = R[first:, first:]
+    n_features, inner = len(R) - 1 - first, R[first:, first:]
     size = np.sqrt(np.sum(inner[:, :-1] ** 2, axis=0) / n_samples)
     whole = np.sqrt(np.sum(R[:, first:-1] ** 2, axis=0) / n_samples)
     size[size <= CONSTANT * whole] = 0.0
@@ -110,17 +107,12 @@ def decompose_triangle(
     left, singular_values, directions = np.linalg.svd(inner[:-1, :-1] / scales)
     kept = min(n_samples, n_features)
     projections = left.T @ inner[:-1, -1]
+    outside = float(inner[-1, -1] ** 2 + np.sum(projections[kept:] ** 2))
+    means = R[0, 1:] / R[0, 0] if fit_intercept else np.zeros(n_features + 1)
     return Decomposition(
-        singular_values[:kept],
-        directions[:kept],
-        projections[:kept],
-        float(inner[-1, -1] ** 2 + np.sum(projections[kept:] ** 2)),
-        n_samples - first,
-        R[0, 1:-1] / R[0, 0] if fit_intercept else np.zeros(n_features),
-        float(R[0, -1] / R[0, 0]) if fit_intercept else 0.0,
-        scales,
-        n_samples,
-    )
+        singular_values[:kept], directions[:kept], projections[:kept], outside, n_samples - first,
+        means[:-1], float(means[-1]), scales, n_samples,
+    )  # fmt: skip
 
 
 def centre_and_scale(X: Floats, scale: bool | ArrayLike, fit_intercept: bool) -> tuple[Floats, Floats]:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -17,6 +18,7 @@ from sklearn.cluster import KMeans
 
 from identification.estimators.estimator import Estimators
 from identification.estimators.lssvm import LSSVM
+from identification.estimators.methods import fit_all
 from identification.estimators.rm_svm import heading_error, most_regularised
 from identification.regression.preprocess import smoothed_channels
 from identification.regression.samples import Samples, build_samples
@@ -67,11 +69,10 @@ def reference_options(options: Options) -> Options:
         )
     if options.regression not in (None, "ls-svm") or options.epsilon is not None:
         raise InputError(f"regression: epsilon-SVR found with kernel {RBF!r}, which is fitted by LS-SVM only")
-    structure, method = options.structure, options.method
+    structure = options.structure
     if structure in (Options.structure, AUTO):  # none was named
         structure = BLACK_BOX if options.reference_model is None else GREY_BOX
-    if structure != GREY_BOX and method == "rm-svm":
-        method = "ls-svm"
+    method = "ls-svm" if structure != GREY_BOX and options.method == "rm-svm" else options.method
     cleared: dict[str, Any] = dict.fromkeys(OWN)
     return replace(options, structure=structure, method=method, **cleared)
 
@@ -115,17 +116,16 @@ def fit_kernel(
     pairs = [(length, weight) for weight in weights for length in stages]  # the smoothest first
     (length, weight), errors = pairs[0], {}
     if len(pairs) > 1:
-        tried = {(length, weight): search.error(stages[length], weight) for length, weight in pairs}
+        tried = {pair: search.error(stages[pair[0]], pair[1]) for pair in pairs}
         length, weight = most_regularised(pairs, [*tried.values()])
         errors = {"kernel": tried[length, weight]}
     errors["reference"] = search.error(stages[length], 0.0)
-    remarks = []
+    remarks, kernel = list[str](), kernels[length]
     if "kernel" in errors and not errors["kernel"] < errors["reference"]:
         remarks.append(
             "on held-out trials the kernel predicts the heading no better than its reference ship alone "
             f"({np.degrees(errors['kernel']):.2g} and {np.degrees(errors['reference']):.2g} deg rms)"
         )
-    kernel = kernels[length]
     report = {
         "kind": RBF, "centres": len(kernel.centres), "features": kernel.basis.shape[1],
         "length": length, "C": weight, "remarks": remarks,
@@ -143,12 +143,9 @@ def _kernels(search: _Search, options: Options) -> dict[float, Kernel]:
     channels = [smoothed_channels(trial, names, smooth) for trial in search.trials]
     x = np.concatenate([kernel_inputs(one, search.blank.particulars) for one in channels])
     offset, scale, centres = chosen_centres(x, number)
-    given = options.kernel_length
+    given, basis = options.kernel_length, np.eye(len(centres))
     lengths = LENGTHS if given is None else (check_number(given, "kernel_length", above=0.0),)
-    return {
-        length: principal(Kernel(offset, scale * length, centres / length, np.eye(len(centres))), x)
-        for length in lengths
-    }
+    return {one: principal(Kernel(offset, scale * one, centres / one, basis), x) for one in lengths}
 
 
 def chosen_centres(x: Floats, number: int) -> tuple[Floats, Floats, Floats]:
@@ -221,9 +218,6 @@ class _Search:
     def fitted(self, stage: KernelFit, weight: float) -> KernelFit:
         """The fit to all rows."""
         samples, C = stage.samples, weight * self.unit(stage.samples)
-        estimators: Estimators = {
-            q: LSSVM(C=C, scale=False, fit_intercept=False).fit(X, samples.targets[q])
-            for q, X in samples.features.items()
-        }
+        estimators = fit_all(partial(LSSVM, C=C, scale=False, fit_intercept=False), samples)
         model = stage.model.with_accelerations({q: one.coef_ for q, one in estimators.items()})
         return KernelFit(model, samples, estimators)

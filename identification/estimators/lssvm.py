@@ -47,7 +47,6 @@ class LSSVM(LinearRegressor):
     gamma : float or None
         Of the rbf and poly kernels; 1 / n_features where None.
     degree : int
-        Of the poly kernel.
     coef0 : float
         Of the poly kernel.
     robust : bool
@@ -111,16 +110,14 @@ class LSSVM(LinearRegressor):
             raise InputError(f"C: {self.C} found, expected a finite number with kernel {self.kernel!r}")
         self.centre_, self.scale_ = centre_and_scale(X, self.scale, self.fit_intercept)
         self.support_ = (X - self.centre_) / self.scale_
-        self.ridge_ = KernelRidge(
-            alpha=1.0 / self.C, kernel=self.kernel, gamma=self.gamma, degree=self.degree, coef0=self.coef0
-        )
+        shape = {"gamma": self.gamma, "degree": self.degree, "coef0": self.coef0}
+        self.ridge_ = KernelRidge(alpha=1.0 / self.C, kernel=self.kernel, **shape)
         # the free b takes so much of the ones that the multipliers sum to zero
         targets = np.column_stack([y, np.ones(len(y))])
         of_targets, of_ones = self.ridge_.fit(self.support_, targets, weights).dual_coef_.T
         self.intercept_ = float(of_targets.sum() / of_ones.sum()) if self.fit_intercept else 0.0
         self.dual_coef_ = self.ridge_.dual_coef_ = of_targets - self.intercept_ * of_ones
-        residual: Floats = y - self.ridge_.predict(self.support_) - self.intercept_
-        return residual
+        return np.asarray(y - self.ridge_.predict(self.support_) - self.intercept_)
 
     def predict(self, X: ArrayLike) -> Floats:
         """Targets, shape (n_samples,), of samples of shape (n_samples, n_features)."""
@@ -128,8 +125,7 @@ class LSSVM(LinearRegressor):
             return super().predict(X)
         check_is_fitted(self)
         features: Floats = validate_data(self, X, reset=False, dtype=np.float64)
-        prediction: Floats = self.ridge_.predict((features - self.centre_) / self.scale_)
-        return prediction + self.intercept_
+        return np.asarray(self.ridge_.predict((features - self.centre_) / self.scale_) + self.intercept_)
 
 
 @settings()
@@ -148,13 +144,9 @@ class TruncatedLSSVM(LinearRegressor):
     selection : {"l-curve", "gcv", "explained-variance", "full"}
         Corner of the L-curve, generalised cross-validation, as many directions as hold the share
         `explained_variance` of the features, or every direction that rounding leaves.
-    scale : bool or array-like of shape (n_features,)
-        As in `LSSVM`.
-    fit_intercept : bool
-        As in `LSSVM`.
     explained_variance : float
         Share of the variance of the scaled features that is to be kept, above 0 and at most 1.
-    robust : bool
+    scale, fit_intercept, robust
         As in `LSSVM`.
 
     Attributes
@@ -198,12 +190,9 @@ class TruncatedLSSVM(LinearRegressor):
         problem = decompose(X, y, self.scale, self.fit_intercept, weights)
         distinct = problem.numerical_rank
         filters = problem.filters(self.C, distinct)
-        self.l_curve_ = l_curve(
-            problem.singular_values[:distinct],
-            problem.projections[:distinct],
-            filters[:distinct],
-            problem.outside + float(np.sum(problem.projections[distinct:] ** 2)),
-        )
+        values, projections = problem.singular_values[:distinct], problem.projections[:distinct]
+        outside = problem.outside + float(np.sum(problem.projections[distinct:] ** 2))
+        self.l_curve_ = l_curve(values, projections, filters[:distinct], outside)
         self.rank_ = self._choose(problem, distinct)
         filters[self.rank_ :] = 0.0
         self.directions_ = problem.directions

@@ -9,14 +9,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 from sklearn.base import clone
 
+from identification.estimators import recursive
 from identification.estimators.comparators import LinearSupportVectorMachine
 from identification.estimators.estimator import Estimator, Estimators, FitTask
+from identification.estimators.linear import LinearRegressor, validated
 from identification.estimators.lssvm import LSSVM, TruncatedLSSVM
-from identification.estimators.recursive import (
-    MultiInnovationLeastSquares,
-    RecursiveLeastSquares,
-    StochasticGradient,
-)
 from identification.estimators.rm_svm import RMSVM, fit_rm_svm
 from identification.estimators.tuned import TunedLSSVM, fit_tuned
 from identification.regression.samples import Samples
@@ -53,8 +50,7 @@ class Method:
 
     def fitted(self, settings: Mapping[str, Any], task: FitTask) -> Estimators:
         """Estimators of all equations, fitted; InputError for settings that the method does not know."""
-        unknown = [name for name in settings if not self.knows(name)]
-        if unknown:
+        if unknown := [name for name in settings if not self.knows(name)]:
             raise InputError(
                 f"settings: {', '.join(unknown)} found, which method {self.name!r} does not know; leave them "
                 f"out, or choose the method that they are for"
@@ -65,10 +61,8 @@ class Method:
         """Whether the estimator has a setting of that name."""
         try:
             self.estimator(**{setting: 1})
-        except TypeError:
-            return False
-        except InputError:  # the value does not fit, the name does
-            return True
+        except (TypeError, InputError) as error:
+            return isinstance(error, InputError)  # the value does not fit, the name does
         return True
 
 
@@ -98,11 +92,11 @@ METHODS = {
         Method("abc-lssvr", partial(_TUNED, optimiser="abc")),
         Method("de-lssvr", partial(_TUNED, optimiser="de")),
         Method("svr", partial(LinearSupportVectorMachine, fit_intercept=False)),
-        Method("rls", RecursiveLeastSquares, regularised=False),
-        Method("sg", StochasticGradient, regularised=False),
-        Method("nisg", partial(StochasticGradient, omega=0.5), regularised=False),
-        Method("mils", partial(MultiInnovationLeastSquares, inverse_free=False), regularised=False),
-        Method("tmils", MultiInnovationLeastSquares, regularised=False),
+        Method("rls", recursive.RecursiveLeastSquares, regularised=False),
+        Method("sg", recursive.StochasticGradient, regularised=False),
+        Method("nisg", partial(recursive.StochasticGradient, omega=0.5), regularised=False),
+        Method("mils", partial(recursive.MultiInnovationLeastSquares, inverse_free=False), regularised=False),
+        Method("tmils", recursive.MultiInnovationLeastSquares, regularised=False),
         Method("output-error", _TLS_SVM, refined=True),
         Method("rm-svm", RMSVM),
     )
@@ -144,7 +138,7 @@ def fit_held(samples: Samples, sizes: dict[str, Floats], strength: float) -> Est
     }
 
 
-class Adapted:
+class Adapted(LinearRegressor):
     """An estimator with scikit-learn's interface, and the moment and covariance that it lacks.
 
     These are those of least squares on the features whose coefficients are not 0: an approximation for an
@@ -156,7 +150,7 @@ class Adapted:
 
     def fit(self, X: ArrayLike, y: ArrayLike) -> Self:
         """Fit; InputError for an estimator that sets no `coef_` of a finite number for each feature."""
-        features, targets = np.asarray(X, dtype=float), np.asarray(y, dtype=float)
+        features, targets = validated(self, X, y)
         self.inner.fit(features, targets)
         found = np.asarray(getattr(self.inner, "coef_", np.nan), dtype=float).ravel()
         if found.shape != features.shape[1:] or not np.isfinite(found).all():
@@ -173,11 +167,6 @@ class Adapted:
         freedom = max(len(targets) - len(used), 1)
         self.covariance_ = float(residual @ residual) / freedom * self.inverse_moment_
         return self
-
-    def predict(self, X: ArrayLike) -> Floats:
-        """Targets, shape (n_samples,)."""
-        prediction: Floats = np.asarray(X, dtype=float) @ self.coef_
-        return prediction
 
 
 def without_constant(estimator: Any) -> Estimator:

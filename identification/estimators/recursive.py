@@ -67,6 +67,8 @@ class Recursion(LinearRegressor):
     start_samples: int = 0
     start_interval: int = 1
     start_C: float = 1e6  # noqa: N815
+    # settings of some of the methods
+    innovations, omega, inverse_free = 1, 0.0, True
 
     def __sklearn_tags__(self) -> Any:
         """A recursion has no intercept, which some of scikit-learn's test data would need."""
@@ -139,6 +141,8 @@ class Recursion(LinearRegressor):
         check_number(self.start_C, "start_C", above=0.0)
         check_whole(self.start_samples, "start_samples", at_least=0)
         check_whole(self.start_interval, "start_interval", at_least=1)
+        check_whole(self.innovations, "innovations", at_least=1)
+        check_number(self.omega, "omega", at_least=0.0)
 
     def _begin(self, features: Floats, targets: Floats) -> None:
         """Zero coefficients with the covariance C, in scales that the samples give."""
@@ -150,7 +154,7 @@ class Recursion(LinearRegressor):
         self._theta = np.zeros((signals, m))
         self._past = (np.empty((0, signals, m)), np.empty((0, signals)))
         self.coef_ = np.zeros(m) if signals == 1 else np.zeros((signals, m))
-        self._begin_memory(features)
+        self._begin_memory()
 
     def _start_from(self, features: Floats, targets: Floats) -> None:
         """Take LS-SVR's estimate on the first samples, and how certain it is (LSSVR-RLS, Zhu 2018, 7.3)."""
@@ -174,21 +178,23 @@ class Recursion(LinearRegressor):
 
     def _summarise(self, features: Floats, targets: Floats, multiplicity: Floats) -> None:
         """Weights and covariance of what the recursion tends to."""
-        self.weights_ = multiplicity * self.forgetting ** np.arange(len(targets) - 1.0, -1.0, -1.0)
+        # a sample is seen again while it is among the last
+        used = np.minimum(self.innovations, len(targets) - np.arange(len(targets)))
+        self.weights_ = multiplicity * used * self.forgetting ** np.arange(len(targets) - 1.0, -1.0, -1.0)
         scaled = features / self.scale_
-        moment = (scaled.T * self.weights_) @ scaled + np.eye(scaled.shape[1]) / self.C
-        inverse = np.linalg.inv(moment)
-        unscale = np.outer(self.scale_, self.scale_)
+        start = np.eye(scaled.shape[1]) / self.C
+        moment = (scaled.T * self.weights_) @ scaled + start
+        inverse, unscale = np.linalg.inv(moment), np.outer(self.scale_, self.scale_)
         self.inverse_moment_ = inverse / unscale
         error = targets - features @ self.coef_
-        effective = float(np.sum(inverse * (moment - np.eye(len(moment)) / self.C)))
+        effective = float(np.sum(inverse * (moment - start)))
         freedom = max(self.weights_.sum() - effective, 1.0)
         self.noise_variance_ = float(self.weights_ @ error**2) / freedom
         middle = (scaled.T * self.weights_**2) @ scaled
         self.covariance_ = self.noise_variance_ * (inverse @ middle @ inverse) / unscale
 
     @abstractmethod
-    def _begin_memory(self, features: Floats) -> None: ...
+    def _begin_memory(self) -> None: ...
 
     @abstractmethod
     def _advance(self, phi: Floats, y: Floats, history: Floats) -> None: ...
@@ -200,16 +206,7 @@ class RecursiveLeastSquares(Recursion):
     Its parameters are those of `Recursion`.
     """
 
-    innovations: int = 1
-    omega: float = 0.0
-    inverse_free: bool = True
-
-    def _check(self) -> None:
-        super()._check()
-        check_whole(self.innovations, "innovations", at_least=1)
-        check_number(self.omega, "omega", at_least=0.0)
-
-    def _begin_memory(self, features: Floats) -> None:
+    def _begin_memory(self) -> None:
         signals, m = self._theta.shape
         self._P = np.tile(self.C * np.eye(m), (signals, 1, 1))
         self._ceiling = np.full((signals, m), float(self.C))
@@ -226,11 +223,6 @@ class RecursiveLeastSquares(Recursion):
         )  # fmt: skip
         kept = min(self.innovations - 1, len(y))
         self._past = (phi[len(y) - kept :].copy(), y[len(y) - kept :].copy())
-
-    def _summarise(self, features: Floats, targets: Floats, multiplicity: Floats) -> None:
-        # a sample is seen again while it is among the last
-        used = np.minimum(self.innovations, len(targets) - np.arange(len(targets)))
-        super()._summarise(features, targets, multiplicity * used)
 
 
 @settings()
@@ -273,11 +265,7 @@ class StochasticGradient(Recursion):
 
     omega: float = 0.0
 
-    def _check(self) -> None:
-        super()._check()
-        check_number(self.omega, "omega", at_least=0.0)
-
-    def _begin_memory(self, features: Floats) -> None:
+    def _begin_memory(self) -> None:
         self._r = np.zeros(len(self._theta))
 
     def _advance(self, phi: Floats, y: Floats, history: Floats) -> None:

@@ -131,13 +131,11 @@ class RMSVM(LinearRegressor):
         """Slopes and offset for standardised features and targets."""
         if not Z.shape[1]:
             return np.zeros(0), 0.0
-        has_offset, C = self.constant is not None, weight / len(e)
-        if self.regression == "svr" and not has_offset:
+        has_offset, C, svr = self.constant is not None, weight / len(e), self.regression == "svr"
+        if svr and not has_offset:
             return _through_zero(Z, e, C, band), 0.0
-        solver = Ridge(alpha=1.0 / C, fit_intercept=has_offset)
-        if self.regression == "svr":
-            solver = SVR(kernel="linear", C=C, epsilon=band)
-        solver.fit(Z, e)
+        ridge = Ridge(alpha=1.0 / C, fit_intercept=has_offset)
+        solver = (SVR(kernel="linear", C=C, epsilon=band) if svr else ridge).fit(Z, e)
         return np.asarray(solver.coef_, dtype=float).ravel(), float(np.sum(solver.intercept_))
 
 
@@ -147,9 +145,8 @@ def _through_zero(Z: Floats, e: Floats, C: float, band: float) -> Floats:
     By coordinate descent, whose time is proportional to the number of samples; where it does not converge, by
     sequential minimal optimisation of the samples and their mirror image, which makes the offset zero.
     """
-    quick = LinearSVR(
-        C=C, epsilon=band, fit_intercept=False, dual=True, tol=1e-6, max_iter=MOST_SWEEPS, random_state=0
-    )
+    solver = {"dual": True, "tol": 1e-6, "max_iter": MOST_SWEEPS, "random_state": 0}
+    quick = LinearSVR(C=C, epsilon=band, fit_intercept=False, **solver)
     with warnings.catch_warnings():
         warnings.simplefilter("error", ConvergenceWarning)
         try:
@@ -174,17 +171,15 @@ def fit_rm_svm(make: Callable[[], Estimator], task: FitTask) -> Estimators:
             "which has a reference ship, with a reference_model: 'auto', a shipped model's name or a model "
             "file; or choose another method, such as 'tls-svm'"
         )
-    tuner = _Tuner(asked, task)
+    tuner, found = _Tuner(asked, task), dict[str, Estimator]()
     weight = tuner.weight() if asked.C is None else float(asked.C)
     bands, search = tuner.bands(weight)
-    estimators: Estimators = {}
     for k, (q, band) in enumerate(zip(task.samples.features, bands, strict=True)):
-        estimator = tuner.fitted(q, weight, band, tuner.everything)
+        found[q] = estimator = tuner.fitted(q, weight, band, tuner.everything)
         estimator.chosen_ = {"C": weight, "epsilon": band}
         if search is not None:
             estimator.search_ = search.of(k, BAND)
-        estimators[q] = estimator
-    return estimators
+    return found
 
 
 class _Tuner:
@@ -204,9 +199,9 @@ class _Tuner:
         if key not in self._known:
             names = [term.name for term in self.blank.table.terms(equation)]
             constant = names.index("0") if self.asked.free_constant and "0" in names else None
-            chosen = {"C": weight, "epsilon": band, "constant": constant}
             used = np.flatnonzero(rows)[:: self.thin]
             X, y = self.samples.features[equation][used], self.samples.targets[equation][used]
+            chosen = {"C": weight, "epsilon": band, "constant": constant}
             self._known[key] = RMSVM(**self.asked.get_params() | chosen).fit(X, y)
         return self._known[key]
 
@@ -256,8 +251,7 @@ def heading_error(model: ShipModel, trial: Trial, objective: str) -> float:
 
     Root mean square, rad ("rmse"), or 1 less Pearson's correlation; infinite where the model runs away.
     """
-    prediction = predict(model, trial)
-    if prediction is None:
+    if (prediction := predict(model, trial)) is None:
         return np.inf
     ours, theirs = prediction["psi"], trial["psi"]
     if objective == "rmse":

@@ -68,16 +68,9 @@ class TunedLSSVM(LinearRegressor):
     robust: bool = False
 
     def fit(self, X: ArrayLike, y: ArrayLike, groups: ArrayLike | None = None) -> Self:
-        """Search for C and fit to samples.
+        """Search for C and fit to samples of shape (n_samples, n_features), in the order of time.
 
-        Parameters
-        ----------
-        X : array-like of shape (n_samples, n_features)
-            Features, in the order of time.
-        y : array-like of shape (n_samples,)
-            Targets.
-        groups : array-like of shape (n_samples,), optional
-            Trial of each sample, for folds="trials".
+        Targets have the shape (n_samples,), as have `groups`: the trial of each sample, for folds="trials".
         """
         check_choice(self.objective, OBJECTIVES, "objective")
         check_whole(self.seed, "seed", at_least=0)
@@ -110,12 +103,11 @@ class TunedLSSVM(LinearRegressor):
     def fit_with(self, X: ArrayLike, y: ArrayLike, search: SearchResult) -> Self:
         """Take C as a search found it, and fit."""
         X, y = validated(self, X, y)
-        C = 10.0 ** float(search.x[0])
-        fitted = vars(self._estimator(C).fit(X, y))
+        self.C_, self.search_ = 10.0 ** float(search.x[0]), search
+        fitted = vars(self._estimator(self.C_).fit(X, y))
         self.__dict__.update({name: value for name, value in fitted.items() if name.endswith("_")})
-        self.C_, self.search_ = C, search
         found = {"value": search.value, "evaluations": search.evaluations}
-        self.chosen_ = {"C": C, "objective": self.objective, **found}
+        self.chosen_ = {"C": self.C_, "objective": self.objective, **found}
         return self
 
     def _estimator(self, C: float) -> LSSVM:
@@ -146,14 +138,9 @@ def free_running_error(model: ShipModel, trials: Sequence[Trial]) -> float:
     """
     errors = []
     for trial in trials:
-        prediction = predict(model, trial)
-        if prediction is None:
-            errors.append(RAN_AWAY)
-            continue
-        motion = [c for c in COMPARED if np.ptp(trial[c]) > 0.0]
-        errors.append(
-            float(np.mean([np.mean((prediction[c] - trial[c]) ** 2) / np.var(trial[c]) for c in motion]))
-        )
+        run, motion = predict(model, trial), [c for c in COMPARED if np.ptp(trial[c]) > 0.0]
+        ratios = [np.mean((run[c] - trial[c]) ** 2) / np.var(trial[c]) for c in motion] if run else [RAN_AWAY]
+        errors.append(np.mean(ratios))
     return float(np.mean(np.minimum(errors, RAN_AWAY)))
 
 
@@ -169,17 +156,14 @@ def _fit_free_running(settings: TunedLSSVM, task: FitTask) -> Estimators:
     }
 
     def error(log_c: Floats) -> float:
-        accelerations = {}
-        for q, exponent in zip(whitened, log_c, strict=True):
-            fit = whitened[q]
-            accelerations[q] = fit.coefficients(fit.filters(10.0**exponent, len(fit.singular_values)))
+        accelerations = {
+            q: fit.coefficients(fit.filters(10.0**exponent, len(fit.singular_values)))
+            for (q, fit), exponent in zip(whitened.items(), log_c, strict=True)
+        }
         return free_running_error(task.blank.with_accelerations(accelerations), task.trials)
 
-    search = get_optimiser(settings.optimiser).minimise(
-        lambda candidates: np.array([error(x) for x in candidates]),
-        [settings.log_bounds()] * len(whitened),
-        settings.seed,
-    )
+    optimiser, bounds = get_optimiser(settings.optimiser), [settings.log_bounds()] * len(whitened)
+    search = optimiser.minimise(lambda xs: np.array([error(x) for x in xs]), bounds, settings.seed)
     return {
         q: clone(settings).fit_with(X, samples.targets[q], search.of(k))
         for k, (q, X) in enumerate(samples.features.items())

@@ -50,10 +50,9 @@ def estimate_current(
     """
     runs = _Runs(trials, length, speed, shared, known)
     x, slopes, residuals = runs.fitted()
-    J = slopes.reshape(-1, len(x))
+    J, changes = slopes.reshape(-1, len(x)), []
     information = J.T @ J + np.diag(runs.weights**2)
     parts = 1 if shared and len(trials) > 2 else 3
-    changes = []
     for k in range(len(trials)):
         for rows in np.array_split(np.flatnonzero(np.isfinite(runs.seen[:, 0, k])), parts):
             own, left = slopes[rows, :, k].reshape(-1, len(x)), residuals[rows, :, k].ravel()
@@ -103,10 +102,8 @@ class _Runs:
             wind = wind_accelerations(trial).T[:2] * travel / speed
             n = trial["n"] / shaft if shaft is not None else np.ones(len(trial))
             north, east = rotate_to_body(*over_ground(trial), -trial["psi"])
-            if "v" in trial.derived and "u" not in trial.derived:  # a speed log, through the water
-                logged = trial["u"]
-            else:
-                logged = np.full(len(trial), np.nan)
+            has_log = "v" in trial.derived and "u" not in trial.derived  # of the speed through the water
+            logged = trial["u"] if has_log else np.full(len(trial), np.nan)
             seen_at = [row / speed for row in (north, east, logged)]
             rows = [trial["r"] * travel, trial["delta"], n, *wind, trial["psi"], *seen_at]
             times = (trial.t - trial.t[0]) / travel
@@ -126,8 +123,7 @@ class _Runs:
 
     def averaged(self, values: Floats) -> Floats:
         """Means over the windows of the grid."""
-        means: Floats = values[:-1].reshape(self.windows, STEPS, *values.shape[1:]).mean(axis=1)
-        return means
+        return np.asarray(values[:-1].reshape(self.windows, STEPS, *values.shape[1:]).mean(axis=1))
 
     def at(self, x: Floats) -> tuple[Floats, Floats]:
         """What is measured less what is simulated, and the slopes of the latter by the unknowns.
@@ -168,7 +164,7 @@ class _Runs:
 
     def fitted(self) -> tuple[Floats, Floats, Floats]:
         """The most probable unknowns, and slopes and residuals there by their standard deviation."""
-        x, damping, scale = self.centre.copy(), 1e-2, 0.1
+        x, damping, scale = self.centre, 1e-2, 0.1
         residuals, slopes = self.at(x)
         count = max(int(np.isfinite(self.seen).sum()) - len(x), 1)
 

@@ -64,9 +64,8 @@ class ForceRegression:
 
     def r_squared(self, coefficients: Floats) -> dict[str, float]:
         """Share of the variance of X, Y and N that is explained (equation 22)."""
-        fitted, forces = self.features @ coefficients, [self.equation == i for i in range(len(FORCES))]
-        explained = [float(r2_score(self.targets[rows], fitted[rows])) for rows in forces]
-        return dict(zip(FORCES, explained, strict=True))
+        fitted, forces = self.features @ coefficients, {f: self.equation == i for i, f in enumerate(FORCES)}
+        return {f: float(r2_score(self.targets[rows], fitted[rows])) for f, rows in forces.items()}
 
 
 def force_regression(
@@ -97,8 +96,7 @@ def force_regression(
     ship, names = particulars.completed(), structure.coefficient_names
     parts, index = [], []
     for i, trial in enumerate(trials):
-        missing = [name for name in NEEDED if name not in trial]
-        if missing:
+        if missing := [name for name in NEEDED if name not in trial]:
             raise InputError(
                 f"trial {trial.name!r}: channel {missing[0]!r} is missing, structure {structure.name!r} "
                 f"needs {', '.join(NEEDED)}; give captive tests"
@@ -179,23 +177,16 @@ def force_variances(equation: Integers, residuals: Floats, leverages: Floats) ->
     """
     forces = [equation == i for i in range(len(FORCES))]
     freedom = [max(float(np.sum(1.0 - leverages[rows])), 1.0) for rows in forces]
-    return np.array(
-        [np.sum(residuals[rows] ** 2, axis=0) / n for rows, n in zip(forces, freedom, strict=True)]
-    )
+    squares = [np.sum(residuals[rows] ** 2, axis=0) for rows in forces]
+    return np.array([square / n for square, n in zip(squares, freedom, strict=True)])
 
 
 @single_threaded()
 def identify_forces(
-    trials: Sequence[Trial],
-    structure: str = "pmm18",
-    particulars: Particulars | None = None,
-    *,
-    method: str = "tls-svm",
-    rank: int | None = None,
-    model_inertia: bool = True,
-    steering: SteeringGear | None = None,
-    name: str | None = None,
-) -> ShipModel:
+    trials: Sequence[Trial], structure: str = "pmm18", particulars: Particulars | None = None, *,
+    method: str = "tls-svm", rank: int | None = None, model_inertia: bool = True,
+    steering: SteeringGear | None = None, name: str | None = None,
+) -> ShipModel:  # fmt: skip
     """Identify a table for forces, added masses included, from captive tests.
 
     Parameters
@@ -226,32 +217,22 @@ def identify_forces(
         raise InputError(f"rank: {rank} found with method {method!r}, which keeps all; choose 'tls-svm'")
     if particulars is None:
         raise InputError("particulars: None found, expected at least length, speed and mass of the ship")
-    regression = force_regression(trials, _captive_table(structure), particulars, model_inertia)
-    estimator = TruncatedLSSVM(selection=METHODS[method], rank=rank, fit_intercept=False)
-    coefficients, covariance = fit_forces(regression, estimator)
-    provenance = {
-        "structure": structure,
-        "method": method,
-        "rank": estimator.rank_,
-        "r_squared": regression.r_squared(coefficients),
-        "trials": [{"name": trial.name, "sha256": trial.sha256} for trial in trials],
-    }
-    return ShipModel(
-        name=name or particulars.name,
-        structure=structure,
-        particulars=particulars.completed(),
-        steering=steering or SteeringGear(),
-        coefficients=dict(zip(regression.names, coefficients.tolist(), strict=True)),
-        covariance=covariance,
-        provenance=provenance,
-    )
-
-
-def _captive_table(structure: str) -> SharedStructure:
     table = get_structure(structure)
     if not isinstance(table, SharedStructure):
         raise InputError(
             f"structure: {structure!r} found, which is identified from free-running trials, expected one for "
             "captive tests, such as 'pmm18'; use identify"
         )
-    return table
+    regression = force_regression(trials, table, particulars, model_inertia)
+    estimator = TruncatedLSSVM(selection=METHODS[method], rank=rank, fit_intercept=False)
+    coefficients, covariance = fit_forces(regression, estimator)
+    provenance = {
+        "structure": structure, "method": method, "rank": estimator.rank_,
+        "r_squared": regression.r_squared(coefficients),
+        "trials": [{"name": trial.name, "sha256": trial.sha256} for trial in trials],
+    }  # fmt: skip
+    return ShipModel(
+        name=name or particulars.name, structure=structure, particulars=particulars.completed(),
+        steering=steering or SteeringGear(), covariance=covariance, provenance=provenance,
+        coefficients=dict(zip(regression.names, coefficients.tolist(), strict=True)),
+    )  # fmt: skip

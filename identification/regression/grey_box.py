@@ -1,13 +1,14 @@
 """Grey boxes: their reference ship, how well she alone predicts, and the regression of a model on itself."""
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from identification.estimators.estimator import Estimator
-from identification.estimators.lssvm import TruncatedLSSVM
+from identification.estimators.methods import METHODS, fit_all
 from identification.regression.samples import Samples, build_samples
 from identification.simulation_error.similarity import AUTO, check_alike, select_reference
 from identification.validation.prediction import predict, trial_metrics
@@ -46,11 +47,9 @@ def chosen_box(
     recorded = set.intersection(*(set(trial.channels) for trial in trials)) if trials else set()
     found: dict[str, float] = {}
     if reference == AUTO:
-        try:  # with what can be estimated
-            ship = particulars.completed()
-        except InputError:  # too little is known for that
-            ship = particulars
-        reference, found = select_reference(ship, recorded)
+        with suppress(InputError):  # too little may be known to estimate the rest
+            particulars = particulars.completed()
+        reference, found = select_reference(particulars, recorded)
         check_alike(reference, found[reference], 'choose structure "abkowitz" or "cubic"')
     box = grey_box(reference)
     return replace(box, shaft=box.shaft and "n" in recorded), found
@@ -65,10 +64,9 @@ def explained_samples(
     """
     table: Any = _OwnAccelerations(grey_box(model, shaft=True))
     own = build_samples(trials, table, model.particulars, shaft_speed=model.service_shaft_speed, **sampling)
-    estimators: dict[str, Estimator] = {}
-    for q, features in own.features.items():
-        estimators[q] = TruncatedLSSVM(selection="full", fit_intercept=False).fit(features, own.targets[q])
-        estimators[q].coef_ = np.ones(1)
+    estimators = fit_all(METHODS["ls"].estimator, own)
+    for estimator in estimators.values():
+        estimator.coef_ = np.ones(1)
     return own, estimators
 
 

@@ -55,11 +55,9 @@ def spline_integrals(
 
 def _between(t: Floats, name: str, values: Floats, rudder: Rudder) -> Callable[[Floats], Floats]:
     """A channel between its samples; a shaft speed, which may jump, is taken straight."""
-    if name == "delta":
-        return rudder
     if name == "n":
         return lambda times: np.interp(times, t, values)
-    return broken_spline(t, values, rudder)
+    return rudder if name == "delta" else broken_spline(t, values, rudder)
 
 
 def broken_spline(t: Floats, values: Floats, rudder: Rudder) -> BSpline:

@@ -57,9 +57,8 @@ def pose(
         )
     used = [repaired(trial) if options.repair else trial for trial in everything if trial.use == "fit"]
     table, similarity = _table(options.structure, options.reference_model, particulars, used)
-    used, everything = (
-        [_at_constant_speed(one, table, particulars) for one in group] for group in (used, everything)
-    )
+    used = [_at_constant_speed(trial, table, particulars) for trial in used]
+    everything = [_at_constant_speed(trial, table, particulars) for trial in everything]
     check_trials(used, table)
     ship = _ship(particulars, used, table)
     for trial in used:
@@ -70,9 +69,8 @@ def pose(
     regression = build_samples(used, table, ship, shaft_speed=shaft, **sampling)
     if options.wind == "constant":
         constants = constant_wind(used, regression, options.structure)
-        used, everything = (
-            [with_constant_wind(one, constants) for one in group] for group in (used, everything)
-        )
+        used = [with_constant_wind(trial, constants) for trial in used]
+        everything = [with_constant_wind(trial, constants) for trial in everything]
         regression = build_samples(used, table, ship, shaft_speed=shaft, **sampling)
         sea["wind"] = {"option": "constant", "accelerations": constants}
     check_samples(regression, used, table)
@@ -96,15 +94,11 @@ def _blank(
     """The model but for its coefficients, with the envelope of the trials behind it."""
     names = (get_dynamics(MMG) if table is MMG_CHANNELS else table).coefficient_names
     return ShipModel(
-        name=name,
-        structure=table.name,
-        particulars=ship,
-        steering=gear,
+        name=name, structure=table.name, particulars=ship, steering=gear, service_shaft_speed=shaft,
         coefficients=dict.fromkeys(names, 0.0),
-        service_shaft_speed=shaft,
         own_table=None if table.name in STRUCTURES or table is MMG_CHANNELS else table,
         envelope=Envelope.from_samples(*(np.concatenate([t[c] for t in used]) for c in ENVELOPE_CHANNELS)),
-    )
+    )  # fmt: skip
 
 
 def held_out(trials: Any, names: Sequence[str]) -> Sequence[Trial]:
@@ -115,8 +109,7 @@ def held_out(trials: Any, names: Sequence[str]) -> Sequence[Trial]:
             f"trials: {wrong[0]!r} found, expected a list of Trials, such as ship.trials() of a ship file"
         )
     known = [trial.name for trial in trials]
-    twice = [name for name in known if known.count(name) > 1]
-    if twice:
+    if twice := [name for name in known if known.count(name) > 1]:
         raise InputError(
             f"trials: {len(known)} trials found, two of them named {twice[0]!r}, expected different names; "
             "rename one with trial.with_(name=...)"

@@ -53,8 +53,7 @@ class Rudder:
         """Rudder angle, rad, at times within the samples."""
         times = np.asarray(times, dtype=float)
         if not self.follows_gear:
-            between: Floats = np.interp(times, self.t, self.delta)
-            return between
+            return np.asarray(np.interp(times, self.t, self.delta))
         k = np.clip(np.searchsorted(self.t, times, side="right") - 1, 0, len(self.t) - 2)
         return self._within(k, times - self.t[k])
 
@@ -105,10 +104,9 @@ def estimate_gear(t: Floats, delta: Floats) -> tuple[float, float]:
     tolerance = TOLERANCE * np.ptp(delta)
 
     def unsteadiness(lag: float) -> float:
-        orders = _orders(t, delta, rate, lag)
-        both = np.isfinite(orders[1:]) & np.isfinite(orders[:-1])
-        jumps = np.abs(np.where(both, orders[1:], 0.0) - np.where(both, orders[:-1], 0.0))
-        return float(np.minimum(jumps, 10 * tolerance).sum())
+        with np.errstate(invalid="ignore"):  # between two ramps
+            jumps = np.abs(np.diff(_orders(t, delta, rate, lag)))
+        return float(np.minimum(np.where(np.isfinite(jumps), jumps, 0.0), 10 * tolerance).sum())
 
     lags = (np.geomspace(0.1, 20.0, 48) * float(np.median(steps))).tolist()
     best = int(np.argmin([unsteadiness(lag) for lag in lags]))
@@ -127,8 +125,7 @@ def _flow(start: Any, order: Any, elapsed: Any, rate: float, lag: float) -> Floa
     ramping = np.minimum(elapsed, (distance - tail) / rate)
     decay = np.exp(-(elapsed - ramping) / lag) if lag > 0.0 else 1.0
     moved = rate * ramping + np.where(ramping < elapsed, tail * (1.0 - decay), 0.0)
-    flow: Floats = start + side * moved
-    return flow
+    return np.asarray(start + side * moved)
 
 
 def _orders(t: Floats, delta: Floats, rate: float, lag: float) -> Floats:
@@ -203,10 +200,8 @@ def _ramp_ends(
     """Times at which a ramp ends inside an interval, with the smoothness there."""
     middle = _flow(delta[:-1], before, switch, rate, lag)
     ends: list[tuple[float, int]] = []
-    for start, order, begin, length in (
-        (delta[:-1], before, t[:-1], switch),
-        (middle, after, t[:-1] + switch, np.diff(t) - switch),
-    ):
+    parts = (delta[:-1], before, t[:-1], switch), (middle, after, t[:-1] + switch, np.diff(t) - switch)
+    for start, order, begin, length in parts:
         ramp = (np.abs(order - start) - rate * lag) / rate
         inside = (ramp > 1e-9) & (ramp < length)
         ends += [(float(time), int(lag > 0.0)) for time in (begin + ramp)[inside]]
@@ -221,10 +216,10 @@ def estimated_gear(trials: Sequence[Trial]) -> SteeringGear:
     """
     limit = max(USUAL_LIMIT_DEG, *(float(np.degrees(np.abs(trial["delta"]).max())) for trial in trials))
     clean = [t for t in trials if not is_noisy(t.t, (t[channel] for channel in "uvr"))]
-    exact = [rudder for trial in clean if (rudder := rebuild(trial.t, trial["delta"])).follows_gear]
+    rudders = [rebuild(trial.t, trial["delta"]) for trial in clean]
+    exact = [(rudder.rate, rudder.time_constant) for rudder in rudders if rudder.follows_gear]
     if exact:
-        rate = float(np.median([rudder.rate for rudder in exact]))
-        lag = float(np.median([rudder.time_constant for rudder in exact]))
+        rate, lag = np.median(exact, axis=0).tolist()
     else:
         rates = np.concatenate([np.abs(np.diff(trial["delta"])) / np.diff(trial.t) for trial in trials])
         fastest = float(np.quantile(rates[rates > 0.0], FAST_QUANTILE))

@@ -16,13 +16,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 
 from identification.regression import preprocess
-from identification.regression.integrals import (
-    Channels,
-    Integrals,
-    spline_integrals,
-    step_integrals,
-    twice_integrated,
-)
+from identification.regression.integrals import Channels, spline_integrals, step_integrals, twice_integrated
 from identification.regression.rudder import rebuild, straight
 from shipgym import InputError, Particulars, SteeringGear, Trial
 from shipgym.arrays import Floats, Integers, integral
@@ -70,26 +64,16 @@ class Samples:
 
     def select(self, rows: NDArray[Any]) -> Self:
         """Some of the rows, by mask or index."""
-        return replace(
-            self,
-            features={q: X[rows] for q, X in self.features.items()},
-            targets={q: y[rows] for q, y in self.targets.items()},
-            start=self.start[rows],
-            duration=self.duration[rows],
-            trial=self.trial[rows],
-        )
+        features, targets = ({q: one[rows] for q, one in of.items()} for of in (self.features, self.targets))
+        own = self.start[rows], self.duration[rows], self.trial[rows]
+        return type(self)(features, targets, *own, self.window)
 
 
 def build_samples(
-    trials: Sequence[Trial],
-    structure: Structure,
-    particulars: Particulars,
-    samples: str = "spline",
-    window: int | None = None,
-    gear: SteeringGear | None = None,
-    smooth: bool | str = True,
+    trials: Sequence[Trial], structure: Structure, particulars: Particulars, samples: str = "spline",
+    window: int | None = None, gear: SteeringGear | None = None, smooth: bool | str = True,
     shaft_speed: float = 0.0,
-) -> Samples:
+) -> Samples:  # fmt: skip
     """Stack the regressions of all trials.
 
     A trial with gaps in time is taken for several (`between_gaps`): nothing is smoothed or integrated across
@@ -164,7 +148,13 @@ class _Sampling:
     def _part(self, trial: Trial, index: int, window: int) -> Samples:
         t, equations = trial.t, self.structure.equations
         channels = preprocess.smoothed_channels(trial, self.structure.required_channels, self.smooth)
-        integrals, moments = self._integrals(trial, channels)
+        if self.samples == "spline":
+            noisy = preprocess.is_noisy(t, (trial[name] for name in channels if name != "delta"))
+            rudder = straight(t, trial["delta"]) if noisy else rebuild(t, trial["delta"], self.gear)
+            integrals, moments = spline_integrals(t, channels, equations, self._terms, rudder)
+        else:
+            by_euler = self.samples == "euler"
+            integrals, moments = step_integrals(t, channels, equations, self._terms, by_euler)
         if "q" in integrals:
             memory = twice_integrated(t, integrals.pop("q"), moments["q"])
             integrals["r"] = np.hstack([integrals["r"], memory])
@@ -183,15 +173,6 @@ class _Sampling:
                 targets[q] -= by_reference
         part = Samples(features, targets, t[first], t[last] - t[first], np.full(len(first), index), window)
         return without_memory(part) if "q" in equations else part
-
-    def _integrals(self, trial: Trial, channels: Channels) -> Integrals:
-        """Integrals of the terms over each step, and their moments."""
-        t, equations = trial.t, self.structure.equations
-        if self.samples != "spline":
-            return step_integrals(t, channels, equations, self._terms, self.samples == "euler")
-        noisy = preprocess.is_noisy(t, (trial[name] for name in channels if name != "delta"))
-        rudder = straight(t, trial["delta"]) if noisy else rebuild(t, trial["delta"], self.gear)
-        return spline_integrals(t, channels, equations, self._terms, rudder)
 
     def _terms(self, equation: str, channels: Channels) -> Floats:
         """The terms of an equation, of a grey box followed by the reference ship's acceleration."""
@@ -217,8 +198,7 @@ def between_gaps(trial: Trial, particulars: Particulars, fewest: int = FEWEST_SA
         return [trial]
     fewest = max(fewest, FEWEST_SAMPLES)
     edges = [0, *gaps.tolist(), len(trial)]
-    rows = [slice(i, j) for i, j in pairwise(edges) if j - i >= fewest]
-    if not rows:
+    if not (rows := [slice(i, j) for i, j in pairwise(edges) if j - i >= fewest]):
         longest = int(np.argmax(steps))
         raise InputError(
             f"trial {trial.name!r}: {gaps.size} gaps in time found (the longest from {trial.t[longest]:g} to "
@@ -260,12 +240,11 @@ def without_memory(part: Samples) -> Samples:
             f"window: a trial of {len(part)} windows found, expected at least two after each other for a "
             "structure with a memory of yaw; give a smaller window, or longer trials"
         )
-    after = following[rows]
-    chosen = part.select(rows)
+    after, chosen = following[rows], part.select(rows)
     scale = 0.5 * (part.duration[rows] + part.duration[after])
     features, targets = part.features["r"] / part.duration[:, None], part.targets["r"] / part.duration
+    features = (features[after] - features[rows]) * scale[:, None]
+    targets = (targets[after] - targets[rows]) * scale
     return replace(
-        chosen,
-        features=chosen.features | {"r": (features[after] - features[rows]) * scale[:, None]},
-        targets=chosen.targets | {"r": (targets[after] - targets[rows]) * scale},
+        chosen, features=chosen.features | {"r": features}, targets=chosen.targets | {"r": targets}
     )

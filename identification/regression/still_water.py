@@ -82,8 +82,7 @@ def _take_out_current(
     """Take the current out of trials, by name, where it is known or asked for; what is known of each."""
     open_ = [t for t in found.values() if t.over_ground and t.use == "fit" and "psi" in t]
     one_heading = open_ and abs(np.exp(1j * np.concatenate([t["psi"] for t in open_])).mean()) > ONE_HEADING
-    rows: dict[str, Any] = {}
-    doubts: dict[str, list[str]] = {}
+    rows, doubts = dict[str, Any](), dict[str, list[str]]()
     for trial, current, covariance, source in _currents(list(found.values()), length, speed, option):
         mean = np.reshape(current, (2, -1)).mean(axis=1)
         row: dict[str, Any] = {"north": float(mean[0]), "east": float(mean[1])}
@@ -109,9 +108,8 @@ def _take_out_current(
         else:
             found[trial.name] = through_water(trial, *current)
         rows[trial.name] = row
-    remarks += [
-        f"{', '.join(names)}: no current is removed: {text}; {REMEDY}" for text, names in doubts.items()
-    ]
+    for doubt, names in doubts.items():
+        remarks.append(f"{', '.join(names)}: no current is removed: {doubt}; {REMEDY}")
     return rows
 
 
@@ -125,13 +123,11 @@ def _currents(
     """
     unknown = []
     for trial in trials:
-        known = _known(trial, option)
-        if known is not None:
+        if (known := _known(trial, option)) is not None:
             yield trial, known, None, "columns" if COLUMNS[0] in trial else "given"
         elif trial.over_ground and trial.channels.keys() >= NEEDED:
             unknown += [trial] * (trial.duration > SHORTEST * length / speed)
-    fitted = [trial for trial in unknown if trial.use == "fit"]
-    if not fitted:
+    if not (fitted := [trial for trial in unknown if trial.use == "fit"]):
         return
     shared = option != "trial"
     found = estimate_current(fitted, length, speed, shared)

@@ -20,15 +20,13 @@ def comparison_page(comparison: Ranking) -> str:
     Raises InputError if plotly is not installed.
     """
     model = comparison.best.model
+    beyond = any((error or 0.0) > LARGEST for one in comparison.standings for error in one.errors.values())
+    headings = None if comparison.in_turn else headings_figure(comparison)
     return render(
-        "identification.report/comparison.html",
-        name=model.particulars.name or model.name,
-        comparison=comparison,
-        errors=errors_figure(comparison),
-        largest=f"{LARGEST:g}",
-        beyond=any((error or 0.0) > LARGEST for one in comparison.standings for error in one.errors.values()),
-        headings=None if comparison.in_turn else headings_figure(comparison),
-    )
+        "identification.report/comparison.html", name=model.particulars.name or model.name,
+        comparison=comparison, errors=errors_figure(comparison), largest=f"{LARGEST:g}", beyond=beyond,
+        headings=headings,
+    )  # fmt: skip
 
 
 def errors_figure(comparison: Ranking) -> Figure:
@@ -55,8 +53,7 @@ def headings_figure(comparison: Ranking) -> Figure:
     for trial in held:
         lines = []
         for method, colour in zip(best, PALETTE, strict=False):
-            prediction = comparison.results[method].predictions[trial.name]
-            if prediction is not None:
+            if (prediction := comparison.results[method].predictions[trial.name]) is not None:
                 error = _smoothed(np.degrees(prediction["psi"] - trial["psi"]))
                 lines.append(line(_smoothed(trial.t), error, method, colour, 1.5))
         shown.append(Panel(lines, "time, s", axis("deg", zero=True), PurePath(trial.name).name))

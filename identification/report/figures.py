@@ -13,22 +13,8 @@ from identification.uncertainty.covariance import residuals
 from identification.validation.diagnostics import autocorrelation, cross_correlation, without_overlap
 from identification.validation.warnings import EQUATIONS
 from shipgym.arrays import Floats
-from shipgym.plots import (
-    LIMIT,
-    MEASURED,
-    MODEL,
-    MUTED,
-    PALETTE,
-    Panel,
-    axis,
-    compact,
-    graph_objects,
-    line,
-    panels,
-    points,
-    translucent,
-)
-from shipgym.plots.style import Figure
+from shipgym.plots import Panel, axis, compact, graph_objects, line, panels, points, translucent
+from shipgym.plots.style import LIMIT, MEASURED, MODEL, MUTED, PALETTE, Figure
 
 UNITS = {"u": "m/s²", "v": "m/s²", "r": "deg/s²", "p": "deg/s²"}
 MOST_ROWS = 2500  # drawn of one equation
@@ -39,16 +25,12 @@ SHOWN = (-1.5, 3.5)  # of an interval, by the size of the coefficient
 
 def all_figures(fit: Fit) -> dict[str, Figure]:
     """Every figure of a fit by its name; see `IdentificationResult.plots`."""
-    fitted = [trial for trial in fit.trials if trial.use == "fit"]
     found = regression_figures(fit) | {"coefficients": coefficients_figure(fit)}
-    overview = overview_figure(fitted, fit.predictions)
+    overview = overview_figure([trial for trial in fit.trials if trial.use == "fit"], fit.predictions)
     if overview is not None:
         found["trials"] = overview
-    return found | {
-        f"prediction: {trial.name}": prediction_figure(trial, fit.predictions[trial.name])
-        for trial in fit.trials
-        if trial.use == "validate"
-    }
+    held = [trial for trial in fit.trials if trial.use == "validate"]
+    return found | {f"prediction: {t.name}": prediction_figure(t, fit.predictions[t.name]) for t in held}
 
 
 def regression_figures(fit: Fit) -> dict[str, Figure]:
@@ -94,10 +76,8 @@ def residual_figure(fit: Fit) -> Figure:
     rudder, lags = rudder_at_windows(fit), np.arange(-LAGS, LAGS + 1)
     bound, shown = NORMAL_95 / np.sqrt(len(rows)), []
     for k, q in enumerate(fit.estimators):
-        own = autocorrelation(errors[q][rows], LAGS)
-        shown.append(
-            _bars(np.arange(1, len(own) + 1), own, bound, EQUATIONS[q], "" if k else "with themselves")
-        )
+        own, title = autocorrelation(errors[q][rows], LAGS), "" if k else "with themselves"
+        shown.append(_bars(np.arange(1, len(own) + 1), own, bound, EQUATIONS[q], title))
         if rudder is not None:
             found = cross_correlation(errors[q][rows], rudder[rows], lags)
             shown.append(_bars(lags, found, bound, "", "" if k else "with the rudder"))
@@ -110,9 +90,8 @@ def residual_figure(fit: Fit) -> Figure:
 def _bars(lags: NDArray[Any], values: Any, bound: float, beside: str, title: str) -> Panel:
     """Correlations by their lags, with the bounds of white noise."""
     hover, ends = "lag %{x}: %{y:.2f}<extra></extra>", [lags[0] - 0.5, lags[-1] + 0.5]
-    bars = graph_objects().Bar(
-        x=lags, y=compact(values), marker={"color": MODEL}, showlegend=False, hovertemplate=hover
-    )
+    style = {"marker": {"color": MODEL}, "showlegend": False, "hovertemplate": hover}
+    bars = graph_objects().Bar(x=lags, y=compact(values), **style)
     name = "95 % bounds of white noise"
     bounds = [line(ends, [at, at], name, LIMIT, 1.2, line_dash="dash") for at in (-bound, bound)]
     largest = min(max(1.1 * float(np.max(np.abs(values), initial=0.0)), 3.0 * bound), 1.05)
@@ -121,8 +100,7 @@ def _bars(lags: NDArray[Any], values: Any, bound: float, beside: str, title: str
 
 def rudder_at_windows(fit: Fit) -> Floats | None:
     """Rudder in the middle of each row's window, rad; None where a trial has none."""
-    samples = fit.samples
-    used = [trial for trial in fit.trials if trial.use == "fit"]
+    samples, used = fit.samples, [trial for trial in fit.trials if trial.use == "fit"]
     if not all("delta" in trial for trial in used):
         return None
     middle, angles = samples.start + 0.5 * samples.duration, np.empty(len(samples))
@@ -134,12 +112,8 @@ def rudder_at_windows(fit: Fit) -> Floats | None:
 
 def truncated(fit: Fit) -> dict[str, TruncatedLSSVM]:
     """The estimators, by equation, that chose or were given a rank."""
-    return {
-        q: estimator
-        for q, estimator in fit.estimators.items()
-        if isinstance(estimator, TruncatedLSSVM)
-        and (estimator.selection != "full" or estimator.rank is not None)
-    }
+    own = {q: one for q, one in fit.estimators.items() if isinstance(one, TruncatedLSSVM)}
+    return {q: one for q, one in own.items() if one.selection != "full" or one.rank is not None}
 
 
 def l_curve_figure(fit: Fit) -> Figure:
@@ -173,8 +147,7 @@ def search_figure(fit: Fit) -> Figure:
     searches = {EQUATIONS.get(q, q): search for q, search in fit.searches.items()}
     logarithmic = all(search.variable == LOG_C for search in searches.values())
     common = len({id(search.history) for search in searches.values()}) == 1  # one search for all
-    objectives: list[Any] = []
-    best: list[Any] = []
+    objectives, best = list[Any](), list[Any]()
     for (name, search), colour in zip(searches.items(), PALETTE, strict=False):
         rounds = np.arange(len(search.history))
         relative = search.history / (search.value if search.value > 0.0 else 1.0)
@@ -184,11 +157,9 @@ def search_figure(fit: Fit) -> Figure:
         best.append(line(rounds, values, name, colour))
     round_axis = axis("round", rangemode="tozero")
     own = axis(type="log", tickformat=".0e") if logarithmic else axis(range=[0.0, 1.0])
-    shown = [
-        Panel(objectives, round_axis, axis(), "best objective, relative to the final one"),
-        Panel(best, round_axis, own, "best C" if logarithmic else f"best {BAND}"),
-    ]
-    return panels(shown, 340, 2, grid={"horizontal_spacing": 0.1}, hovermode="closest")
+    left = Panel(objectives, round_axis, axis(), "best objective, relative to the final one")
+    right = Panel(best, round_axis, own, "best C" if logarithmic else f"best {BAND}")
+    return panels([left, right], 340, 2, grid={"horizontal_spacing": 0.1}, hovermode="closest")
 
 
 def coefficients_figure(fit: Fit) -> Figure:

@@ -21,21 +21,16 @@ def report_page(fit: Fit) -> str:
     figures: dict[str, Any] = {"regression": regression_figures(fit)}
     if instability is None:
         figures |= {"coefficients": coefficients_figure(fit), **trial_figures(fit)}
+    settings = [
+        (name.replace("_", " "), _shown(value))
+        for name, value in fit.settings.items()
+        if value is not None and name not in TOLD_ELSEWHERE
+    ]
     return render(
-        "identification.report/report.html",
-        name=fit.model.particulars.name or fit.model.name,
-        fit=fit_view(fit),
-        figures=figures,
-        instability=instability,
-        held_out=held_out_error(fit),
-        undetermined=undetermined(fit),
-        settings=[
-            (name.replace("_", " "), _shown(value))
-            for name, value in fit.settings.items()
-            if value is not None and name not in TOLD_ELSEWHERE
-        ],
-        hashes=fit.settings["trials"],
-    )
+        "identification.report/report.html", name=fit.model.particulars.name or fit.model.name,
+        fit=fit_view(fit), figures=figures, instability=instability, held_out=held_out_error(fit),
+        undetermined=undetermined(fit), settings=settings, hashes=fit.settings["trials"],
+    )  # fmt: skip
 
 
 def _shown(value: Any) -> Any:

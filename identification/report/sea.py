@@ -27,9 +27,8 @@ def sea_sentences(provenance: Mapping[str, Any]) -> list[str]:
         speeds = wind["mean_speeds"].values()
         found.append(f"wind of {min(speeds):.2g} to {max(speeds):.2g} m/s on average: its forces are removed")
     for name, row in wind.get("accelerations", {}).items():
-        parts = [
-            f"{axis[5]}dot {value:.2g} {'m' if axis[5] == 'v' else 'rad'}/s²" for axis, value in row.items()
-        ]
+        units = {"wind_vdot": "m/s²", "wind_rdot": "rad/s²"}
+        parts = [f"{name[5:]} {value:.2g} {units[name]}" for name, value in row.items()]
         found.append(f"{PurePath(name).name}: constant acceleration removed, {', '.join(parts)}")
     return found
 
@@ -54,8 +53,7 @@ def _set_and_drift(row: Mapping[str, Any]) -> str:
 def track_figure(fit: Fit) -> Figure | None:
     """Tracks over ground and through the water, and the way of the current; None where none was removed."""
     rows = {n: row for n, row in (fit.model.provenance or {}).get("currents", {}).items() if row["taken_out"]}
-    trials = [trial for trial in fit.trials if trial.name in rows and {"x", "y"} <= trial.channels.keys()]
-    if not trials:
+    if not (trials := [t for t in fit.trials if t.name in rows and {"x", "y"} <= t.channels.keys()]):
         return None
     shown = []
     for k, trial in enumerate(trials):

@@ -37,11 +37,11 @@ def summary_table(fit: Fit) -> str:
 def kernel_text(report: dict[str, Any]) -> str:
     """What was added to the reference ship, whose weights tell a reader nothing."""
     errors = report["heading_errors_held_out"].items()
-    held_out = [f"{name} " + ("ran away" if e is None else f"{degrees(e):.2g} deg") for name, e in errors]
+    told = [f"{name} " + ("ran away" if e is None else f"{degrees(e):.2g} deg") for name, e in errors]
     return (
         f"Kernel: {report['centres']} radial basis functions of length {report['length']:g} in "
         f"{report['features']} features an equation, C {report['C']:g}; heading held out, rms: "
-        + ", ".join(held_out)
+        f"{', '.join(told)}"
     )
 
 
@@ -76,12 +76,9 @@ def _inertia(fit: Fit) -> Table:
         table.add_row(name, f"{value:.6g}", units.get(name, "1e-5"), source)
     gear = fit.model.steering
     source = (fit.model.provenance or {}).get("steering", "given")
-    for name, value, unit in (
-        ("rudder limit", gear.rudder_limit_deg, "deg"),
-        ("rudder rate", gear.rudder_rate_deg_s, "deg/s"),
-        ("rudder lag", gear.time_constant, "s"),
-    ):
-        table.add_row(name, f"{value:.4g}", unit, source)
+    table.add_row("rudder limit", f"{gear.rudder_limit_deg:.4g}", "deg", source)
+    table.add_row("rudder rate", f"{gear.rudder_rate_deg_s:.4g}", "deg/s", source)
+    table.add_row("rudder lag", f"{gear.time_constant:.4g}", "s", source)
     return table
 
 

@@ -11,7 +11,7 @@ from identification.report.predictions import overview_figure, prediction_figure
 from identification.report.sea import sea_sentences, track_figure
 from identification.report.summary import PRIME, are_derivatives, kernel_text
 from identification.validation.warnings import EQUATIONS, heading_errors_deg, model_warnings
-from shipgym import ShipModel, Trial
+from shipgym import Particulars, Trial
 from shipgym.files import shipped_toml
 from shipgym.ships.particulars import ADDED_MASSES
 from shipgym.trials.units import KNOT
@@ -22,42 +22,32 @@ WORDS: dict[str, dict[str, Any]] = shipped_toml("identification.report", "words.
 
 def fit_view(fit: Fit) -> dict[str, Any]:
     """What the macros in `sections.html` show of a fit but for its figures."""
-    short = short_names(fit.trials)
+    short, provenance, ship = short_names(fit.trials), fit.model.provenance or {}, fit.model.particulars
     return {
-        "model": fit.model,
-        "provenance": fit.model.provenance or {},
-        "warnings": model_warnings(fit),
-        "sea": sea_sentences(fit.model.provenance or {}),
+        "model": fit.model, "provenance": provenance, "warnings": model_warnings(fit),
+        "sea": sea_sentences(provenance),
         "equations": {EQUATIONS.get(name, name): found for name, found in fit.diagnostics.items()},
         "trials": [_trial(trial, short[trial.name]) for trial in fit.trials],
         "uses": [trial.use for trial in fit.trials],
         "errors": {short[name]: _errors(found) for name, found in fit.metrics["trials"].items()},
-        "heading": _heading(fit),
-        "reference": _reference(fit, short),
-        "particulars": _particulars(fit.model),
+        "heading": _heading(fit), "reference": _reference(fit, short), "particulars": _particulars(ship),
         "added_masses": [
-            (name, name in fit.model.particulars.estimated, fit.model.particulars[name] / PRIME)
-            for name in ADDED_MASSES
-            if fit.model.particulars[name] is not None
+            (name, name in ship.estimated, ship[name] / PRIME)
+            for name in ADDED_MASSES if ship[name] is not None
         ],
-        "derivatives": are_derivatives(fit.model),
-        "coefficients": _coefficients(fit),
-        "kernel": kernel_text(found) if (found := (fit.model.provenance or {}).get("kernel")) else None,
-    }
+        "derivatives": are_derivatives(fit.model), "coefficients": _coefficients(fit),
+        "kernel": kernel_text(provenance["kernel"]) if provenance.get("kernel") else None,
+    }  # fmt: skip
 
 
 def trial_figures(fit: Fit) -> dict[str, Any]:
     """Figures of the trials: those fitted in one, and each of those that had no part in the fit."""
-    short = short_names(fit.trials)
+    short, shown = short_names(fit.trials), fit.predictions
+    fitted, held = ([t for t in fit.trials if t.use == use] for use in ("fit", "validate"))
+    predictions = [(short[t.name], "x" in t, prediction_figure(t, shown.get(t.name))) for t in held]
     return {
-        "tracks": track_figure(fit),
-        "overview": overview_figure([t for t in fit.trials if t.use == "fit"], fit.predictions),
-        "predictions": [
-            (short[t.name], "x" in t, prediction_figure(t, fit.predictions.get(t.name)))
-            for t in fit.trials
-            if t.use == "validate"
-        ],
-    }
+        "tracks": track_figure(fit), "overview": overview_figure(fitted, shown), "predictions": predictions,
+    }  # fmt: skip
 
 
 def short_names(trials: Sequence[Trial]) -> dict[str, str]:
@@ -70,16 +60,12 @@ def _trial(trial: Trial, name: str) -> dict[str, Any]:
     """A row of the table of trials: seconds, degrees and knots."""
     speeds = np.hypot(trial["u"], trial["v"]) / KNOT if "u" in trial and "v" in trial else None
     return {
-        "name": name,
-        "kind": None if trial.kind is None else trial.kind.replace("-", " "),
-        "use": trial.use,
-        "derived": ", ".join(sorted(trial.derived)) or "none",
-        "samples": len(trial),
-        "duration": trial.duration,
-        "interval": float(np.median(np.diff(trial.t))),
+        "name": name, "kind": None if trial.kind is None else trial.kind.replace("-", " "),
+        "use": trial.use, "derived": ", ".join(sorted(trial.derived)) or "none",
+        "samples": len(trial), "duration": trial.duration, "interval": float(np.median(np.diff(trial.t))),
         "rudder": float(np.degrees(np.abs(trial["delta"]).max())) if "delta" in trial else None,
         "speeds": None if speeds is None else (speeds.min(), speeds.max()),
-    }
+    }  # fmt: skip
 
 
 def _errors(metrics: dict[str, Any]) -> dict[str, Any]:
@@ -95,22 +81,16 @@ def _errors(metrics: dict[str, Any]) -> dict[str, Any]:
 def _heading(fit: Fit) -> dict[str, Any] | None:
     """Heading error on the trials that were not fitted, else on those that were, degrees."""
     unseen = any(metrics["use"] == "validate" for metrics in fit.metrics["trials"].values())
-    errors = heading_errors_deg(fit, "validate" if unseen else None)
-    if not errors:
+    if not (errors := heading_errors_deg(fit, "validate" if unseen else None)):
         return None
     worst = max(errors, key=lambda name: errors[name])
-    return {
-        "unseen": unseen,
-        "median": float(np.median(list(errors.values()))),
-        "largest": errors[worst],
-        "trial": PurePath(worst).name,
-    }
+    median, largest = float(np.median(list(errors.values()))), errors[worst]
+    return {"unseen": unseen, "median": median, "largest": largest, "trial": PurePath(worst).name}
 
 
 def _reference(fit: Fit, short: dict[str, str]) -> dict[str, Any] | None:
     """Heading errors of a grey box and of its bare reference ship, rad; None for other structures."""
-    reference = fit.metrics.get("reference")
-    if reference is None:
+    if (reference := fit.metrics.get("reference")) is None:
         return None
     errors = {
         short[name]: (metrics["rmse"]["psi"], reference["trials"][name]["rmse"]["psi"])
@@ -119,12 +99,12 @@ def _reference(fit: Fit, short: dict[str, str]) -> dict[str, Any] | None:
     return {"name": reference["name"], "errors": errors}
 
 
-def _particulars(model: ShipModel) -> list[tuple[str, bool, str, str]]:
+def _particulars(ship: Particulars) -> list[tuple[str, bool, str, str]]:
     """Name, whether estimated, value and unit of the particulars that are known."""
     return [
-        (text, name in model.particulars.estimated, f"{factor * float(model.particulars[name]):.5g}", unit)
+        (text, name in ship.estimated, f"{factor * float(ship[name]):.5g}", unit)
         for name, (text, unit, factor) in WORDS["particulars"].items()
-        if model.particulars[name] is not None
+        if ship[name] is not None
     ]
 
 

@@ -53,11 +53,6 @@ def minimise(
     optimiser : {"abc", "pso", "grid", "de"} or Optimiser
         By name with its usual settings, or one with your own.
 
-    Returns
-    -------
-    SearchResult
-        The best candidate, its value, and the course of the search.
-
     Raises
     ------
     InputError

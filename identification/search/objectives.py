@@ -24,8 +24,7 @@ class ErrorOfC:
     def __call__(self, log_c: Floats) -> Floats:
         """Mean squared errors, shape (n_candidates,), of log10 C of shape (n_candidates, 1)."""
         error = self.offset - (1.0 / (self.squares + 10.0**-log_c)) @ self.gain
-        values: Floats = np.einsum("kij,kij->i", error, error) / self.n_samples
-        return values
+        return np.asarray(np.einsum("kij,kij->i", error, error) / self.n_samples)
 
 
 def training_error(
@@ -41,13 +40,9 @@ def training_error(
 
 
 def held_out_error(
-    X: Floats,
-    y: Floats,
-    scale: bool | ArrayLike,
-    fit_intercept: bool,
-    blocks: Integers,
+    X: Floats, y: Floats, scale: bool | ArrayLike, fit_intercept: bool, blocks: Integers,
     weights: Floats | None = None,
-) -> ErrorOfC:
+) -> ErrorOfC:  # fmt: skip
     """Error on each block of samples, by their indices from 0, of the fit to all others."""
     rows = [blocks == k for k in range(int(blocks.max()) + 1)]
     parts = [triangle(X[r], y[r], fit_intercept, None if weights is None else weights[r]) for r in rows]

@@ -16,14 +16,9 @@ from shipgym.arrays import Floats
 
 
 def pattern_search(
-    objective: Callable[[Floats], float],
-    start: ArrayLike,
-    low: ArrayLike,
-    high: ArrayLike,
-    mesh: float = 0.25,
-    finest: float = 1.0 / 64.0,
-    most_evaluations: int = 200,
-) -> SearchResult:
+    objective: Callable[[Floats], float], start: ArrayLike, low: ArrayLike, high: ArrayLike,
+    mesh: float = 0.25, finest: float = 1.0 / 64.0, most_evaluations: int = 200,
+) -> SearchResult:  # fmt: skip
     """Minimise a function of few variables without derivatives, from a start within bounds of shape (n,).
 
     Each round polls the 2n neighbours on the mesh and moves to the best of them if it is better; else the

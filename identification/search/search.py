@@ -83,35 +83,18 @@ class Recorder:
 
     def result(self) -> SearchResult:
         """The search up to now."""
-        return SearchResult(
-            self.x, self.value, np.array(self._history), np.array(self._course), self.evaluations
-        )
+        history, course = np.array(self._history), np.array(self._course)
+        return SearchResult(self.x, self.value, history, course, self.evaluations)
 
 
 class Optimiser(ABC):
     """Minimises an objective within a box."""
 
     def minimise(self, objective: Objective, bounds: ArrayLike, seed: int = 0) -> SearchResult:
-        """Minimise.
+        """Minimise an objective; arguments and errors are those of `identification.minimise`.
 
-        Parameters
-        ----------
-        objective : callable
-            Values, shape (n_candidates,), of candidates of shape (n_candidates, n_dimensions).
-        bounds : array-like of shape (n_dimensions, 2)
-            Lower and upper bound of each dimension.
-        seed : int
-            The same seed gives the same search.
-
-        Returns
-        -------
-        SearchResult
-            The best candidate, its value, and the course of the search.
-
-        Raises
-        ------
-        InputError
-            For bounds and settings that cannot be.
+        The objective gives values, shape (n_candidates,), of candidates of shape (n_candidates,
+        n_dimensions); the bounds have shape (n_dimensions, 2).
         """
         record = Recorder(objective)
         self._search(record, *check_bounds(bounds), np.random.default_rng(seed))
@@ -127,9 +110,8 @@ def check_bounds(bounds: ArrayLike) -> tuple[Floats, Floats]:
     try:
         box = np.asarray(bounds, dtype=float)
     except (TypeError, ValueError):
-        raise InputError(
-            f"bounds: {bounds!r} found, expected numbers, a lower and an upper for each"
-        ) from None
+        told = f"bounds: {bounds!r} found, expected numbers, a lower and an upper for each"
+        raise InputError(told) from None
     if box.ndim != 2 or box.shape[1] != 2 or not len(box):
         raise InputError(
             f"bounds: shape {box.shape} found, expected a lower and an upper bound for each dimension, "

@@ -25,15 +25,14 @@ def clarke_derivatives(particulars: Particulars) -> dict[str, float]:
     From beam, draught, block coefficient and rudder area: Y_v, Y_r, Y_delta, N_v, N_r, N_delta of the
     hydrodynamic forces alone, without the ship's own inertia; rudder positive to starboard.
     """
-    slender, flat, full, shallow = _proportions(particulars)
+    L, B, T, full = main_dimensions(particulars)
+    slender, flat, shallow = B / L, B / T, T / L
     scale = -math.pi * shallow**2
     return {
-        "Y_v": scale * (1.0 + 0.40 * full * flat),
-        "Y_r": scale * (-0.5 + 2.2 * slender - 0.080 * flat),
-        "N_v": scale * (0.5 + 2.4 * shallow),
-        "N_r": scale * (0.25 + 0.039 * flat - 0.56 * slender),
+        "Y_v": scale * (1.0 + 0.40 * full * flat), "Y_r": scale * (-0.5 + 2.2 * slender - 0.080 * flat),
+        "N_v": scale * (0.5 + 2.4 * shallow), "N_r": scale * (0.25 + 0.039 * flat - 0.56 * slender),
         **_rudder(particulars),
-    }
+    }  # fmt: skip
 
 
 def kijima_derivatives(particulars: Particulars) -> dict[str, float]:
@@ -43,22 +42,19 @@ def kijima_derivatives(particulars: Particulars) -> dict[str, float]:
     and added mass in surge, which is added here.
     """
     p = particulars
-    slender, _, full, shallow = _proportions(p)
-    k = 2.0 * shallow
-    by_length = shallow  # from rho L T U^2 / 2 to rho L^2 U^2 / 2
+    L, B, T, full = main_dimensions(p)
+    slender, by_length = B / L, T / L  # the latter from rho L T U^2 / 2 to rho L^2 U^2 / 2
+    k = 2.0 * by_length
     return {
         "Y_v": -by_length * (0.5 * math.pi * k + 1.4 * full * slender),
         "Y_r": -by_length * 1.5 * full * slender + p.mass_prime - p.require("X_udot"),
-        "N_v": -by_length * k,
-        "N_r": by_length * (k**2 - 0.54 * k),
-        **_rudder(p),
-    }
+        "N_v": -by_length * k, "N_r": by_length * (k**2 - 0.54 * k), **_rudder(p),
+    }  # fmt: skip
 
 
-def _proportions(p: Particulars) -> tuple[float, float, float, float]:
-    """Beam by length, beam by draught, block coefficient and draught by length."""
-    B, T, block = p.require("beam"), p.require("draught"), p.require("block_coefficient")
-    return B / p.length, B / T, block, T / p.length
+def main_dimensions(ship: Particulars) -> tuple[float, float, float, float]:
+    """Length, beam and draught, m, and block coefficient."""
+    return ship.length, ship.require("beam"), ship.require("draught"), ship.require("block_coefficient")
 
 
 def _rudder(p: Particulars) -> dict[str, float]:
@@ -68,9 +64,8 @@ def _rudder(p: Particulars) -> dict[str, float]:
 
 
 FORMULAS: dict[str, Callable[[Particulars], dict[str, float]]] = {
-    "clarke": clarke_derivatives,
-    "kijima": kijima_derivatives,
-}
+    "clarke": clarke_derivatives, "kijima": kijima_derivatives,
+}  # fmt: skip
 
 
 def formula_coefficients(
@@ -86,8 +81,7 @@ def formula_coefficients(
     """
     ship = particulars.completed()
     found = {q: [_linear_symbol(term) for term in terms] for q, terms in structure.equations.items()}
-    lacking = [q for q in ("v", "r") if not set(LINEAR_SYMBOLS) <= set(found.get(q, ()))]
-    if lacking:
+    if not all(set(LINEAR_SYMBOLS) <= set(found.get(q, ())) for q in "vr"):
         raise InputError(
             f"prior: {formula!r} found with structure {structure.name!r}, for which the formulas give no "
             "coefficients: they are those of the terms v, r and delta in sway and yaw; choose another "
@@ -123,6 +117,4 @@ def _accelerations(derivatives: dict[str, float], ship: Particulars) -> Floats:
 def _linear_symbol(term: Term) -> str | None:
     """The one of v, r and delta that a term is, times powers of the surge speed; None for other terms."""
     others = [(symbol, power) for symbol, power in term.powers if symbol not in ("u", "U")]
-    if len(others) == 1 and others[0][0] in LINEAR_SYMBOLS and others[0][1] == 1:
-        return others[0][0]
-    return None
+    return next((symbol for symbol in LINEAR_SYMBOLS if others == [(symbol, 1)]), None)

@@ -78,31 +78,28 @@ def fit_mmg(problem: Problem, options: Options) -> tuple[ShipModel, dict[str, An
     within a tenth of the least.
     """
     prior = mmg_prior(options.reference_model or options.prior or YOSHIMURA, problem.blank.particulars)
-    strength = options.prior_strength
-    if strength is not None:
-        check_number(strength, "prior_strength", above=0.0)
+    given = options.prior_strength
+    if given is not None:
+        check_number(given, "prior_strength", above=0.0)
+    strengths = STRENGTHS if given is None else (given,)
     cost = _Problem(replace(problem.blank, particulars=prior.ship), problem.used, prior)
-    estimates: list[Estimate] = []
-    errors, factors = [], []
-    for value in STRENGTHS if strength is None else (strength,):
-        estimates.append(cost.solve(estimates[-1].z if estimates else np.zeros(len(IDENTIFIED)), value))
-        error, factor = cost.held_out(estimates[-1], estimates[0].scales)
-        errors.append(error)
-        factors.append(factor)
+    estimates, z = list[Estimate](), np.zeros(len(IDENTIFIED))
+    for strength in strengths:
+        estimates.append(cost.solve(z, strength))
+        z = estimates[-1].z
+    errors, factors = zip(*(cost.held_out(one, estimates[0].scales) for one in estimates), strict=True)
     chosen = max(k for k, error in enumerate(errors) if error <= (1.0 + MARGIN) * min(errors))
     best, factor = estimates[chosen], factors[chosen]
+    told = {"similarity": dict(prior.similarity or {}), "prior_remarks": list(prior.remarks)}
     report = {
-        "prior": prior.source,
-        **({"similarity": dict(prior.similarity)} if prior.similarity else {}),
-        **({"prior_remarks": list(prior.remarks)} if prior.remarks else {}),
+        "prior": prior.source, **{name: value for name, value in told.items() if value},
         "prior_strength": best.strength,
         "errors_held_out": {f"{e.strength:g}": error for e, error in zip(estimates, errors, strict=True)},
         "model_error": {"factor": factor, "how": "simulated segments of trials left out in turn"},
-        "segments": len(cost.segments),
-        "evaluations": sum(estimate.evaluations for estimate in estimates),
+        "segments": len(cost.segments), "evaluations": sum(one.evaluations for one in estimates),
         "residual_rms": dict(zip(cost.channels, best.scales.tolist(), strict=True)),
         "deviations_from_prior": dict(zip(IDENTIFIED, best.z.round(3).tolist(), strict=True)),
-    }
+    }  # fmt: skip
     covariance, inner = np.zeros((len(prior.mean),) * 2), slice(len(IDENTIFIED))
     covariance[inner, inner] = factor**2 * best.covariance * np.outer(prior.deviation, prior.deviation)
     return replace(cost.model(best.z), covariance=covariance), report
@@ -157,20 +154,16 @@ class _Problem:
         ships = np.repeat(self.numbers, LANES).reshape(-1, LANES)
         ships[first : first + n] = (self.mean + z * self.prior.deviation)[:, None]
         ships[first + np.arange(n), 1 + np.arange(n)] += STEP * self.prior.deviation
-        found = np.concatenate([self._errors(self.segments[k], ships) for k in which])
+        parts = []
+        for segment in (self.segments[k] for k in which):
+            lanes = sailed(self.blank, segment, ships, np.repeat(segment.start, LANES), np.zeros(LANES))
+            off = lanes[1:, self.columns, : n + 1] - segment.measured[1:, :, None]
+            parts.append(off * np.sqrt(self._weight(segment) / len(off)))
+        found = np.concatenate(parts)
         errors = found[:, :, 0]
         with np.errstate(invalid="ignore", over="ignore"):  # of ships that run away
             slopes = (found[:, :, 1:] - errors[:, :, None]) / STEP
         return errors, slopes
-
-    def _errors(self, segment: Segment, ships: Floats) -> Floats:
-        """Errors of the ships of all lanes in a segment, shape (n_samples - 1, n_channels, 42)."""
-        starts = np.repeat(segment.start, LANES)
-        lanes = sailed(self.blank, segment, ships, starts, np.zeros(LANES))
-        lanes = lanes[1:, self.columns, : len(IDENTIFIED) + 1]
-        share = np.sqrt(self._weight(segment) / len(lanes))
-        found: Floats = (lanes - segment.measured[1:, :, None]) * share
-        return found
 
     def scales(self, errors: Floats, which: Integers) -> Floats:
         """Root mean square of the errors by channel, not below the floors."""

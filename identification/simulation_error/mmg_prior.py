@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from identification.simulation_error.formulas import FORMULAS
+from identification.simulation_error.formulas import FORMULAS, main_dimensions
 from identification.simulation_error.similarity import (
     AUTO,
     LEAST_SIMILARITY,
@@ -60,17 +60,10 @@ class MMGPrior:
 def mmg_prior(source: str | ShipModel, particulars: Particulars) -> MMGPrior:
     """The prior of a reference ship in the MMG form, or of formulas.
 
-    Parameters
-    ----------
-    source : str or ShipModel
-        A reference ship, "auto" for the one most like this ship, or "yoshimura" or "kijima".
-    particulars : Particulars
-        With service speed; beam, draught, block coefficient and what of rudder and propeller is known.
-
-    Raises
-    ------
-    InputError
-        For a reference ship of other equations or unlike this one, and particulars that do not suffice.
+    `source`: a reference ship, "auto" for the one most like this ship, or "yoshimura" or "kijima";
+    `particulars`: with service speed; beam, draught, block coefficient and what of rudder and propeller is
+    known. Raises InputError for a reference ship of other equations or unlike this one, and particulars that
+    do not suffice.
     """
     ship = completed(particulars)
     if isinstance(source, str) and source in HULL_FORMULAS:
@@ -113,11 +106,8 @@ def completed(particulars: Particulars) -> Particulars:
     ship = replace(ship, **none, estimated=ship.estimated - none.keys())
     L, B, T = ship.length, ship.require("beam"), ship.require("draught")
     area = ship.rudder_area or L * T / 100.0 * (1.0 + 25.0 * (B / L) ** 2)
-    usual = {
-        "rudder_area": area,
-        "propeller_diameter": DIAMETER * T,
-        "rudder_aspect_ratio": (SPAN * T) ** 2 * (ship.rudders or 1.0) / area,
-    }
+    aspect = (SPAN * T) ** 2 * (ship.rudders or 1.0) / area
+    usual = {"rudder_area": area, "propeller_diameter": DIAMETER * T, "rudder_aspect_ratio": aspect}
     absent: dict[str, Any] = {name: value for name, value in usual.items() if ship[name] is None}
     return replace(ship, **absent, estimated=ship.estimated | absent.keys())
 
@@ -128,23 +118,21 @@ def _reference(source: str | ShipModel, ship: Particulars) -> tuple[ShipModel, d
     So is the best of the candidates where none is like the ship.
     """
     of_form = [name for name, make in REFERENCE_SHIPS.items() if make().structure in ("kvlcc2", MMG)]
-    asked = source
-    if asked == AUTO:
-        source, _ = select_reference(ship, candidates=of_form)
-    model = source if isinstance(source, ShipModel) else load_model(source)
+    name = select_reference(ship, candidates=of_form)[0] if source == AUTO else source
+    model = name if isinstance(name, ShipModel) else load_model(name)
     if model.structure not in ("kvlcc2", MMG):
         raise InputError(
             f"reference_model: {model.name!r} found, which is not written in the MMG form, expected one of "
             f"{quoted(of_form)}, a model file of structure 'mmg', or none: prior = 'yoshimura' takes formulas"
         )
-    others = {name: make().particulars for name, make in REFERENCE_SHIPS.items() if name != "mariner"}
+    others = {one: make().particulars for one, make in REFERENCE_SHIPS.items() if one != "mariner"}
     vectors = {model.name: similarity_vector(model.particulars)}
-    vectors |= {name: similarity_vector(one.completed()) for name, one in others.items()}
+    vectors |= {one: similarity_vector(p.completed()) for one, p in others.items()}
     try:
         found = correlations(similarity_vector(ship), vectors)
     except InputError:  # too little is known to compare
         return model, {}
-    if asked == AUTO:
+    if source == AUTO:
         otherwise = "give prior = 'yoshimura' for formulas of the main dimensions"
         check_alike(model.name, found[model.name], otherwise)
     return model, found
@@ -160,8 +148,8 @@ def reference_coefficients(model: ShipModel) -> dict[str, float]:
 def formula_coefficients(hull: str, ship: Particulars) -> dict[str, float]:
     """Coefficients from main dimensions; `hull`: "yoshimura" or "kijima"; `ship`: as `completed` gives it."""
     check_choice(hull, HULL_FORMULAS, "prior")
-    Cb = ship.require("block_coefficient")
-    slender = Cb * ship.require("beam") / ship.length
+    L, B, _, Cb = main_dimensions(ship)
+    slender = Cb * B / L
     wide = ship.propellers is not None and ship.propellers > 1.0
     wake = 0.55 * Cb - 0.20 if wide else 0.5 * Cb - 0.05
     aspect, pitch = ship.require("rudder_aspect_ratio"), ship.propeller_pitch_ratio or PITCH
@@ -177,14 +165,9 @@ def formula_coefficients(hull: str, ship: Particulars) -> dict[str, float]:
     }  # fmt: skip
 
 
-def _proportions(ship: Particulars) -> tuple[float, float, float, float]:
-    """Length, beam and draught, m, and block coefficient."""
-    return ship.length, ship.require("beam"), ship.require("draught"), ship.require("block_coefficient")
-
-
 def _yoshimura(ship: Particulars, mx: float, my: float) -> dict[str, float]:
     """The hull by Yoshimura & Masumoto 2012, written there for the drift angle beta = -v'."""
-    L, B, d, Cb = _proportions(ship)
+    L, B, d, Cb = main_dimensions(ship)
     slender, k, fine = Cb * B / L, 2.0 * d / L, (1.0 - Cb) * L / B
     # others cite N_vrr with other signs; this one is near KVLCC2's and Kijima's
     return {
@@ -199,7 +182,7 @@ def _yoshimura(ship: Particulars, mx: float, my: float) -> dict[str, float]:
 
 def _kijima(ship: Particulars, mx: float) -> dict[str, float]:
     """Sway and yaw of the hull by Kijima et al. 1990, squares as linear and cubic terms of least error."""
-    L, B, d, Cb = _proportions(ship)
+    L, B, d, Cb = main_dimensions(ship)
     m = 2.0 * ship.require("mass") / (ship.require("water_density") * L * L * d)
     slender, k, flat, fine = Cb * B / L, 2.0 * d / L, d * Cb / B, d * (1.0 - Cb) / B
     drift, turn = ((5 / 16 * most, 35 / 48 / most) for most in (LARGEST_DRIFT, LARGEST_TURN))
@@ -217,7 +200,7 @@ def _kijima(ship: Particulars, mx: float) -> dict[str, float]:
 
 def _added_mass(ship: Particulars) -> dict[str, float]:
     """Zhou et al. 1983 after Motora's charts, by rho L^2 d / 2."""
-    L, B, d, Cb = _proportions(ship)
+    L, B, d, Cb = main_dimensions(ship)
     m = 2.0 * ship.require("mass") / (ship.require("water_density") * L * L * d)
     long, flat = L / B, d / B
     surge = (
@@ -234,10 +217,9 @@ def _added_mass(ship: Particulars) -> dict[str, float]:
 
 def _resistance(ship: Particulars) -> float:
     """Of a hull without waves, by rho L d U^2 / 2: ITTC 1957 with a form factor of 0.3, roughness 0.0004."""
-    Re = ship.length * ship.require("speed") / VISCOSITY
-    friction = 0.075 / (math.log10(Re) - 2.0) ** 2
-    wetted = 1.7 + ship.require("block_coefficient") * ship.require("beam") / ship.require("draught")
-    return (1.3 * friction + 0.0004) * wetted
+    L, B, d, Cb = main_dimensions(ship)
+    friction = 0.075 / (math.log10(L * ship.require("speed") / VISCOSITY) - 2.0) ** 2
+    return (1.3 * friction + 0.0004) * (1.7 + Cb * B / d)
 
 
 def _self_propulsion(c: Mapping[str, float], ship: Particulars) -> float:
@@ -253,8 +235,8 @@ def _self_propulsion(c: Mapping[str, float], ship: Particulars) -> float:
 
 def _out_of_range(ship: Particulars) -> tuple[str, ...]:
     """What of the main dimensions lies outside the range of the formulas."""
-    B, d = ship.require("beam"), ship.require("draught")
-    found = {"block coefficient": ship.require("block_coefficient"), "L/B": ship.length / B, "B/T": B / d}
+    L, B, d, Cb = main_dimensions(ship)
+    found = {"block coefficient": Cb, "L/B": L / B, "B/T": B / d}
     return tuple(
         f"{name} {found[name]:.3g} is outside the range of the regression formulas, {low:g} to {high:g}: "
         "their coefficients are doubtful; name a reference_model like this ship"

@@ -16,8 +16,7 @@ from typing import Any
 import numpy as np
 
 from identification.estimators.estimator import Estimator, Estimators, FitTask
-from identification.estimators.lssvm import TruncatedLSSVM
-from identification.estimators.methods import Method
+from identification.estimators.methods import METHODS, Method, fit_all
 from identification.regression.samples import Samples, build_samples
 from identification.simulation_error.formulas import FORMULAS, formula_coefficients
 from identification.simulation_error.similarity import AUTO, select_reference
@@ -55,12 +54,9 @@ def formula_prior(formula: str, blank: ShipModel) -> Prior:
     ship, table = blank.particulars, blank.table
     found = formula_coefficients(formula, table, ship)
     sizes = hard_turn_features(table, ship, blank.service_shaft_speed)
-    return Prior(
-        formula,
-        {q: values for q, (values, _) in found.items()},
-        {q: np.diag(sizes[q])[known] for q, (_, known) in found.items()},
-        {q: known for q, (_, known) in found.items()},
-    )
+    centre = {q: values for q, (values, _) in found.items()}
+    known = {q: rows for q, (_, rows) in found.items()}
+    return Prior(formula, centre, {q: np.diag(sizes[q])[rows] for q, rows in known.items()}, known)
 
 
 def reference_prior(reference: str | ShipModel, blank: ShipModel) -> Prior:
@@ -76,13 +72,9 @@ def reference_prior(reference: str | ShipModel, blank: ShipModel) -> Prior:
         virtual_trials(model), table, ship, smooth=False, gear=blank.steering, window=1,
         shaft_speed=blank.service_shaft_speed,
     )  # fmt: skip
-    centre, roots = {}, {}
-    for q, features in samples.features.items():
-        centre[q] = (
-            TruncatedLSSVM(selection="full", fit_intercept=False).fit(features, samples.targets[q]).coef_
-        )
-        per_second = features / samples.duration[:, None] / np.sqrt(len(samples))
-        roots[q] = np.asarray(np.linalg.qr(per_second, mode="r"))
+    centre = {q: one.coef_ for q, one in fit_all(METHODS["ls"].estimator, samples).items()}
+    weight = 1.0 / (samples.duration[:, None] * np.sqrt(len(samples)))
+    roots = {q: np.asarray(np.linalg.qr(X * weight, mode="r")) for q, X in samples.features.items()}
     assert isinstance(model.table, GreyBox)
     known = {q: np.ones(len(values), dtype=bool) for q, values in centre.items()}
     return Prior(model.table.ship.name, centre, roots, known)
@@ -135,9 +127,8 @@ def with_prior(
             "the prior out, or choose another structure"
         )
     if strength is not None and strength != np.inf:
-        check_number(
-            strength, "prior_strength", at_least=0.0, hint="0 for no prior, inf for the prior itself"
-        )
+        hint = "0 for no prior, inf for the prior itself"
+        check_number(strength, "prior_strength", at_least=0.0, hint=hint)
     check_choice(folds, FOLDS, "prior_folds")
     by_formula = isinstance(prior, str) and prior in FORMULAS
     given = formula_prior(str(prior), blank) if by_formula else reference_prior(prior, blank)
@@ -219,9 +210,9 @@ def _toward(estimator: Estimator, samples: Samples, q: str, prior: Prior, streng
 
 def _held(estimator: Estimator, X: Floats, rest: Floats, centre: Floats, known: Flags) -> Estimator:
     """The prior's own coefficients; those it leaves open are fitted."""
-    free = np.flatnonzero(~known)
+    free, (moment, covariance) = np.flatnonzero(~known), np.zeros((2, len(known), len(known)))
     estimator.fit(X[:, free] if free.size else X, rest)  # without free ones for its attributes alone
-    coefficients, moment, covariance = centre.copy(), np.zeros((len(known),) * 2), np.zeros((len(known),) * 2)
+    coefficients = centre.copy()
     if free.size:
         coefficients[free] = estimator.coef_
         moment[np.ix_(free, free)] = estimator.inverse_moment_
@@ -239,19 +230,14 @@ def _folds(task: FitTask, folds: str) -> Iterator[tuple[Samples, Samples]]:
         fit = samples.select(~largest[samples.trial])
         yield from ((fit, samples.select(samples.trial == held)) for held in np.flatnonzero(largest))
         return
-    if samples.trial.max() > samples.trial.min():
-        groups = samples.trial
-    else:
-        groups = np.minimum(np.arange(len(samples)) * BLOCKS // len(samples), BLOCKS - 1)
+    several = samples.trial.max() > samples.trial.min()
+    groups = samples.trial if several else np.arange(len(samples)) * BLOCKS // len(samples)
     for group in np.unique(groups):
         yield samples.select(groups != group), samples.select(groups == group)
 
 
 def _error(estimators: Mapping[str, Estimator], held: Samples) -> float:
     """Mean over the equations of the square error by the square of the target."""
-    ratios = [
-        np.mean((held.targets[q] - held.features[q] @ estimator.coef_) ** 2)
-        / max(float(np.mean(held.targets[q] ** 2)), np.finfo(float).tiny)
-        for q, estimator in estimators.items()
-    ]
-    return float(np.mean(ratios))
+    errors = {q: y - held.features[q] @ estimators[q].coef_ for q, y in held.targets.items()}
+    sizes = {q: max(float(np.mean(y**2)), np.finfo(float).tiny) for q, y in held.targets.items()}
+    return float(np.mean([np.mean(error**2) / sizes[q] for q, error in errors.items()]))

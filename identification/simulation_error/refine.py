@@ -64,13 +64,12 @@ class Refinement:
     anchor_weight: float = 1e-3  # of the squared residuals of those turns
 
     def __post_init__(self) -> None:
-        check_number(
-            self.segment_lengths, "segment_lengths", at_least=0.1, at_most=1e6, hint="in ship lengths"
-        )
+        lengths, hint = self.segment_lengths, "in ship lengths"
+        check_number(lengths, "segment_lengths", at_least=0.1, at_most=1e6, hint=hint)
         check_choice(self.segment_start, STARTS, "segment_start")
         check_number(self.pull, "pull", at_least=0.0)
-        check_number(self.extra_weight, "extra_weight", above=0.0)
-        check_number(self.anchor_weight, "anchor_weight", above=0.0)
+        for name in ("extra_weight", "anchor_weight"):
+            check_number(getattr(self, name), name, above=0.0)
 
     def plain(self) -> dict[str, Any]:
         """The settings for the provenance, extra trials by name and hash."""
@@ -113,22 +112,18 @@ def refine(start: GuardedFit, task: FitTask, settings: Refinement, memory: float
     extra trials that lack channels.
     """
     problem = _Problem(start, task, settings)
-    if not start.stable or not problem.finite():
+    if not (start.stable and np.isfinite(problem.scales).all()):  # it does not sail all segments
         return Refined(start, None, [], settings.plain() | {"decision": "not refined: the start runs away"})
-    rejected: list[dict[str, Any]] = []
-    prior = settings.pull
+    rejected, prior = list[dict[str, Any]](), settings.pull
     for _ in range(ATTEMPTS):
         solution = problem.solve(prior)
         model = problem.model(solution.parameters)
-        reasons = reasons_unstable(model, task.trials)
-        if not reasons:
+        if not (reasons := reasons_unstable(model, task.trials)):
             fit = replace(start, model=model, estimators=problem.estimators(solution.parameters))
             covariance, influences = problem.covariance(solution, prior, memory)
             report = settings.plain() | problem.report(solution) | {"decision": "refined", "pull": prior}
             report |= {"rejected": rejected} if rejected else {}
-            return Refined(
-                fit, covariance, influences, report, stretch(model, solution.segments[: problem.own])
-            )
+            return Refined(fit, covariance, influences, report, problem.width)
         rejected.append({"pull": prior, "reasons": reasons})
         prior = max(prior * STRONGER, 1e-9)
     report = settings.plain() | {"decision": "not refined: it runs away", "rejected": rejected}
@@ -138,10 +133,9 @@ def refine(start: GuardedFit, task: FitTask, settings: Refinement, memory: float
 @dataclass(frozen=True, eq=False)
 class _Solution:
     parameters: Floats
-    segments: list[Segment]
     scales: Floats
     shooting: Shooting
-    costs: tuple[float, float]  # mean squared residual in the last round's scales, before and after
+    costs: list[float]  # mean squared residual in the last round's scales, before and after
     evaluations: int
 
 
@@ -153,8 +147,7 @@ def _check_refinable(blank: ShipModel, extra_trials: Sequence[Trial]) -> None:
             " whose state no trial records, expected one without; choose method 'tls-svm'"
         )
     for trial in extra_trials:
-        missing = [c for c in blank.table.required_channels if c not in trial]
-        if missing:
+        if missing := [c for c in blank.table.required_channels if c not in trial]:
             raise InputError(
                 f"extra trial {trial.name!r}: channel {missing[0]!r} is missing, expected "
                 f"{', '.join(blank.table.required_channels)}"
@@ -171,22 +164,21 @@ class _Problem:
         self.sizes = np.concatenate([_term_sizes(task.samples, q) for q in blank.table.equations])
         channels = compared_channels(blank, [*task.trials, *settings.extra_trials])
         self.shooter = Shooter(blank, channels, self.sizes, settings.segment_start == "free")
-        self.segments = self._segments(task.trials)
-        self.own, count = len(self.segments), len(task.trials)
+        self.own = self._segments(task.trials)  # of the trials to fit
+        self.rows = len(channels) * sum(len(segment.blocks) for segment in self.own)  # of their residuals
+        steps = [float(np.median(np.diff(s.times))) for s in self.own if len(s.times) > 1]
+        # of the bins of time in which residuals are added up, s: a block, or a sampling step
+        self.width = max([float(BLOCK * blank.travel_time), *steps])
         turns = [] if settings.anchor is None else reference_turns(settings.anchor, blank)
-        for further, weight in (
-            (settings.extra_trials, settings.extra_weight),
-            (turns, settings.anchor_weight),
-        ):
-            self.segments += [
-                replace(segment, trial=count + segment.trial, weight=weight)
-                for segment in self._segments(further)
-            ]
-            count += len(further)
+        weights = [settings.extra_weight] * len(settings.extra_trials) + [settings.anchor_weight] * len(turns)
+        further = [
+            replace(segment, trial=len(task.trials) + segment.trial, weight=weights[segment.trial])
+            for segment in self._segments([*settings.extra_trials, *turns])
+        ]
+        self.segments = self.own + further
         values = np.concatenate([start.estimators[q].coef_ for q in blank.table.equations])
-        self.first = np.concatenate(
-            [values / self.sizes, np.zeros(len(task.trials) * settings.rudder_offsets)]
-        )
+        no_offsets = np.zeros(len(task.trials) * settings.rudder_offsets)
+        self.first = np.concatenate([values / self.sizes, no_offsets])
         units = self.shooter.units
         self.scales = self._scales(self.shooter.shoot(self.first, self.segments, units), units)
 
@@ -194,36 +186,24 @@ class _Problem:
         lengths, staggered = self.settings.segment_lengths, self.settings.staggered
         return cut(trials, self.start.model, self.shooter.channels, lengths, staggered)
 
-    def finite(self) -> bool:
-        """Whether the start sails all segments."""
-        return bool(np.all(np.isfinite(self.scales)))
-
     def _scales(self, shooting: Shooting, scales: Floats) -> Floats:
         """Root mean square of the residuals of each channel in the trials, per sample."""
-        rows = shooting.rows[self.own - 1].stop
-        errors = shooting.residuals[:rows].reshape(-1, len(scales)) * scales
-        counts = np.concatenate(
-            [np.diff(s.blocks, append=len(s.measured)) for s in self.segments[: self.own]]
-        )
-        rms = np.sqrt(np.sum(errors**2, axis=0) / np.sum(counts))
-        floor = 1e-9 * self.shooter.units
-        return np.asarray(np.maximum(rms, floor))
+        errors = shooting.residuals[: self.rows].reshape(-1, len(scales)) * scales
+        samples = sum(len(segment.measured) for segment in self.own)
+        rms = np.sqrt(np.sum(errors**2, axis=0) / samples)
+        return np.asarray(np.maximum(rms, 1e-9 * self.shooter.units))
 
     def solve(self, prior: float) -> _Solution:
         """Fit, renew scales and starts of the segments, and fit again."""
-        parameters, segments, scales = self.first, self.segments, self.scales
-        evaluations, before = 0, 0.0
+        parameters, segments, scales, evaluations = self.first, self.segments, self.scales, 0
         for _ in range(ROUNDS):
-            weights = self._prior_weights(prior, segments)
-            before = self._mean_cost(self.shooter.shoot(self.first, segments, scales))
-            found, shooting = self._round(parameters, segments, scales, weights)
-            evaluations += found.nfev
-            parameters = found.x
-            last = (segments, scales)
+            before = self.shooter.shoot(self.first, segments, scales)
+            found, shooting = self._round(parameters, segments, scales, self._prior_weights(prior))
+            parameters, evaluations, last = found.x, evaluations + found.nfev, scales
             segments = self.shooter.moved(segments, shooting.moves)
             scales = self._scales(shooting, scales)
-        costs = (before, self._mean_cost(shooting))
-        return _Solution(parameters, last[0], last[1], shooting, costs, evaluations)
+        costs = [float(np.mean(one.residuals[: self.rows] ** 2)) for one in (before, shooting)]
+        return _Solution(parameters, last, shooting, costs, evaluations)
 
     def _round(
         self, start: Floats, segments: Sequence[Segment], scales: Floats, weights: Floats
@@ -245,13 +225,9 @@ class _Problem:
         )
         return found, shot(found.x.tobytes())
 
-    def _mean_cost(self, shooting: Shooting) -> float:
-        own = shooting.residuals[: shooting.rows[self.own - 1].stop]
-        return float(np.mean(own**2))
-
-    def _prior_weights(self, prior: float, segments: Sequence[Segment]) -> Floats:
-        rows = sum(segment.measured.size for segment in segments[: self.own])
-        weights = np.full(len(self.first), np.sqrt(prior * rows))
+    def _prior_weights(self, prior: float) -> Floats:
+        compared = sum(segment.measured.size for segment in self.own)
+        weights = np.full(len(self.first), np.sqrt(prior * compared))
         weights[len(self.sizes) :] = 1.0 / OFFSET
         return weights
 
@@ -274,20 +250,18 @@ class _Problem:
         time as by Newey & West 1987. Extra trials and the prior count as known.
         """
         shooting, n_terms = solution.shooting, len(self.sizes)
-        weights = self._prior_weights(prior, solution.segments)
-        jacobian = shooting.jacobian
-        inverse = np.linalg.pinv(jacobian.T @ jacobian + np.diag(weights**2), rcond=1e-14, hermitian=True)
-        segments = solution.segments[: self.own]
-        width = stretch(self.start.model, segments)
-        scores = _scores(shooting, segments, width)
-        rows = shooting.rows[self.own - 1].stop
-        times = 2.0 if self.settings.staggered else 1.0
-        used = float(np.einsum("ij,jk,ik->", jacobian[:rows], inverse, jacobian[:rows]))
-        used += sum(len(move) for move in shooting.moves[: self.own]) / times
-        factor = (rows / times) / max(rows / times - used, 1.0)
+        jacobian, precision = shooting.jacobian, np.diag(self._prior_weights(prior) ** 2)
+        inverse = np.linalg.pinv(jacobian.T @ jacobian + precision, rcond=1e-14, hermitian=True)
+        slopes, times = jacobian * shooting.residuals[:, None], 2.0 if self.settings.staggered else 1.0
+        blocks = slopes[: self.rows].reshape(-1, len(self.scales), slopes.shape[1]).sum(axis=1)
+        scores = _in_bins(blocks, self.own, self.width)
+        used = float(np.einsum("ij,jk,ik->", jacobian[: self.rows], inverse, jacobian[: self.rows]))
+        used += sum(len(move) for move in shooting.moves[: len(self.own)]) / times
+        samples = self.rows / times
+        factor = samples / max(samples - used, 1.0)
         total = np.zeros_like(inverse)
         for score in scores:
-            total += newey_west(score, round(memory / width))
+            total += newey_west(score, round(memory / self.width))
         cov = (factor * inverse @ total @ inverse)[:n_terms, :n_terms] * np.outer(self.sizes, self.sizes)
         influences = [-np.sqrt(factor) * (score @ inverse)[:, :n_terms] * self.sizes for score in scores]
         return 0.5 * (cov + cov.T), influences
@@ -296,20 +270,13 @@ class _Problem:
         """For the provenance."""
         names = [trial.name for trial in self.trials]
         offsets = np.degrees(about_mean(solution.parameters[len(self.sizes) :])).tolist()
+        (before, after), channels = solution.costs, self.shooter.channels
         return {
-            "segments": self.own,
-            "cost_before": solution.costs[0],
-            "cost_after": solution.costs[1],
+            "segments": len(self.own), "cost_before": before, "cost_after": after,
             "evaluations": solution.evaluations,
-            "residual_rms": dict(zip(self.shooter.channels, solution.scales.tolist(), strict=True)),
+            "residual_rms": dict(zip(channels, solution.scales.tolist(), strict=True)),
             "rudder_offsets_deg": dict(zip(names, offsets, strict=True)) if offsets else {},
-        }
-
-
-def stretch(model: ShipModel, segments: Sequence[Segment]) -> float:
-    """Width of the bins of time in which residuals are added up, s: a block, or a sampling step."""
-    steps = [float(np.median(np.diff(s.times))) for s in segments if len(s.times) > 1]
-    return max([float(BLOCK * model.travel_time), *steps])
+        }  # fmt: skip
 
 
 def _term_sizes(samples: Samples, equation: str) -> Floats:
@@ -319,15 +286,12 @@ def _term_sizes(samples: Samples, equation: str) -> Floats:
     return np.asarray(whole / np.where(terms > 0.0, terms, np.inf) + np.finfo(float).tiny)
 
 
-def _scores(shooting: Shooting, segments: Sequence[Segment], width: float) -> list[Floats]:
-    """Scores of each trial in bins of time, arrays of shape (n_bins, n_parameters)."""
-    size = shooting.jacobian.shape[1]
-    bins: dict[int, dict[int, Floats]] = {}
-    for segment, rows in zip(segments, shooting.rows, strict=False):
-        scores = shooting.jacobian[rows] * shooting.residuals[rows][:, None]
-        blocks = scores.reshape(len(segment.times), -1, size).sum(axis=1)
-        own = bins.setdefault(segment.trial, {})
-        for index, block in zip(np.floor(segment.times / width).astype(int).tolist(), blocks, strict=True):
-            own[index] = own.get(index, np.zeros(size)) + block
-    empty = np.zeros(size)
-    return [np.array([own.get(i, empty) for i in range(min(own), max(own) + 1)]) for own in bins.values()]
+def _in_bins(scores: Floats, segments: Sequence[Segment], width: float) -> list[Floats]:
+    """Scores of blocks, shape (n_blocks, n_parameters), added up by trial in bins of time of some width."""
+    trial = np.concatenate([np.full(len(segment.times), segment.trial) for segment in segments])
+    times, found = np.floor(np.concatenate([segment.times for segment in segments]) / width), []
+    for own in (trial == index for index in np.unique(trial)):
+        bins = (times[own] - times[own].min()).astype(int)
+        found.append(np.zeros((bins.max() + 1, scores.shape[1])))
+        np.add.at(found[-1], bins, scores[own])
+    return found

@@ -35,11 +35,6 @@ class Segment:
     start: Floats  # state at the first sample, in the order of the model's `state_names`, shape (n_state,)
     weight: float = 1.0  # of its squared residuals
 
-    @property
-    def windy(self) -> bool:
-        """Whether there is wind in it."""
-        return bool(self.inputs[:, 3:].any())
-
 
 def compared_channels(model: ShipModel, trials: Sequence[Trial]) -> tuple[str, ...]:
     """Channels whose residuals are minimised: velocities that the model has equations of, and heading."""
@@ -55,13 +50,9 @@ def _velocities(model: ShipModel) -> tuple[str, ...]:
 
 
 def cut(
-    trials: Sequence[Trial],
-    model: ShipModel,
-    channels: Sequence[str],
-    lengths: float,
-    staggered: bool,
+    trials: Sequence[Trial], model: ShipModel, channels: Sequence[str], lengths: float, staggered: bool,
     interval: float = 0.0,
-) -> list[Segment]:
+) -> list[Segment]:  # fmt: skip
     """Cut trials into segments, and, staggered, again into a set that begins half a segment later.
 
     A gap in time ends a segment. A segment is the time to sail so many ship `lengths` at service speed; it
@@ -72,10 +63,12 @@ def cut(
     segments = []
     for index, trial in enumerate(trials):
         for piece in between_gaps(trial, model.particulars):
-            states, rudder = _states(piece, model), _rudder(piece, model)
-            every = max(int(interval * travel / np.median(np.diff(piece.t)) + 1e-9), 1)
+            t, delta, states = piece.t, piece["delta"], _states(piece, model)
+            noisy = preprocess.is_noisy(t, (piece[q] for q in _velocities(model)))
+            rudder = straight(t, delta) if noisy else rebuild(t, delta, model.steering)
+            every = max(int(interval * travel / np.median(np.diff(t)) + 1e-9), 1)
             for shift in (0.0, 0.5) if staggered else (0.0,):
-                edges = _edges(piece.t, lengths * travel, shift)
+                edges = _edges(t, lengths * travel, shift)
                 segments += [
                     _segment(piece, index, rows, states, channels, rudder, model)
                     for rows in map(slice, edges[:-1], edges[1:] + 1, [every] * len(edges))
@@ -105,21 +98,10 @@ def _states(trial: Trial, model: ShipModel) -> Floats:
     return states
 
 
-def _rudder(trial: Trial, model: ShipModel) -> Rudder:
-    noisy = preprocess.is_noisy(trial.t, (trial[q] for q in _velocities(model)))
-    delta = trial["delta"]
-    return straight(trial.t, delta) if noisy else rebuild(trial.t, delta, model.steering)
-
-
 def _segment(
-    trial: Trial,
-    index: int,
-    rows: slice,
-    states: Floats,
-    channels: Sequence[str],
-    rudder: Rudder,
+    trial: Trial, index: int, rows: slice, states: Floats, channels: Sequence[str], rudder: Rudder,
     model: ShipModel,
-) -> Segment:
+) -> Segment:  # fmt: skip
     t, travel = trial.t[rows], model.travel_time
     steps = np.maximum(np.ceil(np.diff(t) / (LONGEST_STEP * travel) - 1e-9), 1).astype(int)
     parts = [a + (b - a) * np.arange(n) / n for a, b, n in zip(t[:-1], t[1:], steps, strict=True)]
@@ -129,44 +111,29 @@ def _segment(
     samples[np.searchsorted(times, t)] = np.arange(len(t))
     n = np.interp(times, trial.t, trial["n"]) if "n" in trial else np.zeros(len(times))
     wind = [np.interp(times, trial.t, row) for row in wind_accelerations(trial, model.dynamics).T]
-    block = max(int(BLOCK * travel / np.median(np.diff(t))), 1)
-    first = np.arange(0, len(t), block)
-    return Segment(
-        trial=index,
-        inputs=np.column_stack([times, rudder(times), n, *wind]),
-        samples=samples,
-        measured=np.column_stack([trial[name][rows] for name in channels]),
-        blocks=first,
-        times=t[first],
-        start=states[rows.start],
-    )
+    inputs = np.column_stack([times, rudder(times), n, *wind])
+    measured = np.column_stack([trial[name][rows] for name in channels])
+    blocks = np.arange(0, len(t), max(int(BLOCK * travel / np.median(np.diff(t))), 1))
+    return Segment(index, inputs, samples, measured, blocks, t[blocks], states[rows.start])
 
 
 @dataclass(frozen=True, eq=False)
 class Shooting:
     """What the segments of all trials say of a set of parameters."""
 
-    #: simulated less measured, by the scale of the channel, blocks averaged, shape (n_rows,)
+    #: simulated less measured, by the scale of the channel, blocks averaged: those of all segments one after
+    #: the other, the channels of a block together, shape (n_rows,)
     residuals: Floats
     jacobian: Floats  # shape (n_rows, n_parameters)
     moves: list[Floats]  # by segment: how its start would move, shape (n_free,)
-    #: rows of each segment; within it the blocks one after the other, the channels of a block together
-    rows: list[slice]
 
 
 class Shooter:
     """Sails all segments with a model and with its neighbours, a lane each.
 
-    Parameters
-    ----------
-    model : ShipModel
-        Gives the compiled accelerations and all but their coefficients.
-    channels : sequence of str
-        To compare.
-    term_sizes : array of shape (n_coefficients,)
-        Coefficients of the accelerations (SI) that stand for a parameter of 1.
-    free : bool
-        Whether each segment's start is fitted with it, else it is the smoothed measurement.
+    The model gives the compiled accelerations and all but their coefficients; `channels` are compared;
+    `term_sizes`, shape (n_coefficients,), are coefficients of the accelerations (SI) that stand for a
+    parameter of 1; `free`: whether each segment's start is fitted with it, else the smoothed measurement.
     """
 
     def __init__(self, model: ShipModel, channels: Sequence[str], term_sizes: Floats, free: bool) -> None:
@@ -186,8 +153,7 @@ class Shooter:
         n_offsets,); `scales`: residuals that count as 1, shape (n_channels,). Not finite where a ship ran
         away.
         """
-        residuals, jacobians, moves, rows = [], [], [], []
-        n_terms, at = len(self.sizes), 0
+        residuals, jacobians, moves, n_terms = [], [], [], len(self.sizes)
         offsets = about_mean(parameters[n_terms:])
         shares = about_mean(np.eye(len(offsets)))
         for segment in segments:
@@ -206,8 +172,7 @@ class Shooter:
             residuals.append(value)
             jacobians.append(jacobian)
             moves.append(move)
-            rows.append(slice(at, at := at + len(value)))
-        return Shooting(np.concatenate(residuals), np.concatenate(jacobians), moves, rows)
+        return Shooting(np.concatenate(residuals), np.concatenate(jacobians), moves)
 
     def moved(self, segments: Sequence[Segment], moves: Sequence[Floats]) -> list[Segment]:
         """The segments with their starts moved."""
@@ -220,30 +185,22 @@ class Shooter:
 
     def _slopes(self, parameters: Floats, offset: float, segment: Segment) -> tuple[Floats, Floats]:
         """Simulated channels, and their derivatives by coefficients, rudder offset and start."""
-        n_terms, n_free = len(parameters), len(self.free)
-        n_moves = n_terms + 1 + n_free
-        first = len(self.numbers) - n_terms  # the terms' come last
-        numbers = self.numbers.copy()
-        numbers[first:] = parameters * self.sizes
-        slopes = np.empty((len(segment.measured), len(self.channels), n_moves))
-        nominal = np.empty((len(segment.measured), len(self.channels)))
-        for begin in range(0, n_moves, LANES - 1):
-            moves = np.arange(begin, min(begin + LANES - 1, n_moves))
-            lanes = np.arange(1, len(moves) + 1)
-            ship = np.repeat(numbers, LANES).reshape(-1, LANES)
-            state = np.repeat(segment.start, LANES).reshape(-1, LANES)
-            offsets = np.full(LANES, offset)
-            for lane, move in zip(lanes.tolist(), moves.tolist(), strict=True):
-                if move < n_terms:
-                    ship[first + move, lane] += STEP * self.sizes[move]
-                elif move == n_terms:
-                    offsets[lane] += STEP
-                else:
-                    state[self.free[move - n_terms - 1], lane] += STEP * self.units[move - n_terms - 1]
-            found = sailed(self.model, segment, ship, state, offsets)[:, self.columns]
+        n = len(self.numbers)
+        given = np.concatenate([self.numbers, [offset], segment.start])
+        given[n - len(parameters) : n] = parameters * self.sizes  # the terms' numbers come last
+        places = [*range(n - len(parameters), n + 1), *(n + 1 + column for column in self.free)]
+        steps = STEP * np.concatenate([self.sizes, [1.0], self.units[: len(self.free)]])
+        slopes = np.empty((len(segment.measured), len(self.channels), len(places)))
+        nominal = np.empty(slopes.shape[:2])
+        for begin in range(0, len(places), LANES - 1):
+            some = slice(begin, begin + LANES - 1)
+            lanes = np.repeat(given, LANES).reshape(-1, LANES)
+            at = 1 + np.arange(len(places[some]))
+            lanes[places[some], at] += steps[some]
+            found = sailed(self.model, segment, lanes[:n], lanes[n + 1 :], lanes[n])[:, self.columns]
             nominal = found[:, :, 0]
             with np.errstate(invalid="ignore", over="ignore"):  # of ships that ran away
-                slopes[:, :, moves] = (found[:, :, lanes] - nominal[:, :, None]) / STEP
+                slopes[:, :, some] = (found[:, :, at] - nominal[:, :, None]) / STEP
         return nominal, slopes
 
 
@@ -260,7 +217,7 @@ def sailed(model: ShipModel, segment: Segment, ships: Floats, starts: Floats, of
     Numbers of the ships and states at the start, a column for each lane, and offsets of their rudders, rad.
     """
     out = np.empty((len(segment.measured), starts.size))
-    loop = ship_loop(model.vessel, "segments", segment.windy)
+    loop = ship_loop(model.vessel, "segments", bool(segment.inputs[:, 3:].any()))  # with or without wind
     loop(starts.ravel(), ships.ravel(), offsets, segment.inputs, segment.samples, out)
     return out.reshape(len(out), -1, LANES)
 
@@ -272,8 +229,7 @@ def about_mean(values: Floats) -> Floats:
 
 def averaged(values: Floats, blocks: Integers, counts: Integers) -> Floats:
     """Means over the blocks of samples along the first axis."""
-    means: Floats = np.add.reduceat(values, blocks, axis=0)
-    return means / counts.reshape(-1, *(1,) * (values.ndim - 1))
+    return np.asarray(np.add.reduceat(values, blocks) / counts.reshape(-1, *(1,) * (values.ndim - 1)))
 
 
 def _without_start(value: Floats, slope: Floats, n_free: int) -> tuple[Floats, Floats, Floats]:

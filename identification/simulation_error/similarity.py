@@ -26,12 +26,9 @@ def similarity_vector(particulars: Particulars, printed: bool = False) -> Floats
     With `printed` the fourth is L/V0 in seconds, as Mei 2019 prints it, in place of sqrt(g L)/V0: then a
     model of 7 m is like no ship at all.
     """
-    p = particulars
-    L = p.length
-    B, T, V, area, block = (
-        np.nan if p[name] is None else float(p[name])
-        for name in ("beam", "draught", "speed", "rudder_area", "block_coefficient")
-    )
+    L, names = particulars.length, ("beam", "draught", "speed", "rudder_area", "block_coefficient")
+    known = (particulars[name] for name in names)
+    B, T, V, area, block = (np.nan if value is None else float(value) for value in known)
     time = L / V if printed else np.sqrt(GRAVITY * L) / V
     return np.array([block, L / B, B / T, time, area / (L * T)])
 
@@ -51,38 +48,19 @@ def correlations(target: ArrayLike, candidates: Mapping[str, ArrayLike]) -> dict
             "rudder_area in [ship], or name the reference_model"
         )
     table = table[:, known] / np.linalg.norm(table[:, known], axis=0)
-    return {
-        name: float(np.corrcoef(table[0], row)[0, 1]) for name, row in zip(candidates, table[1:], strict=True)
-    }
+    return dict(zip(candidates, np.corrcoef(table)[0, 1:].tolist(), strict=True))
 
 
 def select_reference(
-    particulars: Particulars,
-    channels: Collection[str] | None = None,
+    particulars: Particulars, channels: Collection[str] | None = None,
     candidates: Collection[str] = tuple(REFERENCE_SHIPS),
-) -> tuple[str, dict[str, float]]:
+) -> tuple[str, dict[str, float]]:  # fmt: skip
     """The shipped reference ship most like a ship.
 
-    Parameters
-    ----------
-    particulars : Particulars
-        Of the target.
-    channels : collection of str, optional
-        Recorded of the target: a reference ship that rolls needs p and phi.
-    candidates : collection of str
-        Names of models to choose from.
-
-    Returns
-    -------
-    name : str
-        Of the ship with the highest correlation; of hulls of one form that nearest in length.
-    correlations : dict of str to float
-        Of all candidates.
-
-    Raises
-    ------
-    InputError
-        If too little is known of the target.
+    `particulars`: of the target; `channels`: recorded of the target: a reference ship that rolls needs p and
+    phi; `candidates`: names of models to choose from. Returns the name of the ship with the highest
+    correlation, of hulls of one form that nearest in length, and the correlations of all candidates. Raises
+    InputError if too little is known of the target.
     """
     ships = {name: load_model(name) for name in candidates}
     rolls = channels is None or {"p", "phi"} <= set(channels)
@@ -94,10 +72,9 @@ def select_reference(
         )
     vectors = {name: similarity_vector(_known(name, ship)) for name, ship in usable.items()}
     found = correlations(similarity_vector(particulars), vectors)
-    best = max(found.values())
-    closest = [name for name, value in found.items() if value > best - CORRELATION_TOLERANCE]
-    lengths = {name: usable[name].particulars.length / particulars.length for name in closest}
-    return min(closest, key=lambda name: (abs(np.log(lengths[name])), -found[name])), found
+    least = max(found.values()) - CORRELATION_TOLERANCE
+    apart = {n: abs(np.log(ship.particulars.length / particulars.length)) for n, ship in usable.items()}
+    return min((n for n in found if found[n] > least), key=lambda n: (apart[n], -found[n])), found
 
 
 def check_alike(name: str, similarity: float, otherwise: str) -> None:

@@ -37,10 +37,9 @@ def bootstrap_covariance(
 ) -> Floats:
     """Covariance of the coefficients of all equations by a block bootstrap over time.
 
-    Estimators that choose their rank or regularisation keep what they chose. LS-SVMs are fitted again, other
-    linear estimators take the linear step that the drawn residuals give. `estimators`: fitted to `samples`,
-    by equation; `samples`: the regression; `memory`: length of the blocks, s; at least one row; `draws`:
-    number of refits; `seed`: of the draws. Returns the covariance in the order of the equations and their
+    Estimators, fitted to `samples`, that choose their rank or regularisation keep what they chose. LS-SVMs
+    are fitted again, other linear estimators take the linear step that the drawn residuals give. Blocks are
+    `memory` long, s; at least one row. Returns the covariance in the order of the equations and their
     features, shape (n_coefficients, n_coefficients).
     """
     rng = np.random.default_rng(seed)

@@ -1,5 +1,7 @@
 """How certain the coefficients are, together: one covariance over all equations of motion."""
 
+from itertools import product
+
 import numpy as np
 
 from identification.estimators.estimator import Estimator, Estimators, weights
@@ -26,24 +28,16 @@ def joint_covariance(estimators: Estimators, samples: Samples, memory: float = 0
     are taken to be correlated, s. Returns the covariance in the order of the equations and their features,
     shape (n_coefficients, n_coefficients).
     """
-    errors = {
-        q: error * weights(estimators[q], samples.features[q])
-        for q, error in residuals(estimators, samples).items()
-    }
+    counts = {q: weights(estimators[q], samples.features[q]) for q in estimators}
+    errors = {q: error * counts[q] for q, error in residuals(estimators, samples).items()}
     freedom = {q: effective_freedom(estimators[q], samples.features[q]) for q in estimators}
     maps = {q: samples.features[q] @ estimators[q].inverse_moment_ for q in estimators}
     if memory <= 0.0:
-        blocks = [
-            [
-                (errors[p] @ errors[q]) / np.sqrt(freedom[p] * freedom[q]) * (maps[p].T @ maps[q])
-                for q in estimators
-            ]
-            for p in estimators
-        ]
-        return np.block(blocks)
-    scores = np.hstack(
-        [maps[q] * (errors[q] * np.sqrt(len(samples) / freedom[q]))[:, None] for q in estimators]
-    )
+        pairs = product(estimators, repeat=2)
+        sizes = {(p, q): (errors[p] @ errors[q]) / np.sqrt(freedom[p] * freedom[q]) for p, q in pairs}
+        return np.block([[sizes[p, q] * (maps[p].T @ maps[q]) for q in estimators] for p in estimators])
+    scaled = {q: error * np.sqrt(len(samples) / freedom[q]) for q, error in errors.items()}
+    scores = np.hstack([maps[q] * scaled[q][:, None] for q in estimators])
     total = np.zeros((scores.shape[1],) * 2)
     for trial in np.unique(samples.trial):
         rows = samples.trial == trial

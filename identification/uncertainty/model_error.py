@@ -68,13 +68,12 @@ def model_error(models: Sequence[ShipModel], trials: Sequence[Trial]) -> dict[st
     """
     if len(trials) < FEWEST_TRIALS:
         return _assumed(f"too few trials to leave one out ({len(trials)})")
-    motion: list[Error] = []
-    indices: list[Error] = []
-    predicted = 0
+    motion, indices, predicted = list[Error](), list[Error](), 0
     for model, trial in zip(models, trials, strict=True):
-        own, drawn, clean = replace(model, covariance=None), model.sample(DRAWS, 0), smoothed(trial)
-        found = _motion_errors(own, drawn, trial, clean)
-        if found:
+        own, drawn = replace(model, covariance=None), model.sample(DRAWS, 0)
+        names = [name for name in COMPARED if name in trial]
+        clean = trial.with_channels(smoothed_channels(trial, names, "spline"))  # extremes are read from it
+        if found := _motion_errors(own, drawn, trial, clean):
             predicted += 1
             motion += found
             indices += _index_errors(own, drawn, trial, clean)
@@ -126,8 +125,7 @@ def _motion_errors(own: ShipModel, drawn: Sequence[ShipModel], trial: Trial, cle
 
 def _index_errors(own: ShipModel, drawn: Sequence[ShipModel], trial: Trial, clean: Trial) -> list[Error]:
     """Of each index of a zigzag or a turning circle; a time read from samples is known to a step."""
-    read = index_reader(own, clean)
-    if read is None:
+    if (read := index_reader(own, clean)) is None:
         return []
     sail = closed_loop if trial.kind == "zigzag" else predict
     measured, predicted = read(clean), read(sail(own, clean))
@@ -152,9 +150,3 @@ def _reading_noise(trial: Trial, index: str, model: ShipModel) -> float:
         return float(np.degrees(np.hypot(noise_level(trial.t, trial["psi"]), timing * rate))) ** 2
     noise = noise_level(trial.t, trial["x"]) if "x" in trial and trial.kind != "zigzag" else 0.0
     return float(np.hypot(noise, timing * trial["u"].max()) / model.particulars["length"]) ** 2
-
-
-def smoothed(trial: Trial) -> Trial:
-    """The trial without the noise of heading and velocities, which extremes would be read from."""
-    names = [name for name in ("psi", "u", "v", "r") if name in trial]
-    return trial.with_channels(smoothed_channels(trial, names, "spline"))

@@ -37,7 +37,7 @@ def closed_loop(model: ShipModel, trial: Trial) -> Trial | None:
         order = float(np.median(delta[held]))
         target = float(np.interp(end, trial.t, trial["psi"])) if 1 <= leg <= len(turns) else None
         try:
-            times, sailed = _leg(model, trial, states[-1], order, (t[-1], end - begin), target)
+            times, sailed = _leg(model, trial, states[-1], order, t[-1], end - begin, target)
         except UnstableModelError:
             return None
         if not len(times):
@@ -50,15 +50,10 @@ def closed_loop(model: ShipModel, trial: Trial) -> Trial | None:
 
 
 def _leg(
-    model: ShipModel,
-    trial: Trial,
-    state: Floats,
-    order: float,
-    time: tuple[float, float],
+    model: ShipModel, trial: Trial, state: Floats, order: float, begin: float, duration: float,
     target: float | None,
-) -> tuple[Floats, Floats]:
+) -> tuple[Floats, Floats]:  # fmt: skip
     """Times and states of a leg of some begin and measured duration; none where a target is not reached."""
-    begin, duration = time
     dt = STEP * model.travel_time
     count = max(int(np.ceil((duration if target is None else LONGEST_LEG * duration) / dt)), 2)
     t = begin + dt * np.arange(count + 1, dtype=float)

@@ -51,11 +51,9 @@ class Comparison(Ranking):
 
 
 def compare_methods(
-    trials: Sequence[Trial],
-    methods: Sequence[Any] | None = None,
-    structures: Sequence[str | Structure] | None = None,
-    **arguments: Any,
-) -> Comparison:
+    trials: Sequence[Trial], methods: Sequence[Any] | None = None,
+    structures: Sequence[str | Structure] | None = None, **arguments: Any,
+) -> Comparison:  # fmt: skip
     """Identify by several methods, or structures and methods, and rank them on held-out trials.
 
     These are marked `validate` or named by `hold_out`; where there are none, each trial to fit in turn.
@@ -78,8 +76,7 @@ def compare_methods(
     """
     wanted = [arguments.pop("structure", Options.structure)] if structures is None else [*structures]
     several = structures is not None or AUTO in wanted
-    pairs = _pairs(STRUCTURES if AUTO in wanted else wanted, methods, several)
-    if not pairs:
+    if not (pairs := _pairs(STRUCTURES if AUTO in wanted else wanted, methods, several)):
         raise InputError("methods: none found, expected at least one, such as ['ls', 'tls-svm']")
     marked = held_out(trials, arguments.get("hold_out", ()))
     fitted, held = ([trial for trial in marked if trial.use == use] for use in ("fit", "validate"))
@@ -87,8 +84,7 @@ def compare_methods(
         told = f"trials: {len(fitted)} to fit and none to validate found, expected a held-out trial to rank"
         raise InputError(f'{told} the methods on; mark one use = "validate", or give two to fit')
     left_out = _left_out([get_method(method) for _, method in pairs], arguments)
-    found: list[tuple[Standing, IdentificationResult]] = []
-    refused: dict[str, str] = {}
+    found, refused = list[tuple[Standing, IdentificationResult]](), dict[str, str]()
     for structure, method in counted("structures and methods", pairs):
         name = get_method(method).name
         own = {key: value for key, value in arguments.items() if key not in left_out.get(name, ())}
@@ -159,13 +155,10 @@ def _pairs(structures: Sequence[Any], methods: Sequence[Any] | None, several: bo
 def _left_out(chosen: Sequence[Method], arguments: Mapping[str, Any]) -> dict[str, tuple[str, ...]]:
     """Settings that each method does not have but another one does."""
     settings = [name for name in arguments if name in OPTIONS and OPTIONS[name].setting]
-    of_refinement = {item.name for item in fields(Refinement)}
-    left = {
-        method.name: tuple(
-            one for one in settings if not (method.knows(one) or (method.refined and one in of_refinement))
-        )
-        for method in chosen
-    }
+    of_refinement, left = {item.name for item in fields(Refinement)}, dict[str, tuple[str, ...]]()
+    for method in chosen:
+        further = of_refinement if method.refined else set()
+        left[method.name] = tuple(one for one in settings if not (one in further or method.knows(one)))
     for setting in settings:
         if all(setting in unknown for unknown in left.values()):
             raise InputError(f"settings: {setting} found, which none of the methods {', '.join(left)} knows")

@@ -132,17 +132,15 @@ def diagnose(
         scaled, condition = scaled_features(features)
         groups = getattr(estimator, "collinear_groups_", ())
         found[q] = EquationDiagnostics(
-            samples=len(target),
-            terms=len(names),
+            samples=len(target), terms=len(names), condition_number=condition,
             rank=int(getattr(estimator, "rank_", min(features.shape))),
-            condition_number=condition,
             r_squared=1.0 - float(error @ error) / max(float(target @ target), np.finfo(float).tiny),
             residual_rms=float(np.sqrt(np.mean(error**2))),
             residual_autocorrelation=autocorrelation(error[apart], 10),
             variance_inflation=dict(zip(names, variance_inflation(scaled).tolist(), strict=True)),
             collinear_pairs=_collinear_pairs(scaled, names),
             dropped=tuple(tuple(names[i] for i in group) for group in groups),
-        )
+        )  # fmt: skip
     return found
 
 

@@ -6,6 +6,7 @@ A fit of zigzags extrapolates in hard turns, where terms that hardly mattered in
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -43,14 +44,11 @@ def hard_turn_features(
     """Size of each term in a hard turn, by equation, arrays of shape (n_terms,), SI units."""
     speed = HARD_TURN["speed"] * particulars["speed"]
     state = {
-        "u": speed * np.cos(HARD_TURN["drift"]),
-        "v": -speed * np.sin(HARD_TURN["drift"]),
+        "u": speed * np.cos(HARD_TURN["drift"]), "v": -speed * np.sin(HARD_TURN["drift"]),
         "r": HARD_TURN["yaw_rate"] * speed / particulars["length"],
-        "delta": HARD_TURN["rudder"],
-        "n": HARD_TURN["shaft"] * shaft_speed,
         "p": HARD_TURN["heel"] * HARD_TURN["speed"] * particulars["speed"] / particulars["length"],
-        "phi": HARD_TURN["heel"],
-    }
+        "phi": HARD_TURN["heel"], "delta": HARD_TURN["rudder"], "n": HARD_TURN["shaft"] * shaft_speed,
+    }  # fmt: skip
     channels = {name: np.array([state.get(name, 0.0)]) for name in structure.required_channels}
     sizes = {
         q: np.abs(structure.features(q, channels, particulars, shaft_speed)[0]) for q in structure.equations
@@ -67,22 +65,17 @@ def reasons_unstable(model: ShipModel, trials: Sequence[Trial]) -> list[str]:
     intervals, from short to long, which excites what a zigzag of any other angle would. Stops after the first
     kind in which it does.
     """
-    travel = model.travel_time
     angles = sorted({min(angle, model.steering.rudder_limit_deg) for angle in RUDDERS_DEG}, reverse=True)
     sides = [side for angle in angles for side in (angle, -angle)]
     predictions = (
         (f"trial {trial.name!r}, open loop", partial(open_loop, model, trial), float(trial["u"].min()))
         for trial in trials
     )
-    timing = (DURATION_LENGTHS * travel, STEP * travel)
-    turns = (
-        (f"turning circle, {side:+.0f} deg", partial(turning_circle, model, side, *timing), 0.0)
-        for side in sides
-    )
+    turn = partial(turning_circle, duration=DURATION_LENGTHS * model.travel_time, dt=STEP * model.travel_time)
+    turns = ((f"turning circle, {side:+.0f} deg", partial(turn, model, side), 0.0) for side in sides)
     reversals = (
         (f"rudder {side:+.0f} deg reversed every {gap:g} L/U", partial(_reversed, model, side, gap), 0.0)
-        for side in sides
-        for gap in REVERSALS
+        for side, gap in product(sides, REVERSALS)
     )
     for kind in (predictions, turns, reversals):
         tried = ((name, _runs_away(model, run, least)) for name, run, least in kind)
@@ -136,8 +129,7 @@ def guarded_fit(
     blank, trials = task.blank, task.trials
     estimators = method.fitted(settings, task)
     model = with_coefficients(blank, estimators)
-    reasons = reasons_unstable(model, trials)
-    if not reasons:
+    if not (reasons := reasons_unstable(model, trials)):
         return GuardedFit(model, estimators, True, {"decision": "stable as fitted"})
     rejected = {"rejected": reasons}
     if not (guarded and method.regularised):

@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 
 from identification.result import IdentificationResult
-from identification.validation.prediction import COMPARED
 from shipgym import Trial
 
 
@@ -56,11 +55,10 @@ class Ranking:
         """Plain values, ready for JSON."""
         return {
             "held_out": "each trial in turn" if self.in_turn else "trials marked validate",
-            "ranking": [asdict(standing) for standing in self.standings],
-            "refused": self.refused,
+            "ranking": [asdict(standing) for standing in self.standings], "refused": self.refused,
             "settings_left_out": {name: list(left) for name, left in self.left_out.items()},
-            "settings": next(iter(self.results.values())).settings | {"method": list(self.results)},
-        }
+            "settings": self.best.settings | {"method": list(self.results)},
+        }  # fmt: skip
 
 
 def in_turn(
@@ -70,8 +68,7 @@ def in_turn(
 
     `identify`: from the names held out; `groups`: at most one per trial, in their order.
     """
-    metrics: dict[str, Any] = {}
-    results = []
+    metrics, results = dict[str, Any](), []
     groups = max(1, min(groups, len(trials)))
     for k in range(groups):
         held = [trial.name for i, trial in enumerate(trials) if i * groups // len(trials) == k]
@@ -94,25 +91,18 @@ def standing(
     known = [error for error in errors.values() if error is not None]
     provenance = results[0].model.provenance or {}
     return Standing(
-        structure=provenance["structure"],
-        method=provenance["method"],
-        coefficients=len(results[0].coefficients),
-        stable=all(result.stable for result in results),
+        structure=provenance["structure"], method=provenance["method"],
+        coefficients=len(results[0].coefficients), stable=all(result.stable for result in results),
         ran_away=sum(metrics["diverged"] for metrics in seen.values()),
         error=float(np.mean(known)) if len(known) == len(errors) else None,
-        heading_deg=_mean_degrees(seen, "psi"),
-        yaw_rate_deg_s=_mean_degrees(seen, "r"),
-        errors=errors,
-    )
+        heading_deg=_mean_degrees(seen, "psi"), yaw_rate_deg_s=_mean_degrees(seen, "r"), errors=errors,
+    )  # fmt: skip
 
 
 def _error(metrics: Mapping[str, Any], trial: Trial) -> float | None:
     """Errors of the channels by their standard deviation; None where the simulation ran away."""
-    ratios = [
-        metrics["rmse"][channel] / float(np.std(trial[channel]))
-        for channel in COMPARED
-        if metrics["rmse"][channel] is not None and np.std(trial[channel]) > 0.0
-    ]
+    known = {name: error for name, error in metrics["rmse"].items() if error is not None}
+    ratios = [error / float(np.std(trial[c])) for c, error in known.items() if np.std(trial[c]) > 0.0]
     return float(np.mean(ratios)) if ratios else None
 
 

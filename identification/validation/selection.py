@@ -29,10 +29,9 @@ LEAST_DIFFERENCE = 0.02  # of errors, relative; a smaller one decides nothing
 
 
 def select(
-    identify: Callable[[Sequence[Trial], Options], IdentificationResult],
-    trials: Sequence[Trial],
+    identify: Callable[[Sequence[Trial], Options], IdentificationResult], trials: Sequence[Trial],
     options: Options,
-) -> tuple[Options, dict[str, Any]]:
+) -> tuple[Options, dict[str, Any]]:  # fmt: skip
     """The options with the structure and method that predict best, and the ranking, for the provenance.
 
     Every structure that trials and particulars allow is fitted by its usual method, a table that comes first
@@ -44,8 +43,7 @@ def select(
     free = options.method == Options.method and not options.settings()
     parts = [trial.with_(kind=None) for trial in (pieces(trials[0]) if len(trials) == 1 else trials)]
     cheap = replace(options, hold_out=(), model_error=False, uncertainty="analytic")
-    found: list[Standing] = []
-    refused: dict[str, str] = {}
+    found, refused = list[Standing](), dict[str, str]()
 
     def attempt(structure: str, method: str) -> None:
         reference = reference_of(structure, options.reference_model)

@@ -20,15 +20,11 @@ EQUATIONS = {"u": "surge", "v": "sway", "r": "yaw", "p": "roll"}
 
 def why_unstable(fit: Fit) -> str | None:
     """Why an identified model must not be used, in one sentence; None where it is stable."""
-    ran_away = [name for name, prediction in fit.predictions.items() if prediction is None]
-    if ran_away:
-        first = PurePath(ran_away[0]).name
-        return f"its simulation runs away on {len(ran_away)} of the recorded trials, {first} first"
-    if not fit.stable:
-        guard = (fit.model.provenance or {}).get("guard", {})
-        reasons = guard.get("rejected", ["in a standard manoeuvre"])
-        return f"its simulation runs away ({reasons[0]})"
-    return None
+    if ran_away := [PurePath(name).name for name, found in fit.predictions.items() if found is None]:
+        return f"its simulation runs away on {len(ran_away)} of the recorded trials, {ran_away[0]} first"
+    guard = (fit.model.provenance or {}).get("guard", {})
+    reasons = guard.get("rejected", ["in a standard manoeuvre"])
+    return None if fit.stable else f"its simulation runs away ({reasons[0]})"
 
 
 def model_warnings(fit: Fit) -> list[str]:
@@ -50,8 +46,7 @@ def model_warnings(fit: Fit) -> list[str]:
     found += [*provenance.get("sea_remarks", []), *provenance.get("prior_remarks", [])]
     found += provenance.get("kernel", {}).get("remarks", [])
     found += exactly_collinear(fit) + _lost_headings(fit)
-    derived = {name for trial in provenance.get("trials", []) for name in trial["derived"]}
-    if derived:
+    if derived := {name for trial in provenance.get("trials", []) for name in trial["derived"]}:
         found.append(
             f"not measured but derived from other channels: {', '.join(sorted(derived))}; their noise is "
             "larger, and predictions can be much worse than with measured ones"
@@ -74,14 +69,12 @@ def heading_errors_deg(fit: Fit, use: str | None = None) -> dict[str, float]:
 
 def held_out_error(fit: Fit) -> str:
     """The worst errors on the trials held out, of heading and of an index, in one sentence."""
-    unseen = {n: found for n, found in fit.metrics["trials"].items() if found["use"] == "validate"}
-    if not unseen:
+    if not (unseen := {n: m for n, m in fit.metrics["trials"].items() if m["use"] == "validate"}):
         return "No trial was held out."
-    lost = [PurePath(name).name for name, found in unseen.items() if found["diverged"]]
-    if lost:
+    if lost := [PurePath(name).name for name, found in unseen.items() if found["diverged"]]:
         return f"On {lost[0]}, held out, the model runs away."
-    told, headings = [], heading_errors_deg(fit, "validate")
-    if headings:
+    told = []
+    if headings := heading_errors_deg(fit, "validate"):
         worst = max(headings, key=lambda name: headings[name])
         told.append(f"heading {headings[worst]:.2g} deg rms ({PurePath(worst).name})")
     indices = [
@@ -95,9 +88,8 @@ def held_out_error(fit: Fit) -> str:
         words = key.removesuffix("_deg").removesuffix("_lengths").replace("_", " ")
         words = {"overshoot 1": "first overshoot", "overshoot 2": "second overshoot"}.get(words, words)
         told.append(f"{words} {100.0 * error:.2g} % ({PurePath(name).name})")
-    return (
-        f"Worst errors on held-out trials: {', '.join(told)}." if told else "No held-out trial has a heading."
-    )
+    worst_of_all = f"Worst errors on held-out trials: {', '.join(told)}."
+    return worst_of_all if told else "No held-out trial has a heading."
 
 
 def undetermined(fit: Fit) -> list[str]:
@@ -138,12 +130,11 @@ def _not_corrected(fit: Fit) -> list[str]:
 def _not_refined(provenance: Mapping[str, Any]) -> list[str]:
     """A refinement that was given up: the model is then its start."""
     decision = provenance.get("refinement", {}).get("decision", "refined")
-    if decision == "refined":
-        return []
-    return [
+    told = (
         f"output-error was {decision}: the model is its start, by tls-svm; give a larger pull, shorter "
         "segments (segment_lengths), or a structure with fewer terms"
-    ]
+    )
+    return [] if decision == "refined" else [told]
 
 
 def _shaft_ignored(fit: Fit) -> list[str]:
@@ -169,9 +160,9 @@ def _shaft_ignored(fit: Fit) -> list[str]:
 def _lost_headings(fit: Fit) -> list[str]:
     """The trials whose heading the model does not predict, and the likely cause."""
     errors = {name: error for name, error in heading_errors_deg(fit).items() if error > LOST_HEADING_DEG}
+    worst = ", ".join(f"{PurePath(name).name} ({error:.0f} deg)" for name, error in errors.items())
     if not errors:
         return []
-    worst = ", ".join(f"{PurePath(name).name} ({error:.0f} deg)" for name, error in errors.items())
     return [
         f"the predicted heading drifts from the measured one by more than {LOST_HEADING_DEG:.0f} deg rms on "
         f"{worst}: {_why_lost(fit.model)}"

@@ -12,10 +12,8 @@ from shipgym.checks import check_choice
 
 #: Filters of single channels by name.
 FILTERS: dict[str, Callable[[Floats, Floats], Floats]] = {
-    "spline": smooth,
-    "savgol": savitzky_golay,
-    "median": median,
-}
+    "spline": smooth, "savgol": savitzky_golay, "median": median,
+}  # fmt: skip
 
 #: What `identify` may do with noisy channels.
 PREPROCESSING = (*FILTERS, "rts", "none")

@@ -33,13 +33,12 @@ def savitzky_golay(t: ArrayLike, values: ArrayLike, width: int | None = None) ->
     longest = int(LONGEST_FILTER * len(t))
     if width is None and (longest < ORDER + 2 or noise_ratio(t, values) < NOISY):
         return values
-    steps = np.diff(t)
-    even = np.ptp(steps) <= UNEVEN * np.median(steps)
-    grid = t if even else np.linspace(t[0], t[-1], len(t))
-    on_grid = values if even else np.interp(grid, t, values)
+    uneven = np.ptp(np.diff(t)) > UNEVEN * np.median(np.diff(t))
+    grid = np.linspace(t[0], t[-1], len(t))
+    on_grid = np.interp(grid, t, values) if uneven else values
     chosen = _best_width(on_grid, longest) if width is None else width
     filtered: Floats = savgol_filter(on_grid, chosen, ORDER)
-    return filtered if even else np.interp(t, grid, filtered)
+    return np.interp(t, grid, filtered) if uneven else filtered
 
 
 def _best_width(values: Floats, longest: int) -> int:

@@ -1,7 +1,6 @@
 """Positions, heading and velocities smoothed together, so that each is the derivative of the other."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from scipy.optimize import minimize_scalar
@@ -42,8 +41,8 @@ def _smooth_heading(trial: Trial) -> dict[str, Floats]:
     if "psi" in names and not is_noisy(trial.t, (trial[name] for name in names)):
         return {name: trial[name] for name in names}
     h = np.diff(trial.t)
-    motion = _Motion((*HEADING, "rdot"), _integrators(h), _random_walk(h), (1.0, 1e-2, 1.0))
-    states = motion.smoothed(trial, names, "r" if "r" in trial else "psi")
+    given = (*HEADING, "rdot"), _integrators(h), _random_walk(h), (1.0, 1e-2, 1.0)
+    states = _smooth_states(trial, names, "r" if "r" in trial else "psi", *given)
     return {name: states[name] for name in HEADING}
 
 
@@ -57,47 +56,39 @@ def _smooth_plane(trial: Trial, psi: Floats) -> dict[str, Floats]:
     for first in (2, 3):
         axes = np.array([first, first + 2])
         process[:, axes[:, None], axes] = walk[:, 1:, 1:]
-    transitions, start_variances = _plane_transitions(h, psi), (1e4, 1e4, 1e2, 1e2, 1.0, 1.0)
-    motion = _Motion((*PLANE, "udot", "vdot"), transitions, process, start_variances)
-    return motion.smoothed(trial, names, next(name for name in ("u", "x", "v") if name in trial))
+    given = (*PLANE, "udot", "vdot"), _plane_transitions(h, psi), process, (1e4, 1e4, 1e2, 1e2, 1.0, 1.0)
+    guessed_by = next(name for name in ("u", "x", "v") if name in trial)
+    return _smooth_states(trial, names, guessed_by, *given)
 
 
-@dataclass(frozen=True, eq=False)
-class _Motion:
-    """States that are integrals of a random walk of the acceleration, arguments of `smooth_linear`."""
+def _smooth_states(
+    trial: Trial, names: Sequence[str], guessed_by: str, columns: tuple[str, ...], transitions: Floats,
+    process: Floats, start_variances: tuple[float, ...],
+) -> dict[str, Floats]:  # fmt: skip
+    """States by column, integrals of a random walk of the acceleration, with arguments of `smooth_linear`.
 
-    columns: tuple[str, ...]
-    transitions: Floats
-    process: Floats  # by unit of roughness
-    start_variances: tuple[float, ...]
+    `process` is that by unit of roughness, which is the one of greatest likelihood on the first samples.
+    """
+    observation = np.eye(len(columns))[[columns.index(name) for name in names]]
+    start = np.array([trial[name][0] if name in names else 0.0 for name in columns])
+    measured = np.column_stack([trial[name] for name in names])
+    noise = [[noise_level(trial.t, trial[c]), LEAST_NOISE * np.ptp(trial[c]), 1e-9] for c in names]
+    variances = np.max(noise, axis=1) ** 2
+    # variance by time of the acceleration's random walk, from how much a velocity changes
+    size = float(np.ptp(trial[guessed_by])) or 1.0
+    guess = size**2 / max(trial.duration / 20.0, 1e-9) ** 3
 
-    def smoothed(self, trial: Trial, names: Sequence[str], guessed_by: str) -> dict[str, Floats]:
-        """States by column, at the roughness of greatest likelihood on the first samples."""
-        observation = np.eye(len(self.columns))[[self.columns.index(name) for name in names]]
-        start = np.array([trial[name][0] if name in names else 0.0 for name in self.columns])
-        measured, variances = np.column_stack([trial[name] for name in names]), _variances(trial, names)
-        # variance by time of the acceleration's random walk, from how much a velocity changes
-        size = float(np.ptp(trial[guessed_by])) or 1.0
-        guess = size**2 / max(trial.duration / 20.0, 1e-9) ** 3
-
-        def run(decade: float, rows: int, quick: bool) -> tuple[Floats, float]:
-            process = guess * 10.0**decade * self.process[: rows - 1]
-            return smooth_linear(
-                self.transitions[: rows - 1], process, observation, variances, measured[:rows], start,
-                np.array(self.start_variances), quick,
-            )  # fmt: skip
-
-        best = minimize_scalar(
-            lambda decade: -run(decade, min(len(trial), LONGEST_SEARCH), True)[1],
-            bounds=(-DECADES, DECADES), method="bounded", options={"xatol": 0.1},
+    def run(decade: float, rows: int, quick: bool) -> tuple[Floats, float]:
+        return smooth_linear(
+            transitions[: rows - 1], guess * 10.0**decade * process[: rows - 1], observation, variances,
+            measured[:rows], start, np.array(start_variances), quick,
         )  # fmt: skip
-        return dict(zip(self.columns, run(float(best.x), len(trial), False)[0].T, strict=True))
 
-
-def _variances(trial: Trial, names: Sequence[str]) -> Floats:
-    levels = [[noise_level(trial.t, trial[c]), LEAST_NOISE * np.ptp(trial[c]), 1e-9] for c in names]
-    largest: Floats = np.max(levels, axis=1)
-    return largest**2
+    best = minimize_scalar(
+        lambda decade: -run(decade, min(len(trial), LONGEST_SEARCH), True)[1],
+        bounds=(-DECADES, DECADES), method="bounded", options={"xatol": 0.1},
+    )  # fmt: skip
+    return dict(zip(columns, run(float(best.x), len(trial), False)[0].T, strict=True))
 
 
 def _integrators(h: Floats) -> Floats:
@@ -112,15 +103,13 @@ def _random_walk(h: Floats) -> Floats:
     """Covariance of position, speed and acceleration after a random walk of the acceleration."""
     powers = np.array([[5, 4, 3], [4, 3, 2], [3, 2, 1]])
     factors = np.array([[1 / 20, 1 / 8, 1 / 6], [1 / 8, 1 / 3, 1 / 2], [1 / 6, 1 / 2, 1.0]])
-    found: Floats = factors * h[:, None, None] ** powers
-    return found
+    return np.asarray(factors * h[:, None, None] ** powers)
 
 
 def _plane_transitions(h: Floats, psi: Floats) -> Floats:
     """Transitions of x, y, u, v and their accelerations; mean heading over each step."""
     found = np.tile(np.eye(6), (len(h), 1, 1))
-    cosine = 0.5 * (np.cos(psi[1:]) + np.cos(psi[:-1]))
-    sine = 0.5 * (np.sin(psi[1:]) + np.sin(psi[:-1]))
+    cosine, sine = (0.5 * (values[1:] + values[:-1]) for values in (np.cos(psi), np.sin(psi)))
     for axis, parts in enumerate(((cosine, -sine), (sine, cosine))):
         for k, part in enumerate(parts):
             found[:, axis, 2 + k] = h * part
@@ -130,15 +119,9 @@ def _plane_transitions(h: Floats, psi: Floats) -> Floats:
 
 
 def smooth_linear(
-    transitions: Floats,
-    process: Floats,
-    observation: Floats,
-    variances: Floats,
-    measured: Floats,
-    start: Floats,
-    start_variances: Floats,
-    only_likelihood: bool = False,
-) -> tuple[Floats, float]:
+    transitions: Floats, process: Floats, observation: Floats, variances: Floats, measured: Floats,
+    start: Floats, start_variances: Floats, only_likelihood: bool = False,
+) -> tuple[Floats, float]:  # fmt: skip
     """Smooth x_k+1 = F_k x_k + w_k, y_k = H x_k + e_k (Rauch, Tung & Striebel 1965, AIAA Journal 3(8)).
 
     Measurements are taken in one at a time, in Joseph's form, so that nothing is inverted. `transitions` and
@@ -159,8 +142,7 @@ def smooth_linear(
                 continue
             ph = p @ h
             innovation_variance = float(h @ ph) + variance
-            error = y - float(h @ x)
-            gain = ph / innovation_variance
+            error, gain = y - float(h @ x), ph / innovation_variance
             x = x + gain * error
             left = identity - np.outer(gain, h)
             p = left @ p @ left.T + variance * np.outer(gain, gain)

@@ -22,10 +22,8 @@ def noise_level(t: ArrayLike, values: ArrayLike) -> float:
     times = {i: t[i : len(t) - 4 + i] for i in range(5)}
     expected, gain = np.zeros(len(t) - 4), np.ones(len(t) - 4)
     for i in around:
-        weight = np.ones(len(t) - 4)
-        for j in around:
-            if j != i:
-                weight = weight * (times[2] - times[j]) / (times[i] - times[j])
+        others = [times[j] for j in around if j != i]
+        weight = np.prod([(times[2] - other) / (times[i] - other) for other in others], axis=0)
         expected += weight * values[i : len(t) - 4 + i]
         gain += weight**2
     return float(np.median(np.abs(values[2:-2] - expected) / np.sqrt(gain)) / 0.6745)

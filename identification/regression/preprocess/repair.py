@@ -64,22 +64,15 @@ def repaired(trial: Trial, threshold: float = OUTLYING) -> Trial:
                 f"trial {trial.name!r}: {wrong.sum()} of {len(trial)} samples of {name} would be outliers, "
                 f"expected at most a tenth; check the channel, or give a threshold above {threshold:g}"
             )
-        filled = int(wrong.sum() + (~kept).sum())
         sound = kept.copy()
         sound[kept] = ~wrong
-        channels[name] = _refilled(trial.t[~wrong], values[~wrong], times, values, sound)
-        if filled:
-            counts[name] = filled
+        channels[name] = values
+        if not sound.all():
+            known, good = trial.t[~wrong], values[~wrong]
+            channels[name] = PchipInterpolator(known, good)(np.clip(times, known[0], known[-1]))
+            channels[name][sound] = good  # to the bit as they were
+            counts[name] = int((~sound).sum())
     return trial.with_channels(channels, t=times, repaired=counts) if counts else trial
-
-
-def _refilled(known: Floats, good: Floats, times: Floats, values: Floats, sound: Flags) -> Floats:
-    """Values at the filled times; sound ones to the bit as they were."""
-    if sound.all():
-        return values
-    found: Floats = PchipInterpolator(known, good)(np.clip(times, known[0], known[-1]))
-    found[sound] = good
-    return found
 
 
 def _filled_times(t: Floats) -> Floats:
