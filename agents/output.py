@@ -31,16 +31,12 @@ def check_folder(folder: Path, names: Collection[str]) -> None:
     if target.is_symlink() or (target.exists() and not target.is_dir()):
         raise InputError(f"{folder}: is not a folder, expected one to write the results to; choose another")
     if target.is_dir():
-        foreign = [
-            name
-            for name in present(target)
-            if name not in names or (target / name).is_symlink() or not (target / name).is_file()
-        ]
-        if foreign:
-            raise InputError(
-                f"{folder}: holds '{foreign[0]}', which is not a result of this command, and would be "
-                "replaced as a whole; choose another folder or a new one"
-            )
+        for name in present(target):
+            if name not in names or (target / name).is_symlink() or not (target / name).is_file():
+                raise InputError(
+                    f"{folder}: holds '{name}', which is not a result of this command, and would be "
+                    "replaced as a whole; choose another folder or a new one"
+                )
     check_writable(folder)
 
 

@@ -5,12 +5,10 @@ equivalence); van Amerongen 1982, Adaptive steering of ships; Song 2020, chapter
 `identification.estimators.recursive`).
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from functools import cached_property
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
@@ -83,17 +81,10 @@ class AdaptiveLQ(Controller):
 
     @classmethod
     def from_model(
-        cls,
-        model: ShipModel,
-        *,
-        dt: float | None = None,
-        integral_lengths: float = 20.0,
-        rudder_weight: float = RUDDER_WEIGHT,
-        rate_weight_s2: float | None = None,
-        forgetting_lengths: float = 20.0,
-        redesign_lengths: float = 1.0,
-        noise: float = 1.0,
-    ) -> AdaptiveLQ:
+        cls, model: ShipModel, *, dt: float | None = None, integral_lengths: float = 20.0,
+        rudder_weight: float = RUDDER_WEIGHT, rate_weight_s2: float | None = None,
+        forgetting_lengths: float = 20.0, redesign_lengths: float = 1.0, noise: float = 1.0,
+    ) -> Self:  # fmt: skip
         """Design on a model, from which the ship may differ.
 
         Parameters
@@ -129,16 +120,13 @@ class AdaptiveLQ(Controller):
         deviation = np.sqrt(2.0) * noise / interval * np.array([SEA_TRIAL["v"].noise, SEA_TRIAL["r"].noise])
         errors = np.hypot(UNEXPLAINED, deviation / units(length, speed)[:, 3])
         design = start.design | {
-            "length": length,
-            "speed": speed,
-            "sway_error": float(errors[0]),
-            "yaw_error": float(errors[1]),
-            "gear_lag": model.steering.time_constant,
-            "integral_time": integral_lengths * time,
+            "length": length, "speed": speed,
+            "sway_error": float(errors[0]), "yaw_error": float(errors[1]),
+            "gear_lag": model.steering.time_constant, "integral_time": integral_lengths * time,
             "restless_limit": RESTLESS_LIMIT * np.sqrt(6.0) * max(noise, 1.0) * SEA_TRIAL["r"].noise,
             "forgetting": float(np.exp(-interval / (forgetting_lengths * time))),
             "redesign_steps": float(max(1, round(redesign_lengths * time / interval))),
-        }
+        }  # fmt: skip
         design.pop("integral_lengths")
         common = {one.name: getattr(start, one.name) for one in fields(start)}
         return cls(**common | {"design": design}, prior=prime_steering(model))
@@ -197,9 +185,8 @@ class AdaptiveLQ(Controller):
         speed = np.where(begins, now[:, 3], speed)
         terms = np.stack([sway / speed, turn * length / speed, rudder, np.ones_like(speed)], axis=-1)
         targets = (now - last)[:, :2] / dt * np.stack([length / speed**2, (length / speed) ** 2], axis=-1)
-        linear = (
-            (np.abs(terms[:, 0]) < LARGEST_SWAY) & (np.abs(terms[:, 1]) < LARGEST_TURN) & ~begins & at_rest
-        )
+        gentle = np.abs(terms[:, :2]) < (LARGEST_SWAY, LARGEST_TURN)
+        linear = gentle.all(axis=1) & ~begins & at_rest
         if not linear.any():
             return
         chosen = kept[linear]
@@ -226,16 +213,9 @@ class AdaptiveLQ(Controller):
         chosen["covariance"] = covariance.reshape(chosen["covariance"].shape)
 
     def coefficients(self, state: Floats) -> Floats:
-        """Prime coefficients that are identified, of the state that `predict` returns.
+        """Prime coefficients that are identified, as `prior`, of shape (2, 4) or (n, 2, 4).
 
-        Parameters
-        ----------
-        state : array of shape (memory_size,) or (n, memory_size)
-
-        Returns
-        -------
-        array of shape (2, 4) or (n, 2, 4)
-            As `prior`.
+        `state`: that `predict` returns, shape (memory_size,) or (n, memory_size).
         """
         theta = records(np.asarray(state), self.record)["theta"]
         found: Floats = theta * self.error_size[:, None] / SIZES

@@ -128,12 +128,11 @@ def _checked(action: Any, rows: tuple[int, ...], where: str) -> Any:
         raise InputError(f"{where}: action {action!r} found, expected numbers") from None
     if array.shape != (*rows, 1):
         raise InputError(f"{where}: action of shape {array.shape} found, expected {(*rows, 1)}")
+    found = f"{where}: action {array.ravel()} found"
     if not np.isfinite(array).all():
-        raise InputError(
-            f"{where}: action {array.ravel()} found, expected numbers; look for a division by zero"
-        )
+        raise InputError(f"{found}, expected numbers; look for a division by zero")
     if np.abs(array).max() > 1.0:
-        raise InputError(f"{where}: action {array.ravel()} found, expected [-1, 1]: part of the rudder limit")
+        raise InputError(f"{found}, expected [-1, 1]: part of the rudder limit")
     return np.asarray(action)
 
 

@@ -14,21 +14,13 @@ from typing import Any, ClassVar, NamedTuple, Protocol, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from agents.controllers.linear_loop import (
-    SIGNALS,
-    Compensator,
-    Margins,
-    SampledShip,
-    compensator_margins,
-    sample_ship,
-)
-from agents.controllers.memory import Flags, begun, checked_observation, deviations, size_of
+from agents.controllers.linear_loop import SIGNALS, Compensator, Margins, SampledShip, sample_ship
+from agents.controllers.memory import Flags, Floats, begun, checked_observation, deviations, size_of
 from shipgym.errors import InputError
 from shipgym.files import write_json
 from shipgym.ships import ShipModel
 from shipgym.tasks.task import OBSERVATION_NAMES, observation_scales
 
-Floats = NDArray[np.float64]
 Action = NDArray[np.float32]
 
 FORMAT = 1  # of the controller file
@@ -139,49 +131,25 @@ class Controller:
 
     @classmethod
     def designed(
-        cls,
-        model: ShipModel,
-        ship: SampledShip,
-        gains: dict[str, float],
-        design: dict[str, float],
+        cls, model: ShipModel, ship: SampledShip, gains: dict[str, float], design: dict[str, float],
         **more: Any,
-    ) -> Self:
+    ) -> Self:  # fmt: skip
         """The controller with these gains, its margins computed.
 
-        Parameters
-        ----------
-        model : ShipModel
-            The model it was designed on.
-        ship : SampledShip
-            The same, linearised and sampled.
-        gains : dict of str to float
-            By the names of `feedback`.
-        design : dict of str to float
-            How they were found.
-        **more
-            Further fields of the class.
-
-        Raises
-        ------
-        InputError
-            If the closed loop is unstable.
+        `model`: that it was designed on; `ship`: the same, linearised and sampled; `gains`: by the names of
+        `feedback`; `design`: how they were found; `more`: further fields of the class. Raises InputError if
+        the closed loop is unstable.
         """
-        unknown = Margins(np.nan, np.nan, np.nan, np.nan, np.nan)
+        unknown, scales = Margins(np.nan, np.nan, np.nan, np.nan), tuple(observation_scales(model).tolist())
         found = cls(
-            gains=gains,
-            neutral_rudder=ship.about.rudder,
-            neutral_sway=ship.about.sway,
-            margins=unknown,
-            observation_scales=tuple(observation_scales(model).tolist()),
-            model_name=model.name,
-            model_sha256=model_hash(model),
-            design={"dt": ship.dt, **design},
-            **more,
-        )
+            gains=gains, neutral_rudder=ship.about.rudder, neutral_sway=ship.about.sway, margins=unknown,
+            observation_scales=scales, model_name=model.name, model_sha256=model_hash(model),
+            design={"dt": ship.dt, **design}, **more,
+        )  # fmt: skip
         return replace(found, margins=found._margins(ship, model))
 
     def _margins(self, ship: SampledShip, model: ShipModel) -> Margins:
-        return compensator_margins(ship, self.loop(), f"{type(self).__name__} on model '{model.name}'")
+        return self.loop().margins(ship, f"{type(self).__name__} on model '{model.name}'")
 
     def loop(self) -> Compensator:
         """The controller for small motions, without limits: what its margins are computed from."""
@@ -215,10 +183,7 @@ class Controller:
     def margins_on(self, model: ShipModel) -> Margins:
         """Margins and bandwidth of the same controller on another ship.
 
-        Raises
-        ------
-        InputError
-            If the closed loop is unstable, or the model has no straight course.
+        Raises InputError if the closed loop is unstable, or the model has no straight course.
         """
         return self._margins(sample_ship(model, self.design["dt"]), model)
 
@@ -263,20 +228,9 @@ class Controller:
     def steer(self, seen: dict[str, Floats], memory: Floats, begins: Flags) -> tuple[Floats, Floats]:
         """Commanded rudder and what is remembered next.
 
-        Parameters
-        ----------
-        seen : dict of str to array of shape (n,)
-            What is observed by name, SI units.
-        memory : array of shape (n, memory_size)
-            Zeros where an episode begins.
-        begins : bool array of shape (n,)
-            Whether it does.
-
-        Returns
-        -------
-        order : array of shape (n,)
-            Rad, not yet limited.
-        memory : array of shape (n, memory_size)
+        `seen`: what is observed by name, SI units, each of shape (n,); `memory`: zeros where an episode
+        begins, shape (n, memory_size); `begins`: whether it does, shape (n,). Returns `order`: rad, not yet
+        limited, shape (n,); `memory`: shape (n, memory_size).
         """
         found = deviations(seen, self.neutral_rudder, self.neutral_sway)
         rows = np.broadcast_to(self.row.T, found.shape)
@@ -285,19 +239,8 @@ class Controller:
     def check_fits(self, names: Sequence[str], scales: Sequence[float], where: str = "observations") -> None:
         """Refuse to steer what shows other quantities first, or in other scales, than those designed for.
 
-        Parameters
-        ----------
-        names : sequence of str
-            `observation_names` of an environment; it may show more than what is steered by.
-        scales : sequence of float
-            Its `observation_scales`.
-        where : str
-            Start of the message.
-
-        Raises
-        ------
-        InputError
-            Naming the first difference.
+        `names`, `scales`: `observation_names` and `observation_scales` of an environment; it may show more
+        than what is steered by; `where`: start of the message. Raises InputError naming the first difference.
         """
         meant = (
             f"controller '{self.name}' was designed for {{}} (model '{self.model_name}'): another ship or "
@@ -313,10 +256,7 @@ class Controller:
     def save(self, path: str | Path) -> None:
         """Write the controller as a JSON file, whose fields are listed in docs/deployment.md.
 
-        Raises
-        ------
-        InputError
-            If the folder does not exist or cannot be written.
+        Raises InputError if the folder does not exist or cannot be written.
         """
         write_json(self.to_dict(), Path(path))
 
@@ -329,18 +269,14 @@ class Controller:
         margins = asdict(self.margins)
         arrays = {name: getattr(self, name).tolist() for name in self.arrays}
         return {
-            "format": FORMAT,
-            "kind": self.kind,
+            "format": FORMAT, "kind": self.kind,
             "observation_names": list(self.observation_names),
             "observation_scales": list(self.observation_scales),
-            "gains": self.gains,
-            "neutral_rudder": self.neutral_rudder,
-            "neutral_sway": self.neutral_sway,
+            "gains": self.gains, "neutral_rudder": self.neutral_rudder, "neutral_sway": self.neutral_sway,
             "model": {"name": self.model_name, "sha256": self.model_sha256},
             "margins": {name: value if np.isfinite(value) else None for name, value in margins.items()},
-            "design": self.design,
-            **({"arrays": arrays} if arrays else {}),
-        }
+            "design": self.design, **({"arrays": arrays} if arrays else {}),
+        }  # fmt: skip
 
 
 def check_names(found: Sequence[str], expected: Sequence[str], where: str) -> None:
@@ -368,10 +304,6 @@ def check_scales(
 
 def model_hash(model: ShipModel) -> str:
     """SHA-256 of a model's structure, coefficients, particulars and steering gear."""
-    content = [
-        model.dynamics.to_dict(),
-        model.coefficients,
-        model.particulars.to_dict(),
-        model.steering.to_dict(),
-    ]
+    ship, gear = model.particulars.to_dict(), model.steering.to_dict()
+    content = [model.dynamics.to_dict(), model.coefficients, ship, gear]
     return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()

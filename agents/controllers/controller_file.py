@@ -35,10 +35,7 @@ POLICIES = ("learned", "shielded", "one-for-all")
 
 
 def read_controller(content: Mapping[str, Any], where: str) -> Controller:
-    """A classical controller from what `Controller.to_dict` returned.
-
-    Raises InputError naming the field at fault.
-    """
+    """A classical controller from what `Controller.to_dict` returned; InputError names the field at fault."""
     check_format(content, FORMAT, where)
     if "kind" in content:
         kinds = controller_kinds()

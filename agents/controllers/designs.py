@@ -1,10 +1,8 @@
 """Classical controllers by name, designed for the ship, the control interval and the path of a task."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import Any
 
@@ -25,6 +23,14 @@ NO_BASES = ("mpc", "lq-adaptive", "preview-mpc")
 INNER = "lq_"  # before settings of the LQ that a guidance law leads
 
 
+@dataclass(frozen=True)
+class _Ship:
+    """A ship that equals another of the same numbers."""
+
+    model: ShipModel = field(compare=False)
+    sha256: str  # of its numbers
+
+
 def design(kind: str, task: BenchmarkTask, settings: Mapping[str, Any] | None = None) -> Controller:
     """A classical controller for a task.
 
@@ -37,7 +43,8 @@ def design(kind: str, task: BenchmarkTask, settings: Mapping[str, Any] | None = 
     given = settings or {}
     if not made.has_autopilot:
         written = json.dumps(dict(given), sort_keys=True)
-        return _designed(made, _Ship(task.ship), task.task.interval(task.ship), written)
+        ship = _Ship(task.ship, model_hash(task.ship))
+        return _designed(made, ship, task.task.interval(task.ship), written)
     if not task.task.follows_path:
         raise no_path(kind, task)
     inner = {key.removeprefix(INNER): value for key, value in given.items() if key.startswith(INNER)}
@@ -87,28 +94,12 @@ def design_base(name: str, task: BenchmarkTask) -> Controller | None:
     if name == "none":
         return None
     if name == "tuned":
-        suite = suite_of(task.name)
-        if suite is None:
-            raise InputError(
-                "base: 'tuned' found without a task of the suite, expected --task, or another base"
-            )
-        return tuned("base", task, suite)
+        if suite := suite_of(task.name):
+            return tuned("base", task, suite)
+        raise InputError("base: 'tuned' found without a task of the suite, expected --task, or another base")
     if name.endswith(".json"):
         agent = load_agent(name, task.ship)
         if not isinstance(agent, Controller):
             raise InputError(f"base: {name} holds a learned policy, expected a classical controller")
         return agent
     return design(name, task)
-
-
-@dataclass(frozen=True)
-class _Ship:
-    """A ship that equals another of the same numbers."""
-
-    model: ShipModel
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, _Ship) and hash(self) == hash(other)
-
-    def __hash__(self) -> int:
-        return hash(model_hash(self.model))

@@ -5,11 +5,9 @@ model), 11.1.2 (notch filter), 12.2.6 (heading autopilot with feedforward); Astr
 PID Control, 3.5 (back-calculation).
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
@@ -51,18 +49,11 @@ class FilteredPID(Controller):
 
     @classmethod
     def from_model(
-        cls,
-        model: ShipModel,
-        *,
-        dt: float | None = None,
-        frequency: float | None = None,
-        damping: float | None = None,
-        integral_lengths: float = 20.0,
-        reference_share: float = 3.0,
-        largest_turn_rate_deg_s: float | None = None,
-        tracking_lengths: float = 2.0,
+        cls, model: ShipModel, *, dt: float | None = None, frequency: float | None = None,
+        damping: float | None = None, integral_lengths: float = 20.0, reference_share: float = 3.0,
+        largest_turn_rate_deg_s: float | None = None, tracking_lengths: float = 2.0,
         wave_period: float | None = None,
-    ) -> FilteredPID:
+    ) -> Self:  # fmt: skip
         """Design on a model: PID's gains, and the filters around them.
 
         Parameters
@@ -96,18 +87,13 @@ class FilteredPID(Controller):
             turn_rate = check_number(largest_turn_rate_deg_s, "largest_turn_rate_deg_s", above=0.0)
         if wave_period is not None:
             check_number(wave_period, "wave_period", above=2.0 * interval, hint="two control intervals, in s")
-        return cls.designed(
-            model,
-            sample_ship(model, interval),
-            gains=plain.gains,
-            design={
-                **plain.design,
-                "reference_frequency": frequency_share * plain.design["frequency"],
-                "largest_turn_rate": float(np.radians(turn_rate)),
-                "tracking_rate": 1.0 / tracking if tracking else 0.0,
-                "wave_frequency": 0.0 if wave_period is None else 2.0 * np.pi / wave_period,
-            },
-        )
+        design = plain.design | {
+            "reference_frequency": frequency_share * plain.design["frequency"],
+            "largest_turn_rate": float(np.radians(turn_rate)),
+            "tracking_rate": 1.0 / tracking if tracking else 0.0,
+            "wave_frequency": 0.0 if wave_period is None else 2.0 * np.pi / wave_period,
+        }
+        return cls.designed(model, sample_ship(model, interval), plain.gains, design)
 
     def steer(self, seen: dict[str, Floats], memory: Floats, begins: Flags) -> tuple[Floats, Floats]:
         """One control interval of filters and feedback."""
@@ -172,10 +158,8 @@ class FilteredPID(Controller):
         measure = np.zeros((2, len(SIGNALS)))
         measure[0, ERROR] = measure[1, YAW_RATE] = 1.0
         row = np.array([gains["proportional"] + gains["integral"] * dt, -gains["derivative"]])
-        inner = np.zeros((0, 0)), np.zeros((0, 2)), np.zeros((2, 0)), np.eye(2)
-        if frequency:
-            inner = _two_notches(frequency * dt)
-        a, b, c, d = inner
+        none = np.zeros((0, 0)), np.zeros((0, 2)), np.zeros((2, 0)), np.eye(2)
+        a, b, c, d = _two_notches(frequency * dt) if frequency else none
         n = len(a)
         A = np.zeros((n + 1, n + 1))
         A[:n, :n], A[n, n], A[n, :n] = a, 1.0, dt * c[0]

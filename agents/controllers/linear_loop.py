@@ -6,10 +6,8 @@ it so is exact for small motions: the zero-order hold, the gear's lag and the en
 integral are in it. The rudder's limit and rate are not.
 """
 
-from __future__ import annotations
-
-from dataclasses import dataclass, field
-from typing import Any
+from dataclasses import dataclass
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,7 +41,7 @@ class Margins:
     bandwidth_rad_s: float  # of the heading following its set-point, to -3 dB, rad/s
     #: factor down to which the loop gain may be lowered; 0 where there is no limit. The integral, and a
     #: ship unstable on its course, need some
-    lowest_gain: float = field(default=0.0)
+    lowest_gain: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,7 +130,7 @@ class Compensator:
     D: Floats  # y in the order of `SIGNALS`, deviations in SI units, shape (1, 5)
 
     @classmethod
-    def static(cls, row: Floats) -> Compensator:
+    def static(cls, row: Floats) -> Self:
         """Feedback without a memory, of a row of shape (1, 5)."""
         n = len(SIGNALS)
         return cls(np.zeros((0, 0)), np.zeros((0, n)), np.zeros((1, 0)), row)
@@ -145,34 +143,44 @@ class Compensator:
         kept = np.arange(len(whole)) != INTEGRAL
         return whole[np.ix_(kept, kept)]
 
+    def margins(self, ship: SampledShip, name: str) -> Margins:
+        """Stability margins and bandwidth with a ship.
 
-def compensator_margins(ship: SampledShip, compensator: Compensator, name: str) -> Margins:
-    """Stability margins and bandwidth of any linear controller.
+        The margins follow from the frequency response of the sampled loop (`control.stability_margins`);
+        `name`, of the design, is for the message. Raises InputError if the closed loop is unstable.
+        """
+        import control
 
-    The margins follow from the frequency response of the sampled loop (`control.stability_margins`); `name`,
-    of the design, is for the message. Raises InputError if the closed loop is unstable.
-    """
-    import control
-
-    largest = float(np.abs(np.linalg.eigvals(compensator.closed_loop(ship))).max())
-    if largest >= 1.0:
-        raise InputError(
-            f"{name}: the closed loop is unstable with these gains (largest sampled pole {largest:.4f}, "
-            "expected below 1); choose a shorter control interval dt, and a lower frequency (PID) or a "
-            "larger rate_weight_s2 (LQ) in from_model"
+        largest = float(np.abs(np.linalg.eigvals(self.closed_loop(ship))).max())
+        if largest >= 1.0:
+            raise InputError(
+                f"{name}: the closed loop is unstable with these gains (largest sampled pole {largest:.4f}, "
+                "expected below 1); choose a shorter control interval dt, and a lower frequency (PID) or a "
+                "larger rate_weight_s2 (LQ) in from_model"
+            )
+        nyquist = np.pi / ship.dt
+        omega = np.geomspace(SLOWEST * nyquist, 0.999 * nyquist, FREQUENCIES)
+        opened, following = self._responses(ship, omega)
+        found: Any = control.stability_margins(control.frd(opened, omega), returnall=True)
+        gains, phases, _, _, crossings, _ = (np.asarray(values, dtype=float) for values in found)
+        return Margins(
+            gain_margin=float(min(gains[gains > 1.0], default=np.inf)),
+            phase_margin_deg=float(min(np.abs(phases), default=np.inf)),
+            delay_margin_s=float(min(np.radians(phases % 360.0) / crossings, default=np.inf)),
+            bandwidth_rad_s=_crossing(omega, np.abs(following)),
+            lowest_gain=float(max(gains[gains < 1.0], default=0.0)),
         )
-    nyquist = np.pi / ship.dt
-    omega = np.geomspace(SLOWEST * nyquist, 0.999 * nyquist, FREQUENCIES)
-    opened, following = _responses(ship, compensator, omega)
-    found: Any = control.stability_margins(control.frd(opened, omega), returnall=True)
-    gains, phases, _, _, crossings, _ = (np.asarray(values, dtype=float) for values in found)
-    return Margins(
-        gain_margin=float(min(gains[gains > 1.0], default=np.inf)),
-        phase_margin_deg=float(min(np.abs(phases), default=np.inf)),
-        delay_margin_s=float(min(np.radians(phases % 360.0) / crossings, default=np.inf)),
-        bandwidth_rad_s=_crossing(omega, np.abs(following)),
-        lowest_gain=float(max(gains[gains < 1.0], default=0.0)),
-    )
+
+    def _responses(self, ship: SampledShip, omega: Floats) -> tuple[Complexes, Complexes]:
+        """Of the loop opened at the ship's motions, and of the heading to its set-point, each (n_omega,)."""
+        z = np.exp(1j * omega * ship.dt)
+        motions = _resolved(ship.A, ship.B, z)[:, :, 0].T
+        orders = (self.C @ _resolved(self.A, self.B, z) + self.D)[:, 0].T
+        of_rudder = orders[RUDDER] * motions[RUDDER]
+        of_motions = (orders * motions).sum(axis=0) - of_rudder
+        set_point = orders[ERROR] + orders[INTEGRAL] * ship.dt / (z - 1.0)
+        following = -motions[ERROR] * set_point / (1.0 - of_rudder - of_motions)
+        return -of_motions / (1.0 - of_rudder), following
 
 
 def check_stable(matrix: Floats, where: str) -> None:
@@ -189,19 +197,6 @@ def _crossing(omega: Floats, size: Floats) -> float:
         return float(omega[-1 if len(beyond) == 0 else 0])
     pair = slice(beyond[0] - 1, beyond[0] + 1)
     return float(np.exp(np.interp(-np.sqrt(0.5), -size[pair], np.log(omega[pair]))))
-
-
-def _responses(ship: SampledShip, compensator: Compensator, omega: Floats) -> tuple[Complexes, Complexes]:
-    """Of the loop opened at the ship's motions, and of the heading to its set-point, each (n_omega,)."""
-    z = np.exp(1j * omega * ship.dt)
-    motions = _resolved(ship.A, ship.B, z)[:, :, 0].T
-    c = compensator
-    orders = (c.C @ _resolved(c.A, c.B, z) + c.D)[:, 0].T if len(c.A) else np.tile(c.D.T, len(z))
-    of_rudder = orders[RUDDER] * motions[RUDDER]
-    of_motions = (orders * motions).sum(axis=0) - of_rudder
-    set_point = orders[ERROR] + orders[INTEGRAL] * ship.dt / (z - 1.0)
-    following = -motions[ERROR] * set_point / (1.0 - of_rudder - of_motions)
-    return -of_motions / (1.0 - of_rudder), following
 
 
 def _resolved(A: Floats, B: Floats, z: Complexes) -> Complexes:

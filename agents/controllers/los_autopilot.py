@@ -67,17 +67,13 @@ class Guided(Controller):
         names = next((some for some in cls.alternatives if scales.keys() >= {*some}), cls.observes)
         return cls(
             gains={**gains, "task_lookahead": task.lookahead * model.particulars["length"]},
-            neutral_rudder=like.neutral_rudder,
-            neutral_sway=like.neutral_sway,
+            neutral_rudder=like.neutral_rudder, neutral_sway=like.neutral_sway,
             margins=like.margins if own else Margins(np.inf, np.inf, np.inf, np.inf),
-            observation_scales=tuple(scales[name] for name in names),
-            model_name=like.model_name,
-            model_sha256=like.model_sha256,
-            design={"dt": dt, **design},
-            observation_names=names,
+            observation_scales=tuple(scales[name] for name in names), observation_names=names,
+            model_name=like.model_name, model_sha256=like.model_sha256, design={"dt": dt, **design},
             autopilot=like if autopilot is None else autopilot,
             **({"ship": model} if cls.has_ship else {}),
-        )
+        )  # fmt: skip
 
     @property
     def turns_ahead(self) -> tuple[str, ...]:
@@ -130,12 +126,10 @@ class Guided(Controller):
         return {**super().to_dict(), "autopilot": self._heading_autopilot("a file").to_dict()}
 
     def _heading_autopilot(self, what: str) -> Controller:
-        if not isinstance(self.autopilot, Controller):
-            raise InputError(
-                f"autopilot: {type(self.autopilot).__name__} found, expected a controller of shipgym "
-                f"for {what}"
-            )
-        return self.autopilot
+        if isinstance(self.autopilot, Controller):
+            return self.autopilot
+        found = type(self.autopilot).__name__
+        raise InputError(f"autopilot: {found} found, expected a controller of shipgym for {what}")
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -151,14 +145,9 @@ class LineOfSight(Guided):
 
     @classmethod
     def from_model(
-        cls,
-        model: ShipModel,
-        *,
-        autopilot: Policy | None = None,
-        task: Task | None = None,
-        lookahead_lengths: float | None = None,
-        integral_lengths: float | None = None,
-    ) -> Self:
+        cls, model: ShipModel, *, autopilot: Policy | None = None, task: Task | None = None,
+        lookahead_lengths: float | None = None, integral_lengths: float | None = None,
+    ) -> Self:  # fmt: skip
         """Lead an autopilot along the paths of a task.
 
         Parameters
@@ -206,9 +195,9 @@ class IntegralLineOfSight(LineOfSight):
         """See `Guided.course`; the integral is remembered, m."""
         zero = np.zeros_like(seen["cross_track"])
         where = PathPosition(along=zero, cross_track=seen["cross_track"], course=zero, to_go=zero)
-        gain, dt = self.gains["integral"], self.design["dt"]
+        gains, dt = self.gains, self.design["dt"]
         drift = memory[..., 0]
-        course, drift = integral_line_of_sight(where, self.gains["lookahead"], drift, gain, dt)
+        course, drift = integral_line_of_sight(where, gains["lookahead"], drift, gains["integral"], dt)
         return course, drift[..., None]
 
 

@@ -7,11 +7,9 @@ algebraic Riccati equations, International Journal of Control 77 (doubling: many
 autopilots make them while they sail).
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import ClassVar, NamedTuple
+from typing import ClassVar, NamedTuple, Self
 
 import numpy as np
 
@@ -49,14 +47,9 @@ class LQ(Controller):
 
     @classmethod
     def from_model(
-        cls,
-        model: ShipModel,
-        *,
-        dt: float | None = None,
-        integral_lengths: float = 20.0,
-        rudder_weight: float = RUDDER_WEIGHT,
-        rate_weight_s2: float | None = None,
-    ) -> LQ:
+        cls, model: ShipModel, *, dt: float | None = None, integral_lengths: float = 20.0,
+        rudder_weight: float = RUDDER_WEIGHT, rate_weight_s2: float | None = None,
+    ) -> Self:  # fmt: skip
         """Design on a model, about straight running.
 
         The weights are those of the environment's reward, with that of the rudder rate raised for the
@@ -97,13 +90,9 @@ class Weights(NamedTuple):
 
     @classmethod
     def of(
-        cls,
-        model: ShipModel,
-        dt: float | None,
-        integral_lengths: float,
-        rudder_weight: float,
+        cls, model: ShipModel, dt: float | None, integral_lengths: float, rudder_weight: float,
         rate_weight_s2: float | None,
-    ) -> Weights:
+    ) -> Self:  # fmt: skip
         """Those of a ship, as in `LQ.from_model`; raises InputError if one is out of its range."""
         check_number(integral_lengths, "integral_lengths", above=0.0)
         check_number(rudder_weight, "rudder_weight", above=0.0)
@@ -137,12 +126,10 @@ def lq_gain(
     """
     import control  # here, because it takes a second to import
 
-    outputs = _outputs(ship.A[None], ship.B.T, ship.dt, rate_weight, integral_time, rudder_weight)
-    C, D = outputs[0][0], outputs[1][0]
+    (C,), (D,) = _outputs(ship.A[None], ship.B.T, ship.dt, rate_weight, integral_time, rudder_weight)
     plant = control.ss(ship.A, ship.B, np.eye(len(SIGNALS)), 0.0, ship.dt)
     gain, _, _ = control.lqr(plant, C.T @ C, D.T @ D, C.T @ D)
-    row: Floats = np.asarray(gain, dtype=np.float64)[0]
-    return row
+    return np.asarray(gain, dtype=np.float64).reshape(-1)
 
 
 def _outputs(
@@ -161,13 +148,9 @@ def _outputs(
 
 
 def lq_rows(
-    A: Floats,
-    B: Floats,
-    dt: float,
-    rate_weight: float,
-    integral_time: float,
+    A: Floats, B: Floats, dt: float, rate_weight: float, integral_time: float,
     rudder_weight: float = RUDDER_WEIGHT,
-) -> Floats:
+) -> Floats:  # fmt: skip
     """The same for many ships at once, as designs made while sailing: rows of order = row x, shape (n, 5).
 
     `A`, `B`: sampled ships, shape (n, 5, 5) and (n, 5); `dt`: control interval, s. NaN where no stabilising

@@ -4,11 +4,9 @@ Sources: Fossen 2011, Handbook of Marine Craft Hydrodynamics and Motion Control,
 wave model for heading autopilots) and 13.1 (separation); Anderson & Moore 1990, Optimal Control, chapter 8.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import ClassVar, Self
 
 import numpy as np
 
@@ -87,18 +85,10 @@ class LQG(Controller):
 
     @classmethod
     def from_model(
-        cls,
-        model: ShipModel,
-        *,
-        dt: float | None = None,
-        integral_lengths: float = 20.0,
-        rudder_weight: float = RUDDER_WEIGHT,
-        rate_weight_s2: float | None = None,
-        noise: float = 1.0,
-        disturbance_deg: float = 2.0,
-        wave_period: float | None = None,
-        wave_heading_deg: float = 1.0,
-    ) -> LQG:
+        cls, model: ShipModel, *, dt: float | None = None, integral_lengths: float = 20.0,
+        rudder_weight: float = RUDDER_WEIGHT, rate_weight_s2: float | None = None, noise: float = 1.0,
+        disturbance_deg: float = 2.0, wave_period: float | None = None, wave_heading_deg: float = 1.0,
+    ) -> Self:  # fmt: skip
         """Design on a model, about straight running: LQ's gains and a Kalman filter (`control.dlqe`).
 
         Parameters

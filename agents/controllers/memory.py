@@ -80,10 +80,8 @@ def heading_error(seen: dict[str, Floats]) -> Floats:
 def on_course(seen: NDArray[Any], error: Floats, integral: Floats, reach: float) -> NDArray[np.float32]:
     """Observations of ships with another heading error, rad, and its integral of at most `reach`, rad s."""
     shown = seen.astype(np.float32)
-    values = np.sin(error), np.cos(error), integral / reach
-    for name, value in zip(
-        ("heading_error_sin", "heading_error_cos", "heading_error_integral"), values, strict=True
-    ):
+    angle = {"heading_error_sin": np.sin(error), "heading_error_cos": np.cos(error)}
+    for name, value in {**angle, "heading_error_integral": integral / reach}.items():
         shown[..., OBSERVATION_NAMES.index(name)] = value
     return shown
 

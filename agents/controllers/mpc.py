@@ -10,13 +10,11 @@ Automatica 34 (corrections of a stabilising feedback); Stellato et al. 2020, OSQ
 Computation 12.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from importlib import import_module
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 
@@ -78,15 +76,10 @@ class MPC(Controller):
 
     @classmethod
     def from_model(
-        cls,
-        model: ShipModel,
-        *,
-        dt: float | None = None,
-        integral_lengths: float = 20.0,
-        horizon_lengths: float = 2.0,
-        rudder_weight: float = RUDDER_WEIGHT,
+        cls, model: ShipModel, *, dt: float | None = None, integral_lengths: float = 20.0,
+        horizon_lengths: float = 2.0, rudder_weight: float = RUDDER_WEIGHT,
         rate_weight_s2: float | None = None,
-    ) -> MPC:
+    ) -> Self:  # fmt: skip
         """Design on a model, about straight running.
 
         Parameters
@@ -115,14 +108,9 @@ class MPC(Controller):
             "horizon_steps": float(max(2, round(horizon_lengths * time / interval))),
             "rudder_rate_rad_s": model.steering.rate,
         }
-        return cls.designed(
-            model,
-            sample_ship(model, interval),
-            gains=weights.gains(reduced, time),
-            design=weights.design | limits,
-            transition=reduced.A,
-            effect=reduced.B[:, 0],
-        )
+        gains, design = weights.gains(reduced, time), weights.design | limits
+        ship = {"transition": reduced.A, "effect": reduced.B[:, 0]}
+        return cls.designed(model, sample_ship(model, interval), gains, design, **ship)
 
     def steer(self, seen: dict[str, Floats], memory: Floats, begins: Flags) -> tuple[Floats, Floats]:
         """LQ's command where its plan keeps to the limits, else the first of the nearest plan that does."""
@@ -170,19 +158,10 @@ class MPC(Controller):
         rows, steps = matrix.shape
         solver = _solver_library().OSQP()
         solver.setup(
-            sparse.identity(steps, format="csc"),
-            np.zeros(steps),
-            matrix,
-            np.full(rows, -1.0),
-            np.full(rows, 1.0),
-            verbose=False,
-            eps_abs=ACCURACY,
-            eps_rel=ACCURACY,
-            max_iter=MOST_ITERATIONS,
-            rho=STEP_SIZE,
-            adaptive_rho=False,
-            warm_starting=False,
-        )
+            sparse.identity(steps, format="csc"), np.zeros(steps), matrix, -np.ones(rows), np.ones(rows),
+            verbose=False, eps_abs=ACCURACY, eps_rel=ACCURACY, max_iter=MOST_ITERATIONS, rho=STEP_SIZE,
+            adaptive_rho=False, warm_starting=False,
+        )  # fmt: skip
         return solver
 
     def __getstate__(self) -> dict[str, Any]:

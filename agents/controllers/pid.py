@@ -4,11 +4,9 @@ Source: Fossen 2011, Handbook of Marine Craft Hydrodynamics and Motion Control, 
 van Amerongen 1982, Adaptive steering of ships, chapter 3 (bandwidth from the steering cost).
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import ClassVar, Self
 
 import numpy as np
 
@@ -42,14 +40,9 @@ class PID(Controller):
 
     @classmethod
     def from_model(
-        cls,
-        model: ShipModel,
-        *,
-        dt: float | None = None,
-        frequency: float | None = None,
-        damping: float | None = None,
-        integral_lengths: float = 20.0,
-    ) -> PID:
+        cls, model: ShipModel, *, dt: float | None = None, frequency: float | None = None,
+        damping: float | None = None, integral_lengths: float = 20.0,
+    ) -> Self:  # fmt: skip
         """Design on a model, about straight running.
 
         The poles are placed on the first-order Nomoto form with half of the steering gear's lag and half
@@ -88,27 +81,18 @@ class PID(Controller):
         wanted = min(FREQUENCY_SHARE * wanted, largest)
         if frequency is not None:
             wanted = check_number(frequency, "frequency", above=0.0)
-        return cls.designed(
-            model,
-            ship,
-            gains=place_poles(response, lag, wanted, ratio, slow),
-            design={
-                "frequency": wanted,
-                "damping": ratio,
-                "integral_lengths": float(integral_lengths),
-                "lag": lag,
-                "nomoto_K": response.K,
-                "nomoto_T": response.T,
-            },
-        )
+        design = {
+            "frequency": wanted, "damping": ratio, "integral_lengths": float(integral_lengths), "lag": lag,
+            "nomoto_K": response.K, "nomoto_T": response.T,
+        }  # fmt: skip
+        return cls.designed(model, ship, place_poles(response, lag, wanted, ratio, slow), design)
 
 
 def optimal_poles(response: Nomoto, rate_weight: float) -> tuple[float, float]:
-    """Natural frequency and damping that the steering cost asks for.
+    """Natural frequency, rad/s, and damping that the steering cost asks for.
 
     They are those of the dominant poles of the LQ regulator with weights on heading error, rudder and rudder
-    rate (`rate_weight`, s^2), for the first-order Nomoto form with the rudder rate as input; the first in
-    rad/s.
+    rate (`rate_weight`, s^2), for the first-order Nomoto form with the rudder rate as input.
     """
     import control  # here, because it takes a second to import
 

@@ -62,15 +62,9 @@ class PreviewMPC(WheelOver):
 
     @classmethod
     def from_model(
-        cls,
-        model: ShipModel,
-        *,
-        autopilot: Policy | None = None,
-        task: Task | None = None,
-        horizon_lengths: float = 6.0,
-        deviation_deg: float = 3.0,
-        **settings: Any,
-    ) -> Self:
+        cls, model: ShipModel, *, autopilot: Policy | None = None, task: Task | None = None,
+        horizon_lengths: float = 6.0, deviation_deg: float = 3.0, **settings: Any,
+    ) -> Self:  # fmt: skip
         """Lead LQ along the paths of a task.
 
         Parameters

@@ -80,10 +80,7 @@ def registered_modules() -> tuple[str, ...]:
 
 
 def controller_class(kind: str, where: str = "controller") -> type[Controller]:
-    """The class of a kind of controller.
-
-    Raises InputError if there is none, with the nearest known one.
-    """
+    """The class of a kind of controller; InputError if there is none, with the nearest known one."""
     check_choice(kind, controller_kinds(), where)
     if kind in _REGISTERED:
         return _REGISTERED[kind]

@@ -34,13 +34,7 @@ class MarginUncertainty:
     stable: NDArray[np.bool_]
 
     def quantiles(self, share: Sequence[float] = (0.05, 0.5, 0.95)) -> dict[str, Floats]:
-        """Quantiles of each figure over the ships with a stable loop, by name.
-
-        Raises
-        ------
-        InputError
-            If no loop is stable.
-        """
+        """Quantiles of each figure over ships with a stable loop, by name; InputError if none is stable."""
         if not self.stable.any():
             raise InputError("margins: the loop is stable on none of the ships, so there are no quantiles")
         return {
@@ -58,10 +52,6 @@ def margin_uncertainty(controller: Controller, models: Sequence[ShipModel]) -> M
         A linear one; of a scheduled or adaptive one the design at service speed, of MPC without limits.
     models : sequence of ShipModel
         For example `model.sample(100, seed)`, drawn from the estimated covariance.
-
-    Returns
-    -------
-    MarginUncertainty
 
     Raises
     ------

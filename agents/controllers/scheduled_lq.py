@@ -4,16 +4,14 @@ Source: Rugh & Shamma 2000, Research on gain scheduling, Automatica 36; for auto
 Adaptive steering of ships, chapter 3 (the rudder's effect grows with the square of the speed).
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import ClassVar, Self
 
 import numpy as np
 
 from agents.controllers.controller import Controller
-from agents.controllers.linear_loop import SIGNALS, Compensator, compensator_margins, sample_ship
+from agents.controllers.linear_loop import SIGNALS, Compensator, sample_ship
 from agents.controllers.lq import LQ, Weights, without_yaw_memory
 from agents.controllers.memory import Flags, Floats, deviations
 from shipgym.checks import check_number
@@ -58,15 +56,10 @@ class ScheduledLQ(Controller):
 
     @classmethod
     def from_model(
-        cls,
-        model: ShipModel,
-        *,
-        dt: float | None = None,
-        integral_lengths: float = 20.0,
-        rudder_weight: float = RUDDER_WEIGHT,
-        rate_weight_s2: float | None = None,
+        cls, model: ShipModel, *, dt: float | None = None, integral_lengths: float = 20.0,
+        rudder_weight: float = RUDDER_WEIGHT, rate_weight_s2: float | None = None,
         speeds: Sequence[float] | None = None,
-    ) -> ScheduledLQ:
+    ) -> Self:  # fmt: skip
         """Design on a model, about straight running at each speed.
 
         The shaft is taken to turn as at service speed: the ship has lost speed in a turn or in weather.
@@ -99,21 +92,15 @@ class ScheduledLQ(Controller):
             gains.append(np.array(list(found.values())))
             neutral.append((ship.about.rudder, ship.about.sway))
             name = f"ScheduledLQ on model '{model.name}' at {speed:g} m/s"
-            margins.append(compensator_margins(ship, Compensator.static(gains[-1][None]), name))
+            margins.append(Compensator.static(gains[-1][None]).margins(ship, name))
         at_service = [float(np.interp(service, listed, column)) for column in np.array(gains).T]
         worst = {
             "least_gain_margin": min(1e6, *(m.gain_margin for m in margins)),
             "least_phase_margin_deg": min(m.phase_margin_deg for m in margins),
         }
-        return cls.designed(
-            model,
-            sample_ship(model, weights.dt),
-            gains=dict(zip(SIGNALS, at_service, strict=True)),
-            design=weights.design | worst,
-            speeds=listed,
-            schedule=np.array(gains),
-            neutral=np.array(neutral),
-        )
+        schedule = {"speeds": listed, "schedule": np.array(gains), "neutral": np.array(neutral)}
+        own = dict(zip(SIGNALS, at_service, strict=True))
+        return cls.designed(model, sample_ship(model, weights.dt), own, weights.design | worst, **schedule)
 
     def at(self, speed: Floats) -> tuple[Floats, Floats]:
         """Gains, shape (n, 5), and neutral rudder and sway, shape (n, 2), at surge speeds of shape (n,)."""

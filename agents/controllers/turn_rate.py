@@ -62,13 +62,9 @@ class TurnRate(Controller):
 
     @classmethod
     def from_model(
-        cls,
-        model: ShipModel,
-        *,
-        dt: float | None = None,
-        frequency: float | None = None,
+        cls, model: ShipModel, *, dt: float | None = None, frequency: float | None = None,
         rate_deg_min: float | None = None,
-    ) -> Self:
+    ) -> Self:  # fmt: skip
         """Design on a model, about straight running.
 
         Parameters
@@ -126,9 +122,8 @@ class TurnRate(Controller):
         followed = before + self.smoothing * (wanted - before)
         off = followed - rate
         order = np.interp(followed, self.rates, self.rudders) + gains["proportional"] * off + kept["gathered"]
-        gathered = np.where(
-            np.abs(order) < self.rudder_limit, gains["integral"] * self.design["dt"] * off, 0.0
-        )
+        more = gains["integral"] * self.design["dt"] * off
+        gathered = np.where(np.abs(order) < self.rudder_limit, more, 0.0)
         return order, np.column_stack([kept["gathered"] + gathered, followed])
 
     def loop(self) -> Compensator:

@@ -60,17 +60,10 @@ class WheelOver(Guided):
 
     @classmethod
     def from_model(
-        cls,
-        model: ShipModel,
-        *,
-        autopilot: Policy | None = None,
-        task: Task | None = None,
-        lookahead_lengths: float | None = None,
-        turn_lookahead_lengths: float | None = None,
-        radius_lengths: float | None = None,
-        reach_lengths: float | None = None,
-        crab_share: float = 1.0,
-    ) -> Self:
+        cls, model: ShipModel, *, autopilot: Policy | None = None, task: Task | None = None,
+        lookahead_lengths: float | None = None, turn_lookahead_lengths: float | None = None,
+        radius_lengths: float | None = None, reach_lengths: float | None = None, crab_share: float = 1.0,
+    ) -> Self:  # fmt: skip
         """Lead an autopilot along the paths of a task.
 
         Parameters

@@ -45,10 +45,7 @@ def do_job(function: JobFunction, text: str) -> Outcome:
 
 
 def check_outcome(outcome: dict[str, Any], job: str) -> dict[str, Any]:
-    """Return the outcome of a job that was done.
-
-    Raises InputError, JobError if it was not, naming the job.
-    """
+    """Return the outcome of a job that was done; InputError or JobError, naming the job, if it was not."""
     if "wrong" in outcome:
         raise InputError(f"{job}: {outcome['wrong']}")
     if "failed" in outcome:
@@ -88,13 +85,11 @@ def working_folder() -> Iterator[None]:
 @contextmanager
 def environment(**values: str) -> Iterator[None]:
     """Environment variables for what is loaded or started now; afterwards they are as before."""
-    before = {name: os.environ.get(name) for name in values}
+    before = {name: os.environ[name] for name in values if name in os.environ}
     os.environ.update(values)
     try:
         yield
     finally:
-        for name, value in before.items():
-            if value is None:
-                os.environ.pop(name, None)
-            else:
-                os.environ[name] = value
+        for name in values:
+            os.environ.pop(name, None)
+        os.environ.update(before)

@@ -38,16 +38,10 @@ ENGINES = ("local", "ray")
 
 
 def run_jobs(
-    function: JobFunction,
-    jobs: Sequence[Job],
-    *,
-    engine: str = "local",
-    workers: int | None = 1,
-    address: str | None = None,
-    keep: str | Path | None = None,
-    retries: int = 2,
+    function: JobFunction, jobs: Sequence[Job], *, engine: str = "local", workers: int | None = 1,
+    address: str | None = None, keep: str | Path | None = None, retries: int = 2,
     progress: JobProgress | None = None,
-) -> list[Any]:
+) -> list[Any]:  # fmt: skip
     """Run many independent jobs and return their results in the order of the jobs.
 
     Parameters
@@ -87,7 +81,7 @@ def run_jobs(
     texts = [serialised(job, f"jobs[{k}]") for k, job in enumerate(jobs)]
     kept = None if keep is None else KeptResults(keep, function)
     copies = Counter(texts)
-    found = {} if kept is None else kept.load_all(copies)
+    found = {text: packed for text in copies if kept is not None and (packed := kept.load(text)) is not None}
     tell = progress or (lambda done, total: None)
     tell(sum(copies[text] for text in found), len(texts))
     pending = [text for text in copies if text not in found]
@@ -100,13 +94,9 @@ def run_jobs(
 
 
 def _outcomes(
-    function: JobFunction,
-    texts: list[str],
-    engine: str,
-    workers: int | None,
-    address: str | None,
+    function: JobFunction, texts: list[str], engine: str, workers: int | None, address: str | None,
     retries: int,
-) -> Iterator[Outcome]:
+) -> Iterator[Outcome]:  # fmt: skip
     """Outcomes of the jobs as they come."""
     if not texts:
         return iter(())

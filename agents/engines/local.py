@@ -20,8 +20,7 @@ def in_processes(function: JobFunction, texts: list[str], workers: int, retries:
     """Do jobs in processes, which end with the last of them.
 
     When a worker dies, the jobs that were being done are done again; the last time each alone, so that the
-    error names the job at fault. Raises WorkerDiedError if the worker of a job dies more often than
-    `retries`.
+    error names the job at fault. Raises WorkerDiedError if a job's worker dies more often than `retries`.
     """
     waiting, alone, died = deque(texts), deque[str](), Counter[str]()
     try:

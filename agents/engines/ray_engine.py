@@ -53,9 +53,7 @@ def on_ray(
 def _connected(workers: int | None, address: str | None) -> Iterator[Any]:
     """Ray, connected; what was started here is ended here."""
     os.environ.setdefault("RAY_USAGE_STATS_ENABLED", "0")  # it would ask the network
-    os.environ.setdefault(
-        "RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO", "0"
-    )  # ray's coming default, without a warning
+    os.environ.setdefault("RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO", "0")  # its coming default; it would warn
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         try:
@@ -82,14 +80,11 @@ def _connected(workers: int | None, address: str | None) -> Iterator[Any]:
         ray.shutdown()
 
 
-def check_answers(
-    address: str, patience_s: float = PATIENCE_S, ray_patience_s: float = RAY_PATIENCE_S
-) -> None:
+def check_answers(address: str, ray_patience_s: float = RAY_PATIENCE_S) -> None:
     """Refuse an address at which no ray cluster answers.
 
-    `address`: host and port, with ``ray://`` for a client's; or ``"auto"``; `patience_s`, `ray_patience_s`:
-    how long to wait for anything to answer, and for ray to connect, s. Raises InputError naming what is wrong
-    with the address or what ray says of it.
+    `address`: host and port, with ``ray://`` for a client's; or ``"auto"``; `ray_patience_s`: how long to
+    wait for ray to connect, s. Raises InputError naming what is wrong with the address, or what ray says.
     """
     if address != "auto":
         host, _, port = address.removeprefix("ray://").rpartition(":")
@@ -99,9 +94,9 @@ def check_answers(
                 f"a cluster is 6379 unless it was started with another, that of its client server 10001"
             )
         try:
-            socket.create_connection((host.strip("[]"), int(port)), timeout=patience_s).close()
+            socket.create_connection((host.strip("[]"), int(port)), timeout=PATIENCE_S).close()
         except OSError as error:
-            raise _no_cluster(address, patience_s, error.strerror or str(error)) from None
+            raise _no_cluster(address, PATIENCE_S, error.strerror or str(error)) from None
     command = [sys.executable, "-c", CONNECT, address]
     try:
         subprocess.run(command, check=True, capture_output=True, text=True, timeout=ray_patience_s)

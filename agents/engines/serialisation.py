@@ -9,7 +9,7 @@ import hashlib
 import json
 import math
 import re
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -25,10 +25,7 @@ _NUMBERS_OR_TEXTS = re.compile(r"[<>|=][biufcU]\d{1,6}")  # types of arrays
 
 
 def serialised(job: Any, where: str) -> str:
-    """A job as text, its keys in the order in which they are.
-
-    Raises InputError if it is not a dict that JSON can hold.
-    """
+    """A job as text, keys in the order in which they are; InputError if it is no dict that JSON can hold."""
     if not isinstance(job, Mapping):
         raise InputError(f"{where}: {job!r} found, expected a dict")
     try:
@@ -89,17 +86,9 @@ def unpack(value: Any) -> Any:
 class KeptResults:
     """A folder with one file for each job that is done, named by a hash of the job.
 
-    Parameters
-    ----------
-    folder : str or Path
-        Made with the first result where it does not exist, so that nothing is left of a call that does none.
-    function : callable
-        That does the jobs: results of another function, or of another version of shipgym, are not taken.
-
-    Raises
-    ------
-    InputError
-        If there is a file of that name.
+    `folder`: made with the first result where it does not exist, so that nothing is left of a call that does
+    none; `function`: does the jobs: results of another one, or of another version of shipgym, are not taken.
+    Raises InputError if there is a file of that name.
     """
 
     def __init__(self, folder: str | Path, function: Callable[[dict[str, Any]], Any]) -> None:
@@ -115,20 +104,11 @@ class KeptResults:
             unpack(content["result"]["value"])
         except (InputError, LookupError, TypeError, ValueError, OverflowError):
             return None
-        same = all(content.get(name) == value for name, value in self._key(text).items())
         result: dict[str, Any] = content["result"]
-        return result if same else None
-
-    def load_all(self, texts: Iterable[str]) -> dict[str, dict[str, Any]]:
-        """The packed results that are there, by job."""
-        there = {text: self.load(text) for text in texts}
-        return {text: packed for text, packed in there.items() if packed is not None}
+        return result if self._key(text).items() <= content.items() else None
 
     def save(self, text: str, packed: dict[str, Any]) -> None:
-        """Keep the packed result of a job; the file is written whole or not at all.
-
-        Raises InputError if it cannot be written.
-        """
+        """Keep the packed result of a job, whole or not at all; InputError if it cannot be written."""
         make_folder(self.folder)
         write_json({**self._key(text), "result": packed}, self._path(text))
 

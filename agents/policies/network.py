@@ -23,10 +23,7 @@ OUTPUTS = ("linear", "tanh")
 
 @dataclass(frozen=True, eq=False)
 class Network:
-    """Dense layers with one activation between them.
-
-    Raises InputError if shapes do not fit, or a number is not finite.
-    """
+    """Dense layers, one activation between; InputError if shapes do not fit, or a number is not finite."""
 
     layers: tuple[Layer, ...]  # float32 arrays of shape (n_out, n_in) and (n_out,), as torch has them
     activation: str = "relu"  # relu or tanh, after every layer but the last
@@ -66,18 +63,17 @@ class Network:
 
 def _check_layer(weight: Any, bias: Any, where: str) -> None:
     for name, array, ndim in (("weight", weight, 2), ("bias", bias, 1)):
+        place = f"{where}.{name}"
         known = isinstance(array, np.ndarray) and array.dtype == np.float32
         if not known or array.ndim != ndim or array.size == 0:
             found = getattr(array, "dtype", type(array).__name__), getattr(array, "shape", ())
             raise InputError(
-                f"{where}.{name}: {found[0]} of shape {found[1]} found, expected float32 with {ndim} axes, "
-                f"none of them empty"
+                f"{place}: {found[0]} of shape {found[1]} found, expected float32 with {ndim} axes, none of "
+                f"them empty"
             )
         if not np.isfinite(array).all():
             wrong = tuple(np.argwhere(~np.isfinite(array))[0].tolist())
-            raise InputError(
-                f"{where}.{name}: {array[wrong]} found at {list(wrong)}, expected finite numbers"
-            )
+            raise InputError(f"{place}: {array[wrong]} found at {list(wrong)}, expected finite numbers")
     if len(bias) != len(weight):
         raise InputError(
             f"{where}.bias: {len(bias)} found, expected {len(weight)}, one for each row of weight"

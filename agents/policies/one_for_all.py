@@ -86,20 +86,15 @@ def base_for(model: ShipModel, task: Task, rule: Mapping[str, float]) -> WheelOv
         return float(rule.get(name, 1.0) * min(task.corridor, 1.0) ** rule.get(f"{name}_power", 0.0))
 
     pilot = LQ.from_model(
-        model,
-        dt=task.interval(model),
-        integral_lengths=20.0 * factor("integral"),
+        model, dt=task.interval(model), integral_lengths=20.0 * factor("integral"),
         rudder_weight=RUDDER_WEIGHT * factor("rudder_weight"),
         rate_weight_s2=rate_weight(model) * factor("rate_weight"),
-    )
+    )  # fmt: skip
+    lookahead, reach = task.lookahead * factor("lookahead"), own_lead(model, pilot) * factor("reach")
     return WheelOver.from_model(
-        model,
-        autopilot=pilot,
-        task=task,
-        lookahead_lengths=task.lookahead * factor("lookahead"),
-        reach_lengths=own_lead(model, pilot) * factor("reach"),
+        model, autopilot=pilot, task=task, lookahead_lengths=lookahead, reach_lengths=reach,
         crab_share=min(factor("crab_share"), 2.0),
-    )
+    )  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,9 +121,8 @@ class OneForAll:
             check_number(high, f"context.{name}[3]", above=low)
         check_keys(self.rule, RULES, "rule")
         for name, value in self.rule.items():
-            check_number(
-                value, f"rule.{name}", at_least=-4.0 if name.endswith("_power") else 1e-3, at_most=1e3
-            )
+            least = -4.0 if name.endswith("_power") else 1e-3
+            check_number(value, f"rule.{name}", at_least=least, at_most=1e3)
         sizes, n_in = self.network.sizes, len(self.observation_names) + 1 + len(CONTEXT)
         if (sizes[0], sizes[-1]) != (n_in, 1):
             raise InputError(f"network: sizes {sizes} found, expected {n_in} inputs and 1 output")
@@ -158,15 +152,12 @@ class OneForAll:
             network=replace(self.network, layers=(first, *rest)),
             observation_names=self.observation_names,
             observation_scales=tuple(one.scale for one in observed),
-            base=base,
-            authority=self.authority * (1.0 - max(outside.values(), default=0.0) / FAR),
+            base=base, authority=self.authority * (1.0 - max(outside.values(), default=0.0) / FAR),
             action_repeat=max(1, round(self.decision * time / asked.interval(model))),
-            env_id=ENV_ID,
-            env_options=as_json(asked.options),
-            model_name=model.name,
-            model_sha256=model_hash(model),
+            env_id=ENV_ID, env_options=as_json(asked.options),
+            model_name=model.name, model_sha256=model_hash(model),
             training={**self.training, "algorithm": ONE_FOR_ALL, "outside": outside},
-        )
+        )  # fmt: skip
 
     def outside(self, told: Floats, name: str) -> dict[str, float]:
         """By how much of the fleet's range a context is outside it; InputError, with the ship, where far."""
@@ -185,14 +176,10 @@ class OneForAll:
         """Write NAME.json and, beside it, NAME.safetensors (fields in docs/policies.md)."""
         network, tensors = network_fields(self.network)
         content = {
-            "format": FORMAT,
-            "kind": ONE_FOR_ALL,
+            "format": FORMAT, "kind": ONE_FOR_ALL,
             "observation_names": list(self.observation_names),
             "context": dict(zip(CONTEXT, self.fleet.tolist(), strict=True)),
-            "network": network,
-            "decision": self.decision,
-            "authority": self.authority,
-            "training": as_json(self.training),
-            "rule": dict(self.rule),
-        }
+            "network": network, "decision": self.decision, "authority": self.authority,
+            "training": as_json(self.training), "rule": dict(self.rule),
+        }  # fmt: skip
         write_policy(content, tensors, Path(path))

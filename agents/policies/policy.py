@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from agents.controllers.controller import FORMAT, Action, Controller, check_names, check_scales
 from agents.controllers.memory import checked_memory, checked_observation, checked_starts
-from agents.policies.network import Network
+from agents.policies.network import Network, Numbers
 from agents.policies.policy_extraction import sb3_fields, task_showing
 from agents.policies.weights_file import Tensors, as_json, write_policy
 from shipgym.checks import check_choice, check_number, check_whole
@@ -29,8 +29,6 @@ from shipgym.errors import InputError
 from shipgym.ships import ShipModel
 from shipgym.tasks.definition import read_definition
 from shipgym.tasks.task import ACTIONS, RUDDER_ORDERS, Task
-
-Numbers = NDArray[np.float32]
 
 ORDERS = np.array(RUDDER_ORDERS, dtype=np.float32)
 #: Number of the network's outputs by the kind of action.
@@ -112,11 +110,9 @@ class LearnedPolicy:
         check_part(self)
         if self.action == "rudder-discrete" and self.rate_limit < NO_LIMIT:
             raise InputError(f"rate_limit: {self.rate_limit:g} found with discrete orders, expected 2")
-        n = len(self.observation_names)
-        if len(self.observation_scales) != n:
-            raise InputError(
-                f"observation_scales: {len(self.observation_scales)} found, expected {n} numbers"
-            )
+        n, n_scales = len(self.observation_names), len(self.observation_scales)
+        if n_scales != n:
+            raise InputError(f"observation_scales: {n_scales} found, expected {n} numbers")
         if self.base is not None:
             if self.action != "rudder":
                 raise InputError(f"action: '{self.action}' found together with a base, expected 'rudder'")
@@ -246,17 +242,12 @@ class LearnedPolicy:
         """What stands in its JSON, and its weights by name."""
         network, tensors = network_fields(self.network)
         content = {
-            "format": FORMAT,
-            "kind": "learned",
+            "format": FORMAT, "kind": "learned",
             "observation_names": list(self.observation_names),
             "observation_scales": list(self.observation_scales),
-            "action": self.action,
-            "network": network,
-            "frame_stack": self.frame_stack,
+            "action": self.action, "network": network, "frame_stack": self.frame_stack,
             "base": None if self.base is None else self.base.to_dict(),
-            "authority": self.authority,
-            "action_repeat": self.action_repeat,
-            "rate_limit": self.rate_limit,
+            "authority": self.authority, "action_repeat": self.action_repeat, "rate_limit": self.rate_limit,
             "environment": {"id": self.env_id, "options": as_json(self.env_options)},
             "model": {"name": self.model_name, "sha256": self.model_sha256},
             "training": as_json(self.training),

@@ -38,7 +38,7 @@ RUNNING = ("task", "model", "num_envs", "threads", "autoreset_mode", "vectorizat
 #: Wrappers that change observations.
 REFUSED = ("VecFrameStack", "VecTransposeImage", "VecExtractDictObs")
 #: What the wrapper has that adds to a controller.
-RESIDUAL = ("base", "authority", "frame_stack", "action_repeat", "rate_limit")
+RESIDUAL = {"authority": float, "frame_stack": int, "action_repeat": int, "rate_limit": float}
 N_COMPARED = 16
 AGREEMENT = 1e-4  # of the commands found with torch and without, far above rounding
 
@@ -90,16 +90,14 @@ def _check_wrappers(stack: Sequence[Any]) -> None:
 def _residual(stack: Sequence[Any]) -> dict[str, Any]:
     """History, base and authority of the wrapper that adds to a controller, if there is one."""
     for wrapper in stack:
-        if all(name in vars(wrapper) for name in RESIDUAL):
+        if vars(wrapper).keys() >= {"base", *RESIDUAL}:
             base = wrapper.base
             if base is not None and not isinstance(base, Controller):
                 raise InputError(
                     f"base: {type(base).__name__} found, expected a controller of shipgym, which a file can "
                     "hold"
                 )
-            whole = {name: int(getattr(wrapper, name)) for name in ("frame_stack", "action_repeat")}
-            parts = {name: float(getattr(wrapper, name)) for name in ("authority", "rate_limit")}
-            return {"base": base, **whole, **parts}
+            return {"base": base, **{name: kind(getattr(wrapper, name)) for name, kind in RESIDUAL.items()}}
     return {}
 
 

@@ -15,7 +15,7 @@ from agents.policies.network import Layer, Network
 from agents.policies.one_for_all import CONTEXT, ONE_FOR_ALL, OneForAll
 from agents.policies.policy import NO_LIMIT, LearnedPolicy
 from agents.policies.shield import Limits, Shielded
-from agents.policies.weights_file import REMEDY, Tensors, read_weights, weights_path
+from agents.policies.weights_file import REMEDY, Tensors, present_names, read_weights, weights_path
 from shipgym.checks import (
     check_array,
     check_format,
@@ -35,7 +35,6 @@ from shipgym.tasks.task import OBSERVATION_NAMES
 LATER: Mapping[str, Mapping[str, Any]] = {
     "learned": {"action_repeat": 1, "rate_limit": NO_LIMIT}, ONE_FOR_ALL: {"rule": {}}
 }  # fmt: skip
-RENAMED = {"history": "frame_stack", "hold": "action_repeat"}  # fields of older files
 #: Fields of each kind, beside `weights`.
 FIELDS: Mapping[str, tuple[str, ...]] = {
     "learned": (
@@ -71,8 +70,7 @@ def read_policy(content: Mapping[str, Any], path: Path) -> LearnedPolicy | Shiel
 
 def _checked(content: Mapping[str, Any], where: str, more: tuple[str, ...] = ()) -> dict[str, Any]:
     """The fields by their present names: all there, none besides, and of this format."""
-    current = {RENAMED.get(name, name): value for name, value in content.items()}
-    current = {**LATER.get(content["kind"], {}), **current}
+    current = {**LATER.get(content["kind"], {}), **present_names(content)}
     expected = (*FIELDS[content["kind"]], *more)
     check_format(current, FORMAT, where)
     check_keys(current, expected, where, expected)

@@ -124,14 +124,9 @@ class Shielded:
 
     @classmethod
     def from_model(
-        cls,
-        model: ShipModel,
-        policy: Policy,
-        fallback: Controller | None = None,
-        *,
-        dt: float | None = None,
+        cls, model: ShipModel, policy: Policy, fallback: Controller | None = None, *, dt: float | None = None,
         limits: Limits | None = None,
-    ) -> Self:
+    ) -> Self:  # fmt: skip
         """Put a policy under a shield with a model's envelope.
 
         Parameters
@@ -263,12 +258,9 @@ class Shielded:
             )
         policy, tensors = self.policy.file_fields()
         content = {
-            "format": FORMAT,
-            "kind": "shielded",
-            "policy": policy,
-            "fallback": self.fallback.to_dict(),
-            "dt": self.dt,
+            "format": FORMAT, "kind": "shielded",
+            "policy": policy, "fallback": self.fallback.to_dict(), "dt": self.dt,
             "envelope": None if self.envelope is None else self.envelope.to_dict(),
             "limits": asdict(self.limits),
-        }
+        }  # fmt: skip
         return content, {f"policy.{name}": tensor for name, tensor in tensors.items()}

@@ -22,6 +22,12 @@ from shipgym.ships import ShipModel
 Tensors = dict[str, NDArray[Any]]
 
 REMEDY = "take another copy of both files"
+RENAMED = {"history": "frame_stack", "hold": "action_repeat"}  # fields and settings of older files
+
+
+def present_names(content: Mapping[str, Any]) -> dict[str, Any]:
+    """Fields or settings by their present names, where some have older ones."""
+    return {RENAMED.get(name, name): value for name, value in content.items()}
 
 
 def write_policy(content: Mapping[str, Any], tensors: Tensors, path: Path) -> None:
@@ -53,10 +59,7 @@ def weights_path(path: Path) -> Path:
 
 
 def read_weights(path: Path, sha256: str, json_path: Path) -> Tensors:
-    """The weights at `path`, whose hash stands in `json_path`.
-
-    Raises InputError if they are missing, broken, or those of another policy.
-    """
+    """Weights at `path`, of the hash in `json_path`; InputError if missing, broken or of another policy."""
     content = read_bytes(path, f"file with the weights of {json_path}", LARGEST_TENSORS)
     found = hashlib.sha256(content).hexdigest()
     if found != sha256:

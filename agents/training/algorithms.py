@@ -139,10 +139,7 @@ def set_deviation(agent: Any, settings: Settings) -> None:
 
 
 def algorithm_class(name: str) -> Any:
-    """The class of an algorithm by its name.
-
-    Raises InputError if its package is not installed.
-    """
+    """The class of an algorithm by its name; InputError if its package is not installed."""
     if name != "tqc":
         return {"ppo": PPO, "sac": SAC, "td3": TD3}[name]
     try:

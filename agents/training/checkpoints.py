@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 import torch
-from stable_baselines3.common.save_util import recursive_getattr
+from stable_baselines3.common.save_util import recursive_getattr, recursive_setattr
 from stable_baselines3.common.vec_env import VecEnvWrapper, VecNormalize
 
 from agents.training.safe_file import check_like
@@ -23,6 +23,11 @@ COUNTERS = (
 )  # fmt: skip
 LARGEST_WEIGHT, LARGEST_LOG_STD = 1e9, 20.0
 STORED = ("observations", "next_observations", "actions", "rewards", "dones", "timeouts")
+#: What is kept of the scales of rewards, and where they have it.
+SCALES = {
+    "mean": "ret_rms.mean", "var": "ret_rms.var", "count": "ret_rms.count", "returns": "returns",
+    "old_obs": "old_obs",
+}  # fmt: skip
 
 
 def take(agent: Any) -> Memory:
@@ -36,17 +41,14 @@ def take(agent: Any) -> Memory:
         "parameters": agent.get_parameters(),
         "variables": {name: recursive_getattr(agent, name) for name in variables},
         "counters": {name: getattr(agent, name) for name in COUNTERS},
-        "episodes": list(agent.ep_info_buffer),
-        "successes": [float(one) for one in agent.ep_success_buffer],
+        "episodes": list(agent.ep_info_buffer), "successes": [float(one) for one in agent.ep_success_buffer],
         "ships": [_layer_memory(layer) for layer in _layers(agent.env)],
         "replay": _replay_memory(getattr(agent, "replay_buffer", None)),
         "random": {
-            "python": random.getstate(),
-            "numpy": np.random.get_state(),
-            "torch": torch.get_rng_state(),
+            "python": random.getstate(), "numpy": np.random.get_state(), "torch": torch.get_rng_state(),
             "actions": agent.action_space.np_random.bit_generator.state,
         },
-    }
+    }  # fmt: skip
 
 
 def put_back(agent: Any, memory: Memory) -> None:
@@ -80,10 +82,9 @@ def _check_weights(parameters: Memory) -> None:
         for name, one in weights.items():
             if isinstance(one, torch.Tensor) and one.is_floating_point():
                 most = LARGEST_LOG_STD if "log_std" in name else LARGEST_WEIGHT
+                place = f"parameters.{part}.{name}"
                 if not bool((one.abs() <= most).all()):
-                    raise ValueError(
-                        f"parameters.{part}.{name}: expected numbers of magnitude {most:g} at most"
-                    )
+                    raise ValueError(f"{place}: expected numbers of magnitude {most:g} at most")
 
 
 def check_record(record: Any) -> None:
@@ -154,22 +155,17 @@ def _layers(env: Any) -> list[Any]:
 
 
 def _layer_memory(layer: Any) -> Memory:
-    if not isinstance(layer, VecNormalize):
-        found: Memory = layer.memory()
-        return found
-    scale = layer.ret_rms
-    return {
-        "mean": scale.mean, "var": scale.var, "count": scale.count, "returns": layer.returns,
-        "old_obs": layer.old_obs,
-    }  # fmt: skip
+    if isinstance(layer, VecNormalize):
+        return {name: recursive_getattr(layer, place) for name, place in SCALES.items()}
+    return dict(layer.memory())
 
 
 def _put_layer_back(layer: Any, memory: Memory) -> None:
-    if not isinstance(layer, VecNormalize):
+    if isinstance(layer, VecNormalize):
+        for name, place in SCALES.items():
+            recursive_setattr(layer, place, memory[name])
+    else:
         layer.remember(memory)
-        return
-    layer.ret_rms.mean, layer.ret_rms.var = np.float64(memory["mean"]), np.float64(memory["var"])
-    layer.ret_rms.count, layer.returns, layer.old_obs = memory["count"], memory["returns"], memory["old_obs"]
 
 
 def _replay_memory(buffer: Any) -> Memory | None:

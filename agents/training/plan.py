@@ -1,23 +1,21 @@
 """What a run of training is: algorithm, task, settings and seed; how it is read from what a user gives."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 from agents.controllers.controller import model_hash
 from agents.policies.weights_file import as_json
 from agents.suites.suite import ENVIRONMENTS, BenchmarkTask, find_task
 from agents.training.settings import (
-    ALGORITHMS,
     Settings,
     changed,
     load_settings,
     make_settings,
     read_settings_file,
+    settings_of,
 )
 from shipgym.checks import check_choice, check_keys, check_whole
 from shipgym.envs.registration import environments
@@ -52,7 +50,7 @@ class Plan:
     threads: int = 1  # of torch and of the kernels
 
     def __post_init__(self) -> None:
-        kind = ALGORITHMS[check_choice(self.algorithm, ALGORITHMS, "algorithm")]
+        kind = settings_of(self.algorithm)
         if type(self.settings) is not kind:
             raise InputError(
                 f"settings: {type(self.settings).__name__} found, expected {kind.__name__} for "
@@ -81,18 +79,14 @@ class Plan:
         """All that decides what is learned, ready for JSON; threads are stored beside it."""
         return {
             "algorithm": self.algorithm,
-            "task": self.task.name,
-            "environment": self.task.environment,
-            "model": self.task.model,
-            "model_sha256": model_hash(self.task.ship),
+            "task": self.task.name, "environment": self.task.environment,
+            "model": self.task.model, "model_sha256": model_hash(self.task.ship),
             "options": as_json(self.task.options),
-            "randomise": self.randomise,
-            "seed": self.seed,
-            "settings": self.settings.to_dict(),
-        }
+            "randomise": self.randomise, "seed": self.seed, "settings": self.settings.to_dict(),
+        }  # fmt: skip
 
     @classmethod
-    def from_configuration(cls, content: Mapping[str, Any], threads: int) -> Plan:
+    def from_configuration(cls, content: Mapping[str, Any], threads: int) -> Self:
         """The run that `configuration` describes."""
         options = {name: _read(value, name) for name, value in content["options"].items()}
         task = BenchmarkTask(content["task"], content["environment"], content["model"], "", options)
@@ -128,17 +122,13 @@ def make_plan(given: Given, stored: Plan | None = None) -> Plan:
     stored : Plan, optional
         The run that is resumed: what is not given is as it was.
 
-    Returns
-    -------
-    Plan
-
     Raises
     ------
     InputError
         For an unknown algorithm, environment, task, model, option or setting, with the nearest known one,
         or a value out of its range.
     """
-    check_choice(given.algorithm, ALGORITHMS, "algorithm")
+    settings_of(given.algorithm)  # its error goes before those of the task
     task = _task(given, stored)
     own = read_settings_file(given.settings_file, given.algorithm) if given.settings_file else {}
     own |= given.settings
@@ -154,8 +144,7 @@ def make_plan(given: Given, stored: Plan | None = None) -> Plan:
 def _task(given: Given, stored: Plan | None) -> BenchmarkTask:
     """Environment, model and options."""
     named = {"--env": given.environment, "--model": given.model, "--sea": given.sea}
-    beside = [name for name, value in named.items() if value is not None]
-    beside += ["--option"] * bool(given.options)
+    beside = [name for name, value in named.items() if value is not None] + ["--option"] * bool(given.options)
     if given.task is not None:
         if beside:
             raise InputError(
@@ -167,16 +156,13 @@ def _task(given: Given, stored: Plan | None) -> BenchmarkTask:
     before = BenchmarkTask(NO_TASK, "course-keeping", "mariner") if stored is None else stored.task
     environment, variant = read_environment(given.environment or before.environment)
     sea = {} if given.sea is None else {"sea": given.sea}
-    options = ({} if stored is None else dict(before.options)) | variant | sea | dict(given.options)
+    options = {**before.options, **variant, **sea, **given.options}
     model = options.pop("model", before.model)
     return BenchmarkTask(before.name, environment, given.model or model, "", options)
 
 
 def read_environment(name: str) -> tuple[str, dict[str, Any]]:
-    """An environment's short name and the options of its variant, from that name or from an id.
-
-    Raises InputError for an unknown one, with the nearest known one.
-    """
+    """Short name and variant's options of an environment, by name or id; InputError names the nearest one."""
     short_names = {task: short for short, (_, task) in ENVIRONMENTS.items()}
     ids = {name: (short_names[options.pop("task")], options) for name, options in environments().items()}
     known: dict[str, tuple[str, dict[str, Any]]] = {short: (short, {}) for short in ENVIRONMENTS}
@@ -219,7 +205,7 @@ def _read(value: Any, name: str) -> Any:
 
 def first_difference(found: Mapping[str, Any], expected: Mapping[str, Any], where: str = "") -> str | None:
     """The first entry in which two configurations differ, with both values; None if they are the same."""
-    for name in [*expected, *(name for name in found if name not in expected)]:
+    for name in {**expected, **found}:
         one, other = found.get(name), expected.get(name)
         if isinstance(one, Mapping) and isinstance(other, Mapping):
             if (inner := first_difference(one, other, f"{where}{name}.")) is not None:

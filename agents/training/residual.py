@@ -6,10 +6,11 @@ from typing import Any
 
 import numpy as np
 from gymnasium import spaces
-from numpy.typing import NDArray
 
 from agents.controllers.controller import Policy
+from agents.policies.network import Numbers
 from agents.policies.policy import NO_LIMIT, check_part, toward
+from shipgym.arrays import Flags
 from shipgym.errors import InputError
 
 try:
@@ -18,9 +19,6 @@ except ImportError:
     raise InputError(
         "stable-baselines3 is not installed, learning needs it: pip install 'shipgym[rl]'"
     ) from None
-
-Floats = NDArray[np.float32]
-Flags = NDArray[np.bool_]
 
 
 class ResidualVecEnv(VecEnvWrapper):  # type: ignore[misc]  # stable-baselines3 is not type-checked here
@@ -45,15 +43,9 @@ class ResidualVecEnv(VecEnvWrapper):  # type: ignore[misc]  # stable-baselines3 
     """
 
     def __init__(
-        self,
-        venv: VecEnv,
-        base: Policy | None = None,
-        *,
-        authority: float = 1.0,
-        frame_stack: int = 1,
-        action_repeat: int = 1,
-        rate_limit: float = NO_LIMIT,
-    ) -> None:
+        self, venv: VecEnv, base: Policy | None = None, *, authority: float = 1.0, frame_stack: int = 1,
+        action_repeat: int = 1, rate_limit: float = NO_LIMIT,
+    ) -> None:  # fmt: skip
         self.base, self.authority, self.frame_stack = base, authority, frame_stack
         self.action_repeat, self.rate_limit = action_repeat, rate_limit
         check_part(self)
@@ -67,26 +59,22 @@ class ResidualVecEnv(VecEnvWrapper):  # type: ignore[misc]  # stable-baselines3 
         super().__init__(venv, observation_space=spaces.Box(low.astype(np.float32), high.astype(np.float32)))
         self._past = np.zeros((venv.num_envs, self.frame_stack, *venv.observation_space.shape), np.float32)
         self._state: Any = None
-        self._proposed: Floats = np.zeros((venv.num_envs, 0), np.float32)
+        self._proposed: Numbers = np.zeros((venv.num_envs, 0), np.float32)
         self._outputs: Any = None
         self._in_force = np.zeros((venv.num_envs, *(venv.action_space.shape or (1,))), np.float32)
 
-    def reset(self) -> Floats:
-        """Begin an episode in each row.
-
-        Returns an array of shape (num_envs, frame_stack * n_observations + n_commands).
-        """
+    def reset(self) -> Numbers:
+        """Begin an episode in each row; shape (num_envs, frame_stack * n_observations + n_commands)."""
         observations = self.venv.reset()
         self._state = None
         self._in_force[:] = 0.0
-        every = np.ones(self.num_envs, dtype=np.bool_)
-        return self._begin(observations, every)
+        return self._begin(observations, np.ones(self.num_envs, dtype=np.bool_))
 
     def step_async(self, actions: Any) -> None:
         """Add the agent's outputs, shape (num_envs, n_commands), to what the base proposes."""
         self._outputs = np.array(actions)
 
-    def step_wait(self) -> tuple[Floats, Floats, Flags, list[dict[str, Any]]]:
+    def step_wait(self) -> tuple[Numbers, Numbers, Flags, list[dict[str, Any]]]:
         """`action_repeat` control intervals; `terminal_observation` is what the agent would have seen next.
 
         Returns what the ships inside return, rewards summed up to the end of an episode, infos of that end.
@@ -102,7 +90,7 @@ class ResidualVecEnv(VecEnvWrapper):  # type: ignore[misc]  # stable-baselines3 
             dones = dones | ends
         return observations, rewards, dones, infos
 
-    def _interval(self) -> tuple[Floats, Floats, Flags, list[dict[str, Any]]]:
+    def _interval(self) -> tuple[Numbers, Numbers, Flags, list[dict[str, Any]]]:
         """One control interval of the ships with the agent's outputs."""
         self.venv.step_async(self._commands())
         observations, rewards, dones, infos = self.venv.step_wait()
@@ -141,13 +129,13 @@ class ResidualVecEnv(VecEnvWrapper):  # type: ignore[misc]  # stable-baselines3 
             return self._in_force
         return np.clip(self._proposed + np.float32(self.authority) * self._in_force, -1.0, 1.0)
 
-    def _begin(self, observations: Floats, starts: Flags) -> Floats:
+    def _begin(self, observations: Numbers, starts: Flags) -> Numbers:
         """What the agent sees where some rows begin an episode."""
         self._past[:, -1] = observations
         self._past[starts] = observations[starts, None]
         return self._shown(starts)
 
-    def _shown(self, starts: Flags | None) -> Floats:
+    def _shown(self, starts: Flags | None) -> Numbers:
         """Histories and the base's proposals, which are kept for the step that follows."""
         seen = self._past.reshape(self.num_envs, -1)
         if self.base is None:

@@ -7,18 +7,10 @@ from pathlib import Path
 from typing import Any
 
 from agents.output import check_writable, present
+from agents.policies.weights_file import present_names
 from agents.training.plan import Given, Plan, check_same
-from agents.training.settings import LATER, present_names
-from shipgym.checks import (
-    Shape,
-    check_fields,
-    check_format,
-    check_shape,
-    check_table,
-    check_whole,
-    data_only,
-    placed,
-)
+from agents.training.settings import LATER
+from shipgym.checks import Shape, check_fields, check_format, check_shape, check_table, data_only, placed
 from shipgym.errors import InputError
 from shipgym.files import make_folder, read_json, write_json
 
@@ -79,7 +71,7 @@ def read_plan(folder: Path, given: Given | None = None) -> Plan:
     data_only(named, f"{where}: configuration", given and {"model": given.model, "options": given.options})
     with placed(where):
         check_shape(configuration, CONFIGURATION, "configuration")
-        plan = Plan.from_configuration(configuration, check_whole(content["threads"], "threads", at_least=1))
+        plan = Plan.from_configuration(configuration, content["threads"])
     check_same(plan.configuration(), configuration, str(folder))
     return plan
 

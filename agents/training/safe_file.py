@@ -85,15 +85,10 @@ def check_like(found: Any, own: Any, where: str) -> None:
         for number, one in enumerate(own):
             check_like(found[number], one, f"{where}[{number}]")
     elif _is_array(own):
-        _check_finite(_as_array(found), _as_array(own), where)
-
-
-def _check_finite(found: Any, own: Any, where: str) -> None:
-    """Raise ValueError for the first number that is infinite or NaN where its own is finite."""
-    wrong = np.argwhere(np.isfinite(own) & ~np.isfinite(found))
-    if len(wrong):
-        at = tuple(wrong[0].tolist())
-        raise ValueError(f"{where}: {found[at]} found at {list(at)}, expected a finite number")
+        numbers = _as_array(found)
+        if wrong := np.argwhere(np.isfinite(_as_array(own)) & ~np.isfinite(numbers)).tolist():
+            number = numbers[tuple(wrong[0])]
+            raise ValueError(f"{where}: {number} found at {wrong[0]}, expected a finite number")
 
 
 def _is_array(value: Any) -> bool:
@@ -130,10 +125,8 @@ def _packed(value: Any, name: str, arrays: Arrays) -> Any:
         arrays[name] = np.array(value, order="C")
         return {"array": name}
     if isinstance(value, dict):
-        pairs = [
-            [key, _packed(one, f"{name}.{key}" if name else str(key), arrays)] for key, one in value.items()
-        ]
-        return {"dict": pairs}
+        inner = f"{name}." if name else ""
+        return {"dict": [[key, _packed(one, f"{inner}{key}", arrays)] for key, one in value.items()]}
     if isinstance(value, list | tuple):
         items = [_packed(one, f"{name}.{i}", arrays) for i, one in enumerate(value)]
         return {"tuple" if isinstance(value, tuple) else "list": items}

@@ -7,26 +7,24 @@ setting of the algorithm to learn from scratch; those that differ beside a base 
 
 from collections.abc import Mapping, Sequence
 from dataclasses import MISSING, Field, asdict, dataclass, field, fields, replace
-from importlib.resources import files
 from pathlib import Path
 from typing import Any, ClassVar
 
 from agents.controllers.registry import controller_kinds
+from agents.policies.weights_file import present_names
 from agents.suites.suite import ENVIRONMENTS, suite_of
 from shipgym.checks import check_choice, check_keys, check_number, check_table, check_text, check_whole
 from shipgym.errors import InputError
-from shipgym.files import named_values, parse_toml, read_toml
+from shipgym.files import named_values, read_toml, shipped_toml
 from shipgym.tasks.task import ACTIONS
 
-RENAMED = {"history": "frame_stack", "hold": "action_repeat"}  # older names that are still taken
 RUNNING, LEARNED = "running", "learned"  # words in the place of numbers
 NUMBER_OR_WORD, WIDTHS = float | str, tuple[int, ...]  # types of settings
 
 
 def hyperparameters(name: str) -> dict[str, Any]:
     """The content of a file of `hyperparameters/`."""
-    file = files("agents.training").joinpath("hyperparameters", f"{name}.toml")
-    return parse_toml(file.read_text("utf-8"), f"{file}:")
+    return shipped_toml("agents.training", f"hyperparameters/{name}.toml")
 
 
 #: What is known of each setting, by `Settings.section` and name.
@@ -207,12 +205,9 @@ def _number_or_word(value: Any, name: str, allowed: dict[str, Any]) -> Any:
 
 
 def load_settings(
-    algorithm: str,
-    environment: str = "course-keeping",
-    task: str = "",
-    given: Mapping[str, Any] | None = None,
-    action: str = "rudder",
-) -> Settings:
+    algorithm: str, environment: str = "course-keeping", task: str = "",
+    given: Mapping[str, Any] | None = None, action: str = "rudder",
+) -> Settings:  # fmt: skip
     """The tuned settings of an algorithm, with those given by name replaced.
 
     Parameters
@@ -255,10 +250,7 @@ def settings_of(algorithm: str) -> type[Settings]:
 
 
 def make_settings(algorithm: str, values: Mapping[str, Any]) -> Settings:
-    """Settings by name, all of them.
-
-    Raises InputError for an unknown one, one that is missing, or a value out of its range.
-    """
+    """Settings by name, all of them; InputError for one unknown or missing, or a value out of its range."""
     kind, where = settings_of(algorithm), f"settings of {algorithm}"
     table = _settings(values, kind, where)
     check_keys(table, table, where, [one.name for one in fields(kind) if one.default is MISSING])
@@ -266,18 +258,12 @@ def make_settings(algorithm: str, values: Mapping[str, Any]) -> Settings:
 
 
 def changed(settings: Settings, given: Mapping[str, Any]) -> Settings:
-    """The settings with others in the place of some.
-
-    Raises InputError for an unknown one, or a value out of its range.
-    """
+    """The settings with some replaced; InputError for an unknown one, or a value out of its range."""
     return replace(settings, **_settings(given, type(settings), "settings"))
 
 
 def read_settings_file(path: Path, algorithm: str) -> dict[str, Any]:
-    """Settings in a TOML file of a user's own.
-
-    Raises InputError if it cannot be read, or names an unknown setting.
-    """
+    """Settings in a user's own TOML file; InputError if it cannot be read, or names an unknown setting."""
     return _settings(read_toml(path, "settings file"), settings_of(algorithm), str(path))
 
 
@@ -291,11 +277,6 @@ def parsed_settings(texts: Sequence[str], where: str = "--set") -> dict[str, Any
 
 #: What settings mean that older runs do not have.
 LATER = {one.name: one.default for one in fields(Settings) if one.default is not MISSING}
-
-
-def present_names(settings: Mapping[str, Any]) -> dict[str, Any]:
-    """Settings by their present names, where some have older ones."""
-    return {RENAMED.get(name, name): value for name, value in settings.items()}
 
 
 def _settings(value: Any, kind: type[Settings], where: str) -> dict[str, Any]:

@@ -4,14 +4,12 @@ A run can be killed at any moment. It goes on at the last boundary between a rol
 kept, and ends with the same policy, bit for bit, as if nothing had happened (same machine, same versions).
 """
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, nullcontext, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -53,7 +51,7 @@ class HeldOut:
     lq_cost: float | None  # mean cost of LQ designed on the task's ship; None where there is none for her
 
     @classmethod
-    def of(cls, task: BenchmarkTask, first: int, number: int, threads: int = 1) -> HeldOut:
+    def of(cls, task: BenchmarkTask, first: int, number: int, threads: int = 1) -> Self:
         """The episodes with seeds from `first` on; LQ follows paths by the course that the task shows."""
         found = cls(task.engine(number, threads=threads), first + np.arange(number), None)
         lq = None
@@ -115,14 +113,9 @@ class TrainingResult:
 
 
 def train(
-    plan: Plan,
-    out: str | Path | None = None,
-    *,
-    resume: bool = False,
-    max_seconds: float | None = None,
-    tell: Callable[[Progress], None] | None = None,
-    command: str | None = None,
-) -> TrainingResult:
+    plan: Plan, out: str | Path | None = None, *, resume: bool = False, max_seconds: float | None = None,
+    tell: Callable[[Progress], None] | None = None, command: str | None = None,
+) -> TrainingResult:  # fmt: skip
     """Train an agent.
 
     Parameters
@@ -139,10 +132,6 @@ def train(
         Called with the progress at each boundary. What it raises ends the training.
     command : str, optional
         Command line that is written into the run's folder.
-
-    Returns
-    -------
-    TrainingResult
 
     Raises
     ------
@@ -169,30 +158,14 @@ class _TimeIsUpError(Exception):
     """Ends the training at a boundary."""
 
 
-class _Boundary(BaseCallback):  # type: ignore[misc]  # stable-baselines3 is not type-checked here
-    """Calls at each boundary between an update and the next rollout."""
-
-    def __init__(self, call: Callable[[], None]) -> None:
-        super().__init__()
-        self.call = call
-
-    def _on_rollout_start(self) -> None:
-        self.call()
-
-    def _on_step(self) -> bool:
-        return True
-
-
-class _Training:
-    """A training under way."""
+class _Training(BaseCallback):  # type: ignore[misc]  # stable-baselines3 is not type-checked here
+    """A training under way, which is called at each boundary between an update and the next rollout."""
 
     def __init__(
-        self,
-        plan: Plan,
-        folder: Path | None,
-        tell: Callable[[Progress], None] | None,
+        self, plan: Plan, folder: Path | None, tell: Callable[[Progress], None] | None,
         max_seconds: float | None,
-    ) -> None:
+    ) -> None:  # fmt: skip
+        super().__init__()
         self.plan, self.folder, self.tell, self.max_seconds = plan, folder, tell, max_seconds
         self.started = time.monotonic()
         base = design_base(plan.settings.base, plan.task)
@@ -211,7 +184,7 @@ class _Training:
         left = self.plan.settings.total_steps - self.agent.num_timesteps
         try:
             if left > 0:
-                self.agent.learn(left, _Boundary(self.at_boundary), reset_num_timesteps=False)
+                self.agent.learn(left, self, reset_num_timesteps=False)
         except _TimeIsUpError:  # kept, and no evaluation that a run without an end would not have
             return self._result(finished=False)
         except ValueError as error:  # torch refuses to draw from a distribution that is not one
@@ -250,7 +223,10 @@ class _Training:
         """Spent so far, those before it was resumed among them."""
         return self.seconds_before + time.monotonic() - self.started
 
-    def at_boundary(self) -> None:
+    def _on_step(self) -> bool:
+        return True
+
+    def _on_rollout_start(self) -> None:
         """Evaluate and keep the run when it is time to; stop when the time is up."""
         steps, every = self.agent.num_timesteps, self.plan.settings.evaluate_every
         due = steps // every > self._evaluated("steps", -every) // every
@@ -298,11 +274,10 @@ class _Training:
             "training_seeds": [plan.training_seed, plan.training_seed + plan.settings.ships - 1],
             "evaluation_seeds": [EVALUATION_SEED, EVALUATION_SEED + N_EVALUATIONS - 1],
             "steps": self.agent.num_timesteps,
-            "cost": self._evaluated("cost", None),
-            "lq_cost": self.held_out.lq_cost,
+            "cost": self._evaluated("cost", None), "lq_cost": self.held_out.lq_cost,
             "curve": [[row["steps"], row["cost"]] for row in self.found["curve"]],
             "versions": run_folder.versions(),
-        }
+        }  # fmt: skip
 
     def keep(self) -> None:
         """Write the run as it is, whole or not at all."""
@@ -342,9 +317,8 @@ def _torch_threads(number: int) -> Iterator[None]:
 
 def _logger(folder: Path | None) -> Logger:
     """TensorBoard's log, where there is a folder and TensorBoard is installed."""
-    if folder is None:
-        return Logger(None, [])
-    try:
-        return Logger(None, [TensorBoardOutputFormat(str(folder / run_folder.TENSORBOARD))])
-    except (ImportError, AssertionError):
-        return Logger(None, [])
+    formats: list[Any] = []
+    if folder is not None:
+        with suppress(ImportError, AssertionError):
+            formats.append(TensorBoardOutputFormat(str(folder / run_folder.TENSORBOARD)))
+    return Logger(None, formats)

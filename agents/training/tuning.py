@@ -46,9 +46,6 @@ LAST = 2**62  # steps, after all evaluations
 #: What a training returns.
 TRIAL: Shape = {"cost": (int, float, NoneType), "curve": [[(int,), (int, float)]], "ended": (str,)}
 
-#: Cost of each evaluation of a training, by its steps.
-Curve = Sequence[tuple[int, float]]
-
 
 @dataclass(frozen=True)
 class Trial:
@@ -72,40 +69,21 @@ class Tuning:
 
 
 def tune(
-    plan: Plan,
-    out: str | Path,
-    trials: int = 20,
-    *,
-    fixed: Sequence[str] = (),
-    where: JobEngine = HERE,
+    plan: Plan, out: str | Path, trials: int = 20, *, fixed: Sequence[str] = (), where: JobEngine = HERE,
     progress: Callable[[int, int, float | None], None] | None = None,
     training: Callable[[dict[str, Any]], dict[str, Any]] | None = None,
-) -> Tuning:
+) -> Tuning:  # fmt: skip
     """Search the settings with which an agent learns a task best; a study that is there goes on.
 
-    Parameters
-    ----------
-    plan : Plan
-        What is learned, with the settings to begin from and the seed of every trial.
-    out : str or Path
-        Folder of the study: `study.db` (Optuna's, SQLite), `trials/`, `study.json` and `best.toml`, which is
-        there as soon as a trial has finished and is settings for training.
-    trials : int
-        In all, those done before among them.
-    fixed : sequence of str
-        Settings that are left as they are.
-    where : JobEngine
-        Where trials are trained; the results are the same.
-    progress : callable, optional
-        Called with the trials done, their total and the best cost.
-    training : callable, optional
-        Used instead of `train_trial`: takes a job, returns cost, curve and how it ended.
+    `plan`: what is learned, with the settings to begin from and the seed of every trial; `out`: folder of the
+    study: `study.db` (Optuna's, SQLite), `trials/`, `study.json` and `best.toml`, which is there as soon as a
+    trial has finished and is settings for training; `trials`: in all, those done before among them; `fixed`:
+    settings that are left as they are; `where`: where trials are trained; the results are the same;
+    `progress`: called with the trials done, their total and the best cost; `training`: used instead of
+    `train_trial`: takes a job, returns cost, curve and how it ended.
 
-    Raises
-    ------
-    InputError
-        If Optuna is missing, another process uses the folder, it holds a study of something else or anything
-        else, or every trial of the first batch diverges.
+    Raises InputError if Optuna is missing, another process uses the folder, it holds a study of something
+    else or anything else, or every trial of the first batch diverges.
     """
     check_whole(trials, "trials", at_least=1)
     folder = Path(out)
@@ -121,10 +99,11 @@ def tune(
                     progress(before + done, trials, best)
 
             bounds = limits(found, plan.settings.total_steps)
-            jobs = [_job(plan, settings, bounds) for _, settings in proposed]
+            run = plan.configuration()
+            jobs = [{"configuration": run | {"settings": one}, "limits": bounds} for _, one in proposed]
             results = replace(where, keep=folder / KEPT).run(training or train_trial, jobs, tell)
-            for k, ((parameters, settings), result) in enumerate(zip(proposed, results, strict=True)):
-                found.append(_trial(first + k, parameters, settings, result))
+            for (parameters, settings), result in zip(proposed, results, strict=True):
+                found.append(_trial(len(found), parameters, settings, result))
             _record(study, found, plan, fixed)
             if all(trial.ended == "diverged" for trial in found):
                 raise InputError(f"every trial diverged, the first: {results[0]['why']}")
@@ -151,7 +130,7 @@ def train_trial(job: dict[str, Any]) -> dict[str, Any]:
     def tell(now: Progress) -> None:
         if now.evaluated and now.cost is not None and now.steps > 0:
             curve.append((now.steps, now.cost))
-            if _best_until(curve, now.steps) > allowed(job["limits"], now.steps):
+            if lowest(curve, now.steps) > lowest(job["limits"], now.steps):
                 raise _StoppedEarlyError
 
     try:
@@ -175,20 +154,12 @@ def limits(trials: Sequence[Trial], total_steps: int) -> list[tuple[int, float]]
         return []
     first = SHARE_BEFORE_STOPPING * total_steps
     marks = sorted({steps for curve in finished for steps, _ in curve if steps >= first})
-    return [(mark, float(np.median([_best_until(curve, mark) for curve in finished]))) for mark in marks]
+    return [(mark, float(np.median([lowest(curve, mark) for curve in finished]))) for mark in marks]
 
 
-def allowed(limits: Curve, steps: int) -> float:
-    """The largest best cost with which a training goes on after some steps."""
-    return min((cost for mark, cost in limits if mark <= steps), default=np.inf)
-
-
-def _best_until(curve: Curve, steps: int) -> float:
+def lowest(curve: Sequence[tuple[int, float]], steps: int) -> float:
+    """The lowest cost by some steps; of limits, the largest best cost with which a training goes on."""
     return min((cost for mark, cost in curve if mark <= steps), default=np.inf)
-
-
-def _job(plan: Plan, settings: Mapping[str, Any], bounds: Curve) -> dict[str, Any]:
-    return {"configuration": {**plan.configuration(), "settings": dict(settings)}, "limits": bounds}
 
 
 def _trial(number: int, parameters: Mapping[str, Any], settings: Mapping[str, Any], result: Any) -> Trial:
@@ -199,7 +170,7 @@ def _trial(number: int, parameters: Mapping[str, Any], settings: Mapping[str, An
 
 def _best(trials: Sequence[Trial]) -> Trial:
     """The finished trial of the lowest cost; one that was stopped early only where none has finished."""
-    return min(trials, key=lambda trial: (trial.cost is None, _best_until(trial.curve, LAST)))
+    return min(trials, key=lambda trial: (trial.cost is None, lowest(trial.curve, LAST)))
 
 
 def _proposed(
@@ -241,9 +212,8 @@ def _opened(folder: Path, plan: Plan, fixed: Sequence[str]) -> optuna.Study:
         make_folder(folder)
         write_json(expected, note)
     try:
-        study = optuna.create_study(
-            storage=f"sqlite:///{folder / STUDY}", study_name="shipgym", load_if_exists=True
-        )
+        storage = f"sqlite:///{folder / STUDY}"
+        study = optuna.create_study(storage=storage, study_name="shipgym", load_if_exists=True)
         study.get_trials(deepcopy=False)  # of a damaged file this may be the first that fails
         return study
     except Exception as error:  # what SQLAlchemy raises for a broken file is of many kinds
@@ -278,9 +248,8 @@ def search_space(algorithm: str, fixed: Sequence[str] = ()) -> dict[str, Any]:
     tables = hyperparameters("search")
     shared = tables["off-policy"] if issubclass(settings_of(algorithm), OffPolicySettings) else {}
     space = {**tables["all"], **shared, **tables[algorithm]}
-    return {
-        name: _distribution(one) for name, one in space.items() if STANDS_FOR.get(name, name) not in fixed
-    }
+    varied = (name for name in space if STANDS_FOR.get(name, name) not in fixed)
+    return {name: _distribution(space[name]) for name in varied}
 
 
 def _distribution(given: Any) -> distributions.BaseDistribution:
@@ -291,10 +260,7 @@ def _distribution(given: Any) -> distributions.BaseDistribution:
 
 
 def with_parameters(settings: Settings, parameters: Mapping[str, Any]) -> Settings:
-    """The settings that parameters stand for.
-
-    Raises InputError if they conflict with the settings that are not varied.
-    """
+    """The settings that parameters stand for; InputError if they conflict with those that are not varied."""
     given = {name: value for name, value in parameters.items() if name not in STANDS_FOR}
     if "one_minus_gamma" in parameters:
         given["gamma"] = 1.0 - parameters["one_minus_gamma"]

@@ -16,9 +16,9 @@ from agents.training.settings import ALGORITHMS, load_settings
 from agents.training.tuning import (
     Trial,
     Tuning,
-    allowed,
     evaluated_evenly,
     limits,
+    lowest,
     search_space,
     train_trial,
     tune,
@@ -172,8 +172,8 @@ def test_a_trial_must_keep_up_with_the_median_of_finished_ones():
     found = limits(trials, 400)
     assert found == [(100, 7.5), (200, 6.5), (300, 6.5)]
     assert limits(trials, 800) == [(200, 6.5), (300, 6.5)]  # in the first quarter nobody is stopped
-    assert allowed(found, 50) == float("inf")
-    assert allowed(found, 250) == 6.5
+    assert lowest(found, 50) == float("inf")
+    assert lowest(found, 250) == 6.5
 
 
 def test_folder_of_something_else_is_refused(trainings, tmp_path):
