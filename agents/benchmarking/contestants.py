@@ -331,10 +331,7 @@ def _policy(source: Any, task: BenchmarkTask) -> Policy:
 
 
 def file_hash(path: str | Path) -> str:
-    """SHA-256 of a file.
-
-    Raises InputError if it cannot be read.
-    """
+    """SHA-256 of a file; raises InputError if it cannot be read."""
     return hashlib.sha256(read_bytes(Path(path), "file", LARGEST_TENSORS)).hexdigest()
 
 

@@ -25,7 +25,6 @@ def joined(
     parts: Sequence[tuple[str, str, int, NDArray[np.int64], Mapping[str, NDArray[np.float64]]]],
 ) -> Columns:
     """One table of the episodes of all contestants, tasks and runs; figures that one lacks are NaN."""
-    names = list(dict.fromkeys(name for *_, figures in parts for name in figures))
     counts = [len(seeds) for *_, seeds, _ in parts]
     columns: Columns = {
         "contestant": np.repeat(np.array([part[0] for part in parts], dtype=np.str_), counts),
@@ -33,27 +32,27 @@ def joined(
         "run": np.repeat(np.array([part[2] for part in parts], dtype=np.int64), counts),
         "seed": np.concatenate([np.zeros(0, dtype=np.int64), *(part[3] for part in parts)]),
     }
-    for name in names:
+    for name in dict.fromkeys(name for *_, figures in parts for name in figures):
         columns[name] = np.concatenate(
             [part[4].get(name, np.full(len(part[3]), np.nan)) for part in parts], dtype=np.float64
         )
     return columns
 
 
-def check_library() -> None:
-    """Refuse to go on without pyarrow.
-
-    Raises InputError saying how it is installed.
-    """
-    _arrow()
+def library() -> tuple[Any, Any]:
+    """Pyarrow and its part for Parquet; an InputError saying how it is installed if it is not there."""
+    try:
+        return import_module("pyarrow"), import_module("pyarrow.parquet")
+    except ModuleNotFoundError:
+        raise InputError(
+            "benchmark: pyarrow, which writes the table of episodes, is not installed; install it with: "
+            "pip install 'shipgym[benchmark]'"
+        ) from None
 
 
 def write_episodes(columns: Columns, path: Path) -> None:
-    """Write a table as Parquet, to a temporary name and then renamed.
-
-    Raises InputError if it cannot be written.
-    """
-    arrow, parquet = _arrow()
+    """Write a table as Parquet, whole or not at all; raises InputError if it cannot be written."""
+    arrow, parquet = library()
     arrays = {name: _array(arrow, name, values) for name, values in columns.items()}
     with atomic_path(path) as draft:
         parquet.write_table(arrow.table(arrays), draft, compression="zstd")
@@ -64,7 +63,7 @@ def read_episodes(path: Path, rows: int) -> Columns:
 
     Raises InputError if it is missing or no such file.
     """
-    arrow, parquet = _arrow()
+    arrow, parquet = library()
     content = read_bytes(path, "file of episodes", LARGEST_TENSORS)
     try:
         file = parquet.ParquetFile(arrow.BufferReader(content))
@@ -102,13 +101,3 @@ def _array(arrow: Any, name: str, values: NDArray[Any]) -> Any:
     missing = np.isnan(values)
     kind = np.bool_ if name in FLAGS else np.int64 if name in COUNTS else np.float64
     return arrow.array(np.where(missing, 0.0, values).astype(kind), mask=missing)
-
-
-def _arrow() -> tuple[Any, Any]:
-    try:
-        return import_module("pyarrow"), import_module("pyarrow.parquet")
-    except ModuleNotFoundError:
-        raise InputError(
-            "benchmark: pyarrow, which writes the table of episodes, is not installed; install it with: "
-            "pip install 'shipgym[benchmark]'"
-        ) from None

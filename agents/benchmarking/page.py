@@ -7,15 +7,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from agents.benchmarking import page_figures as figures
 from agents.benchmarking.contestants import BEST_KNOWN
-from agents.benchmarking.page_figures import (
-    costs_figure,
-    histories_figure,
-    profile_figure,
-    scores_figure,
-    styles,
-    tracks_figure,
-)
 from agents.benchmarking.page_replays import bests_of, contestants_of, hardest_of, replay_data, replayable
 from agents.benchmarking.replays import EpisodeId, Rerun, rerun
 from agents.benchmarking.results import RESULTS, BenchmarkResult
@@ -84,8 +77,7 @@ def write_page(
     check_page(target)
     graph_objects()  # refuse a missing extra before the work
     count, episodes = replayable(result, worst)
-    again = rerun(result, episodes, controllers, workers, progress)
-    write_text(_page(result, again, count), target)
+    write_text(_page(result, rerun(result, episodes, controllers, workers, progress), count), target)
 
 
 def _page(result: BenchmarkResult, again: Rerun, count: int) -> str:
@@ -96,12 +88,12 @@ def _page(result: BenchmarkResult, again: Rerun, count: int) -> str:
         about=result.summary,
         names=result.ranking,
         best_known=BEST_KNOWN,
-        styles=styles(result.ranking),
+        styles=figures.styles(result.ranking),
         wins={name: wins.count(name) for name in result.ranking},
         failures=result.failures,
         figures={
-            "scores": scores_figure(result),
-            "profile": profile_figure(result.summary["profile"], result.ranking),
+            "scores": figures.scores_figure(result),
+            "profile": figures.profile_figure(result.summary["profile"], result.ranking),
         },
         tasks=[_task(result, again, task) for task in result.tasks],
         replays={
@@ -131,7 +123,7 @@ def _task(result: BenchmarkResult, again: Rerun, task: str) -> dict[str, Any]:
         "found": found,
         "best": bests_of(result, task),
         "metrics": [(name, *METRICS[name]) for name in METRICS if _is_shown(name, found)],
-        "costs": costs_figure(result, task),
+        "costs": figures.costs_figure(result, task),
         "seed": hardest_of(result, task),
         "hardest": _hardest(result, again, task),
     }
@@ -145,15 +137,14 @@ def _is_shown(metric: str, found: Mapping[str, Any]) -> bool:
 
 def _hardest(result: BenchmarkResult, again: Rerun, task: str) -> dict[str, Any]:
     """Figures of all contestants in the hardest episode; none where none of them can be replayed."""
-    wanted = {
-        name: EpisodeId(name, task, 0, hardest_of(result, task)) for name in contestants_of(result, task)
-    }
-    episodes = {name: again.episodes[one] for name, one in wanted.items() if one in again.episodes}
+    names, seed = contestants_of(result, task), hardest_of(result, task)
+    wanted = {name: again.episodes.get(EpisodeId(name, task, 0, seed)) for name in names}
+    episodes = {name: episode for name, episode in wanted.items() if episode is not None}
     if not episodes:
         return {}
-    found = {"histories": histories_figure(episodes, result.ranking)}
+    found = {"histories": figures.histories_figure(episodes, result.ranking)}
     if any(episode.waypoints is not None for episode in episodes.values()):
-        found["tracks"] = tracks_figure(episodes, result.ranking)
+        found["tracks"] = figures.tracks_figure(episodes, result.ranking)
     return found
 
 

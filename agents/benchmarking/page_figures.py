@@ -2,18 +2,17 @@
 
 from collections.abc import Mapping, Sequence
 from functools import partial
+from itertools import cycle
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from agents.benchmarking.contestants import BEST_KNOWN
 from agents.benchmarking.results import BenchmarkResult
+from shipgym.arrays import Floats, Integers
 from shipgym.envs.episode import Episode
 from shipgym.plots import INK, MUTED, Panel, axis, compact, graph_objects, line, panels, points, translucent
 from shipgym.plots.style import Figure
-
-Floats = NDArray[np.float64]
 
 # as in the replay player (chart.html)
 COLOURS = (
@@ -32,12 +31,8 @@ bare_panels = partial(panels, margin={"l": 58, "r": 14, "t": 14, "b": 44}, showl
 
 def styles(names: Sequence[str]) -> dict[str, tuple[str, str]]:
     """Colour and dashes of each contestant; those of the best known are dark and solid."""
-    others = [name for name in names if name != BEST_KNOWN]
-    found = {
-        name: (COLOURS[k % len(COLOURS)], DASHES[k // len(COLOURS) % len(DASHES)])
-        for k, name in enumerate(others)
-    }
-    return {name: (INK, "solid") if name == BEST_KNOWN else found[name] for name in names}
+    looks = cycle((colour, dashes) for dashes in DASHES for colour in COLOURS)
+    return {name: (INK, "solid") if name == BEST_KNOWN else next(looks) for name in names}
 
 
 def scores_figure(result: BenchmarkResult) -> Figure:
@@ -46,9 +41,8 @@ def scores_figure(result: BenchmarkResult) -> Figure:
     scored = bool(result.summary["reference"])
     for entry in result.summary["ranking"]:
         score = entry["score"] if scored else {"value": entry["relative_cost"], "low": None, "high": None}
-        if score["value"] is None:
+        if (value := score["value"]) is None:
             continue
-        value = score["value"]
         low, high = (value if score[end] is None else score[end] for end in ("low", "high"))
         low, at, high = np.clip((low, value, high), *SHOWN[scored]).tolist()
         beyond = "triangle-left" if value < at else "triangle-right" if value > at else "circle"
@@ -179,7 +173,7 @@ def _unwrapped(angle: Floats, other: Floats) -> Floats:
     return near
 
 
-def _thinned(steps: int) -> NDArray[np.int64]:
+def _thinned(steps: int) -> Integers:
     """Indices of the samples that are drawn, the first and the last among them."""
     return np.unique(np.linspace(0, steps, min(steps, SAMPLES) + 1).round().astype(np.int64))
 

@@ -4,16 +4,14 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from agents.benchmarking.contestants import BEST_KNOWN
 from agents.benchmarking.page_figures import styles
 from agents.benchmarking.replays import SAME_COST, EpisodeId, Rerun, cost_of
 from agents.benchmarking.results import BenchmarkResult
-from agents.rollouts.replay_page import player
+from agents.rollouts.replay_page import PLAYER
 from agents.rollouts.replay_series import quantities, run
-
-Floats = NDArray[np.float64]
+from shipgym.pages import render
 
 MOST_RUNS = 300  # in a page, 5 kB each
 MARK = "@episodes@"  # what the page's script puts its runs in the place of
@@ -32,9 +30,8 @@ def contestants_of(result: BenchmarkResult, task: str) -> list[str]:
 
 def bests_of(result: BenchmarkResult, task: str) -> list[str]:
     """Names of the lowest mean cost in a task, several where equal to rounding, of those that sail."""
-    costs = {
-        name: result.summary["tasks"][task][name]["cost"]["value"] for name in contestants_of(result, task)
-    }
+    found = result.summary["tasks"][task]
+    costs = {name: found[name]["cost"]["value"] for name in contestants_of(result, task)}
     known = {name: cost for name, cost in costs.items() if cost is not None}
     least = min(known.values(), default=np.nan)
     return [name for name, cost in known.items() if np.isclose(cost, least, rtol=SAME_COST)]
@@ -44,12 +41,9 @@ def worst_of(result: BenchmarkResult, contestant: str, task: str, count: int) ->
     """The episodes that cost a contestant most, the worst first; over all of its training runs."""
     costs = result.figures(contestant, task)
     order = np.argsort(-np.nan_to_num(costs, nan=np.inf).ravel(), kind="stable")[:count]
-    runs, places = np.unravel_index(order, costs.shape)
     first = result.summary["seeds"]["first"]
-    return [
-        EpisodeId(contestant, task, int(run), first + int(place))
-        for run, place in zip(runs, places, strict=True)
-    ]
+    runs, places = (one.tolist() for one in np.unravel_index(order, costs.shape))
+    return [EpisodeId(contestant, task, k, first + place) for k, place in zip(runs, places, strict=True)]
 
 
 def hardest_of(result: BenchmarkResult, task: str) -> int:
@@ -95,39 +89,24 @@ def replay_data(result: BenchmarkResult, again: Rerun, count: int) -> dict[str, 
     in their short form (`short`); `entries`, what may be chosen, by task: for whom, seed, cost, outcome and
     numbers of the runs.
     """
-    kept: dict[EpisodeId, int] = {}
-    runs: list[dict[str, Any]] = []
-    whole: list[dict[str, Any]] = []
-    entries: dict[str, list[dict[str, Any]]] = {}
-    look = styles(result.ranking)
+    whole: dict[EpisodeId, dict[str, Any]] = {}
+    entries: dict[str, list[dict[str, Any]]] = {task: [] for task in result.tasks}
     for task in result.tasks:
-        entries[task] = []
         for who, episodes in entries_of(result, task, count):
             there = [episode for episode in episodes if episode in again.episodes]
-            if not there or (who and there[0].contestant != who):
+            if not there or who not in ("", there[0].contestant):
                 continue
-            for episode in there:
-                if episode not in kept:
-                    kept[episode] = len(runs)
-                    whole.append(run(_called(result, episode), again.episodes[episode]))
-                    runs.append({**short(whole[-1]), "colour": look[episode.contestant][0]})
-            entries[task].append(
-                {
-                    "who": who,
-                    "seed": there[0].seed,
-                    "cost": round(cost_of(result, there[0]), 2),
-                    "outcome": runs[kept[there[0]]]["outcome"],
-                    "runs": [kept[episode] for episode in there],
-                }
-            )
-    page = player("Replay", MARK)
+            for one in there:
+                whole[one] = whole.get(one) or run(_called(result, one), again.episodes[one])
+            entry = {"who": who, "seed": there[0].seed, "cost": round(cost_of(result, there[0]), 2)}
+            places = [list(whole).index(one) for one in there]
+            entries[task].append({**entry, "outcome": whole[there[0]]["outcome"], "runs": places})
+    look = styles(result.ranking)
+    runs = [{**short(found), "colour": look[one.contestant][0]} for one, found in whole.items()]
     return {
-        "page": page,
-        "mark": f'"{MARK}"',
-        "quantities": quantities(whole),
-        "runs": runs,
-        "entries": entries,
-    }
+        "page": render(PLAYER, title="Replay", data=MARK), "mark": f'"{MARK}"',
+        "quantities": quantities([*whole.values()]), "runs": runs, "entries": entries,
+    }  # fmt: skip
 
 
 def _called(result: BenchmarkResult, episode: EpisodeId) -> str:

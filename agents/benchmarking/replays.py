@@ -1,7 +1,7 @@
 """Single episodes of a benchmark run once more, with all that happened in them."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 from functools import partial
 from typing import Any, NamedTuple
 
@@ -39,12 +39,9 @@ class Rerun:
 
 
 def rerun(
-    result: BenchmarkResult,
-    episodes: Sequence[EpisodeId],
-    controllers: Any = None,
-    workers: int | None = 1,
+    result: BenchmarkResult, episodes: Sequence[EpisodeId], controllers: Any = None, workers: int | None = 1,
     progress: Progress | None = None,
-) -> Rerun:
+) -> Rerun:  # fmt: skip
     """Run episodes of a benchmark again, from their seeds.
 
     `result`: whose contestants and tasks they are of. `controllers`: as `benchmark` was given them; objects,
@@ -78,31 +75,25 @@ def rerun(
 
 def rerun_job(job: dict[str, Any]) -> dict[str, Any]:
     """Run chosen episodes of one contestant and task, in any process; see `_recorded`."""
-    one = Contestant(job["contestant"], job["source"])
-    return _recorded(one, load_suite(job["suite"]).task(job["task"]), job["suite"], job["runs"])
+    one, task = Contestant(job["contestant"], job["source"]), load_suite(job["suite"]).task(job["task"])
+    return _recorded(one, task, job["suite"], job["runs"])
 
 
 def _recorded(
     one: Contestant, task: BenchmarkTask, suite: str, runs: Sequence[Sequence[int]]
 ) -> dict[str, Any]:
     """Why it cannot be, or of each training run, given with its seeds, costs and fields of the episodes."""
+    done = []
     try:
         policies = one.policies(task, suite)
-        found = [(run, seeds, recorded(policies[run], task, seeds)) for run, *seeds in runs]
+        for run, *seeds in runs:
+            found = recorded(policies[run], task, seeds)
+            episodes = [None if episode is None else vars(episode) for episode in found.episodes]
+            done.append({"run": run, "seeds": seeds, "costs": found.costs, "episodes": episodes})
     except Exception as error:  # one that cannot be made again is no reason to have no page
         said = str(error) if isinstance(error, InputError) else f"{type(error).__name__}: {error}"
         return {"refused": said}
-    return {
-        "refused": "",
-        "runs": [
-            {"run": run, "seeds": seeds, "costs": each.costs, "episodes": [_fields(e) for e in each.episodes]}
-            for run, seeds, each in found
-        ],
-    }
-
-
-def _fields(episode: Episode | None) -> dict[str, Any] | None:
-    return None if episode is None else {item.name: getattr(episode, item.name) for item in fields(episode)}
+    return {"refused": "", "runs": done}
 
 
 def _gathered(result: BenchmarkResult, found: Mapping[tuple[str, str], Mapping[str, Any]]) -> Rerun:

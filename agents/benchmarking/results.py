@@ -9,6 +9,7 @@ from __future__ import annotations
 import platform
 from collections import Counter
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
 from importlib.metadata import PackageNotFoundError, version
@@ -16,20 +17,18 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from agents.benchmarking.contestants import Contestant, file_hash, names_code
-from agents.benchmarking.episode_table import Columns, check_library, joined, read_episodes, write_episodes
+from agents.benchmarking.episode_table import Columns, joined, library, read_episodes, write_episodes
 from agents.benchmarking.results_shape import SHAPE, check_summary
 from agents.benchmarking.summary import Done, summary_of
 from agents.controllers.controller import model_hash
 from agents.output import present
 from agents.suites.suite import FIRST_SEED, BenchmarkTask, suite_hash
+from shipgym.arrays import Floats
 from shipgym.checks import check_choice, check_fields, check_format
 from shipgym.errors import InputError
 from shipgym.files import make_folder, read_json, write_json
-
-Floats = NDArray[np.float64]
 
 FORMAT, KIND = 2, "shipgym-benchmark"
 RESULTS, EPISODES, PARTS = "results.json", "episodes.parquet", "parts"
@@ -107,7 +106,7 @@ class BenchmarkResult:
         if folder is None:
             return self
         target = Path(folder)
-        check_library()
+        library()
         make_folder(target)
         write_episodes(self.episodes, target / EPISODES)
         about = {**self.summary["episodes"], "sha256": file_hash(target / EPISODES)}
@@ -121,7 +120,7 @@ def check_new(folder: Path, resume: bool, suite: str) -> Path:
 
     Raises InputError saying what to do.
     """
-    check_library()
+    library()  # a missing extra is reported now, not after the work
     if not folder.exists():
         return folder
     if not folder.is_dir():
@@ -149,14 +148,13 @@ def gathered(
     `episodes`: number of episodes of each task.
     """
     seeds = FIRST_SEED + np.arange(episodes)
-    table = joined(
-        [
-            (one.name, task.name, number, seeds, run["episodes"])
-            for one in who
-            for task in tasks
-            for number, run in enumerate(done[one.name, task.name]["runs"])
-        ]
-    )
+    rows = [
+        (one.name, task.name, number, seeds, run["episodes"])
+        for one in who
+        for task in tasks
+        for number, run in enumerate(done[one.name, task.name]["runs"])
+    ]
+    table = joined(rows)
     about_tasks = {task.name: _about_task(task) for task in tasks}
     about = {
         "format": FORMAT,
@@ -167,9 +165,9 @@ def gathered(
         "contestants": {one.name: _about_contestant(one, tasks, done) for one in who},
     }
     found = summary_of(suite, tasks, [one.name for one in who], done)
-    rows = {"file": EPISODES, "rows": len(table["seed"]), "sha256": None}
+    file = {"file": EPISODES, "rows": len(table["seed"]), "sha256": None}
     code = tuple(one.source for one in who if one.is_text and names_code(one.source))
-    return BenchmarkResult({**about, **found, "episodes": rows}, table, code)
+    return BenchmarkResult({**about, **found, "episodes": file}, table, code)
 
 
 def versions() -> dict[str, str]:
@@ -178,22 +176,16 @@ def versions() -> dict[str, str]:
 
     found = {"python": platform.python_version(), "processor": str(binding.get_host_cpu_name())}
     for package in PACKAGES:
-        try:
+        with suppress(PackageNotFoundError):
             found[package] = version(package)
-        except PackageNotFoundError:
-            continue
     return found
 
 
 def _about_task(task: BenchmarkTask) -> dict[str, Any]:
     return {
-        "environment": task.environment,
-        "model": task.model,
-        "model_sha256": model_hash(task.ship),
-        "why": task.why,
-        "on": task.on,
-        "ship": task.behind,
-    }
+        "environment": task.environment, "model": task.model, "model_sha256": model_hash(task.ship),
+        "why": task.why, "on": task.on, "ship": task.behind,
+    }  # fmt: skip
 
 
 def _about_contestant(one: Contestant, tasks: Sequence[BenchmarkTask], done: Done) -> dict[str, Any]:
@@ -243,11 +235,8 @@ def load_results(path: str | Path) -> BenchmarkResult:
 def _check_agree(result: BenchmarkResult, where: str) -> None:
     """The rows must be those of the contestants, tasks and seeds that the summary names."""
     count, episodes = result.summary["seeds"]["count"], result.episodes
-    told = {
-        (one, task): found["runs"]
-        for task, by_name in result.summary["tasks"].items()
-        for one, found in by_name.items()
-    }
+    tasks = result.summary["tasks"]
+    told = {(one, task): found["runs"] for task in tasks for one, found in tasks[task].items()}
     rows = Counter(zip(episodes["contestant"].tolist(), episodes["task"].tolist(), strict=True))
     for one, task in [*told, *rows]:  # in the order of the summary, then of the table
         runs = told.get((one, task), 0)

@@ -9,14 +9,7 @@ from shipgym.checks import ANY_KEY, Shape, check_choice, check_shape, check_whol
 TEXT, COUNT, NUMBER = (str,), (int,), (int, float)
 PERHAPS = (int, float, NoneType)
 INTERVAL: Shape = {"value": PERHAPS, "low": PERHAPS, "high": PERHAPS}
-TASK: Shape = {
-    "environment": TEXT,
-    "model": TEXT,
-    "model_sha256": TEXT,
-    "why": TEXT,
-    "on": TEXT,
-    "ship": TEXT,
-}
+TASK: dict[str, Shape] = dict.fromkeys(("environment", "model", "model_sha256", "why", "on", "ship"), TEXT)
 CONTESTANT: Shape = {  # files: SHA-256 by path; refused: why, by task
     "source": (str, NoneType), "files": {ANY_KEY: TEXT}, "runs": COUNT, "refused": {ANY_KEY: TEXT},
 }  # fmt: skip

@@ -96,9 +96,7 @@ def checked_part(part: dict[str, Any], job: Mapping[str, Any]) -> dict[str, Any]
     check_shape(part, PART, where)
     names = {"cost"}.union(*(run["episodes"] for run in part["runs"]))
     for run in part["runs"]:
-        shapes = {
-            name: values.shape for name, values in run["episodes"].items() if values.dtype.kind in "bif"
-        }
+        shapes = {name: one.shape for name, one in run["episodes"].items() if one.dtype.kind in "bif"}
         if shapes != dict.fromkeys(names, (job["episodes"],)):
             raise InputError(f"{where}: expected cost and other figures of {job['episodes']} episodes")
     return part
@@ -122,20 +120,15 @@ def _chosen(suite: str, names: Sequence[str] | None) -> tuple[BenchmarkTask, ...
 def job_of(one: Contestant, task: BenchmarkTask, suite: str, episodes: int) -> dict[str, Any]:
     """The job of one contestant and task; it names all that its result depends on."""
     return {
-        "suite": suite,
-        "suite_sha256": suite_hash(suite),
-        "task": task.name,
-        "contestant": one.name,
-        "source": one.source,
-        "files": one.fingerprint(task),
-        "episodes": episodes,
-    }
+        "suite": suite, "suite_sha256": suite_hash(suite), "task": task.name, "contestant": one.name,
+        "source": one.source, "files": one.fingerprint(task), "episodes": episodes,
+    }  # fmt: skip
 
 
 def run_job(job: dict[str, Any]) -> dict[str, Any]:
     """Do a job of `job_of`, in any process; see `results_of`."""
-    one = Contestant(job["contestant"], job["source"])
-    return results_of(one, load_suite(job["suite"]).task(job["task"]), job["suite"], job["episodes"])
+    one, task = Contestant(job["contestant"], job["source"]), load_suite(job["suite"]).task(job["task"])
+    return results_of(one, task, job["suite"], job["episodes"])
 
 
 def results_of(one: Contestant, task: BenchmarkTask, suite: str, episodes: int) -> dict[str, Any]:
@@ -164,8 +157,6 @@ def results_of(one: Contestant, task: BenchmarkTask, suite: str, episodes: int) 
 
 def _run(episodes: Any, failure: str, seconds_per_action: float, policy_sha256: str | None) -> dict[str, Any]:
     return {
-        "episodes": episodes,
-        "failure": failure,
-        "seconds_per_action": seconds_per_action,
+        "episodes": episodes, "failure": failure, "seconds_per_action": seconds_per_action,
         "policy_sha256": policy_sha256,
-    }
+    }  # fmt: skip

@@ -17,10 +17,10 @@ from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.stats import trim_mean
 
-Floats = NDArray[np.float64]
+from shipgym.arrays import Floats, Integers
 
 N_DRAWS = 2000
 LEVEL = 0.95
@@ -49,23 +49,14 @@ def finite(number: float) -> float | None:
 
 def interquartile_mean(values: ArrayLike, axis: int | None = None) -> Floats:
     """Mean of the middle half: a quarter, rounded down, is dropped at each end; by default of all values."""
-    found: Floats = np.asarray(trim_mean(np.asarray(values, dtype=np.float64), TRIMMED, axis=axis))
-    return found
+    return np.asarray(trim_mean(np.asarray(values, dtype=np.float64), TRIMMED, axis=axis))
 
 
 class Draws:
     """Bootstrap draws of the episodes of each task, the same for every contestant.
 
-    Parameters
-    ----------
-    n_tasks : int
-        Number of tasks; each has draws of its own.
-    n_episodes : int
-        Episodes of each task; a draw takes as many of them, with replacement.
-    seed : int
-        Of the draws.
-    n_draws : int
-        Draws of each task.
+    `n_tasks`: each has `n_draws` draws of its own; `n_episodes`: of each task, of which a draw takes as many,
+    with replacement; `seed`: of the draws.
     """
 
     def __init__(self, n_tasks: int, n_episodes: int, seed: int = 0, n_draws: int = N_DRAWS) -> None:
@@ -75,7 +66,7 @@ class Draws:
         #: How often each episode is drawn, over their number, shape (n_tasks, n_draws, n_episodes).
         self.episodes: Floats = random.multinomial(n_episodes, even, (n_tasks, n_draws)) / n_episodes
 
-    def runs(self, task: int, n_runs: int, who: int) -> NDArray[np.int64]:
+    def runs(self, task: int, n_runs: int, who: int) -> Integers:
         """Training runs of one contestant that are drawn for a task, shape (n_draws, n_runs)."""
         random = np.random.default_rng([self.seed, 1, task, who])
         return random.integers(n_runs, size=(self.n_draws, n_runs))
@@ -112,7 +103,7 @@ def interquartile_cost(costs: Floats, draws: Draws, task: int, who: int = 0) -> 
     return interval(float(interquartile_mean(costs)), drawn)
 
 
-def weighted_interquartile_mean(values: Floats, weights: NDArray[np.int64]) -> Floats:
+def weighted_interquartile_mean(values: Floats, weights: Integers) -> Floats:
     """Interquartile means of samples given by how often they hold each value.
 
     `values`: shape (n,); `weights`: each row of the same sum, shape (n_samples, n). Returns an array of shape
@@ -133,17 +124,13 @@ def score(cost: ArrayLike, zero: ArrayLike, best: ArrayLike) -> Floats:
     start = np.asarray(zero, dtype=np.float64)
     way, made = start - np.asarray(best, dtype=np.float64), start - np.asarray(cost, dtype=np.float64)
     with np.errstate(divide="ignore", invalid="ignore"):
-        share: Floats = np.where(way > 0.0, made / way, np.nan)
-    return share
+        return np.where(way > 0.0, made / way, np.nan)
 
 
 def aggregate_score(
-    costs: Sequence[Floats],
-    references: Sequence[tuple[float, float]],
-    draws: Draws,
-    tasks: Sequence[int],
+    costs: Sequence[Floats], references: Sequence[tuple[float, float]], draws: Draws, tasks: Sequence[int],
     who: int,
-) -> Interval:
+) -> Interval:  # fmt: skip
     """Interquartile mean of the scores of all runs and tasks.
 
     `costs`: of each task, shape (n_runs, n_episodes); `references`: costs that are 0 and 1 in each task.
@@ -176,9 +163,7 @@ def improvement(
         wins = (mine < its) + 0.5 * (mine == its)  # of runs i and k in each episode, shape (i, k, n_episodes)
         values.append(wins.mean())
         per_draw = np.tensordot(draws.episodes[task], wins, axes=(1, 2))
-        first, second = (
-            draws.runs(task, n_runs, number) for n_runs, number in zip(wins.shape, who, strict=False)
-        )
+        first, second = (draws.runs(task, wins.shape[i], who[i]) for i in (0, 1))
         drawn += per_draw[rows, first[:, :, None], second[:, None, :]].mean(axis=(1, 2))
     return interval(float(np.mean(values)), drawn / len(common))
 

@@ -1,28 +1,18 @@
 """The summary of a benchmark: per task and contestant, the ranking, and who improves on which other."""
 
 from collections.abc import Mapping, Sequence
+from itertools import permutations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from agents.benchmarking import statistics
 from agents.benchmarking.contestants import BEST_KNOWN
-from agents.benchmarking.statistics import (
-    NOTHING,
-    Draws,
-    Interval,
-    aggregate_score,
-    finite,
-    improvement,
-    interquartile_cost,
-    mean_cost,
-    performance_profile,
-    score,
-)
+from agents.benchmarking.statistics import NOTHING, Draws, Interval, finite, score
 from agents.suites.reference import reference_costs
 from agents.suites.suite import N_EPISODES, SETS, BenchmarkTask
+from shipgym.arrays import Floats
 
-Floats = NDArray[np.float64]
 #: By contestant and task what `agents.benchmarking.run.results_of` answers.
 Done = Mapping[tuple[str, str], Mapping[str, Any]]
 
@@ -38,7 +28,13 @@ def summary_of(
     `agents.benchmarking.run.results_of`. Ranking, improvements and profiles are of the episodes on the ship;
     what each contestant came to on the model and far from the design stands beside its place, `elsewhere`.
     """
-    return _Summary(suite, tasks, names, done).fields()
+    found = _Summary(suite, tasks, names, done)
+    by_task = {task.name: found.task(k) for k, task in enumerate(tasks)}
+    known = {tasks[k].name: {"zero": zero, "best": best} for k, (zero, best) in found.reference.items()}
+    return {
+        "tasks": by_task, "reference": known, "ranking": found.ranking(by_task),
+        "improvement": found.improvements(), "profile": found.profiles(),
+    }  # fmt: skip
 
 
 class _Summary:
@@ -60,34 +56,19 @@ class _Summary:
         self.reference = {k: known[task] for k, task in enumerate(self.tasks) if task in known}
         self.draws = Draws(len(tasks), n_episodes)
 
-    def fields(self) -> dict[str, Any]:
-        """All of it."""
-        by_task = {task: self._of_task(k) for k, task in enumerate(self.tasks)}
-        return {
-            "tasks": by_task,
-            "reference": {
-                self.tasks[k]: {"zero": zero, "best": best} for k, (zero, best) in self.reference.items()
-            },
-            "ranking": self._ranking(by_task),
-            "improvement": self._improvements(),
-            "profile": self._profiles(),
-        }
-
-    def _of_task(self, number: int) -> dict[str, Any]:
+    def task(self, number: int) -> dict[str, Any]:
         """What each contestant did in one task."""
         taking_part = {who: cost for (who, k), cost in self.costs.items() if k == number}
-        lowest = min(
-            (cost.mean() for who, cost in taking_part.items() if self.names[who] != BEST_KNOWN),
-            default=np.nan,
-        )
-        found = {}
+        means = [cost.mean() for who, cost in taking_part.items() if self.names[who] != BEST_KNOWN]
+        lowest, reference, found = min(means, default=np.nan), self.reference.get(number), {}
         for who, cost in taking_part.items():
             runs = self.done[self.names[who], self.tasks[number]]["runs"]
-            mean, reference = mean_cost(cost, self.draws, number, who), self.reference.get(number)
+            mean = statistics.mean_cost(cost, self.draws, number, who)
+            usual = statistics.interquartile_cost(cost, self.draws, number, who)
             seconds = float(np.mean([run["seconds_per_action"] for run in runs]))
             found[self.names[who]] = {
                 "cost": mean.to_dict(),
-                "cost_iqm": interquartile_cost(cost, self.draws, number, who).to_dict(),
+                "cost_iqm": usual.to_dict(),
                 "score": (NOTHING if reference is None else _score(mean, reference)).to_dict(),
                 "relative_cost": finite(mean.value / lowest),
                 "runs": len(runs),
@@ -100,21 +81,15 @@ class _Summary:
             }
         return found
 
-    def _ranking(self, by_task: Mapping[str, Mapping[str, Any]]) -> list[dict[str, Any]]:
+    def ranking(self, by_task: Mapping[str, Mapping[str, Any]]) -> list[dict[str, Any]]:
         """The contestants, those that took part in all tasks first, the best first.
 
         By score if every task has its references, else by the geometric mean of their costs over the lowest.
         """
-        found = [
-            {
-                "name": name,
-                **self._entry(who, "ship", by_task),
-                "elsewhere": {
-                    on: self._entry(who, on, by_task) for on in SETS if on != "ship" and self.sets[on]
-                },
-            }
-            for who, name in enumerate(self.names)
-        ]
+        others, found = [on for on in SETS if on != "ship" and self.sets[on]], []
+        for who, name in enumerate(self.names):
+            elsewhere = {on: self._entry(who, on, by_task) for on in others}
+            found.append({"name": name, **self._entry(who, "ship", by_task), "elsewhere": elsewhere})
         by_score = all(k in self.reference for k in self.sets["ship"])
         return sorted(found, key=lambda entry: _place(entry, by_score))
 
@@ -126,7 +101,7 @@ class _Summary:
         found = [by_task[self.tasks[k]][self.names[who]] for k in part]
         relative = [one["relative_cost"] for one in found if one["relative_cost"]]
         return {
-            "score": aggregate_score(costs, known, self.draws, scored, who).to_dict(),
+            "score": statistics.aggregate_score(costs, known, self.draws, scored, who).to_dict(),
             "scored_tasks": len(scored),
             "relative_cost": finite(np.exp(np.mean(np.log(relative)))) if relative else None,
             "tasks": len(part),
@@ -134,22 +109,17 @@ class _Summary:
             "failed": sum(one["failed"] for one in found),
         }
 
-    def _improvements(self) -> dict[str, dict[str, Any]]:
+    def improvements(self) -> dict[str, dict[str, Any]]:
         """Probability that one costs less than another, for all pairs."""
-        ship = self.sets["ship"]
-        of = [
-            {k: self.costs[who, k] for k in ship if (who, k) in self.costs} for who in range(len(self.names))
-        ]
-        return {
-            one: {
-                other: improvement(of[i], of[k], self.draws, (i, k)).to_dict()
-                for k, other in enumerate(self.names)
-                if k != i
-            }
-            for i, one in enumerate(self.names)
-        }
+        ship, n = self.sets["ship"], len(self.names)
+        costs = [{k: self.costs[who, k] for k in ship if (who, k) in self.costs} for who in range(n)]
+        found: dict[str, dict[str, Any]] = {name: {} for name in self.names}
+        for i, k in permutations(range(n), 2):
+            better = statistics.improvement(costs[i], costs[k], self.draws, (i, k))
+            found[self.names[i]][self.names[k]] = better.to_dict()
+        return found
 
-    def _profiles(self) -> dict[str, Any]:
+    def profiles(self) -> dict[str, Any]:
         """Share of episodes whose score is above each threshold."""
         shares = {}
         for who, name in enumerate(self.names):
@@ -161,7 +131,7 @@ class _Summary:
             every = np.concatenate([np.zeros(0), *scores])
             every = every[np.isfinite(every)]
             if len(every):
-                shares[name] = performance_profile(every, THRESHOLDS).tolist()
+                shares[name] = statistics.performance_profile(every, THRESHOLDS).tolist()
         return {"thresholds": THRESHOLDS.round(6).tolist(), "shares": shares}
 
 

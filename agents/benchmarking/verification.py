@@ -10,6 +10,7 @@ import numpy as np
 from agents.benchmarking.contestants import remade
 from agents.benchmarking.results import REMEDY, BenchmarkResult, load_results, versions
 from agents.benchmarking.run import job_of, run_job
+from agents.benchmarking.statistics import finite
 from agents.benchmarking.submission import KIND, read_submission
 from agents.controllers.designs import CLASSICAL
 from agents.engines.jobs import run_jobs
@@ -44,19 +45,13 @@ class Check:
 
     def to_dict(self) -> dict[str, Any]:
         """For programs; a difference that is no number is null."""
-        known = np.isfinite(self.difference)
-        return {**asdict(self), "difference": self.difference if known else None, "passed": self.passed}
+        return {**asdict(self), "difference": finite(self.difference), "passed": self.passed}
 
 
 def verify(
-    path: str | Path,
-    *,
-    sample: int = N_SAMPLED,
-    seed: int = 0,
-    tolerance: float | None = None,
-    workers: int | None = 1,
-    allow_code: Sequence[str] = (),
-) -> list[Check]:
+    path: str | Path, *, sample: int = N_SAMPLED, seed: int = 0, tolerance: float | None = None,
+    workers: int | None = 1, allow_code: Sequence[str] = (),
+) -> list[Check]:  # fmt: skip
     """Run a sample of a benchmark again and compare.
 
     `path`: folder of the results, their `results.json`, or a submission. `sample`: pairs of a contestant and
@@ -94,12 +89,8 @@ def verify(
 
 def _read(path: Path) -> BenchmarkResult:
     """Results of a folder, or a submission."""
-    if (
-        path.is_file()
-        and (content := read_json(path, "file of benchmark results", REMEDY)).get("kind") == KIND
-    ):
-        return read_submission(content, str(path))
-    return load_results(path)
+    content = read_json(path, "file of benchmark results", REMEDY) if path.is_file() else {}
+    return read_submission(content, str(path)) if content.get("kind") == KIND else load_results(path)
 
 
 def _sampled(result: BenchmarkResult, sample: int, seed: int) -> list[tuple[str, str]]:
@@ -137,10 +128,8 @@ def _compared(
     allowed = tolerance if tolerance is not None else ROUNDING if learned or other else 0.0
     note = f"{', '.join(other)} differ from those of the file" if other else ""
     if len(again["runs"]) != len(cost):
-        note = (
-            again["refused"] or note or f"{len(again['runs'])} training runs found, {len(cost)} in the file"
-        )
-        return Check(name, task, cost.size, np.inf, False, allowed, note)
+        runs = f"{len(again['runs'])} training runs found, {len(cost)} in the file"
+        return Check(name, task, cost.size, np.inf, False, allowed, again["refused"] or note or runs)
     costs = np.stack([run["episodes"]["cost"] for run in again["runs"]])
     exact = all(
         np.array_equal(run["episodes"][figure], result.figures(name, task, figure)[k], equal_nan=True)

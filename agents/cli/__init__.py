@@ -15,28 +15,17 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+from typer import Argument, Option
 
+from agents.cli import command
 from agents.cli.benchmark import benchmark_command
-from agents.cli.command import (
-    FAILED,
-    Address,
-    Commands,
-    EngineName,
-    IdentifyCommand,
-    IdentifyOptions,
-    ShipFileArgument,
-    Workers,
-    answered,
-    fail,
-    told_failure,
-)
+from agents.cli.command import FAILED, answered, fail
 from agents.cli.export import export_command
 from agents.cli.identification import advise_command, identify_command, reduce_command
 from agents.cli.logs import look_command, new_ship_command
 from agents.cli.reproduction import reproduce_command
 from agents.cli.steer import simulate_command, steer_command
-from agents.cli.training import train_command
-from agents.cli.tuning import tune_command
+from agents.cli.training import train_command, tune_command
 from agents.cli.warm import warm_command
 
 if TYPE_CHECKING:
@@ -44,8 +33,7 @@ if TYPE_CHECKING:
     from agents.verification.result import AutopilotResult
 
 app = typer.Typer(
-    cls=Commands,
-    help="From recorded ship trials to an identified model, its uncertainty and verified autopilots.",
+    cls=command.Commands,
     epilog="Example: shipgym new-ship zigzag.csv, then shipgym autopilot ship.toml --out report/",
     no_args_is_help=True,
     pretty_exceptions_enable=False,
@@ -65,7 +53,7 @@ def _version(wanted: bool) -> None:
 @app.callback()
 def shipgym_command(
     version: Annotated[
-        bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version and exit.")
+        bool, Option("--version", callback=_version, is_eager=True, help="Print the version and exit.")
     ] = False,
 ) -> None:
     """From recorded ship trials to an identified model, its uncertainty and verified autopilots."""
@@ -73,18 +61,12 @@ def shipgym_command(
 
 @answered
 def trials_command(
-    model: Annotated[
-        str, typer.Argument(metavar="MODEL", help="A model file, or the name of a shipped model.")
-    ],
-    out: Annotated[
-        Path | None, typer.Option(metavar="PLOTS.HTML", help="Write figures to this file.")
-    ] = None,
-    draws: Annotated[
-        int, typer.Option(min=0, help="Models drawn from an identified model's covariance.")
-    ] = 100,
-    seed: Annotated[int, typer.Option(min=0, help="Random seed of the draws.")] = 0,
+    model: Annotated[str, Argument(metavar="MODEL", help="A model file, or the name of a shipped model.")],
+    out: Annotated[Path | None, Option(metavar="PLOTS.HTML", help="Write figures to this file.")] = None,
+    draws: Annotated[int, Option(min=0, help="Models drawn from an identified model's covariance.")] = 100,
+    seed: Annotated[int, Option(min=0, help="Random seed of the draws.")] = 0,
     depth: Annotated[
-        float | None, typer.Option(metavar="M", help="Depth of water, m; default: deep water.")
+        float | None, Option(metavar="M", help="Depth of water, m; default: deep water.")
     ] = None,
 ) -> None:
     """Simulate the standard manoeuvres of a model. Assesses them by the IMO criteria.
@@ -130,15 +112,15 @@ def _print_trials(found: StandardTrials, page: Path | None) -> None:
 
 @answered
 def autopilot_command(
-    ship: ShipFileArgument,
-    out: Annotated[Path, typer.Option(metavar="FOLDER", help="Folder for the report, model and autopilots.")],
-    draws: Annotated[int, typer.Option(min=2, help="Models drawn from the coefficient covariance.")] = 200,
-    seed: Annotated[int, typer.Option(min=0, help="Random seed of draws and episodes.")] = 0,
+    ship: command.ShipFileArgument,
+    out: Annotated[Path, Option(metavar="FOLDER", help="Folder for the report, model and autopilots.")],
+    draws: Annotated[int, Option(min=2, help="Models drawn from the coefficient covariance.")] = 200,
+    seed: Annotated[int, Option(min=0, help="Random seed of draws and episodes.")] = 0,
     *,
-    options: IdentifyOptions,
+    options: command.IdentifyOptions,
     agents: Annotated[
         list[str] | None,
-        typer.Option(
+        Option(
             "--agent",
             metavar="AGENT",
             help="Also run this autopilot: a file, or the name of a pretrained one; repeatable.",
@@ -146,19 +128,18 @@ def autopilot_command(
     ] = None,
     autopilots: Annotated[
         str | None,
-        typer.Option(
+        Option(
             metavar="NAMES",
             help="Autopilots to design; default: pid,lq,lq-scheduled,turn-rate,wheel-over. "
             "Others: preview-mpc, lqg.",
         ),
     ] = None,
     standards: Annotated[
-        bool,
-        typer.Option("--standards", help="Simulate topics of ISO 11674 and IEC 62065, with our own limits."),
+        bool, Option("--standards", help="Simulate topics of ISO 11674 and IEC 62065, with our own limits.")
     ] = False,
-    engine: EngineName = "local",
-    workers: Workers = 1,
-    address: Address = None,
+    engine: command.EngineName = "local",
+    workers: command.Workers = 1,
+    address: command.Address = None,
 ) -> None:
     """Go from trials to a report on autopilots. Identifies, predicts, designs, runs them on drawn models.
 
@@ -180,28 +161,20 @@ def autopilot_command(
 
 def _print_result(result: AutopilotResult, report: Path, draws: int) -> None:
     """Print the result of the chain; fail for an unstable model, and where every design is refused."""
-    from agents.cli.terminal import (
-        answer,
-        console,
-        criteria_notes,
-        criteria_table,
-        prediction_table,
-        ranking_table,
-        say,
-        warn,
-    )
+    from agents.cli import terminal
+    from agents.cli.terminal import answer, console, say, warn
     from identification.validation.warnings import held_out_error, model_warnings
 
     answer({**result.metrics, "report": str(report)})
     if result.verification is not None:
         found = result.verification.manoeuvres
         say(held_out_error(result.identification))
-        console.print(prediction_table(result.identification))
+        console.print(terminal.prediction_table(result.identification))
         console.print()
-        console.print(criteria_table(found.criteria))
-        say(*criteria_notes(found.criteria))
+        console.print(terminal.criteria_table(found.criteria))
+        say(*terminal.criteria_notes(found.criteria))
         console.print(f"\nunstable draws: {int(found.unstable.sum())} of {draws}\n")
-        console.print(ranking_table(result))
+        console.print(terminal.ranking_table(result))
         console.print()
         for row in result.verification.standards:
             if not row.passed:
@@ -225,9 +198,9 @@ def _print_result(result: AutopilotResult, report: Path, draws: int) -> None:
 @answered
 def replay_command(
     episodes: Annotated[
-        list[Path], typer.Argument(metavar="EPISODE.JSON", help="Episodes that RecordEpisode wrote.")
+        list[Path], Argument(metavar="EPISODE.JSON", help="Episodes that RecordEpisode wrote.")
     ],
-    out: Annotated[Path, typer.Option(metavar="REPLAY.HTML", help="The page to write.")],
+    out: Annotated[Path, Option(metavar="REPLAY.HTML", help="The page to write.")],
 ) -> None:
     """Replay recorded episodes in one HTML page. Chart, time slider, time histories; several overlaid."""
     from agents.cli.terminal import answer, say
@@ -276,9 +249,9 @@ COMMANDS: dict[str, tuple[Callable[..., None], str]] = {
 }
 IDENTIFYING = ("identify", "advise", "reduce", "autopilot")  # they take the options of `identify`
 
-for name, (command, example) in COMMANDS.items():
-    kind = IdentifyCommand if name in IDENTIFYING else None
-    app.command(name, epilog=f"Example: shipgym {name} {example}", cls=kind)(command)
+for name, (function, example) in COMMANDS.items():
+    kind = command.IdentifyCommand if name in IDENTIFYING else None
+    app.command(name, epilog=f"Example: shipgym {name} {example}", cls=kind)(function)
 
 
 def _show_warning(message: Warning | str, *_: Any, **__: Any) -> None:
@@ -299,4 +272,4 @@ def main() -> None:
     try:
         app(prog_name="shipgym")
     except OSError as error:  # of the help, which no command answers for
-        sys.exit(told_failure(error))
+        sys.exit(command.told_failure(error))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import typer
+from typer import Option
 
 from agents.cli.command import FAILED, INTERRUPTED, Address, EngineName, answered, fail
 
@@ -14,43 +14,37 @@ if TYPE_CHECKING:
 
 Controllers = Annotated[
     str | None,
-    typer.Option(
+    Option(
         help="Who takes part, separated by commas: classical controllers (pid, lq, mpc, ...), tuned-pid, "
         "pretrained agents (ppo, sac), files of agents, module:function, name=...; default: all classical "
         "ones."
     ),
 ]
 Out = Annotated[
-    Path | None,
-    typer.Option(metavar="FOLDER", help="Folder for results.json, episodes.parquet and index.html."),
+    Path | None, Option(metavar="FOLDER", help="Folder for results.json, episodes.parquet and index.html.")
 ]
-Workers = Annotated[int | None, typer.Option(min=1, help="Number of processes; default: one per core.")]
-Episodes = Annotated[
-    int, typer.Option(min=1, max=100, help="Number of episodes of each task, for a quick look.")
-]
-Resume = Annotated[bool, typer.Option("--resume", help="Continue in a folder with results or parts of them.")]
+Workers = Annotated[int | None, Option(min=1, help="Number of processes; default: one per core.")]
+Episodes = Annotated[int, Option(min=1, max=100, help="Number of episodes of each task, for a quick look.")]
+Resume = Annotated[bool, Option("--resume", help="Continue in a folder with results or parts of them.")]
 Page = Annotated[
-    bool, typer.Option("--page/--no-page", help="Write index.html, with the worst episodes to replay.")
+    bool, Option("--page/--no-page", help="Write index.html, with the worst episodes to replay.")
 ]
 Results = Annotated[
     Path | None,
-    typer.Option(
+    Option(
         metavar="RESULTS", help="Instead, repeat a sample of these results, or of a submission, and compare."
     ),
 ]
 Submit = Annotated[
     Path | None,
-    typer.Option(
-        metavar="FILE", help="Also write the last contestant's costs as a submission, one JSON file."
-    ),
+    Option(metavar="FILE", help="Also write the last contestant's costs as a submission, one JSON file."),
 ]
 Tolerance = Annotated[
-    float | None,
-    typer.Option(min=0.0, help="Relative difference in cost that --verify allows; default: see docs."),
+    float | None, Option(min=0.0, help="Relative difference in cost that --verify allows; default: see docs.")
 ]
 AllowCode = Annotated[
     list[str] | None,
-    typer.Option(metavar="MODULE:FUNCTION", help="Code named in results that --verify may run; repeatable."),
+    Option(metavar="MODULE:FUNCTION", help="Code named in results that --verify may run; repeatable."),
 ]
 
 
@@ -58,8 +52,8 @@ AllowCode = Annotated[
 def benchmark_command(
     controllers: Controllers = None,
     out: Out = None,
-    suite: Annotated[str, typer.Option(help="Name of the suite of tasks.")] = "shipgym-v1",
-    tasks: Annotated[str | None, typer.Option(help="Only these tasks, separated by commas.")] = None,
+    suite: Annotated[str, Option(help="Name of the suite of tasks.")] = "shipgym-v1",
+    tasks: Annotated[str | None, Option(help="Only these tasks, separated by commas.")] = None,
     workers: Workers = None,
     engine: EngineName = "local",
     address: Address = None,
@@ -68,7 +62,7 @@ def benchmark_command(
     page: Page = True,
     submit: Submit = None,
     verify: Results = None,
-    sample: Annotated[int, typer.Option(min=1, help="Contestant-task pairs that --verify runs.")] = 8,
+    sample: Annotated[int, Option(min=1, help="Contestant-task pairs that --verify runs.")] = 8,
     tolerance: Tolerance = None,
     allow_code: AllowCode = None,
 ) -> None:

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 from rich.text import Text
 
-from agents.cli.terminal import number, plain_table
+from agents.cli.terminal import between, number, plain_table
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -25,15 +25,11 @@ def ranking_table(result: BenchmarkResult) -> Table:
         ">cost by\nthe lowest", ">tasks", ">runs", ">lost\ncontrol", ">failed", ">us by\naction",
     )  # fmt: skip
     for entry in summary["ranking"]:
-        name = entry["name"]
-        times = [
-            by_name[name]["microseconds_per_action"]
-            for by_name in summary["tasks"].values()
-            if name in by_name and by_name[name]["microseconds_per_action"] is not None  # best known
-        ]
-        failed = entry["failed"]
+        name, score, failed = entry["name"], entry["score"], entry["failed"]
+        taken = (by[name]["microseconds_per_action"] for by in summary["tasks"].values() if name in by)
+        times = [time for time in taken if time is not None]  # as that of the best known
         table.add_row(
-            name, number(entry["score"]["value"], 3), between(entry["score"], 3),
+            name, number(score["value"], 3), between((score["low"], score["high"]), 3),
             number(entry["relative_cost"], 3), str(entry["tasks"]), str(summary["contestants"][name]["runs"]),
             str(entry["lost"]), Text(str(failed), "bold red") if failed else "0",
             number(sum(times) / len(times) if times else None, 2),
@@ -48,11 +44,11 @@ def costs_table(result: BenchmarkResult) -> Table:
     for task, by_name in result.summary["tasks"].items():
         ordered = sorted(by_name.items(), key=lambda item: item[1]["cost"]["value"])
         for k, (name, found) in enumerate(ordered):
-            success = found["metrics"].get("success", {}).get("mean")
+            success, cost = found["metrics"].get("success", {}).get("mean"), found["cost"]
             table.add_row(
-                task if k == 0 else "", name, number(found["cost"]["value"], 2), between(found["cost"], 2),
-                number(found["score"]["value"], 2), str(found["lost"] + found["failed"]),
-                "-" if success is None else f"{100.0 * success:.0f} %",
+                task if k == 0 else "", name, number(cost["value"], 2),
+                between((cost["low"], cost["high"]), 2), number(found["score"]["value"], 2),
+                str(found["lost"] + found["failed"]), "-" if success is None else f"{100.0 * success:.0f} %",
             )  # fmt: skip
     return table
 
@@ -60,19 +56,11 @@ def costs_table(result: BenchmarkResult) -> Table:
 def verification_table(checks: Sequence[Check]) -> Table:
     """What was run again."""
     table = plain_table("Run again", "contestant", "task", ">episodes", ">difference")
-    for heading in ("verdict", "note"):
-        table.add_column(heading, overflow="fold")
+    table.add_column("verdict", overflow="fold")
+    table.add_column("note", overflow="fold")
     for check in checks:
-        verdict = Text("the same" if check.exact else "close", "green")
-        verdict = verdict if check.passed else Text("differs", "red")
+        same = "the same" if check.exact else "close"
+        verdict = Text(same, "green") if check.passed else Text("differs", "red")
         difference = "none" if check.exact else f"{check.difference:.1e}"
-        row = check.contestant, check.task, str(check.episodes), difference, verdict, check.note
-        table.add_row(*row)
+        table.add_row(check.contestant, check.task, str(check.episodes), difference, verdict, check.note)
     return table
-
-
-def between(interval: Mapping[str, Any], decimals: int) -> str:
-    """An interval, a dash where there is none."""
-    if interval["low"] is None or interval["high"] is None:
-        return "-"
-    return f"{interval['low']:.{decimals}f} to {interval['high']:.{decimals}f}"

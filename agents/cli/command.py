@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
+from typer import Argument, Option
 from typer.core import TyperCommand, TyperGroup
 
 from agents.cli.parameters import take_parameters, typed_parameters
@@ -18,28 +19,15 @@ FAILED, WRONG_INPUT, INTERRUPTED = 1, 2, 130
 OUTPUT_GONE = (EPIPE, ENOSPC, EBADF)
 LONGEST_NAME = 200  # characters of a path that are told
 
-ShipFileArgument = Annotated[Path, typer.Argument(metavar="SHIP.TOML", help="The ship file with its trials.")]
-Algorithm = Annotated[str, typer.Argument(metavar="ALGORITHM", help="ppo, sac, td3 or tqc.")]
-Environment = Annotated[
-    str | None, typer.Option(help="course-keeping (default), path-following-v1, or an environment id.")
-]
-Model = Annotated[
-    str | None, typer.Option(help="A model file, or the name of a shipped model; default: mariner.")
-]
-Sea = Annotated[str | None, typer.Option(help="calm (default), slight, moderate or rough.")]
-TaskName = Annotated[str | None, typer.Option(help="A benchmark task, instead of --env, --model and --sea.")]
-EnvironmentOptions = Annotated[
-    list[str] | None,
-    typer.Option("--option", metavar="NAME=VALUE", help="Any other argument of the environment; repeatable."),
-]
-EngineName = Annotated[str, typer.Option("--engine", help="Where jobs run: local (this computer) or ray.")]
-Workers = Annotated[int, typer.Option(min=1, help="Jobs at a time; the results do not depend on it.")]
+ShipFileArgument = Annotated[Path, Argument(metavar="SHIP.TOML", help="The ship file with its trials.")]
+EngineName = Annotated[str, Option("--engine", help="Where jobs run: local (this computer) or ray.")]
+Workers = Annotated[int, Option(min=1, help="Jobs at a time; the results do not depend on it.")]
 Address = Annotated[
-    str | None, typer.Option(metavar="HOST:PORT", help="Ray cluster; default: start Ray on this computer.")
+    str | None, Option(metavar="HOST:PORT", help="Ray cluster; default: start Ray on this computer.")
 ]
-IdentifyOptions = Annotated[dict[str, Any], typer.Option(parser=dict, hidden=True)]  # see IdentifyCommand
-Json = Annotated[bool, typer.Option("--json", help="Print JSON for programs instead of tables.")]
-Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print only errors, and the result with --json.")]
+IdentifyOptions = Annotated[dict[str, Any], Option(parser=dict, hidden=True)]  # see IdentifyCommand
+Json = Annotated[bool, Option("--json", help="Print JSON for programs instead of tables.")]
+Quiet = Annotated[bool, Option("--quiet", "-q", help="Print only errors, and the result with --json.")]
 SHARED = {"as_json": Json, "quiet": Quiet}  # options of every command
 
 

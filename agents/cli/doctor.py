@@ -52,7 +52,7 @@ def examine_installation() -> list[Finding]:
             for extra, names in needed.items()
             if extra not in OTHERS
         ),
-        cache_finding(),
+        Finding("cache", *_cache()),
         *left_findings(),
         *(name_finding(name) for name in OURS),
     ]
@@ -83,8 +83,8 @@ def _installed(what: str, names: list[str], otherwise: str, remedy: str) -> Find
     return Finding(what, "fine", ", ".join(versions))
 
 
-def cache_finding() -> Finding:
-    """Where compiled ships are kept, how much and whether it can be used, so that a second start is fast."""
+def _cache() -> tuple[str, str]:
+    """Whether compiled ships can be kept, so that a second start is fast, where they are, and how much."""
     folder, kept = cache_folder(), ""
     try:
         folder = open_folder()
@@ -92,21 +92,17 @@ def cache_finding() -> Finding:
         kept = f"{folder}, {len(files)} files, {sum(path.stat().st_size for path in files) / 1e6:.1f} MB"
         if wrong := [f"{path.name} {why}" for path in files if (why := loop_fault(path))]:
             told = f"{kept}, {len(wrong)} of them not usable: {wrong[0]}; delete what is not, or wait until"
-            return Finding("cache", "wrong", f"{told} it is compiled again")
+            return "wrong", f"{told} it is compiled again"
         with tempfile.NamedTemporaryFile(dir=folder):
             pass
     except ValueError as error:
-        return Finding("cache", "wrong", str(error))
+        return "wrong", str(error)
     except OSError as error:
         if folder.is_dir() and os.access(folder, os.R_OK | os.X_OK) and any(folder.iterdir()):
-            return Finding("cache", "fine", f"{kept}, to be read only: what is missing is compiled in memory")
-        return Finding(
-            "cache",
-            "wrong",
-            f"{folder} cannot be written ({error.strerror}): every process compiles its ships again; set "
-            f"{CACHE_VARIABLE} to a folder that can be",
-        )
-    return Finding("cache", "fine", kept)
+            return "fine", f"{kept}, to be read only: what is missing is compiled in memory"
+        told = f"{folder} cannot be written ({error.strerror}): every process compiles its ships again"
+        return "wrong", f"{told}; set {CACHE_VARIABLE} to a folder that can be"
+    return "fine", kept
 
 
 def left_findings() -> list[Finding]:
@@ -122,19 +118,14 @@ def left_findings() -> list[Finding]:
 
 def name_finding(name: str) -> Finding:
     """Whether an import name is this project's alone; `agents` is also that of other distributions."""
-    owners = set(importlib.metadata.packages_distributions().get(name, ()))
-    others = sorted(owners - {"shipgym"})
+    what = f"import {name}"
+    others = sorted({*importlib.metadata.packages_distributions().get(name, ())} - {"shipgym"})
     if others:
-        return Finding(
-            f"import {name}",
-            "wrong",
-            f"also a package of {', '.join(others)}, they overwrite each other: use an environment without",
-        )
+        told = f"also a package of {', '.join(others)}, they overwrite each other"
+        return Finding(what, "wrong", f"{told}: use an environment without")
     found = importlib.util.find_spec(name)
     folder = None if found is None or found.origin is None else Path(found.origin).resolve().parent
     home = Path(shipgym.__file__).resolve().parents[1]
     if folder is None or folder.parent != home:
-        return Finding(
-            f"import {name}", "wrong", f"leads to {folder}, expected {home / name}: install shipgym again"
-        )
-    return Finding(f"import {name}", "fine", os.fspath(folder))
+        return Finding(what, "wrong", f"leads to {folder}, expected {home / name}: install shipgym again")
+    return Finding(what, "fine", os.fspath(folder))

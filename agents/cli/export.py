@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import typer
+from typer import Argument, Option
 
 from agents.cli.command import answered
 
@@ -16,24 +16,17 @@ if TYPE_CHECKING:
 @answered
 def export_command(
     what: Annotated[
-        str,
-        typer.Argument(
-            metavar="AGENT|MODEL", help="File of a controller, policy or model, or a shipped name."
-        ),
+        str, Argument(metavar="AGENT|MODEL", help="File of a controller, policy or model, or a shipped name.")
     ],
     onnx: Annotated[
-        Path | None, typer.Option(metavar="OUT.ONNX", help="Write a learned policy as an ONNX graph.")
+        Path | None, Option(metavar="OUT.ONNX", help="Write a learned policy as an ONNX graph.")
     ] = None,
-    c: Annotated[
-        Path | None, typer.Option("--c", metavar="FOLDER", help="Write C99: NAME.h, NAME.c.")
-    ] = None,
-    fmu: Annotated[
-        Path | None, typer.Option(metavar="OUT.FMU", help="Write an FMU for co-simulation.")
-    ] = None,
-    fmi: Annotated[str, typer.Option(help="Version of the FMU: 3.0 or 2.0.")] = "3.0",
-    name: Annotated[str | None, typer.Option(help="Name in C and FMU; default: the file's name.")] = None,
+    c: Annotated[Path | None, Option("--c", metavar="FOLDER", help="Write C99: NAME.h, NAME.c.")] = None,
+    fmu: Annotated[Path | None, Option(metavar="OUT.FMU", help="Write an FMU for co-simulation.")] = None,
+    fmi: Annotated[str, Option(help="Version of the FMU: 3.0 or 2.0.")] = "3.0",
+    name: Annotated[str | None, Option(help="Name in C and FMU; default: the file's name.")] = None,
     depth: Annotated[
-        float, typer.Option(metavar="M", help="For a model: depth of water, m; default: deep.")
+        float, Option(metavar="M", help="For a model: depth of water, m; default: deep.")
     ] = float("inf"),
 ) -> None:
     """Write an autopilot or a ship model as C99 or FMU. Learned policies also as ONNX."""
@@ -63,8 +56,7 @@ def export_command(
         export_onnx(load_agent(what), onnx)
     written = [str(path) for path in (onnx, c, fmu) if path]
     answer({"written": written})
-    for path in written:
-        say(f"written: {path}")
+    say(*(f"written: {path}" for path in written))
 
 
 def _source(what: str, name: str | None, depth: float) -> Source:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-import typer
+from typer import Option
 
 from agents.cli.command import FAILED, IdentifyOptions, ShipFileArgument, answered, fail
 
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from identification import IdentificationResult
     from shipgym.trials.ship_file import ShipFile
 
-Out = Annotated[Path, typer.Option(metavar="FOLDER", help="Folder for the results.")]
+Out = Annotated[Path, Option(metavar="FOLDER", help="Folder for the results.")]
 
 
 @answered
@@ -23,13 +23,13 @@ def identify_command(
     *,
     options: IdentifyOptions,
     compare: Annotated[
-        bool, typer.Option("--compare", help="Fit structures and methods and rank them on held-out trials.")
+        bool, Option("--compare", help="Fit structures and methods and rank them on held-out trials.")
     ] = False,
     methods: Annotated[
-        str | None, typer.Option(metavar="NAMES", help="Methods to compare, separated by commas, or all.")
+        str | None, Option(metavar="NAMES", help="Methods to compare, separated by commas, or all.")
     ] = None,
     structures: Annotated[
-        str | None, typer.Option(metavar="NAMES", help="Structures to compare, separated by commas, or auto.")
+        str | None, Option(metavar="NAMES", help="Structures to compare, separated by commas, or auto.")
     ] = None,
 ) -> None:
     """Identify a manoeuvring model from recorded trials. Writes model, metrics, settings and report.
@@ -85,8 +85,7 @@ def _check_stable(result: IdentificationResult) -> None:
     from agents.cli.terminal import warn
     from identification.validation.warnings import model_warnings, why_unstable
 
-    instability = why_unstable(result)
-    if instability is not None:
+    if (instability := why_unstable(result)) is not None:
         fail(f"the identified model is unstable: {instability}; it must not be used", FAILED)
     notes = [f"{trial.name}: {note}" for trial in result.trials for note in trial.notes]
     for warning in [*notes, *model_warnings(result)]:
@@ -121,12 +120,12 @@ def _compare(
 def advise_command(
     ship: ShipFileArgument,
     criterion: Annotated[
-        str, typer.Option(help="What to reduce: c (one coefficient), D (volume) or E (longest axis).")
+        str, Option(help="What to reduce: c (one coefficient), D (volume) or E (longest axis).")
     ] = "c",
     coefficient: Annotated[
-        str | None, typer.Option(help="Coefficient for criterion c; default: the least certain.")
+        str | None, Option(help="Coefficient for criterion c; default: the least certain.")
     ] = None,
-    number: Annotated[int, typer.Option(min=1, help="Number of manoeuvres.")] = 3,
+    number: Annotated[int, Option(min=1, help="Number of manoeuvres.")] = 3,
     *,
     options: IdentifyOptions,
 ) -> None:
@@ -154,10 +153,10 @@ def reduce_command(
     ship: ShipFileArgument,
     out: Out,
     direction: Annotated[
-        str, typer.Option(help="backward (drop terms one by one) or forward (add them).")
+        str, Option(help="backward (drop terms one by one) or forward (add them).")
     ] = "backward",
     tolerance: Annotated[
-        float, typer.Option(min=0.0, help="By how much R2 on held-out stretches may fall.")
+        float, Option(min=0.0, help="By how much R2 on held-out stretches may fall.")
     ] = 1e-3,
     *,
     options: IdentifyOptions,

@@ -2,10 +2,10 @@
 
 import functools
 import inspect
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from typing import Annotated, Any
 
-import typer
+from typer import Option
 
 from agents.cli.parameters import take_parameters, typed_parameters
 from shipgym.files import named_values
@@ -19,12 +19,16 @@ SET_HELP = "Any option of the table [identify]; repeatable."
 
 
 def takes_identify_options(command: Callable[..., None]) -> Callable[..., None]:
-    """Give a command the options of `identify`, those given as the one mapping `options` that it takes."""
+    """Give a command the options of `identify`, those given as the one mapping `options` that it takes.
+
+    Those with a name of their own go before those of `--set`.
+    """
 
     @functools.wraps(command)
     def wrapped(**arguments: Any) -> None:
-        named = {name: arguments.pop(name) for name in COMMON}
-        command(options=given_options(named, arguments.pop(SET) or ()), **arguments)
+        named = {name: value for name in COMMON if (value := arguments.pop(name)) not in (None, [])}
+        others = parsed_options(arguments.pop(SET) or ())
+        command(options=others | check_options(named, "options"), **arguments)
 
     parameters: dict[str, inspect.Parameter] = {}
     for name, one in typed_parameters(command).items():
@@ -34,22 +38,14 @@ def takes_identify_options(command: Callable[..., None]) -> Callable[..., None]:
 
 def _parameters() -> list[inspect.Parameter]:
     """A parameter for each common option, and one for all others."""
-    of_options = [
-        (name, TYPES.get(OPTIONS[name].kind, str), typer.Option(*_flags(name), help=_help(name)))
-        for name in COMMON
-    ]
-    of_others = (SET, list[str], typer.Option("--set", metavar="OPTION=VALUE", help=SET_HELP))
-    return [
-        inspect.Parameter(
-            name, inspect.Parameter.KEYWORD_ONLY, default=None, annotation=Annotated[kind | None, option]
-        )
-        for name, kind, option in (*of_options, of_others)
-    ]
-
-
-def _flags(name: str) -> tuple[str, ...]:
-    flag = f"--{name.replace('_', '-')}"
-    return (f"{flag}/--no-{name}",) if OPTIONS[name].kind == FLAG else (flag,)
+    kinds: dict[str, Any] = {}
+    for name in COMMON:
+        kind, flag = OPTIONS[name].kind, f"--{name.replace('_', '-')}"
+        flag += f"/--no-{name}" if kind == FLAG else ""
+        kinds[name] = Annotated[TYPES.get(kind, str) | None, Option(flag, help=_help(name))]
+    kinds[SET] = Annotated[list[str] | None, Option("--set", metavar="OPTION=VALUE", help=SET_HELP)]
+    keyword = inspect.Parameter.KEYWORD_ONLY
+    return [inspect.Parameter(name, keyword, default=None, annotation=kind) for name, kind in kinds.items()]
 
 
 def _help(name: str) -> str:
@@ -65,12 +61,6 @@ def _help(name: str) -> str:
     if isinstance(default, str):
         text += f"; default: the ship file's, else {default}"
     return f"{text}; may be repeated." if option.kind == TEXTS else f"{text}."
-
-
-def given_options(named: Mapping[str, Any], texts: Sequence[str]) -> dict[str, Any]:
-    """Options of the command line: those with a name of their own, which go first, and those of `--set`."""
-    given = {name: value for name, value in named.items() if value not in (None, [])}
-    return parsed_options(texts) | check_options(given, "options")
 
 
 def parsed_options(texts: Sequence[str]) -> dict[str, Any]:

@@ -6,7 +6,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Annotated
 
-import typer
+from typer import Argument, Option
 
 from agents.cli.command import answered
 
@@ -16,11 +16,11 @@ HISTORIES = ("psi", "r", "delta", "u", "v", "n", "phi", "wind_speed")
 @answered
 def new_ship_command(
     logs: Annotated[
-        list[Path], typer.Argument(metavar="LOG...", help="Logs: CSV, NMEA 0183, Excel, Parquet or MATLAB.")
+        list[Path], Argument(metavar="LOG...", help="Logs: CSV, NMEA 0183, Excel, Parquet or MATLAB.")
     ],
-    out: Annotated[Path, typer.Option(metavar="FILE", help="The ship file to write.")] = Path("ship.toml"),
+    out: Annotated[Path, Option(metavar="FILE", help="The ship file to write.")] = Path("ship.toml"),
     length: Annotated[
-        float | None, typer.Option(min=0.01, help="Length between perpendiculars, m; or fill it in later.")
+        float | None, Option(min=0.01, help="Length between perpendiculars, m; or fill it in later.")
     ] = None,
 ) -> None:
     """Write a ship file for recorded trials. Guesses columns, units and signs, and reports the guesses."""
@@ -62,8 +62,8 @@ def new_ship_command(
 
 @answered
 def look_command(
-    log: Annotated[Path, typer.Argument(metavar="LOG|SHIP.TOML", help="A log, or a ship file with trials.")],
-    out: Annotated[Path, typer.Option(metavar="FILE", help="The page to write.")] = Path("look.html"),
+    log: Annotated[Path, Argument(metavar="LOG|SHIP.TOML", help="A log, or a ship file with trials.")],
+    out: Annotated[Path, Option(metavar="FILE", help="The page to write.")] = Path("look.html"),
 ) -> None:
     """Draw the trials of a ship file, or a log. Shows track, channels, repairs and problems found."""
     from agents.cli.terminal import answer, say, warn

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
+from typer import Argument, Option
 
 from agents.cli.command import WRONG_INPUT, Json, answered, fail
 
@@ -16,14 +17,12 @@ SCRIPT = Path(__file__).resolve().parents[2] / "scripts" / "reproduce.py"
 def reproduce_command(
     paper: Annotated[
         str,
-        typer.Argument(
+        Argument(
             metavar="PAPER",
             help="cao2015, xu2020, zhu2018, mei2019, song2020, comparators, requirements or all.",
         ),
     ],
-    markdown: Annotated[
-        Path | None, typer.Option(metavar="PAGE.MD", help="Write the tables to this file.")
-    ] = None,
+    markdown: Annotated[Path | None, Option(metavar="PAGE.MD", help="Write the tables to this file.")] = None,
     as_json: Json = False,
 ) -> None:
     """Reproduce the papers' tables.
@@ -34,11 +33,8 @@ def reproduce_command(
     from agents.cli.terminal import out
 
     if not SCRIPT.is_file():
-        fail(
-            "the papers' tables are not part of the installed package: in a checkout of the project run "
-            f"python scripts/reproduce.py {paper}",
-            WRONG_INPUT,
-        )
+        told = "the papers' tables are not part of the installed package: in a checkout of the project run"
+        fail(f"{told} python scripts/reproduce.py {paper}", WRONG_INPUT)
     options = [*(["--markdown", str(markdown)] if markdown else []), *(["--json"] if as_json else [])]
     command = [sys.executable, str(SCRIPT), paper, *options]
     printed = subprocess.DEVNULL if out.quiet and not as_json else None

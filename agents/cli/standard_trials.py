@@ -49,12 +49,9 @@ class StandardTrials:
 
 
 def standard_trials(
-    model: ShipModel,
-    draws: int = 0,
-    seed: int = 0,
-    progress: Callable[[int], None] | None = None,
+    model: ShipModel, draws: int = 0, seed: int = 0, progress: Callable[[int], None] | None = None,
     water_depth: float = np.inf,
-) -> StandardTrials:
+) -> StandardTrials:  # fmt: skip
     """Sail every standard manoeuvre that suits the ship, with the model and with models drawn from it.
 
     `model`: the ship; `draws`: models drawn from its covariance; a ship without one has none; `seed`: of the

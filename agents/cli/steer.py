@@ -4,41 +4,40 @@ from math import inf, radians
 from pathlib import Path
 from typing import Annotated
 
-import typer
+from typer import Argument, Option
 
 from agents.cli.command import FAILED, answered, fail
 
 Address = Annotated[
-    str, typer.Option("--nmea", help="tcp:HOST:PORT, udp:HOST:PORT, serial:DEVICE or serial:DEVICE@BAUD.")
+    str, Option("--nmea", help="tcp:HOST:PORT, udp:HOST:PORT, serial:DEVICE or serial:DEVICE@BAUD.")
 ]
-Duration = Annotated[float, typer.Option(min=0.0, help="Seconds after which to stop; default: never.")]
-SpeedUp = Annotated[float, typer.Option(min=0.01, help="Times faster than real time; same at both ends.")]
+Duration = Annotated[float, Option(min=0.0, help="Seconds after which to stop; default: never.")]
+SpeedUp = Annotated[float, Option(min=0.01, help="Times faster than real time; same at both ends.")]
 
 
 @answered
 def steer_command(
     agent: Annotated[
-        str, typer.Argument(metavar="AGENT", help="A controller's file, or the name of a pretrained agent.")
+        str, Argument(metavar="AGENT", help="A controller's file, or the name of a pretrained agent.")
     ],
     nmea: Address,
     heading: Annotated[
-        float | None, typer.Option(metavar="DEG", help="Heading to steer; default: the plotter's (APB).")
+        float | None, Option(metavar="DEG", help="Heading to steer; default: the plotter's (APB).")
     ] = None,
     rate: Annotated[
         float | None,
-        typer.Option(
+        Option(
             "--rate-of-turn",
             metavar="DEG",
             help="Degrees per minute, for turn-rate; with --heading the limit.",
         ),
     ] = None,
     route: Annotated[
-        Path | None,
-        typer.Option(metavar="CSV", help="Route for wheel-over: columns latitude, longitude, degrees."),
+        Path | None, Option(metavar="CSV", help="Route for wheel-over: columns latitude, longitude, degrees.")
     ] = None,
     limit: Annotated[
         list[str] | None,
-        typer.Option(metavar="NAME=VALUE", help="When to hand over: silence_s=3, rudder_deg=5; repeatable."),
+        Option(metavar="NAME=VALUE", help="When to hand over: silence_s=3, rudder_deg=5; repeatable."),
     ] = None,
     duration: Duration = inf,
     speed_up: SpeedUp = 1.0,
@@ -64,13 +63,11 @@ def steer_command(
     pilot = load_agent(agent)
     radius = getattr(pilot, "gains", {}).get("path_radius", 0.0)
     track = None if route is None else Route.from_csv(route, radius)
-    found = asyncio.run(
-        steer(
-            pilot, nmea, heading=course, limits=Limits(**limits), duration=duration, speed_up=speed_up,
-            told=lambda line: say(line), route=track,
-            rate=None if rate is None else radians(rate) / 60.0,
-        )
+    steering = steer(
+        pilot, nmea, heading=course, limits=Limits(**limits), duration=duration, speed_up=speed_up, told=say,
+        route=track, rate=None if rate is None else radians(rate) / 60.0,
     )  # fmt: skip
+    found = asyncio.run(steering)
     answer({"state": found.state, "alarm": found.alarm, **found.counts})
     if found.alarm:
         fail(f"handed over: {found.alarm}", FAILED)
@@ -78,16 +75,14 @@ def steer_command(
 
 @answered
 def simulate_command(
-    model: Annotated[
-        str, typer.Argument(metavar="MODEL", help="A model file, or the name of a shipped model.")
-    ],
+    model: Annotated[str, Argument(metavar="MODEL", help="A model file, or the name of a shipped model.")],
     nmea: Address,
-    leg: Annotated[float, typer.Option(metavar="DEG", help="Leg that her plotter sends.")] = 0.0,
-    sea: Annotated[str, typer.Option(help="calm, slight, moderate or rough.")] = "calm",
-    seed: Annotated[int, typer.Option(min=0, help="Seed of the sea.")] = 0,
+    leg: Annotated[float, Option(metavar="DEG", help="Leg that her plotter sends.")] = 0.0,
+    sea: Annotated[str, Option(help="calm, slight, moderate or rough.")] = "calm",
+    seed: Annotated[int, Option(min=0, help="Seed of the sea.")] = 0,
     drop: Annotated[
         list[str] | None,
-        typer.Option(
+        Option(
             metavar="HDT=60",
             help="Sentence that falls silent after this many seconds (HDT=60: HDT after 60 s); repeatable.",
         ),

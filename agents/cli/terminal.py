@@ -11,7 +11,7 @@ from pathlib import PurePath
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from rich.console import Console, ConsoleOptions, ConsoleRenderable, RenderHook
+from rich.console import Console
 from rich.segment import Segment
 from rich.table import Table
 from rich.text import Text
@@ -31,32 +31,21 @@ CONTROLS = dict.fromkeys(
 )
 
 
-class _WithoutControls:
-    """What is printed, without control characters: names come from files and must not steer a terminal."""
+class _Plain(Console):
+    """A console to which brackets, colons and control characters mean nothing: names come from files."""
 
-    def __init__(self, printed: ConsoleRenderable) -> None:
-        self.printed = printed
+    def __init__(self, **settings: Any) -> None:
+        super().__init__(highlight=False, markup=False, emoji=False, **settings)
 
-    def __rich_console__(self, console: Console, options: ConsoleOptions) -> Iterable[Segment]:
-        for segment in console.render(self.printed, options):
+    def render(self, *what: Any, **more: Any) -> Iterable[Segment]:
+        """What is printed, without the control characters of its texts, which must not steer a terminal."""
+        for segment in super().render(*what, **more):
             yield segment if segment.control else segment._replace(text=segment.text.translate(CONTROLS))
 
 
-class _Stripping(RenderHook):
-    def process_renderables(self, renderables: list[ConsoleRenderable]) -> list[ConsoleRenderable]:
-        return [_WithoutControls(one) for one in renderables]
-
-
-def _console(**settings: Any) -> Console:
-    """A console to which brackets, colons and control characters in names mean nothing."""
-    console = Console(highlight=False, markup=False, emoji=False, **settings)
-    console.push_render_hook(_Stripping())
-    return console
-
-
 AS_JSON: ContextVar[bool] = ContextVar("as_json", default=False)
-out = _console(width=None if sys.stdout.isatty() else WIDTH_WITHOUT_TERMINAL)
-console, err = out, _console(stderr=True)
+out = _Plain(width=None if sys.stdout.isatty() else WIDTH_WITHOUT_TERMINAL)
+console, err = out, _Plain(stderr=True)
 
 
 def plain_table(title: str, *headings: str) -> Table:
@@ -90,7 +79,7 @@ def answer(fields: Mapping[str, Any]) -> None:
 
 
 def print_json(fields: Mapping[str, Any]) -> None:
-    """One JSON object and nothing else, for programs to read."""
+    """One JSON object, for programs to read."""
     print(json.dumps(fields, indent=1, allow_nan=False))
 
 
@@ -164,9 +153,8 @@ def training_bar() -> Iterator[Callable[[Training], None] | None]:
 
         def line(now: Training) -> None:
             if now.evaluated:
-                err.print(
-                    f"step {now.steps:,} of {now.total:,}, {now.seconds:.0f} s: {_costs(now)}", soft_wrap=True
-                )
+                told = f"step {now.steps:,} of {now.total:,}, {now.seconds:.0f} s: {_costs(now)}"
+                err.print(told, soft_wrap=True)
 
         yield line
         return
@@ -221,12 +209,8 @@ def selection_table(ranking: Mapping[str, Any]) -> Table:
 
 
 def _indices(metrics: Mapping[str, Any]) -> str:
-    names = {
-        "overshoot_1_deg": "1st",
-        "overshoot_2_deg": "2nd",
-        "advance_lengths": "advance",
-        "tactical_diameter_lengths": "diameter",
-    }
+    names = {"overshoot_1_deg": "1st", "overshoot_2_deg": "2nd"}
+    names |= {"advance_lengths": "advance", "tactical_diameter_lengths": "diameter"}
     return "\n".join(
         f"{text} {number(found['measured'], 2)} -> {number(found['predicted'], 2)}"
         + (f" ({number(found['closed_loop'], 2)})" if "closed_loop" in found else "")
@@ -244,7 +228,7 @@ def manoeuvre_table(rows: Mapping[str, Mapping[str, IndexInterval]], water: str 
         for k, (name, index) in enumerate(indices.items()):
             cells = [manoeuvre if k == 0 else "", name, number(index.value, 2)]
             if drawn:
-                cells += [_interval(index.interval), str(index.n_ran_away + index.n_never_reached)]
+                cells += [between(index.interval, 2), str(index.n_ran_away + index.n_never_reached)]
             table.add_row(*cells)
     return table
 
@@ -257,13 +241,12 @@ def criteria_table(criteria: Mapping[str, Criterion]) -> Table:
         "criterion": True, ">measured": measured, ">value": True, ">95 % interval": drawn, ">limit": True,
         "unit": True, "verdict": True, ">probability": drawn, "manoeuvre": True, "paragraph": True,
     }  # fmt: skip
-    table = plain_table(
-        "IMO criteria, resolution MSC.137(76)", *(one for one, shown in headings.items() if shown)
-    )
+    there = [heading for heading, shown in headings.items() if shown]
+    table = plain_table("IMO criteria, resolution MSC.137(76)", *there)
     for name, criterion in criteria.items():
         probability = criterion.probability
         cells = [
-            name, number(criterion.measured, 2), number(criterion.value, 2), _interval(criterion.interval),
+            name, number(criterion.measured, 2), number(criterion.value, 2), between(criterion.interval, 2),
             number(criterion.limit, 2), criterion.unit, _verdict(criterion),
             "-" if probability is None else f"{100.0 * probability:.1f} %",
             criterion.manoeuvre, criterion.source.rpartition(" ")[2],
@@ -276,19 +259,13 @@ def criteria_notes(criteria: Mapping[str, Criterion]) -> list[str]:
     """What is to be said of criteria below their table: why one is not decided, and draws without a value."""
     notes = [f"{name}: {one.note}" for name, one in criteria.items() if one.note]
     lost = {name: "" if one.drawn is None else one.drawn.lost_in_words for name, one in criteria.items()}
-    return notes + [
-        f"{name}: {words}, which are not in its interval" for name, words in lost.items() if words
-    ]
+    return notes + [f"{name}: {who}, which are not in its interval" for name, who in lost.items() if who]
 
 
 def _verdict(criterion: Criterion) -> str | Text:
     if criterion.passed is None:
         return Text("not decided", "yellow") if criterion.manoeuvre else "not assessable"
     return Text("passes", "green") if criterion.passed else Text("fails", "red")
-
-
-def _interval(interval: tuple[float, float] | None) -> str:
-    return "-" if interval is None else f"{interval[0]:.2f} to {interval[1]:.2f}"
 
 
 def ranking_table(result: AutopilotResult) -> Table:
@@ -302,13 +279,12 @@ def ranking_table(result: AutopilotResult) -> Table:
     for name in metrics["ranking"]:
         found = metrics["controllers"][name]
         margins = found["margins"] or {}
-        columns = {
-            "cost_mean": 2, "cost_quantile_95": 2, "heading_rmse_deg_mean": 2,
-            "rudder_travel_deg_min_mean": 1,
-        }  # fmt: skip
-        figures = [number(found[one], decimals) for one, decimals in columns.items()]
-        both = [_margin(margins, "gain_margin", 2), _margin(margins, "phase_margin_deg", 1)]
-        table.add_row(name.upper(), *figures, *both, str(found["lost_control"]))
+        table.add_row(
+            name.upper(), number(found["cost_mean"], 2), number(found["cost_quantile_95"], 2),
+            number(found["heading_rmse_deg_mean"], 2), number(found["rudder_travel_deg_min_mean"], 1),
+            _margin(margins, "gain_margin", 2), _margin(margins, "phase_margin_deg", 1),
+            str(found["lost_control"]),
+        )  # fmt: skip
     return table
 
 
@@ -322,3 +298,9 @@ def _margin(margins: Mapping[str, Any], name: str, decimals: int) -> str:
 def number(value: float | None, decimals: int) -> str:
     """A number, a dash where there is none."""
     return "-" if value is None else f"{value:.{decimals}f}"
+
+
+def between(ends: tuple[float | None, float | None] | None, decimals: int) -> str:
+    """An interval, a dash where there is none."""
+    low, high = ends or (None, None)
+    return "-" if low is None or high is None else f"{low:.{decimals}f} to {high:.{decimals}f}"

@@ -1,67 +1,70 @@
-"""The command that trains: `train`."""
+"""The commands that train and tune: `train` and `tune`."""
 
 from __future__ import annotations
 
 import shlex
 import sys
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-import typer
+from typer import Argument, Option
 
-from agents.cli.command import (
-    INTERRUPTED,
-    Algorithm,
-    Environment,
-    EnvironmentOptions,
-    Model,
-    Sea,
-    TaskName,
-    answered,
-    fail,
-)
+from agents.cli.command import INTERRUPTED, Address, EngineName, Workers, answered, fail
 
 if TYPE_CHECKING:
     from agents.training.plan import Given
     from agents.training.training import TrainingResult
+    from agents.training.tuning import Tuning
+
+Algorithm = Annotated[str, Argument(metavar="ALGORITHM", help="ppo, sac, td3 or tqc.")]
+Environment = Annotated[
+    str | None, Option(help="course-keeping (default), path-following-v1, or an environment id.")
+]
+Model = Annotated[str | None, Option(help="A model file, or the name of a shipped model; default: mariner.")]
+Sea = Annotated[str | None, Option(help="calm (default), slight, moderate or rough.")]
+TaskName = Annotated[str | None, Option(help="A benchmark task, instead of --env, --model and --sea.")]
+EnvironmentOptions = Annotated[
+    list[str] | None,
+    Option("--option", metavar="NAME=VALUE", help="Any other argument of the environment; repeatable."),
+]
+Randomise = Annotated[
+    bool | None,
+    Option(
+        "--randomise", help="Domain randomisation: ships drawn from the covariance, all seas, all speeds."
+    ),
+]
 
 
 @answered
 def train_command(
     algorithm: Algorithm,
-    out: Annotated[Path, typer.Option(metavar="FOLDER", help="Folder of the run.")],
+    out: Annotated[Path, Option(metavar="FOLDER", help="Folder of the run.")],
     env: Environment = None,
     model: Model = None,
     sea: Sea = None,
     task: TaskName = None,
     environment_options: EnvironmentOptions = None,
     total_steps: Annotated[
-        int | None, typer.Option(min=1, help="Decisions to learn from; default: as in the settings.")
+        int | None, Option(min=1, help="Decisions to learn from; default: as in the settings.")
     ] = None,
     settings: Annotated[
-        Path | None, typer.Option(metavar="FILE.TOML", help="Settings that override the tuned ones.")
+        Path | None, Option(metavar="FILE.TOML", help="Settings that override the tuned ones.")
     ] = None,
     set_: Annotated[
         list[str] | None,
-        typer.Option("--set", metavar="SETTING=VALUE", help="Any setting of the algorithm; repeatable."),
+        Option("--set", metavar="SETTING=VALUE", help="Any setting of the algorithm; repeatable."),
     ] = None,
     from_nothing: Annotated[
-        bool, typer.Option("--from-nothing", help="Learn without a base: --set base=none.")
+        bool, Option("--from-nothing", help="Learn without a base: --set base=none.")
     ] = False,
-    seed: Annotated[int | None, typer.Option(min=0, max=799, help="Random seed; default: 0.")] = None,
-    randomise: Annotated[
-        bool | None,
-        typer.Option(
-            "--randomise", help="Domain randomisation: ships drawn from the covariance, all seas, all speeds."
-        ),
-    ] = None,
-    threads: Annotated[
-        int | None, typer.Option(min=1, help="Threads for torch and the ships; default: 1.")
-    ] = None,
+    seed: Annotated[int | None, Option(min=0, max=799, help="Random seed; default: 0.")] = None,
+    randomise: Randomise = None,
+    threads: Annotated[int | None, Option(min=1, help="Threads for torch and the ships; default: 1.")] = None,
     max_seconds: Annotated[
-        float | None, typer.Option(min=0.0, help="Stop after this time; --resume continues.")
+        float | None, Option(min=0.0, help="Stop after this time; --resume continues.")
     ] = None,
-    resume: Annotated[bool, typer.Option("--resume", help="Continue the run in the folder.")] = False,
+    resume: Annotated[bool, Option("--resume", help="Continue the run in the folder.")] = False,
 ) -> None:
     """Train an autopilot by reinforcement learning. Writes policy, learning curve and checkpoints.
 
@@ -77,8 +80,7 @@ def train_command(
         algorithm, env, model, sea, task, parsed_settings(environment_options or (), "--option"), settings,
         own, seed, randomise, threads,
     )  # fmt: skip
-    result = _train(given, out, resume, max_seconds)
-    _print_result(result, out)
+    _print_result(_train(given, out, resume, max_seconds), out)
 
 
 def _train(given: Given, out: Path, resume: bool, max_seconds: float | None) -> TrainingResult:
@@ -119,10 +121,82 @@ def _print_result(result: TrainingResult, out: Path) -> None:
     lq = "" if result.lq_cost is None else f"; LQ's: {result.lq_cost:.2f}"
     found = f"cost of a held-out episode: {result.best_cost:.2f}{lq}"
     say(f"{found} (step {result.best_steps:,} of {result.steps:,})")
-    reached = result.lq_reached
-    if reached is not None:
+    if (reached := result.lq_reached) is not None:
         console.print(f"LQ's cost reached at step {reached['steps']:,}, after {reached['seconds']:.0f} s")
     if not result.finished:
         total = result.plan.settings.total_steps
         say(f"stopped at step {result.steps:,} of {total:,}: continue with --resume --out {out}")
     say(f"written: {out / 'agent.json'}")
+
+
+@answered
+def tune_command(
+    algorithm: Algorithm,
+    out: Annotated[Path, Option(metavar="FOLDER", help="Folder of the study; resumed if it exists.")],
+    env: Environment = None,
+    model: Model = None,
+    sea: Sea = None,
+    task: TaskName = None,
+    environment_options: EnvironmentOptions = None,
+    trials: Annotated[int, Option(min=1, help="Trials in all, with those already done.")] = 20,
+    total_steps: Annotated[
+        int | None, Option(min=1, help="For each trial; default: as in the settings.")
+    ] = None,
+    settings: Annotated[
+        Path | None, Option(metavar="FILE.TOML", help="Settings to start from; they are varied too.")
+    ] = None,
+    set_: Annotated[
+        list[str] | None,
+        Option("--set", metavar="SETTING=VALUE", help="A setting that is not varied; repeatable."),
+    ] = None,
+    seed: Annotated[int, Option(min=0, max=799, help="Random seed of trainings and search.")] = 0,
+    randomise: Randomise = False,
+    engine: EngineName = "local",
+    workers: Workers = 1,
+    address: Address = None,
+) -> None:
+    """Search the settings with which an agent learns best. Uses Optuna; writes them for `train --settings`.
+
+    Four trials are proposed at a time, so more than four workers are of no use. If it is killed, the same
+    command continues with the trials that are not done.
+    """
+    from agents.cli.terminal import progress_bars
+    from agents.engines.jobs import JobEngine
+    from agents.training.plan import Given, make_plan
+    from agents.training.settings import parsed_settings
+    from agents.training.tuning import evaluated_evenly, tune
+
+    fixed = parsed_settings(set_ or ())
+    own = fixed | ({} if total_steps is None else {"total_steps": total_steps})
+    options = parsed_settings(environment_options or (), "--option")
+    where = JobEngine(engine, workers, address)
+    where.check()
+    given = Given(algorithm, env, model, sea, task, options, settings, own, seed, randomise, threads=1)
+    plan = make_plan(given)
+    if "evaluate_every" not in fixed:
+        plan = evaluated_evenly(plan)
+    with progress_bars() as bars:
+        tell = None if bars is None else (lambda done, total, _: bars("trials", done, total))
+        found = tune(plan, out, trials, fixed=tuple(fixed), where=where, progress=tell)
+    _print_tuning(found, out)
+
+
+def _print_tuning(found: Tuning, out: Path) -> None:
+    """Print trials and where the best settings are."""
+    from agents.cli.terminal import answer, console, plain_table, say
+    from agents.training.tuning import BEST
+
+    trials = [asdict(trial) for trial in found.trials]
+    answer({"trials": trials, "best": found.best.number, "settings": str(out / BEST)})
+    title = "Trials by the mean cost of a held-out episode, best first"
+    table = plain_table(title, ">trial", ">cost", "ended", "what was varied")
+    for trial in sorted(found.trials, key=lambda one: (one.cost is None, one.cost or 0.0)):
+        varied = ", ".join(f"{name} {_short(value)}" for name, value in trial.parameters.items())
+        cost = "-" if trial.cost is None else f"{trial.cost:.3f}"
+        table.add_row(str(trial.number), cost, trial.ended, varied or "nothing: as it was")
+    console.print(table)
+    say(f"\nwritten: {out / BEST}")
+
+
+def _short(value: object) -> str:
+    return f"{value:.3g}" if isinstance(value, float) else str(value)

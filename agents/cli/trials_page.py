@@ -62,14 +62,10 @@ def _figures(
     if name == "pull-outs" and trials:
         found = [(name, pull_out_figure(trials), family[next(iter(trials))].caption)]
     else:
-        found = [
-            (
-                f"{name}-{k}",
-                (family[key].figure or manoeuvre_figure)(run),
-                f"{key[0].upper()}{key[1:]}. {family[key].caption}",
-            )
-            for k, (key, run) in enumerate(sailed.items())
-        ]
+        found = []
+        for k, (key, run) in enumerate(sailed.items()):
+            caption = f"{key[0].upper()}{key[1:]}. {family[key].caption}"
+            found.append((f"{name}-{k}", (family[key].figure or manoeuvre_figure)(run), caption))
         if trials:
             found.append((f"{name}-paths", path_figure(trials), "Paths from above, north up, in metres."))
     histories = trials or {key: run.trial for key, run in sailed.items() if isinstance(run, Spiral)}

@@ -1,21 +1,19 @@
 """`shipgym warm`: compile beforehand what environments and models need, so that no run waits for it."""
 
 import time
+import warnings
 from collections.abc import Callable, Iterator
 from functools import partial
 from typing import Annotated, Any
 
-import typer
+from typer import Argument, Option
 
 from agents.cli.command import answered
 
 Wanted = Annotated[
-    list[str] | None,
-    typer.Argument(metavar="[ID|MODEL]...", help="Environment ids, names of models, model files."),
+    list[str] | None, Argument(metavar="[ID|MODEL]...", help="Environment ids, names of models, model files.")
 ]
-All = Annotated[
-    bool, typer.Option("--all", help="All environments, calm and in a sea, and all shipped models.")
-]
+All = Annotated[bool, Option("--all", help="All environments, calm and in a sea, and all shipped models.")]
 SEAS = (None, "rough")  # every sea but the calm one shares what is compiled
 
 
@@ -44,8 +42,7 @@ def warm_command(wanted: Wanted = None, everything: All = False) -> None:
             refused = str(error)  # not every ship has the particulars that a sea asks for
         seconds = time.perf_counter() - begin  # that compiling took; few if it was in the cache
         done.append({"what": what, "seconds": round(seconds, 2), "refused": refused})
-        told = refused or f"{seconds:.1f} s"
-        say(f"{number}/{len(jobs)}  {what}: {told}")
+        say(f"{number}/{len(jobs)}  {what}: {refused or f'{seconds:.1f} s'}")
     answer({"cache": str(folder), "ready": done})
     say(f"kept in {folder}")
 
@@ -82,8 +79,6 @@ def _jobs(name: str) -> Iterator[tuple[str, Callable[[], Any]]]:
 
 
 def _make(env_id: str, options: dict[str, Any]) -> None:
-    import warnings
-
     import gymnasium
 
     with warnings.catch_warnings():

@@ -44,11 +44,8 @@ def _reads(agent: Any) -> set[str]:
 @cache
 def bounds() -> dict[str, tuple[float, float]]:
     """Bounds of observations by name, in multiples of their scale."""
-    notes = [
-        note
-        for record in (Helm, Extras, path_following_v0.Observation, path_following.Observation)
-        for note in field_types(record, notes=True).items()
-    ]
+    records = Helm, Extras, path_following_v0.Observation, path_following.Observation
+    notes = [note for record in records for note in field_types(record, notes=True).items()]
     seen = [(name, one) for name, note in notes for one in getattr(note, "__metadata__", ())]
     return {name: (one.low, one.high) for name, one in seen if isinstance(one, Seen)}
 
@@ -84,9 +81,8 @@ class Autopilot:
             self.dt = float(agent.design["dt"])
         self.begins, self.integral, self.last_command = True, 0.0, 0.0
         self.guided = np.zeros((1, getattr(agent, "remembers", 0)))  # what guidance remembers
-        self.memory: Any = (
-            np.zeros((1, self.pilot.memory_size)) if isinstance(self.pilot, Controller) else None
-        )
+        size = self.pilot.memory_size if isinstance(self.pilot, Controller) else None
+        self.memory: Any = None if size is None else np.zeros((1, size))
 
     def step(self, given: Mapping[str, float]) -> float:
         """Ordered rudder, rad, at most `largest`, for the numbers named in `inputs`."""
@@ -121,8 +117,6 @@ class Autopilot:
             order, self.memory = pilot.steer(arrays, self.memory, np.array([self.begins]))
             return float(order[0])
         pairs = zip(pilot.observation_names, pilot.observation_scales, strict=True)
-        shown = np.array(
-            [np.clip(seen[name] / scale, *bounds()[name]) for name, scale in pairs], dtype=np.float32
-        )
-        action, self.memory = pilot.predict(shown, self.memory, self.begins)
+        shown = [np.clip(seen[name] / scale, *bounds()[name]) for name, scale in pairs]
+        action, self.memory = pilot.predict(np.array(shown, dtype=np.float32), self.memory, self.begins)
         return float(action[0]) * self.limit

@@ -89,9 +89,8 @@ def ship_source(model: ShipModel, name: str | None = None, water_depth: float = 
         without |= {"wind_speed", "wind_from"}
         notes, column = (f"wind is left out: {error}",), np.array(flat(CALM))
     column[leaves(SeaParameters).index("wind_speed")] = 0.0  # it is given
-    c = Translator(
-        {**vessel.parts(), **sea_functions(True)}, name, {Motion: f"{name}_state", ShipInput: f"{name}_input"}
-    )
+    types: dict[Any, str] = {Motion: f"{name}_state", ShipInput: f"{name}_input"}
+    c = Translator({**vessel.parts(), **sea_functions(True)}, name, types)
     longest = LONGEST_STEP * p["length"] / p["speed"]
     numbers = iter([*model.ship_numbers(water_depth, longest), *column])
     kinds = {"SHIP": Ship, "COEFFICIENTS": vessel.coefficients, "SEA": SeaParameters}

@@ -23,20 +23,9 @@ COMPILING_S = 120.0
 def write_fmu(source: Source, path: str | Path, fmi: str = "3.0") -> None:
     """Write a ship or an autopilot as an FMU.
 
-    Parameters
-    ----------
-    source : Source
-        Of `ship_source` or `autopilot_source`.
-    path : str or Path
-        NAME.fmu.
-    fmi : {"3.0", "2.0"}
-        Version of the standard.
-
-    Raises
-    ------
-    InputError
-        For another version, a folder in its place, or if there is no C compiler or no FMPy, whose headers of
-        the standard are needed.
+    `source`: of `ship_source` or `autopilot_source`; `path`: NAME.fmu; `fmi`: version of the standard, "3.0"
+    or "2.0". Raises InputError for another version, a folder in its place, or if there is no C compiler or no
+    FMPy, whose headers of the standard are needed.
     """
     version, path = int(check_choice(fmi, VERSIONS, "fmi")[0]), Path(path)
     if path.suffix != ".fmu":

@@ -67,10 +67,8 @@ def _told(fields: list[str], kinds: dict[str, Any], talker: str) -> Iterator[Rea
     for quantity, one in kinds.items():
         if all(fields[int(k)] == text for k, text in one["needs"].items()) and fields[one["at"]]:
             value = float(fields[one["at"]])
-            if one["unit"] == "deg min":  # as 5430.5, 54 degrees and 30.5 minutes
-                value = radians(value // 100.0 + value % 100.0 / 60.0)
-            else:
-                value *= TO_SI[one["unit"]]
+            minutes = one["unit"] == "deg min"  # as 5430.5, 54 degrees and 30.5 minutes
+            value = radians(value // 100.0 + value % 100.0 / 60.0) if minutes else value * TO_SI[one["unit"]]
             value = copysign(value, SIDES[fields[one["side"]]]) if "side" in one else value
             if abs(value) <= TABLES["believed"][quantity]:
                 yield Reading(quantity, value, talker)

@@ -42,10 +42,8 @@ class Route:
         self.origin = float(waypoints[0, 0]), float(waypoints[0, 1])
         path = Path(np.column_stack(local_metres(waypoints[:, 0], waypoints[:, 1], self.origin)))
         if (far := float(np.abs(path.waypoints).max())) > FURTHEST_M:
-            raise InputError(
-                f"waypoints: {far / 1e3:.0f} km from the first found, expected at most "
-                f"{FURTHEST_M / 1e3:.0f} km; divide the route"
-            )
+            expected = f"expected at most {FURTHEST_M / 1e3:.0f} km; divide the route"
+            raise InputError(f"waypoints: {far / 1e3:.0f} km from the first found, {expected}")
         path.check_turns(radius)
         self.plan, self.ended = path.waypoints.ravel(), False
         self.ship: Any = _Scale(1.0, radius, 1.0)  # stands for the records of the environment

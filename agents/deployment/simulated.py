@@ -49,9 +49,8 @@ class SimulatedShip:
     def advance(self) -> None:
         """One step; InputError where the ship has run away."""
         order = np.array([[self.order, self.model.service_shaft_speed]])
-        if not self.passage.loop("simulate")(
-            self.states, order, self.step, *self.passage.sea, self.passage.numbers
-        ):
+        sail = self.passage.loop("simulate")
+        if not sail(self.states, order, self.step, *self.passage.sea, self.passage.numbers):
             raise InputError(f"model '{self.model.name}' ran away after {self.steps * self.step:.1f} s")
         self.states[0], self.steps = self.states[1], self.steps + 1
 

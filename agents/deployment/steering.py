@@ -216,9 +216,7 @@ class Helm:
         if self.route is None:
             return inf if to_waypoint is None else to_waypoint / speed
         reach = self.pilot.agent.gains["turn_reach"]
-        turns = [
-            (given[f"{which}_turn_distance"], given[f"{which}_turn_angle"]) for which in ("next", "second")
-        ]
+        turns = [(given[f"{k}_turn_distance"], given[f"{k}_turn_angle"]) for k in ("next", "second")]
         return min(((to_go - reach) / speed for to_go, turn in turns if turn and to_go > reach), default=inf)
 
     @property

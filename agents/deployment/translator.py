@@ -138,13 +138,11 @@ class _Body(ast.NodeTransformer):
         """The C of the function, and what it returns."""
         lines, of = self._statements(self.body), self.translator.type
         unused = [f"    (void){c_name(one)};" for one in self.arguments if one not in self.used]
-        local = [
-            f"    {of(kind)} {c_name(one)};" for one, kind in self.kinds.items() if one not in self.arguments
-        ]
+        own = {one: kind for one, kind in self.kinds.items() if one not in self.arguments}
+        local = [f"    {of(kind)} {c_name(one)};" for one, kind in own.items()]
         given = ", ".join(f"{of(kind)} {c_name(one)}" for one, kind in self.arguments.items())
-        about = re.sub(
-            r"[^\w .,:;()+-]", "", (self.function.__doc__ or "").strip().partition("\n")[0], flags=re.ASCII
-        )
+        first = (self.function.__doc__ or "").strip().partition("\n")[0]
+        about = re.sub(r"[^\w .,:;()+-]", "", first, flags=re.ASCII)
         head = f"/* {about} */\nstatic {of(self.returned)} {name}({given}) {{"
         return "\n".join([head, *local, *unused, *lines, "}\n"]), self.returned
 
@@ -308,16 +306,13 @@ class _Body(ast.NodeTransformer):
         if not (record or isinstance(function, FunctionType)):
             raise self._refusal(node)
         try:
-            bound = inspect.signature(function).bind(
-                *node.args, **{str(k.arg): k.value for k in node.keywords}
-            )
+            named = {str(one.arg): one.value for one in node.keywords}
+            bound = inspect.signature(function).bind(*node.args, **named)
         except TypeError:
             raise self._refusal(node) from None
         bound.apply_defaults()
-        parts = [
-            self._c(one if isinstance(one, ast.expr) else ast.Constant(one))
-            for one in bound.arguments.values()
-        ]
+        given = bound.arguments.values()
+        parts = [self._c(one if isinstance(one, ast.expr) else ast.Constant(one)) for one in given]
         if record:
             return self._made(parts, function)
         name, kind = self.translator.function(function, *(kind for _, kind in parts))

@@ -12,7 +12,7 @@ from agents.controllers.linear_loop import length_time
 from agents.controllers.memory import gathered, on_course
 from agents.rollouts.metrics import costs, mean, steering
 from agents.rollouts.rollout import Rollout, check_fits, rollout
-from shipgym.arrays import Floats
+from shipgym.arrays import Flags, Floats, Integers
 from shipgym.checks import check_number
 from shipgym.envs.engine import Engine
 from shipgym.errors import InputError
@@ -58,9 +58,9 @@ class Episodes:
     heading_rmse_deg: Floats
     rudder_travel_deg_min: Floats
     extrapolating: Floats
-    terminated: NDArray[np.bool_]
+    terminated: Flags
     duration_s: Floats
-    seeds: NDArray[np.int64]
+    seeds: Integers
 
 
 class StepResponses(NamedTuple):
@@ -126,13 +126,11 @@ def sail(
         ships = lanes[first : first + AT_ONCE] if len(fleet) > 1 else fleet
         engine = Engine(ships, some.size, task, allow_unstable=allow_unstable)
         found.append(_figures(rollout(controller, engine, some, record=RECORDED)))
-    joined = {
-        name: np.concatenate([part[name] for part in found]).reshape(numbers.shape) for name in found[0]
-    }
-    return Episodes(**joined, seeds=numbers)
+    figures = {name: np.concatenate([part[name] for part in found]) for name in found[0]}
+    return Episodes(**{name: one.reshape(numbers.shape) for name, one in figures.items()}, seeds=numbers)
 
 
-def _seeds(seeds: ArrayLike, n_models: int) -> NDArray[np.int64]:
+def _seeds(seeds: ArrayLike, n_models: int) -> Integers:
     """Seeds of the episodes, with several models one row for each."""
     numbers = np.asarray(seeds)
     if numbers.dtype.kind not in "iu" or numbers.size == 0:
@@ -140,10 +138,8 @@ def _seeds(seeds: ArrayLike, n_models: int) -> NDArray[np.int64]:
     if n_models > 1 and numbers.ndim == 0:
         numbers = np.full(n_models, int(numbers))
     if n_models > 1 and numbers.shape[0] != n_models:
-        raise InputError(
-            f"seeds: shape {numbers.shape} found, expected ({n_models},) or ({n_models}, n_episodes): "
-            f"one row for each model"
-        )
+        expected = f"({n_models},) or ({n_models}, n_episodes): one row for each model"
+        raise InputError(f"seeds: shape {numbers.shape} found, expected {expected}")
     return numbers
 
 
@@ -195,20 +191,16 @@ def step_response(
     check_number(step_deg, "step_deg", at_least=-LARGEST_STEP_DEG, at_most=LARGEST_STEP_DEG)
     asked = task or course_keeping_task()
     check_fits(controller, asked, fleet[0], f"model '{fleet[0].name}'")
-    if duration is None:
-        duration = STEP_LENGTHS * length_time(fleet[0])
-    check_number(duration, "duration", above=0.0)
-    steps = int(np.ceil(duration / asked.interval(fleet[0])))
+    lasts = STEP_LENGTHS * length_time(fleet[0]) if duration is None else duration
+    steps = int(np.ceil(check_number(lasts, "duration", above=0.0) / asked.interval(fleet[0])))
     straight = asked.changed(course_change_deg=0.0, episode_steps=steps)
     engine = Engine(fleet, len(fleet), straight, allow_unstable=allow_unstable)
     seeds = np.zeros(len(fleet), dtype=np.int64)
     course = _other_course(engine, np.radians(step_deg))
     states = rollout(controller, engine, seeds, record=RECORDED, show=course).states
     left = ((0, steps + 1 - len(states["psi"])), (0, 0))  # after all were lost, if they were
-    heading, rudder = (
-        np.pad(values, left, mode="edge").T
-        for values in (states["psi"] - states["set_point"], states["delta"])
-    )
+    found = states["psi"] - states["set_point"], states["delta"]
+    heading, rudder = (np.pad(values, left, mode="edge").T for values in found)
     t: Floats = np.arange(steps + 1, dtype=np.float64) * engine.dt
     return StepResponses(t, heading, rudder)
 

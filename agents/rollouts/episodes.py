@@ -51,35 +51,24 @@ def _episode(run: Rollout, task: BenchmarkTask, lane: int, engine: Engine, strid
     success = [bool(np.any(infos[name][1:] > 0.0)) for name in SUCCESS if name in infos]
 
     def summed(values: Floats) -> Floats:
-        together: Floats = np.diff(np.append(0.0, np.cumsum(values))[at])
-        return together
+        return np.diff(np.append(0.0, np.cumsum(values))[at])
 
+    parts = task.task.reward_parts
+    commands = {name: states.get(f"{name}_command") for name in ship.command_names}
     return Episode(
-        environment=task.env_id,
-        model=ship.name,
-        dt=run.dt * stride,
-        length=ship.particulars["length"],
-        beam=ship.particulars.get("beam"),
-        rudder_limit=ship.steering.limit,
-        states=_finite(states),
-        actions=run.actions[at[:-1], lane],
-        rewards=summed(run.rewards[:steps, lane]),
-        commands={
-            name: states[f"{name}_command"][1:] for name in ship.command_names if f"{name}_command" in states
-        },
-        reward_parts={name: summed(infos[name][1:]) for name in task.task.reward_parts},
-        info=_finite(
-            {name: infos[name][at] for name in infos if name not in {*task.task.reward_parts, *SUCCESS}}
-        ),
-        waypoints=engine.waypoints(lane),
-        corridor=engine.path_metres("corridor"),
+        environment=task.env_id, model=ship.name, dt=run.dt * stride,
+        length=ship.particulars["length"], beam=ship.particulars.get("beam"),
+        rudder_limit=ship.steering.limit, states=_finite(states),
+        actions=run.actions[at[:-1], lane], rewards=summed(run.rewards[:steps, lane]),
+        commands={name: values[1:] for name, values in commands.items() if values is not None},
+        reward_parts={name: summed(infos[name][1:]) for name in parts},
+        info=_finite({name: infos[name][at] for name in infos if name not in {*parts, *SUCCESS}}),
+        waypoints=engine.waypoints(lane), corridor=engine.path_metres("corridor"),
         turn_radius=engine.path_metres("turn_radius"),
-        arguments=plain({"model": task.model, **task.options}),
-        seed=int(run.seeds[lane]),
+        arguments=plain({"model": task.model, **task.options}), seed=int(run.seeds[lane]),
         terminated=not failed and bool(run.terminated[lane]),
-        truncated=not failed and bool(run.truncated[lane]),
-        success=success[0] if success else None,
-    )
+        truncated=not failed and bool(run.truncated[lane]), success=success[0] if success else None,
+    )  # fmt: skip
 
 
 def _finite(histories: Mapping[str, Floats]) -> dict[str, Floats]:

@@ -12,18 +12,16 @@ from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from agents.controllers.controller import Policy
 from agents.rollouts.rollout import Rollout, rollout
 from agents.suites.suite import BenchmarkTask
-from shipgym.arrays import Floats
+from shipgym.arrays import Flags, Floats
 from shipgym.ships import ShipModel
 from shipgym.tasks.guidance import wrapped
 from shipgym.tasks.steering import HEADING_SCALE
 from shipgym.tasks.task import Task
-
-Flags = NDArray[np.bool_]
 
 #: Physical states that `metrics` needs, beside all of `info`.
 STATES = ("psi", "u", "v", "n", "delta", "set_point")
@@ -146,8 +144,7 @@ def course_changes(run: Rollout) -> dict[str, Floats]:
         for begin, end in pairwise(begins):
             if end > begin and abs(error[begin]) >= SMALLEST_CHANGE:
                 changed = course[end] != course[begin]  # the error at `end` is that against the next course
-                stretch = error[begin : end + (not changed)]
-                found.append(step_figures(stretch, run.dt))
+                found.append(step_figures(error[begin : end + (not changed)], run.dt))
         if found:
             means[:, episode] = np.mean(found, axis=0)
     return dict(zip(OF_COURSES, means, strict=True))
@@ -179,8 +176,7 @@ def fuel_per_distance(run: Rollout) -> Floats:
     shaft = run.states["n"][1:] / service if service > 0.0 else 1.0
     spent = total(np.where(run.sailing, shaft, 0.0) ** 3) * run.dt
     if _on_path(run.task):
-        made = np.where(run.sailing, run.infos["distance_made_good"][1:], 0.0)
-        way = made.max(axis=0, initial=0.0)
+        way = np.where(run.sailing, run.infos["distance_made_good"][1:], 0.0).max(axis=0, initial=0.0)
     else:
         error = run.infos["heading_error"]
         along = run.states["u"] * np.cos(error) + run.states["v"] * np.sin(error)

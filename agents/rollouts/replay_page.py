@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
 from agents.output import check_page
 from agents.rollouts.replay_series import quantities, run
@@ -10,6 +9,9 @@ from shipgym.envs.episode import Episode
 from shipgym.errors import InputError
 from shipgym.files import write_text
 from shipgym.pages import render
+
+#: Template that loads nothing and replays its `data`: `runs` and `quantities`, or a placeholder.
+PLAYER = "agents.rollouts/replay.html"
 
 
 def write_replay(paths: Sequence[str | Path], out: str | Path) -> None:
@@ -31,9 +33,9 @@ def write_replay(paths: Sequence[str | Path], out: str | Path) -> None:
     check_page(target)
     if not paths:
         raise InputError("episodes: none found, expected at least one episode file")
-    sources = [Path(path) for path in paths]
-    episodes = [Episode.load(path) for path in sources]
-    write_text(replay_page(dict(zip(names(sources), episodes, strict=True))), target)
+    called = names([Path(path) for path in paths])
+    episodes = {name: Episode.load(path) for name, path in zip(called, paths, strict=True)}
+    write_text(replay_page(episodes), target)
 
 
 def replay_page(episodes: Mapping[str, Episode]) -> str:
@@ -42,12 +44,7 @@ def replay_page(episodes: Mapping[str, Episode]) -> str:
         raise InputError("episodes: none found, expected at least one")
     runs = [run(name, episode) for name, episode in episodes.items()]
     ships = ", ".join(dict.fromkeys(episode.model for episode in episodes.values()))
-    return player(f"Replay: {ships}", {"runs": runs, "quantities": quantities(runs)})
-
-
-def player(title: str, data: Any) -> str:
-    """HTML that loads nothing and replays `runs` and `quantities` (`replay_series`), or a placeholder."""
-    return render("agents.rollouts/replay.html", title=title, data=data)
+    return render(PLAYER, title=f"Replay: {ships}", data={"runs": runs, "quantities": quantities(runs)})
 
 
 def names(paths: Sequence[Path]) -> list[str]:
@@ -56,8 +53,7 @@ def names(paths: Sequence[Path]) -> list[str]:
     A file that is given twice is numbered.
     """
     stems = [path.absolute().with_suffix("").parts for path in paths]
-    deepest = max(len(stem) for stem in stems)
-    for depth in range(1, deepest + 1):
+    for depth in range(1, max(map(len, stems)) + 1):
         called = ["/".join(stem[-depth:]).replace("//", "/") for stem in stems]
         if len(set(called)) == len(set(stems)):
             break

@@ -7,6 +7,7 @@ import numpy as np
 
 from shipgym.arrays import Floats
 from shipgym.envs.episode import Episode
+from shipgym.tasks.guidance import wrapped
 
 DIGITS = 7  # significant, of the numbers in the page: a millimetre in a kilometre; nine decimals at most
 BEAM = 1.0 / 6.5  # of the length, drawn where the beam is not known
@@ -98,23 +99,19 @@ def series(episode: Episode) -> dict[str, Floats]:
         found["shaft_speed"] = 60.0 * states["n"]
     elif "n" in commands:
         found["shaft_speed"] = 60.0 * _before_steps(commands["n"])
-    order = _first(COURSE_ORDERS, states)
-    if order is not None:
-        error = np.remainder(states[order] - heading + np.pi, 2.0 * np.pi) - np.pi
+    if order := _first(COURSE_ORDERS, states):
+        error = wrapped(states[order] - heading)
         found["heading_error"] = np.degrees(error)
         found["course_order"] = np.degrees(heading + error)  # without a jump from the heading
     recorded = {**episode.info, **states}
-    cross_track = _first(CROSS_TRACK, recorded)
-    if cross_track is not None:
+    if cross_track := _first(CROSS_TRACK, recorded):
         found["cross_track_error"] = recorded[cross_track]
     return {**found, **_weather(states)}
 
 
 def quantities(runs: list[dict[str, Any]]) -> list[dict[str, Any]]:
     """The histories and read-outs that some of the runs have."""
-    return [
-        quantity._asdict() for quantity in QUANTITIES if any(quantity.line in run["series"] for run in runs)
-    ]
+    return [one._asdict() for one in QUANTITIES if any(one.line in run["series"] for run in runs)]
 
 
 def outcome(episode: Episode) -> str:

@@ -10,13 +10,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from agents.controllers.controller import Policy
 from agents.policies.shield import ShieldState, interventions
-from shipgym.arrays import Floats
+from shipgym.arrays import Flags, Floats
 from shipgym.envs.engine import Engine
 from shipgym.errors import InputError
 from shipgym.ships import ShipModel
 from shipgym.tasks.task import Task
-
-Flags = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)
@@ -227,20 +225,13 @@ class _Log:
         engine, n = self.engine, self.engine.num_envs
         actions, rewards, shielded = zip(*self.intervals, strict=True) if self.intervals else ((), (), ())
         return Rollout(
-            task=engine.task,
-            model=engine.model,
-            dt=engine.dt,
-            seeds=seeds,
-            costs=self.costs,
+            task=engine.task, model=engine.model, dt=engine.dt, seeds=seeds, costs=self.costs,
             sailing=np.array(self.sailed, dtype=np.bool_).reshape(-1, n),
-            terminated=self.terminated,
-            truncated=self.truncated,
-            failed=self.failed,
-            failure=self.failure,
+            terminated=self.terminated, truncated=self.truncated, failed=self.failed, failure=self.failure,
             seconds_per_action=self.seconds / max(self.asked, 1),
             actions=np.array(actions, dtype=np.float32).reshape(-1, n, len(engine.command)),
             rewards=np.array(rewards).reshape(-1, n),
             shielded=np.array(shielded, dtype=np.bool_).reshape(-1, n),
             states={name: np.array([one[name] for one in self.states]) for name in (self.states or [{}])[0]},
             infos={name: np.array([one[k] for one in self.infos]) for k, name in enumerate(self.names)},
-        )
+        )  # fmt: skip

@@ -12,9 +12,9 @@ Files of `agents/suites`:
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from agents.suites.suite import N_EPISODES, BenchmarkTask, suite_file
+from shipgym.arrays import Floats
 from shipgym.checks import ANY_KEY, Shape, check_shape, check_table
 from shipgym.errors import InputError
 from shipgym.files import read_json
@@ -40,12 +40,11 @@ def best_known(suite: str) -> dict[str, dict[str, Any]]:
 
 def reference_costs(suite: str) -> dict[str, tuple[float, float]]:
     """Mean costs with scores 0 and 1, by task: wheel-over designed on the model, and the best known."""
-    return {
-        task: (float(one["zero"]), float(np.mean(one["costs"]))) for task, one in best_known(suite).items()
-    }
+    known = best_known(suite)
+    return {task: (float(one["zero"]), float(np.mean(one["costs"]))) for task, one in known.items()}
 
 
-def best_costs(task: BenchmarkTask, suite: str) -> NDArray[np.float64]:
+def best_costs(task: BenchmarkTask, suite: str) -> Floats:
     """The best known cost of each scored episode, shape (100,); an InputError if there is none."""
     known = best_known(suite)
     if task.name not in known:

@@ -15,8 +15,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from shipgym.arrays import Integers
 from shipgym.checks import check_choice, check_keys, check_table, check_text, data_only, placed
 from shipgym.envs.engine import Engine
 from shipgym.envs.environment import read_options
@@ -106,7 +106,7 @@ class BenchmarkTask:
         return self.parts[1]
 
     @property
-    def seeds(self) -> NDArray[np.int64]:
+    def seeds(self) -> Integers:
         """Of the episodes that are scored, shape (100,)."""
         return FIRST_SEED + np.arange(N_EPISODES)
 
@@ -124,10 +124,7 @@ class Suite:
     tasks: tuple[BenchmarkTask, ...]  # in the order of the file
 
     def task(self, name: str) -> BenchmarkTask:
-        """The task by its name.
-
-        Raises InputError for an unknown name, with the nearest known one.
-        """
+        """The task by its name; raises InputError for an unknown name, with the nearest known one."""
         known = {task.name: task for task in self.tasks}
         return known[check_choice(name, known, f"suite '{self.name}': task")]
 
@@ -139,10 +136,7 @@ def list_suites() -> list[str]:
 
 @lru_cache(maxsize=4)
 def load_suite(name: str = DEFAULT_SUITE) -> Suite:
-    """Read a shipped suite.
-
-    Raises InputError for an unknown name, or naming the field at fault.
-    """
+    """Read a shipped suite; raises InputError for an unknown name, or naming the field at fault."""
     return parse_suite(_suite_text(name), f"suite '{name}'")
 
 
@@ -200,11 +194,8 @@ def _sets(name: str, value: Any, where: str) -> list[BenchmarkTask]:
     far = _options(check_table(value.get("far", {}), f"{where}.far"), f"{where}.far")
     changes: dict[str, dict[str, Any]] = {"ship": {}, "model": {"behind": ""}, "far": {"far": far}}
     with placed(where):
-        return [
-            replace(task, name=name + SETS[on], on=on, base=name, **changes[on])
-            for on in SETS
-            if on != "far" or far
-        ]
+        sets = [on for on in SETS if on != "far" or far]
+        return [replace(task, name=name + SETS[on], on=on, base=name, **changes[on]) for on in sets]
 
 
 def _options(table: Mapping[str, Any], where: str) -> dict[str, Any]:

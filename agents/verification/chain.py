@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -45,18 +46,11 @@ LARGEST_SEED = 2**32
 
 
 def build_autopilot(
-    ship_file: str | Path,
-    out: str | Path,
-    *,
-    draws: int = 200,
-    seed: int = 0,
-    options: Mapping[str, Any] | None = None,
-    agents: Sequence[str | Path] = (),
-    designs: Sequence[str] = DESIGNS,
-    standards: bool = False,
-    progress: Progress | None = None,
+    ship_file: str | Path, out: str | Path, *, draws: int = 200, seed: int = 0,
+    options: Mapping[str, Any] | None = None, agents: Sequence[str | Path] = (),
+    designs: Sequence[str] = DESIGNS, standards: bool = False, progress: Progress | None = None,
     where: JobEngine = HERE,
-) -> AutopilotResult:
+) -> AutopilotResult:  # fmt: skip
     """Identify a ship from its trials, design autopilots, verify them, write the report.
 
     The folder holds `report.html`, `metrics.json`, `model.json` and a file of each autopilot, such as
@@ -85,10 +79,8 @@ def build_autopilot(
             trials, arguments = trials_of(ship, identification_settings(ship, options or {}))
         with _stage(tell, "identifying"):
             fit = identify_trials(ship, trials, arguments)
-
-        def verified() -> Verification:
-            return verify(fit.model, int(draws), int(seed), tell, where, [one for _, one in guests], designs)
-
+        others = [one for _, one in guests]
+        verified = partial(verify, fit.model, int(draws), int(seed), tell, where, others, designs)
         result = examined(ship, fit, guests, verified)
         found = result.verification
         if standards and found is not None and result.refusal is None:
@@ -125,25 +117,21 @@ def _write(result: AutopilotResult, folder: Path) -> None:
 
 
 def examined(
-    ship: ShipFile,
-    fit: IdentificationResult,
-    guests: list[tuple[str, Agent]],
+    ship: ShipFile, fit: IdentificationResult, guests: list[tuple[str, Agent]],
     verified: Callable[[], Verification],
-) -> AutopilotResult:
+) -> AutopilotResult:  # fmt: skip
     """What is found on an identified model: its verification, or why there is none."""
     instability = why_unstable(fit)
     refusal = why_refused(fit) if instability is None else None
-    verification = None
-    if instability is None and refusal is None:
-        for where, guest in guests:
-            _check_fits(guest, fit.model, where)
-        try:
-            verification = verified()
-        except (UnstableModelError, InputError) as error:  # the user's input was right, the model is not
-            instability = str(error)
-    if verification is not None:
-        verification, refusal = _decided(verification, fit)
-    return AutopilotResult(ship, fit.trials, fit, instability, verification, refusal)
+    if instability is not None or refusal is not None:
+        return AutopilotResult(ship, fit.trials, fit, instability, None, refusal)
+    for where, guest in guests:
+        _check_fits(guest, fit.model, where)
+    try:
+        found = verified()
+    except (UnstableModelError, InputError) as error:  # the user's input was right, the model is not
+        return AutopilotResult(ship, fit.trials, fit, str(error), None)
+    return AutopilotResult(ship, fit.trials, fit, None, *_decided(found, fit))
 
 
 def _decided(found: Verification, fit: IdentificationResult) -> tuple[Verification, str | None]:
@@ -175,27 +163,20 @@ def _to_standards(found: Verification, model: ShipModel) -> Verification:
 
 
 def verify(
-    model: ShipModel,
-    draws: int,
-    seed: int,
-    tell: Progress = lambda *_: None,
-    where: JobEngine = HERE,
-    guests: Sequence[Agent] = (),
-    designs: Sequence[str] = DESIGNS,
-) -> Verification:
+    model: ShipModel, draws: int, seed: int, tell: Progress = lambda *_: None, where: JobEngine = HERE,
+    guests: Sequence[Agent] = (), designs: Sequence[str] = DESIGNS,
+) -> Verification:  # fmt: skip
     """Design autopilots on a model and run them, and guests, over models drawn from its covariance.
 
     `model`: with a covariance; `draws`, `seed`, `where`, `designs`: see `build_autopilot`; `tell`: told the
     progress; `guests`: further autopilots. Raises UnstableModelError if the model itself runs away;
     InputError if no autopilot can be designed on it.
     """
-    stage = "models drawn"
-    tell(stage, 0, draws)
+    tell("models drawn", 0, draws)
     controllers, guides, refused = _designed(model, designs)
     found = monte_carlo(
-        controllers, model, draws, seed,
-        where=where, progress=lambda done: tell(stage, done, draws),
-    )  # fmt: skip
+        controllers, model, draws, seed, where=where, progress=lambda done: tell("models drawn", done, draws)
+    )
     seeds = seed + np.arange(draws)
     episodes = [*found.episodes, *(sail(guest, found.draws, seeds=seeds) for guest in guests)]
     stable = [draw for draw, lost in zip(found.draws, found.manoeuvres.unstable, strict=True) if not lost]
@@ -206,24 +187,17 @@ def verify(
         step = step_response(controller, [model, *stable], STEP_DEG)
         pilots.append(Pilot(keys[k], controller, episodes[k], step))
     tell("step responses", len(autopilots), len(autopilots))
-    return Verification(
-        draws=draws,
-        seed=seed,
-        manoeuvres=found.manoeuvres,
-        course_unstable=found.course_unstable,
-        nomoto=nomoto(model),
-        pilots=tuple(sorted(pilots, key=lambda pilot: float(np.mean(pilot.episodes.cost)))),
-        refused=refused,
-        tracks=_tracks(guides, [model, *stable], refused),
-    )
+    tracks = _tracks(guides, [model, *stable], refused)
+    ranked = tuple(sorted(pilots, key=lambda pilot: float(np.mean(pilot.episodes.cost))))
+    linear, unstable = nomoto(model), found.course_unstable
+    return Verification(draws, seed, found.manoeuvres, unstable, linear, ranked, refused, tracks)
 
 
 def _tracks(guides: list[Controller], models: list[ShipModel], refused: dict[str, str]) -> tuple[Track, ...]:
     """The track of each path autopilot; one that does not arrive on the identified model is refused."""
     tracks = tuple(keep_track(guide, models) for guide in guides)
-    for track in tracks:
-        if not track.arrived[0]:
-            refused[track.key] = "it does not reach the end of the track on the identified model"
+    late = "it does not reach the end of the track on the identified model"
+    refused |= {track.key: late for track in tracks if not track.arrived[0]}
     return tracks
 
 
@@ -241,10 +215,8 @@ def _check_fits(guest: Agent, model: ShipModel, where: str) -> None:
 
 def _unique_keys(names: Sequence[str]) -> list[str]:
     """Names, those that were there before with a number."""
-    return [
-        name if name not in names[:k] else f"{name}-{names[:k].count(name) + 1}"
-        for k, name in enumerate(names)
-    ]
+    earlier = [names[:k].count(name) for k, name in enumerate(names)]
+    return [f"{name}-{k + 1}" if k else name for name, k in zip(names, earlier, strict=True)]
 
 
 def _designed(

@@ -9,23 +9,11 @@ import numpy as np
 
 from agents.verification.index_uncertainty import ManoeuvreUncertainty
 from identification.report.predictions import RUDDER
+from shipgym import plots
 from shipgym.arrays import Floats
 from shipgym.manoeuvres import Criterion
 from shipgym.manoeuvres.intervals import LEVELS
-from shipgym.plots import (
-    LIMIT,
-    MEASURED,
-    MODEL,
-    MUTED,
-    Panel,
-    axis,
-    compact,
-    graph_objects,
-    line,
-    panels,
-    points,
-    translucent,
-)
+from shipgym.plots import LIMIT, MEASURED, MODEL, MUTED, Panel, axis, line, panels, translucent
 from shipgym.plots.style import Figure
 
 if TYPE_CHECKING:
@@ -66,7 +54,7 @@ def criteria_figure(criteria: Mapping[str, Criterion]) -> Figure:
         share = 100.0 * values[np.isfinite(values)] / criterion.limit
         heights = row + jitter.uniform(-0.22, 0.22, len(share))
         hover, pale = "%{x:.1f} %<extra></extra>", translucent(MODEL, 0.3)
-        traces.append(points(share, heights, "models drawn", pale, 5, hovertemplate=hover))
+        traces.append(plots.points(share, heights, "models drawn", pale, 5, hovertemplate=hover))
         marks = ("measured", criterion.measured, RUDDER), ("identified model", criterion.value, MEASURED)
         for name, value, colour in marks:
             if value is not None:
@@ -96,11 +84,9 @@ def manoeuvres_figure(found: ManoeuvreUncertainty, length: float) -> Figure:
         paths = np.concatenate([part for path in found.circle_paths for part in (path / length, gap)])
         tracks.insert(0, line(paths[:, 1], paths[:, 0], "single draws", translucent(MODEL, 0.22), 1.0))
     north = axis("north, ship lengths", scaleanchor="x2", scaleratio=1)
-    shown = [
-        Panel(headings, "time, s", "heading change and rudder, deg", "20/20 zigzag"),
-        Panel(tracks, "east, ship lengths", north, "Turning circle to starboard"),
-    ]
-    return panels(shown, 430, 2, grid={"horizontal_spacing": 0.1}, hovermode="closest")
+    left = Panel(headings, "time, s", "heading change and rudder, deg", "20/20 zigzag")
+    right = Panel(tracks, "east, ship lengths", north, "Turning circle to starboard")
+    return panels([left, right], 430, 2, grid={"horizontal_spacing": 0.1}, hovermode="closest")
 
 
 def steps_figure(t: Floats, responses: Mapping[str, tuple[Floats, Floats]], step_deg: float) -> Figure:
@@ -136,21 +122,16 @@ def tracks_figure(tracks: Mapping[str, Track], length: float) -> Figure:
         errors.append(line(way, track.cross_track, name, colour, 1.6))
     north = axis("north, ship lengths", scaleanchor="x", scaleratio=1)
     aside = axis("m, positive to starboard", zero=True)
-    shown = [
-        Panel(paths, "east, ship lengths", north, "Track"),
-        Panel(errors, "way, ship lengths", aside, "Cross-track error"),
-    ]
-    return panels(shown, 430, 2, grid={"horizontal_spacing": 0.1}, hovermode="closest")
+    left = Panel(paths, "east, ship lengths", north, "Track")
+    right = Panel(errors, "way, ship lengths", aside, "Cross-track error")
+    return panels([left, right], 430, 2, grid={"horizontal_spacing": 0.1}, hovermode="closest")
 
 
 def costs_figure(costs: Mapping[str, Floats]) -> Figure:
-    """Box plot of the cost of each autopilot over the models drawn.
-
-    `costs`: by autopilot, shape (n_draws,).
-    """
+    """Box plot of the cost of each autopilot, shape (n_draws,), over the models drawn."""
     boxes = [
-        graph_objects().Box(
-            x=compact(values), name=name, boxpoints="all", jitter=0.6, pointpos=0.0,
+        plots.graph_objects().Box(
+            x=plots.compact(values), name=name, boxpoints="all", jitter=0.6, pointpos=0.0,
             marker={"color": translucent(colour, 0.45), "size": 3.5},
             line={"color": colour, "width": 1.6},
             fillcolor=translucent(colour, 0.12), showlegend=False,

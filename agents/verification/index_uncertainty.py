@@ -36,11 +36,11 @@ class ManoeuvreUncertainty:
 
 
 def nominal_runs(model: ShipModel) -> tuple[Trial, Trial]:
-    """Zigzag and turning circle of the model itself.
-
-    Raises UnstableModelError if it runs away.
-    """
-    return _zigzag(model), _circle(model)
+    """Zigzag and turning circle of a model, as they are kept; raises UnstableModelError if it runs away."""
+    dt = float(model.particulars["length"] / model.particulars["speed"] / SAMPLES_PER_LENGTH)
+    duration, turning = (lengths * SAMPLES_PER_LENGTH * dt for lengths in (ZIGZAG_LENGTHS, TURN_LENGTHS))
+    run = zigzag(model, *ZIGZAG_DEG, duration=duration, dt=dt, must_reverse=False)
+    return run, turning_circle(model, min(TURN_DEG, model.steering.rudder_limit_deg), turning, dt)
 
 
 def sail_draws(model: ShipModel, draws: Sequence[ShipModel]) -> dict[str, Any]:
@@ -81,41 +81,20 @@ def uncertainty_of(
         for name, test in imo_manoeuvres(model).items()
     }
     criteria = {name: one for name, one in imo_criteria(model, found).items() if one.drawn is not None}
-    unstable = np.any([c.drawn.ran_away for c in criteria.values() if c.drawn is not None], axis=0)
     lost = np.concatenate([part["lost"] for part in parts])
-    unstable |= lost
+    unstable = lost | np.any([c.drawn.ran_away for c in criteria.values() if c.drawn is not None], axis=0)
     headings, paths = ([one for part in parts for one in part[name]] for name in ("headings", "paths"))
     stable = ~unstable[~lost]  # of those that were kept
     return ManoeuvreUncertainty(
-        criteria=criteria,
-        unstable=unstable,
-        zigzag=nominal[0],
-        zigzag_headings=np.array(headings)[stable],
-        circle=nominal[1],
+        criteria, unstable, zigzag=nominal[0], zigzag_headings=np.array(headings)[stable], circle=nominal[1],
         circle_paths=tuple(np.array(paths)[stable][:PATHS_KEPT]),
-    )
+    )  # fmt: skip
 
 
 def _kept_runs(model: ShipModel) -> tuple[Floats, Floats] | None:
     """Headings in the zigzag and path in the circle; None where the ship runs away."""
     try:
-        heading, circle = _zigzag(model)["psi"], _circle(model)
+        run, circle = nominal_runs(model)
     except UnstableModelError:
         return None
-    return heading, np.column_stack([circle["x"], circle["y"]])
-
-
-def _sampling(model: ShipModel) -> float:
-    return float(model.particulars["length"] / model.particulars["speed"] / SAMPLES_PER_LENGTH)
-
-
-def _zigzag(model: ShipModel) -> Trial:
-    dt = _sampling(model)
-    duration = ZIGZAG_LENGTHS * SAMPLES_PER_LENGTH * dt
-    return zigzag(model, *ZIGZAG_DEG, duration=duration, dt=dt, must_reverse=False)
-
-
-def _circle(model: ShipModel) -> Trial:
-    dt = _sampling(model)
-    rudder = min(TURN_DEG, model.steering.rudder_limit_deg)
-    return turning_circle(model, rudder, TURN_LENGTHS * SAMPLES_PER_LENGTH * dt, dt)
+    return run["psi"], np.column_stack([circle["x"], circle["y"]])

@@ -14,12 +14,8 @@ from agents.controllers.controller import Controller
 from agents.controllers.controller_file import read_controller
 from agents.engines.jobs import HERE, JobEngine
 from agents.rollouts.course_keeping import Episodes, sail
-from agents.verification.index_uncertainty import (
-    ManoeuvreUncertainty,
-    nominal_runs,
-    sail_draws,
-    uncertainty_of,
-)
+from agents.verification import index_uncertainty
+from agents.verification.index_uncertainty import ManoeuvreUncertainty
 from shipgym.checks import check_whole
 from shipgym.errors import InputError
 from shipgym.ships import ShipModel
@@ -40,74 +36,48 @@ class MonteCarlo:
 
 
 def monte_carlo(
-    controllers: Sequence[Controller],
-    model: ShipModel,
-    draws: int = 200,
-    seed: int = 0,
-    *,
-    where: JobEngine = HERE,
-    progress: Callable[[int], None] | None = None,
-) -> MonteCarlo:
+    controllers: Sequence[Controller], model: ShipModel, draws: int = 200, seed: int = 0, *,
+    where: JobEngine = HERE, progress: Callable[[int], None] | None = None,
+) -> MonteCarlo:  # fmt: skip
     """Sail the standard manoeuvres and an episode of course keeping with models drawn from the covariance.
 
-    Parameters
-    ----------
-    controllers : sequence of Controller
-        Each steers every draw; draw i with seed + i, the same episodes for all.
-    model : ShipModel
-        With a covariance.
-    draws : int
-        Models drawn, at least 2.
-    seed : int
-        Of the draws and of the episodes.
-    where : JobEngine
-        In this process, in several, or on a ray cluster; the results are the same, bit for bit.
-    progress : callable, optional
-        Told the number of draws done.
-
-    Raises
-    ------
-    InputError
-        If the model has no covariance, or a controller is for another ship.
-    UnstableModelError
-        If the model itself runs away.
+    `controllers`: each steers every draw, draw i with seed + i, the same episodes for all; `model`: with a
+    covariance; `draws`: models drawn, at least 2; `seed`: of the draws and of the episodes; `where`: in this
+    process, in several, or on a ray cluster: the results are the same, bit for bit; `progress`: told the
+    number of draws done. Raises InputError if the model has no covariance, or a controller is for another
+    ship; UnstableModelError if the model itself runs away.
     """
     check_whole(draws, "draws", at_least=2)
     check_whole(seed, "seed", at_least=0)
     for controller in controllers:
         controller.check_fits_model(model)
-    nominal = nominal_runs(model)
+    nominal = index_uncertainty.nominal_runs(model)
     drawn = model.sample(draws, seed)
     tell = progress or (lambda done: None)
     jobs = draw_jobs(controllers, model, drawn, seed)
     found = where.run(do_draws, jobs, lambda done, _: tell(min(done * DRAWS_A_JOB, draws)))
-    episodes = zip(*(part["episodes"] for part in found), strict=True) if controllers else ()
-    return MonteCarlo(
-        draws=tuple(drawn),
-        manoeuvres=uncertainty_of(model, nominal, [part["sailed"] for part in found]),
-        course_unstable=np.concatenate([part["course_unstable"] for part in found]),
-        episodes=tuple(
-            Episodes(**{name: np.concatenate([part[name] for part in parts]) for name in parts[0]})
-            for parts in episodes
-        ),
+    sailed = index_uncertainty.uncertainty_of(model, nominal, [part["sailed"] for part in found])
+    unstable = np.concatenate([part["course_unstable"] for part in found])
+    episodes = tuple(
+        Episodes(**{name: np.concatenate([part[name] for part in parts]) for name in parts[0]})
+        for parts in zip(*(part["episodes"] for part in found), strict=True)
     )
+    return MonteCarlo(tuple(drawn), sailed, unstable, episodes)
 
 
 def draw_jobs(
     controllers: Sequence[Controller], model: ShipModel, drawn: Sequence[ShipModel], seed: int
 ) -> list[dict[str, Any]]:
     """The jobs: coefficients as drawn here, since another computer may draw others in the last digit."""
-    common = {
-        "model": replace(model, covariance=None).to_dict(),
-        "controllers": [controller.to_dict() for controller in controllers],
-    }
-    jobs = []
-    for first in range(0, len(drawn), DRAWS_A_JOB):
-        some = drawn[first : first + DRAWS_A_JOB]
-        coefficients = [list(draw.coefficients.values()) for draw in some]
-        names = [draw.name for draw in some]
-        jobs.append({**common, "coefficients": coefficients, "names": names, "first_seed": seed + first})
-    return jobs
+    own, pilots = replace(model, covariance=None).to_dict(), [one.to_dict() for one in controllers]
+    parts = [(first, drawn[first : first + DRAWS_A_JOB]) for first in range(0, len(drawn), DRAWS_A_JOB)]
+    return [
+        {
+            "model": own, "controllers": pilots, "names": [draw.name for draw in some],
+            "coefficients": [[*draw.coefficients.values()] for draw in some], "first_seed": seed + first,
+        }
+        for first, some in parts
+    ]  # fmt: skip
 
 
 def do_draws(job: dict[str, Any]) -> dict[str, Any]:
@@ -120,7 +90,7 @@ def do_draws(job: dict[str, Any]) -> dict[str, Any]:
     seeds = job["first_seed"] + np.arange(len(draws))
     controllers = [read_controller(content, "controller") for content in job["controllers"]]
     return {
-        "sailed": sail_draws(model, draws),
+        "sailed": index_uncertainty.sail_draws(model, draws),
         "course_unstable": np.array([not keeps_course(draw) for draw in draws]),
         "episodes": [asdict(sail(controller, draws, seeds=seeds)) for controller in controllers],
     }

@@ -8,22 +8,9 @@ import numpy as np
 
 import shipgym
 from agents.controllers.controller import Controller
-from agents.verification.figures import (
-    costs_figure,
-    criteria_figure,
-    criterion_name,
-    manoeuvres_figure,
-    steps_figure,
-    tracks_figure,
-)
-from agents.verification.result import (
-    STEP_DEG,
-    AutopilotResult,
-    Pilot,
-    Verification,
-    pilot_metrics,
-    track_metrics,
-)
+from agents.verification import figures
+from agents.verification.figures import criterion_name
+from agents.verification.result import STEP_DEG, AutopilotResult, Verification, pilot_metrics, track_metrics
 from identification.report.view import fit_view, trial_figures
 from identification.validation.warnings import held_out_error
 from shipgym.files import write_text
@@ -45,29 +32,23 @@ def write_report(result: AutopilotResult, path: str | Path) -> None:
     what the chain found; `path`: the HTML file. Raises InputError if plotly is not installed.
     """
     found, provenance = result.verification, result.model.provenance or {}
-    figures = {} if found is None else trial_figures(result.identification) | _figures(result, found)
+    length = float(result.model.particulars["length"])
+    drawn = {} if found is None else trial_figures(result.identification) | _figures(found, length)
     page = render(
         "agents.verification/report.html",
-        ship=result.ship.particulars.name,
-        fit=fit_view(result.identification),
-        found=None if found is None else verification_view(found) | {"length": _length(result)},
-        figures=figures,
-        instability=result.instability,
-        refusal=result.refusal,
-        held_out=held_out_error(result.identification),
-        software=provenance.get("software", f"shipgym {shipgym.__version__}"),
-        ship_file=result.ship.path.name,
+        found=None if found is None else verification_view(found) | {"length": length},
+        ship=result.ship.particulars.name, ship_file=result.ship.path.name, figures=drawn,
+        fit=fit_view(result.identification), held_out=held_out_error(result.identification),
+        instability=result.instability, refusal=result.refusal, trials=result.trials, step_deg=STEP_DEG,
+        software=provenance.get("software", f"shipgym {shipgym.__version__}"), infinity=np.inf,
         settings=[str(provenance.get(key, NONE)) for key in ("structure", "method", "samples")],
-        trials=result.trials,
-        step_deg=STEP_DEG,
-        infinity=np.inf,
-    )
+    )  # fmt: skip
     write_text(page, Path(path))
 
 
 def verification_view(found: Verification) -> dict[str, Any]:
     """What the template shows of a verification but for its figures."""
-    designed = {pilot.name: pilot.design for pilot in _by_name(found) if pilot.design is not None}
+    designed = {pilot.name: pilot.design for pilot in found.by_name if pilot.design is not None}
     criteria = {criterion_name(name, one): one for name, one in found.manoeuvres.criteria.items()}
     first, *others = found.pilots
     passed = [one.passed for one in criteria.values()]
@@ -86,10 +67,8 @@ def verification_view(found: Verification) -> dict[str, Any]:
         "linear": {name: one for name, one in designed.items() if one.feedback},
         "gains": _gains([one for one in designed.values() if one.feedback]),
         "tracks": {track.key.upper(): track_metrics(track) for track in found.tracks},
-        "learned": [pilot.name for pilot in _by_name(found) if pilot.design is None],
-        "cheaper": {
-            other.name: float(np.mean(first.episodes.cost < other.episodes.cost)) for other in others
-        },
+        "learned": [pilot.name for pilot in found.by_name if pilot.design is None],
+        "cheaper": {one.name: float(np.mean(first.episodes.cost < one.episodes.cost)) for one in others},
     }
 
 
@@ -116,8 +95,7 @@ def headline(found: Verification) -> str:
 def _gains(designs: Sequence[Controller]) -> list[tuple[str, str, list[tuple[str, float] | None]]]:
     """Signal, unit, and of each design the gain on it by its name, with the sign that it has in the file."""
     gains = [
-        {signal: (gain, design.gains[gain]) for gain, (signal, _) in design.feedback.items()}
-        for design in designs
+        {signal: (gain, one.gains[gain]) for gain, (signal, _) in one.feedback.items()} for one in designs
     ]
     return [
         (name, unit, [gain.get(signal) for gain in gains])
@@ -126,22 +104,12 @@ def _gains(designs: Sequence[Controller]) -> list[tuple[str, str, list[tuple[str
     ]
 
 
-def _figures(result: AutopilotResult, found: Verification) -> dict[str, Any]:
-    pilots = _by_name(found)
-    responses = {pilot.name: pilot.step[1:] for pilot in pilots}
+def _figures(found: Verification, length: float) -> dict[str, Any]:
+    responses = {pilot.name: pilot.step[1:] for pilot in found.by_name}
     return {
-        "criteria": criteria_figure(found.manoeuvres.criteria),
-        "manoeuvres": manoeuvres_figure(found.manoeuvres, _length(result)),
-        "steps": steps_figure(found.pilots[0].step[0], responses, STEP_DEG),
-        "costs": costs_figure({pilot.name: pilot.episodes.cost for pilot in pilots}),
-        "track_keeping": tracks_figure({track.key.upper(): track for track in found.tracks}, _length(result)),
+        "criteria": figures.criteria_figure(found.manoeuvres.criteria),
+        "manoeuvres": figures.manoeuvres_figure(found.manoeuvres, length),
+        "steps": figures.steps_figure(found.pilots[0].step[0], responses, STEP_DEG),
+        "costs": figures.costs_figure({pilot.name: pilot.episodes.cost for pilot in found.by_name}),
+        "track_keeping": figures.tracks_figure({track.key.upper(): track for track in found.tracks}, length),
     }
-
-
-def _length(result: AutopilotResult) -> float:
-    return float(result.model.particulars["length"])
-
-
-def _by_name(found: Verification) -> list[Pilot]:
-    """Autopilots in an order that does not change with the ranking, for their colours."""
-    return sorted(found.pilots, key=lambda pilot: pilot.name, reverse=True)

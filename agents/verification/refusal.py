@@ -36,10 +36,8 @@ def why_refused(fit: Fit) -> str | None:
     steering = float(A[1, 0] * B[0, 0] - A[0, 0] * B[1, 0])  # a steady rudder turns to that side
     measured = rudder_effect([trial for trial in fit.trials if trial.use == "fit"], model)
     if measured * steering < 0.0 and abs(measured) > SURE_T:
-        return (
-            "at low frequency the model's rudder turns the ship to the other side than in the trials; "
-            f"run {helpful_trial(fit)}"
-        )
+        why = "at low frequency the model's rudder turns the ship to the other side than in the trials"
+        return f"{why}; run {helpful_trial(fit)}"
     sway = "v" in getattr(model.dynamics, "equations", ("v",))
     for row, name in ((0, "sway damping (Y_v)"), (1, "yaw damping (N_r)")) if sway else ():
         share = float(np.mean([found[0][row, row] > 0.0 for found in drawn]))

@@ -61,6 +61,11 @@ class Verification:
     tracks: tuple[Track, ...] = ()  # of autopilots that keep to a track
     standards: tuple[Row, ...] = ()  # what the standards of heading and track control ask for
 
+    @property
+    def by_name(self) -> list[Pilot]:
+        """Autopilots in an order that does not change with the ranking, for their colours."""
+        return sorted(self.pilots, key=lambda pilot: pilot.name, reverse=True)
+
 
 @dataclass(frozen=True, eq=False)
 class AutopilotResult:
@@ -134,11 +139,9 @@ def track_metrics(track: Track) -> dict[str, Any]:
 def pilot_metrics(pilot: Pilot) -> dict[str, Any]:
     """Gains and margins of one autopilot, null if it is learned, and its episodes over the models drawn."""
     episodes, design = pilot.episodes, pilot.design
-    gains = None if design is None else {name: float(value) for name, value in design.gains.items()}
-    margins = None if design is None else {k: _finite(value) for k, value in asdict(design.margins).items()}
     return {
-        "gains": gains,
-        "margins": margins,
+        "gains": design and {name: float(value) for name, value in design.gains.items()},
+        "margins": design and {name: _finite(value) for name, value in asdict(design.margins).items()},
         "cost_mean": float(np.mean(episodes.cost)),
         "cost_quantile_95": float(np.quantile(episodes.cost, 0.95)),
         "heading_rmse_deg_mean": float(np.mean(episodes.heading_rmse_deg)),

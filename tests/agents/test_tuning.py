@@ -8,7 +8,7 @@ import pytest
 from typer.testing import CliRunner
 
 from agents.cli import app
-from agents.cli.tuning import _print_result
+from agents.cli.training import _print_tuning
 from agents.engines.jobs import JobEngine
 from agents.training import tuning
 from agents.training.plan import Given, make_plan
@@ -142,7 +142,7 @@ def test_trials_are_told_the_best_first(tmp_path, capsys):
         Trial(2, varied | {"activation": "tanh"}, {}, 5.4321, ((100, 5.4321),), "finished"),
         Trial(3, varied, {}, None, (), "diverged"),
     )
-    _print_result(Tuning(trials, trials[2]), tmp_path)
+    _print_tuning(Tuning(trials, trials[2]), tmp_path)
     assert same_text("tune", capsys.readouterr().out)
 
 
