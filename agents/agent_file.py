@@ -26,6 +26,9 @@ PRETRAINED = Path(__file__).parent / "pretrained"
 def load_agent(path: str | Path, model: ShipModel | None = None) -> Agent:
     """Read the file of a controller, a learned policy or a shielded one; none needs torch.
 
+    Returns a Controller, LearnedPolicy or Shielded, as it was saved. Raises InputError naming the file and
+    the field at fault, or the difference to the model.
+
     Parameters
     ----------
     path : str or Path
@@ -33,16 +36,6 @@ def load_agent(path: str | Path, model: ShipModel | None = None) -> Agent:
     model : ShipModel, optional
         The ship to steer; one with other observation scales is refused. A policy for all ships is made for
         her (`OneForAll.for_ship`).
-
-    Returns
-    -------
-    Controller, LearnedPolicy or Shielded
-        Of the kind that was saved.
-
-    Raises
-    ------
-    InputError
-        Naming the file and the field at fault, or the difference to the model.
     """
     agent = read_agent(path)
     if hasattr(agent, "for_ship"):

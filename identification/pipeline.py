@@ -46,6 +46,9 @@ def identify(
 
     Trials marked `validate` are predicted, and influence no coefficient.
 
+    Raises InputError for trials that excite nothing, lack channels or samples, and for particulars that do
+    not suffice.
+
     Parameters
     ----------
     trials : sequence of Trial
@@ -66,11 +69,6 @@ def identify(
         Estimated from the rudders of the trials where absent.
     **options
         The other fields of `Options`: of the identification, and settings of the method.
-
-    Raises
-    ------
-    InputError
-        For trials that excite nothing, lack channels or samples, and for particulars that do not suffice.
     """
     asked = Options.of({"structure": structure, "method": method, "samples": samples, **options})
     return _identified(trials, asked, particulars, steering)

@@ -34,17 +34,14 @@ class IdentificationResult(Fit):
     def plots(self) -> dict[str, Figure]:
         """Figures of the fit and of what the model predicts.
 
+        Raises InputError if plotly is not installed.
+
         Returns
         -------
         dict of str to plotly.graph_objects.Figure
             "fit", "residuals" (autocorrelation, and cross-correlation with the rudder), "l-curve" and
             "search" for methods that have one, "coefficients", "trials", and "prediction: NAME" for each
             trial held out.
-
-        Raises
-        ------
-        InputError
-            If plotly is not installed.
         """
         return all_figures(self)
 
@@ -54,15 +51,12 @@ class IdentificationResult(Fit):
         The same call on the same data gives the same files, byte for byte. Without plotly there is no
         report, and a warning says so.
 
+        Raises InputError where it cannot be written.
+
         Parameters
         ----------
         folder : str or Path
             Created where it does not exist.
-
-        Raises
-        ------
-        InputError
-            Where it cannot be written.
         """
         folder = Path(folder)
         try:

@@ -53,6 +53,8 @@ def write_page(
 ) -> None:
     """Write the page of a benchmark. The worst episodes are run again for it.
 
+    Raises InputError if plotly is not installed or the page cannot be written; nothing is written then.
+
     Parameters
     ----------
     result : BenchmarkResult
@@ -67,11 +69,6 @@ def write_page(
         Processes that run them; None for as many as there are cores.
     progress : callable, optional
         Told the stage of the work, what is done and the total.
-
-    Raises
-    ------
-    InputError
-        If plotly is not installed or the page cannot be written; nothing is written then.
     """
     target = Path(path)
     check_page(target)

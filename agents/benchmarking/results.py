@@ -81,10 +81,7 @@ class BenchmarkResult:
     def figures(self, contestant: str, task: str, name: str = "cost") -> Floats:
         """A figure of each episode, shape (n_runs, n_episodes); of no runs where it took no part.
 
-        Raises
-        ------
-        InputError
-            For an unknown contestant, task or figure.
+        Raises InputError for an unknown contestant, task or figure.
         """
         check_choice(contestant, self.summary["contestants"], "contestant")
         check_choice(task, self.tasks, "task")
@@ -98,10 +95,7 @@ class BenchmarkResult:
 
         Returns the result with the hash of `episodes.parquet` in its summary.
 
-        Raises
-        ------
-        InputError
-            If pyarrow is missing or the folder cannot be written.
+        Raises InputError if pyarrow is missing or the folder cannot be written.
         """
         if folder is None:
             return self
@@ -202,15 +196,12 @@ def _about_contestant(one: Contestant, tasks: Sequence[BenchmarkTask], done: Don
 def load_results(path: str | Path) -> BenchmarkResult:
     """Read the results of a benchmark.
 
+    Raises InputError naming the file and the field at fault.
+
     Parameters
     ----------
     path : str or Path
         Their folder, or `results.json` in it.
-
-    Raises
-    ------
-    InputError
-        Naming the file and the field at fault.
     """
     where = Path(path)
     where = where / RESULTS if where.is_dir() else where

@@ -43,6 +43,9 @@ def benchmark(
 ) -> BenchmarkResult:
     """Run controllers through the tasks of a suite and rank them.
 
+    Returns results that are the same wherever the work is done, but for the times. Raises InputError for an
+    unknown contestant, suite or task, a broken agent or one for no task, or a folder in use.
+
     Parameters
     ----------
     controllers : str, sequence, or mapping of str
@@ -60,16 +63,6 @@ def benchmark(
         Whether to go on in a folder of results: what is there already is not run again.
     episodes : int
         How many of the scored ones; fewer are for a quick look, not for a ranking.
-
-    Returns
-    -------
-    BenchmarkResult
-        The same wherever the work is done, but for the times.
-
-    Raises
-    ------
-    InputError
-        For an unknown contestant, suite or task, a broken agent or one for no task, or a folder in use.
     """
     chosen, who = _chosen(suite, tasks), contestants(controllers)
     check_number(check_whole(episodes, "episodes", at_least=1), "episodes", at_most=N_EPISODES)

@@ -87,6 +87,8 @@ class AdaptiveLQ(Controller):
     ) -> Self:  # fmt: skip
         """Design on a model, from which the ship may differ.
 
+        Raises InputError if the model has no sway or no straight course, or an argument is out of its range.
+
         Parameters
         ----------
         model : ShipModel
@@ -102,11 +104,6 @@ class AdaptiveLQ(Controller):
         noise : float
             Of sway speed and yaw rate, in multiples of a sea trial's sensors (`SEA_TRIAL`). The noisier, the
             longer the model is believed.
-
-        Raises
-        ------
-        InputError
-            If the model has no sway or no straight course, or an argument is out of its range.
         """
         check_number(forgetting_lengths, "forgetting_lengths", above=0.0)
         check_number(redesign_lengths, "redesign_lengths", above=0.0)

@@ -30,6 +30,8 @@ def check_controller(
     answer to the same question, which leaves observations and state as they were; each ship steered as if
     it were alone; and a memory that ends where `episode_start` says so.
 
+    Raises InputError naming the first requirement that is not met, what was found and what is expected.
+
     Parameters
     ----------
     controller : Policy
@@ -40,11 +42,6 @@ def check_controller(
         Whose observations it is shown; by default that of course keeping.
     n_steps : int
         Control intervals.
-
-    Raises
-    ------
-    InputError
-        Naming the first requirement that is not met, what was found and what is expected.
     """
     check_whole(n_steps, "n_steps", at_least=2)
     ship = load_model("mariner") if model is None else model

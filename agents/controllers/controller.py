@@ -48,6 +48,9 @@ class Policy(Protocol):
     ) -> tuple[Any, Any]:
         """Commands for one or many observations, with the signature of stable-baselines3.
 
+        Raises InputError if the observation has fewer entries or another number of dimensions, or the state
+        is not one of as many ships.
+
         Parameters
         ----------
         observation : array-like of shape (n_observations,) or (n, n_observations)
@@ -67,12 +70,6 @@ class Policy(Protocol):
             Parts of the limits in [-1, 1], the first of the rudder.
         state : Any
             For the next call: all that is remembered is in it.
-
-        Raises
-        ------
-        InputError
-            If the observation has fewer entries or another number of dimensions, or the state is not one of
-            as many ships.
         """
 
 

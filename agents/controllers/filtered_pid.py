@@ -56,6 +56,9 @@ class FilteredPID(Controller):
     ) -> Self:  # fmt: skip
         """Design on a model: PID's gains, and the filters around them.
 
+        Raises InputError if the model has no straight course, an argument is out of its range, or the loop is
+        unstable.
+
         Parameters
         ----------
         model, dt, frequency, damping, integral_lengths
@@ -70,11 +73,6 @@ class FilteredPID(Controller):
             infinite leaves the anti-windup out.
         wave_period : float, optional
             Of the first-order motion as it is met, s: heading and yaw rate go through a notch there.
-
-        Raises
-        ------
-        InputError
-            If the model has no straight course, an argument is out of its range, or the loop is unstable.
         """
         plain = PID.from_model(
             model, dt=dt, frequency=frequency, damping=damping, integral_lengths=integral_lengths

@@ -150,6 +150,8 @@ class LineOfSight(Guided):
     ) -> Self:  # fmt: skip
         """Lead an autopilot along the paths of a task.
 
+        Raises InputError if an argument is out of its range or the autopilot was designed for another ship.
+
         Parameters
         ----------
         model : ShipModel
@@ -164,11 +166,6 @@ class LineOfSight(Guided):
             Time over which a steady cross-track error is integrated to as much again, in times to travel
             one ship length. By default 4 times `lookahead_lengths`, with which the way back to the path is
             critically damped; less swings, more is slower.
-
-        Raises
-        ------
-        InputError
-            If an argument is out of its range or the autopilot was designed for another ship.
         """
         asked = task or path_following_task()
         length = model.particulars["length"]

@@ -57,6 +57,8 @@ class LQ(Controller):
         one of first order. The reward has none on the integral of the error; it is given the one
         with which an offset decays over about `integral_lengths` ship lengths, at hardly any cost.
 
+        Raises InputError if the model has no straight course, or an argument is out of its range.
+
         Parameters
         ----------
         model : ShipModel
@@ -69,11 +71,6 @@ class LQ(Controller):
             Weight of the squared rudder beside that of the heading error; by default the environment's.
         rate_weight_s2 : float, optional
             Weight of the squared rudder rate, s^2; by default `rate_weight`.
-
-        Raises
-        ------
-        InputError
-            If the model has no straight course, or an argument is out of its range.
         """
         weights = Weights.of(model, dt, integral_lengths, rudder_weight, rate_weight_s2)
         gains = weights.gains(without_yaw_memory(model, weights.dt), length_time(model))

@@ -91,6 +91,8 @@ class LQG(Controller):
     ) -> Self:  # fmt: skip
         """Design on a model, about straight running: LQ's gains and a Kalman filter (`control.dlqe`).
 
+        Raises InputError if the model has no straight course, or an argument is out of its range.
+
         Parameters
         ----------
         model, dt, integral_lengths, rudder_weight, rate_weight_s2
@@ -104,11 +106,6 @@ class LQG(Controller):
             Of the first-order motion, s, as it is met; by default it is not modelled.
         wave_heading_deg : float
             Standard deviation of the heading in it, degrees.
-
-        Raises
-        ------
-        InputError
-            If the model has no straight course, or an argument is out of its range.
         """
         from scipy.linalg import block_diag
 

@@ -82,6 +82,9 @@ class MPC(Controller):
     ) -> Self:  # fmt: skip
         """Design on a model, about straight running.
 
+        Raises InputError if OSQP is not installed, the model has no straight course, or an argument is out of
+        its range.
+
         Parameters
         ----------
         model, dt, integral_lengths, rudder_weight
@@ -92,11 +95,6 @@ class MPC(Controller):
         rate_weight_s2 : float, optional
             Weight of the rudder rate, s^2; by default the environment's own. LQ's is higher
             (`linear_loop.rate_weight`), because LQ's model has no slow gear.
-
-        Raises
-        ------
-        InputError
-            If OSQP is not installed, the model has no straight course, or an argument is out of its range.
         """
         _solver_library()
         check_number(horizon_lengths, "horizon_lengths", above=0.0, at_most=20.0)

@@ -49,6 +49,9 @@ class PID(Controller):
         a control interval for the held command. Their natural frequency and damping are, if not given,
         near those that the environment's cost asks for (`optimal_poles`), lower where the lag is long.
 
+        Raises InputError if the model has no straight course, an argument is out of its range, or the poles
+        asked for leave the ship unstable.
+
         Parameters
         ----------
         model : ShipModel
@@ -60,12 +63,6 @@ class PID(Controller):
             Its damping ratio.
         integral_lengths : float
             Time for an offset to decay, in times to travel one ship length.
-
-        Raises
-        ------
-        InputError
-            If the model has no straight course, an argument is out of its range, or the poles asked for
-            leave the ship unstable.
         """
         check_number(integral_lengths, "integral_lengths", above=0.0)
         interval = control_interval(model) if dt is None else check_number(dt, "dt", above=0.0)

@@ -33,21 +33,14 @@ _REGISTERED: dict[str, type[Controller]] = {}
 def register_controller(controller: type[C]) -> type[C]:
     """Make a controller known by its `kind` to `--controllers`, files, the benchmark and learning.
 
+    Returns the class, so that this may decorate it. Raises InputError if it is not such a class, or there is
+    another controller of that kind.
+
     Parameters
     ----------
     controller : type
         A subclass of `Controller` with a `kind` and `from_model(model, *, dt=None, ...)`. To be found by
         workers it is to be at the top level of a module that they can import.
-
-    Returns
-    -------
-    type
-        The same, so that this may decorate the class.
-
-    Raises
-    ------
-    InputError
-        If it is not such a class, or there is another controller of that kind.
     """
     where = "register_controller"
     if not (isinstance(controller, type) and issubclass(controller, Controller)):

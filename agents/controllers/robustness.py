@@ -46,17 +46,14 @@ class MarginUncertainty:
 def margin_uncertainty(controller: Controller, models: Sequence[ShipModel]) -> MarginUncertainty:
     """Margins of a linear controller on each of many ships.
 
+    Raises InputError if there are no models.
+
     Parameters
     ----------
     controller : Controller
         A linear one; of a scheduled or adaptive one the design at service speed, of MPC without limits.
     models : sequence of ShipModel
         For example `model.sample(100, seed)`, drawn from the estimated covariance.
-
-    Raises
-    ------
-    InputError
-        If there are no models.
     """
     if not models:
         raise InputError("models: none found, expected at least one")

@@ -64,6 +64,10 @@ class ScheduledLQ(Controller):
 
         The shaft is taken to turn as at service speed: the ship has lost speed in a turn or in weather.
 
+        In the `design` of what is returned, `least_gain_margin` and `least_phase_margin_deg` are those of the
+        worst speed. Raises InputError if the model has no straight course at one of the speeds, or an
+        argument is out of its range.
+
         Parameters
         ----------
         model, dt, integral_lengths, rudder_weight, rate_weight_s2
@@ -71,16 +75,6 @@ class ScheduledLQ(Controller):
         speeds : sequence of float, optional
             m/s, rising, at least two; by default 0.6 to 1.1 times service speed. They should not leave the
             range of speeds that the model was identified in.
-
-        Returns
-        -------
-        ScheduledLQ
-            In `design`, `least_gain_margin` and `least_phase_margin_deg` are those of the worst speed.
-
-        Raises
-        ------
-        InputError
-            If the model has no straight course at one of the speeds, or an argument is out of its range.
         """
         weights = Weights.of(model, dt, integral_lengths, rudder_weight, rate_weight_s2)
         length, service = model.particulars["length"], model.particulars["speed"]

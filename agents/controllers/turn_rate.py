@@ -67,6 +67,9 @@ class TurnRate(Controller):
     ) -> Self:  # fmt: skip
         """Design on a model, about straight running.
 
+        Raises InputError if the model has no straight course or no steady turns, an argument is out of its
+        range, or the closed loop is unstable.
+
         Parameters
         ----------
         model, dt
@@ -77,12 +80,6 @@ class TurnRate(Controller):
         rate_deg_min : float, optional
             Rate at which courses are changed, degrees per minute; by default that of a steady turn with three
             tenths of the rudder's limit.
-
-        Raises
-        ------
-        InputError
-            If the model has no straight course or no steady turns, an argument is out of its range, or the
-            closed loop is unstable.
         """
         interval = control_interval(model) if dt is None else check_number(dt, "dt", above=0.0)
         ship, time = sample_ship(model, interval), length_time(model)

@@ -66,6 +66,9 @@ class WheelOver(Guided):
     ) -> Self:  # fmt: skip
         """Lead an autopilot along the paths of a task.
 
+        Raises InputError if an argument is out of its range, the autopilot was designed for another ship, or
+        the model does not turn.
+
         Parameters
         ----------
         model, autopilot, task
@@ -78,12 +81,6 @@ class WheelOver(Guided):
             ahead its course is taken, by default `own_lead`.
         crab_share : float
             Share of the angle of drift by the current that is countered.
-
-        Raises
-        ------
-        InputError
-            If an argument is out of its range, the autopilot was designed for another ship, or the model
-            does not turn.
         """
         asked, length = task or path_following_task(), model.particulars["length"]
         arcs = float(getattr(asked.settings, "turn_radius", 0.0))

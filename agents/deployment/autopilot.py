@@ -58,10 +58,7 @@ class Autopilot:
     learned to follow paths the course that its environment shows: of legs without arcs the leg's less
     atan(cross-track error / lookahead).
 
-    Raises
-    ------
-    InputError
-        For a policy that commands the shaft too, or reads what no ship is known to show.
+    Raises InputError for a policy that commands the shaft too, or reads what no ship is known to show.
     """
 
     def __init__(self, agent: Any) -> None:

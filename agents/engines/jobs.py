@@ -44,6 +44,10 @@ def run_jobs(
 ) -> list[Any]:  # fmt: skip
     """Run many independent jobs and return their results in the order of the jobs.
 
+    Returns a list of one result each. Tuples have become lists. Raises InputError for wrong arguments, a
+    cluster that does not answer, or wrong input that a job reports. Raises JobError or WorkerDiedError naming
+    the job, if it raises anything else, or its worker dies more often than `retries`.
+
     Parameters
     ----------
     function : callable
@@ -63,18 +67,6 @@ def run_jobs(
         How often a job is done again whose worker died, the last time alone, so that it is the one at fault.
     progress : callable, optional
         Called with the number of jobs done and their total.
-
-    Returns
-    -------
-    list
-        One result each. Tuples have become lists.
-
-    Raises
-    ------
-    InputError
-        For wrong arguments, a cluster that does not answer, or wrong input that a job reports.
-    JobError, WorkerDiedError
-        Naming the job, if it raises anything else, or its worker dies more often than `retries`.
     """
     check_engine(engine, workers, address)
     _check_work(function, retries)

@@ -55,6 +55,8 @@ class Memory(NamedTuple):
 class LearnedPolicy:
     """A learned autopilot in the signature of `Controller.predict`; steers without torch.
 
+    Raises InputError naming the field whose value does not fit.
+
     Attributes
     ----------
     network : Network
@@ -83,11 +85,6 @@ class LearnedPolicy:
         The model that it learned on, and a hash of its structure and numbers.
     training : dict
         How it was made, as JSON has it: algorithm, seeds, steps, command, versions, learning curve, score.
-
-    Raises
-    ------
-    InputError
-        Naming the field whose value does not fit.
     """
 
     network: Network

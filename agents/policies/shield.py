@@ -129,6 +129,8 @@ class Shielded:
     ) -> Self:  # fmt: skip
         """Put a policy under a shield with a model's envelope.
 
+        Raises InputError if the fallback or the policy was made for another ship.
+
         Parameters
         ----------
         model : ShipModel
@@ -141,11 +143,6 @@ class Shielded:
             Control interval, s; by default that of the environment.
         limits : Limits, optional
             When the fallback takes over.
-
-        Raises
-        ------
-        InputError
-            If the fallback or the policy was made for another ship.
         """
         interval = control_interval(model) if dt is None else check_number(dt, "dt", above=0.0)
         rescue = LQ.from_model(model, dt=interval) if fallback is None else fallback

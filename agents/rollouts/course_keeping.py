@@ -91,6 +91,10 @@ def sail(
 ) -> Episodes:
     """Sail episodes of course keeping with one controller, many at once.
 
+    Returns the same for the same arguments, whatever else is sailed with them. Raises InputError if the
+    controller was designed for other observations, answers with something that is not a command for each
+    ship, seeds and models do not fit, or a model is unstable.
+
     Parameters
     ----------
     controller : Policy
@@ -104,17 +108,6 @@ def sail(
         (n_models, n_episodes). With one model any shape.
     allow_unstable : bool
         Whether models that were found unstable when they were identified may be sailed, with a warning.
-
-    Returns
-    -------
-    Episodes
-        The same for the same arguments, whatever else is sailed with them.
-
-    Raises
-    ------
-    InputError
-        If the controller was designed for other observations, answers with something that is not a
-        command for each ship, seeds and models do not fit, or a model is unstable.
     """
     fleet = _fleet(models)
     numbers = _seeds(seeds, len(fleet))
@@ -167,6 +160,8 @@ def step_response(
 ) -> StepResponses:
     """Turn ships from straight ahead to a new course, all at once.
 
+    Raises InputError as `sail`; or if the step or the duration is out of its range.
+
     Parameters
     ----------
     controller : Policy
@@ -177,15 +172,6 @@ def step_response(
         Change of course, degrees, positive to starboard.
     duration : float, optional
         In s; by default the time to travel 16 ship lengths.
-
-    Returns
-    -------
-    StepResponses
-
-    Raises
-    ------
-    InputError
-        As `sail`; or if the step or the duration is out of its range.
     """
     fleet = _fleet(models)
     check_number(step_deg, "step_deg", at_least=-LARGEST_STEP_DEG, at_most=LARGEST_STEP_DEG)

@@ -17,17 +17,15 @@ PLAYER = "agents.rollouts/replay.html"
 def write_replay(paths: Sequence[str | Path], out: str | Path) -> None:
     """Write the replay page of recorded episodes.
 
+    Raises InputError if there is no episode, one cannot be read, or the page cannot be written; nothing is
+    written then.
+
     Parameters
     ----------
     paths : sequence of str or Path
         Episode files, of one ship or of several; the page shows them together.
     out : str or Path
         The HTML file; one that exists is replaced.
-
-    Raises
-    ------
-    InputError
-        If there is no episode, one cannot be read, or the page cannot be written; nothing is written then.
     """
     target = Path(out)
     check_page(target)

@@ -81,6 +81,9 @@ def rollout(
 ) -> Rollout:
     """Steer the ships of an engine through one episode each.
 
+    Returns the same for the same arguments; only the time differs. Raises InputError if the policy gives no
+    finite command for each ship, unless `tolerant`.
+
     Parameters
     ----------
     policy : Policy
@@ -96,16 +99,6 @@ def rollout(
         that it fails in and the others go on; otherwise that is an error.
     show : callable, optional
         What the policy is shown in place of the observations; asked before each command.
-
-    Returns
-    -------
-    Rollout
-        The same for the same arguments; only the time differs.
-
-    Raises
-    ------
-    InputError
-        If the policy gives no finite command for each ship, unless `tolerant`.
     """
     log = _Log(engine, record, tolerant)
     seen, memory, starts = engine.reset(seeds), None, log.sailing

@@ -116,17 +116,14 @@ class Given:
 def make_plan(given: Given, stored: Plan | None = None) -> Plan:
     """The run that a user asks for.
 
+    Raises InputError for an unknown algorithm, environment, task, model, option or setting, with the nearest
+    known one, or a value out of its range.
+
     Parameters
     ----------
     given : Given
     stored : Plan, optional
         The run that is resumed: what is not given is as it was.
-
-    Raises
-    ------
-    InputError
-        For an unknown algorithm, environment, task, model, option or setting, with the nearest known one,
-        or a value out of its range.
     """
     settings_of(given.algorithm)  # its error goes before those of the task
     task = _task(given, stored)

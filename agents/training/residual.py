@@ -28,18 +28,15 @@ class ResidualVecEnv(VecEnvWrapper):  # type: ignore[misc]  # stable-baselines3 
     `action_repeat` control intervals, its reward is their sum. Where an episode ends among them, the rest of
     the step is not counted: the next episode begins with the base alone (without base: the output).
 
+    Raises InputError for commands that are not continuous beside a base, a base that does not fit the ship,
+    or a value out of its range.
+
     Parameters
     ----------
     venv : VecEnv
         Ships, such as `shipgym.ShipVecEnv`.
     base, authority, frame_stack, action_repeat, rate_limit
         As in `LearnedPolicy`; the base is any controller in the signature of `Controller.predict`.
-
-    Raises
-    ------
-    InputError
-        For commands that are not continuous beside a base, a base that does not fit the ship, or a value out
-        of its range.
     """
 
     def __init__(

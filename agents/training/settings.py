@@ -210,6 +210,9 @@ def load_settings(
 ) -> Settings:  # fmt: skip
     """The tuned settings of an algorithm, with those given by name replaced.
 
+    Returns settings of the algorithm's class in `ALGORITHMS`. Raises InputError for an unknown algorithm or
+    setting, with the nearest known one, or a value out of its range.
+
     Parameters
     ----------
     algorithm : {"ppo", "sac", "td3", "tqc"}
@@ -221,16 +224,6 @@ def load_settings(
     action : {"rudder", "rudder-discrete", "rudder-shaft"}
         What is commanded. With others than the rudder, or `base` given as "none", a policy learns from
         scratch.
-
-    Returns
-    -------
-    Settings
-        Of the algorithm's class in `ALGORITHMS`.
-
-    Raises
-    ------
-    InputError
-        For an unknown algorithm or setting, with the nearest known one, or a value out of its range.
     """
     check_choice(algorithm, ALGORITHMS, "algorithm")
     check_choice(environment, ENVIRONMENTS, "environment")

@@ -118,6 +118,10 @@ def train(
 ) -> TrainingResult:  # fmt: skip
     """Train an agent.
 
+    Raises InputError if another process uses the folder; if it holds something already, or, to resume,
+    nothing or a run of another configuration; if the ship and the settings do not go together; or if the
+    networks diverge.
+
     Parameters
     ----------
     plan : Plan
@@ -132,12 +136,6 @@ def train(
         Called with the progress at each boundary. What it raises ends the training.
     command : str, optional
         Command line that is written into the run's folder.
-
-    Raises
-    ------
-    InputError
-        If another process uses the folder; if it holds something already, or, to resume, nothing or a run of
-        another configuration; if the ship and the settings do not go together; or if the networks diverge.
     """
     folder = None if out is None else Path(out)
     if resume and folder is None:

@@ -163,6 +163,8 @@ def advise(
 ) -> Advice:  # fmt: skip
     """Which manoeuvres to run next, chosen one after the other.
 
+    Raises InputError for an unknown criterion or coefficient, and where no candidate can be simulated.
+
     Parameters
     ----------
     model : ShipModel
@@ -180,11 +182,6 @@ def advise(
         a coefficient near zero is not taken for uncertain.
     number : int
         How many to choose; the same one may be chosen again.
-
-    Raises
-    ------
-    InputError
-        For an unknown criterion or coefficient, and where no candidate can be simulated.
     """
     check_choice(criterion, CRITERIA, "criterion")
     if coefficient is not None:

@@ -55,6 +55,9 @@ def identify_reduced(
 ) -> ReducedIdentification:
     """Identify a structure, reduce it on the same samples, and identify the smaller one.
 
+    Raises InputError for a grey box, whose table is what its reference ship leaves, for a structure with a
+    memory of yaw, and for fewer than five samples a term.
+
     Parameters
     ----------
     trials : sequence of Trial
@@ -65,12 +68,6 @@ def identify_reduced(
         By how much the R2 of stretches held out may fall.
     **arguments
         Of `identify`.
-
-    Raises
-    ------
-    InputError
-        For a grey box, whose table is what its reference ship leaves, for a structure with a memory of yaw,
-        and for fewer than five samples a term.
     """
     full = identify(trials, **arguments)
     table = full.model.table

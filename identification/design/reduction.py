@@ -83,6 +83,9 @@ def backward_elimination(
 ) -> Reduction:  # fmt: skip
     """Drop terms one by one as long as held-out data is explained equally well.
 
+    Returns a Reduction whose path ends with the chosen model. Raises InputError for shapes that do not fit
+    and fewer than five samples a term.
+
     Parameters
     ----------
     X : array-like of shape (n_samples, n_terms)
@@ -97,16 +100,6 @@ def backward_elimination(
         Relative standard error above which a term is a candidate; terms of a collinear group always are.
     prefer : sequence of str
         Terms that are dropped only where no other candidate can be: where two say the same, it decides.
-
-    Returns
-    -------
-    Reduction
-        The path ends with the chosen model.
-
-    Raises
-    ------
-    InputError
-        For shapes that do not fit and fewer than five samples a term.
     """
     features, targets, labels = _checked(X, y, names)
     check_number(tolerance, "tolerance", at_least=0.0)
@@ -136,6 +129,9 @@ def forward_selection(
 ) -> Reduction:
     """Add terms by error reduction ratio; choose the shortest model near the best on what is held out.
 
+    Returns a Reduction whose path goes on beyond the chosen model. Raises InputError for shapes that do not
+    fit and fewer than five samples a term.
+
     Parameters
     ----------
     X, y, names
@@ -144,16 +140,6 @@ def forward_selection(
         By how much the held-out R2 of the chosen model may lie below the best of the path.
     most : int, optional
         Terms at which to stop.
-
-    Returns
-    -------
-    Reduction
-        The path goes on beyond the chosen model.
-
-    Raises
-    ------
-    InputError
-        For shapes that do not fit and fewer than five samples a term.
     """
     features, targets, labels = _checked(X, y, names)
     check_number(tolerance, "tolerance", at_least=0.0)
@@ -223,6 +209,8 @@ def sensitivity(
 ) -> dict[str, float]:
     """Change of a simulated manoeuvre per per cent of each coefficient (Cao 2015).
 
+    Raises InputError for a ship with equations written by hand.
+
     Parameters
     ----------
     model : ShipModel
@@ -237,11 +225,6 @@ def sensitivity(
     dict of str to float
         By coefficient, the largest first: root mean square change of u, v, r and psi, each by its span, in
         per cent per per cent. Infinite where the changed ship runs away.
-
-    Raises
-    ------
-    InputError
-        For a ship with equations written by hand.
     """
     check_number(change, "change", above=0.0, below=1.0)
     table_of(model)

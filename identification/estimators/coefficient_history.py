@@ -55,6 +55,8 @@ def coefficient_history(
 ) -> CoefficientHistory:  # fmt: skip
     """Run a recursive method over trials and keep every estimate.
 
+    Raises InputError for a method that is not recursive.
+
     Parameters
     ----------
     source : Samples, Trial or sequence of Trial
@@ -70,11 +72,6 @@ def coefficient_history(
         At service speed, 1/s, for structures that refer to it.
     **sampling
         `samples`, `window`, `gear`, `smooth` of `build_samples`.
-
-    Raises
-    ------
-    InputError
-        For a method that is not recursive.
     """
     table = get_structure(structure) if isinstance(structure, str) else structure
     estimator = get_method(method).estimator() if isinstance(method, str) else method

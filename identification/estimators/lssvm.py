@@ -245,20 +245,13 @@ def polynomial_coefficients(estimator: LSSVM) -> dict[tuple[int, ...], float]:
 
     The kernel (gamma x_i.x + coef0)^d is multiplied out and summed over the samples.
 
+    Returns a dict of coefficients by the powers of the features, as they were given: (2, 1) is that of x0^2
+    x1. Raises InputError for another kernel.
+
     Parameters
     ----------
     estimator : LSSVM
         Fitted, with kernel "poly".
-
-    Returns
-    -------
-    dict
-        Coefficient by the powers of the features, as they were given: (2, 1) is that of x0^2 x1.
-
-    Raises
-    ------
-    InputError
-        For another kernel.
     """
     if estimator.kernel != "poly":
         raise InputError(f"kernel: {estimator.kernel!r} found, expected 'poly': only a polynomial has them")

@@ -73,6 +73,8 @@ def force_regression(
 ) -> ForceRegression:
     """Stack the forces of captive tests over X, Y and N.
 
+    Raises InputError for no trial, a missing channel, or a ship at rest.
+
     Parameters
     ----------
     trials : sequence of Trial
@@ -85,11 +87,6 @@ def force_regression(
         Length, water density; mass, centre of gravity and yaw gyradius where `model_inertia`.
     model_inertia : bool
         Whether the inertia of the ship herself is in the forces (`Tank.model_inertia`); it is taken out.
-
-    Raises
-    ------
-    InputError
-        For no trial, a missing channel, or a ship at rest.
     """
     if not trials:
         raise InputError("trials: none found, expected captive tests with the channels u, v, r, X, Y, N")
@@ -189,6 +186,9 @@ def identify_forces(
 ) -> ShipModel:  # fmt: skip
     """Identify a table for forces, added masses included, from captive tests.
 
+    Returns a ShipModel with the covariance of the coefficients, for white errors; its provenance holds R^2 of
+    X, Y, N. Raises InputError for a structure of free-running trials, and what `force_regression` refuses.
+
     Parameters
     ----------
     trials, particulars, model_inertia
@@ -201,16 +201,6 @@ def identify_forces(
         Directions that `tls-svm` keeps; by default by its L-curve.
     steering, name : optional
         Of the model; the name by default the ship's.
-
-    Returns
-    -------
-    ShipModel
-        With covariance of the coefficients, for white errors; its provenance holds R^2 of X, Y, N.
-
-    Raises
-    ------
-    InputError
-        For a structure of free-running trials, and what `force_regression` refuses.
     """
     check_choice(method, METHODS, "method")
     if rank is not None and method != "tls-svm":

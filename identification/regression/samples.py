@@ -79,6 +79,9 @@ def build_samples(
     A trial with gaps in time is taken for several (`between_gaps`): nothing is smoothed or integrated across
     a gap. Of a grey box the targets are what the reference ship's converted acceleration leaves.
 
+    Raises InputError for a window or sample structure that does not exist, and for a trial of which gaps
+    leave nothing.
+
     Parameters
     ----------
     trials : sequence of Trial
@@ -99,11 +102,6 @@ def build_samples(
         named (`preprocess.PREPROCESSING`).
     shaft_speed : float
         At service speed, 1/s, for terms that refer to it.
-
-    Raises
-    ------
-    InputError
-        For a window or sample structure that does not exist, and for a trial of which gaps leave nothing.
     """
     if samples not in SAMPLE_STRUCTURES:
         raise InputError(f"samples: {samples!r} found, expected one of {', '.join(SAMPLE_STRUCTURES)}")

@@ -42,6 +42,8 @@ def minimise(
 ) -> SearchResult:
     """Minimise an objective within a box by any optimiser.
 
+    Raises InputError for bounds and settings that cannot be.
+
     Parameters
     ----------
     objective : callable
@@ -52,10 +54,5 @@ def minimise(
         The same seed gives the same search.
     optimiser : {"abc", "pso", "grid", "de"} or Optimiser
         By name with its usual settings, or one with your own.
-
-    Raises
-    ------
-    InputError
-        For bounds and settings that cannot be.
     """
     return get_optimiser(optimiser).minimise(objective, bounds, seed)

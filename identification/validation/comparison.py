@@ -58,6 +58,9 @@ def compare_methods(
 
     These are marked `validate` or named by `hold_out`; where there are none, each trial to fit in turn.
 
+    Raises InputError for an unknown method or setting, no two trials to hold one out of, and where nothing
+    can be fitted.
+
     Parameters
     ----------
     trials : sequence of Trial
@@ -68,11 +71,6 @@ def compare_methods(
         As for `identify`; `auto` for all that it tries. A `reference_model` goes to those that know one.
     **arguments
         Of `identify` but for `method`. A method is not given settings that it does not have.
-
-    Raises
-    ------
-    InputError
-        For an unknown method or setting, no two trials to hold one out of, and where nothing can be fitted.
     """
     wanted = [arguments.pop("structure", Options.structure)] if structures is None else [*structures]
     several = structures is not None or AUTO in wanted
@@ -110,6 +108,9 @@ def compare_methods(
 def cross_validate(trials: Sequence[Trial], folds: int | None = None, **arguments: Any) -> dict[str, Any]:
     """Predict each trial by a model identified from others.
 
+    Returns, for each trial by its name, the metrics (`IdentificationResult.metrics`) of its prediction.
+    Raises InputError for fewer than 2 trials or more folds than trials.
+
     Parameters
     ----------
     trials : sequence of Trial
@@ -118,16 +119,6 @@ def cross_validate(trials: Sequence[Trial], folds: int | None = None, **argument
         Groups of trials that are held out together, in their order; by default each by itself.
     **arguments
         Of `identify`.
-
-    Returns
-    -------
-    dict
-        For each trial by its name the metrics (`IdentificationResult.metrics`) of its prediction.
-
-    Raises
-    ------
-    InputError
-        For fewer than 2 trials or more folds than trials.
     """
     used = [trial for trial in trials if trial.use == "fit"]
     if len(used) < 2:

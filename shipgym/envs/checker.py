@@ -27,6 +27,8 @@ def check_vector_env(
     Spaces and shapes, seeds that hold, arrays that are not changed later, the autoreset that its metadata
     name, wrong actions, and, given single environments, that each row is one of them, bit for bit.
 
+    Raises InputError naming the first requirement that is not met, what was found and what is expected.
+
     Parameters
     ----------
     make : callable
@@ -36,11 +38,6 @@ def check_vector_env(
         Makes the single environment that row i equals when it is reset with the seed plus i.
     n_steps : int
         Steps taken in each check; let them be enough for some episodes to end.
-
-    Raises
-    ------
-    InputError
-        Naming the first requirement that is not met, what was found and what is expected.
     """
     for check in (_check_spaces, _check_reset, _check_steps, _check_seeds, _check_actions, _check_autoreset):
         with closing(make()) as env:

@@ -31,6 +31,9 @@ N_FIXED = 22  # words of a loop's world before those of its outputs
 class Engine(Lanes):
     """A task for many ships at once.
 
+    Raises InputError if `num_envs` is not positive, the number of models or their structures do not fit, a
+    ship's particulars are not enough for the weather, or a model is unstable.
+
     Parameters
     ----------
     models : ShipModel or sequence of ShipModel
@@ -47,12 +50,6 @@ class Engine(Lanes):
         Number of threads that share the lanes; the results do not depend on it.
     model_index : int, optional
         The one of the ships that are drawn from that all episodes have.
-
-    Raises
-    ------
-    InputError
-        If `num_envs` is not positive, the number of models or their structures do not fit, a ship's
-        particulars are not enough for the weather, or a model is unstable.
     """
 
     def __init__(

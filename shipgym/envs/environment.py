@@ -176,11 +176,8 @@ class ShipsEnv:
     def set_state(self, state: Mapping[str, Any]) -> None:
         """Go on from what `get_state` of an environment made by the same arguments gave.
 
-        Raises
-        ------
-        InputError
-            For a state of another task, version, ship or number of ships, or one with a number that is not
-            finite; nothing is changed then.
+        Raises InputError for a state of another task, version, ship or number of ships, or one with a number
+        that is not finite; nothing is changed then.
         """
         names = ("asked", "engine", *self._counters())
         check_table(state, "state", names, names)

@@ -31,6 +31,8 @@ class Episode:
     States and info are those at the beginning and after each of the n steps; commands, actions and rewards
     belong to the steps.
 
+    Raises InputError naming the field, what was found and what is expected.
+
     Parameters
     ----------
     environment, model : str
@@ -65,11 +67,6 @@ class Episode:
         How it ended; neither where it was cut off.
     success : bool, optional
         Whether it was a success, where the environment reports that.
-
-    Raises
-    ------
-    InputError
-        Naming the field, what was found and what is expected.
     """
 
     environment: str

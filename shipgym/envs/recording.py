@@ -31,6 +31,9 @@ class RecordEpisode(
     A file is written, complete, when its episode ends. One cut off by `reset` or `close` is written as
     well, neither terminated nor truncated, if it has a step.
 
+    Raises InputError if the environment is not one of shipgym's, the folder cannot be made, or it holds
+    recordings already.
+
     Parameters
     ----------
     env : gymnasium.Env
@@ -45,11 +48,6 @@ class RecordEpisode(
         How the names of the files begin.
     overwrite : bool
         Whether files of an earlier recording may be replaced.
-
-    Raises
-    ------
-    InputError
-        If the environment is not one of shipgym's, the folder cannot be made, or it holds recordings already.
     """
 
     def __init__(

@@ -58,6 +58,9 @@ def register_environments() -> None:
 def register_task(env_id: str, task: str | Path | Any, **options: Any) -> None:
     """Register a task of your own, so that `gym.make` and `gym.make_vec` know it.
 
+    Raises InputError if the task is not what the contract asks, or the id belongs to another; nothing is
+    registered then.
+
     Parameters
     ----------
     env_id : str
@@ -66,11 +69,6 @@ def register_task(env_id: str, task: str | Path | Any, **options: Any) -> None:
         The file of the task (`shipgym.tasks.contract`). Give its path, and worker processes find it too.
     **options
         Keywords of the environment that differ from their defaults.
-
-    Raises
-    ------
-    InputError
-        If the task is not what the contract asks, or the id belongs to another; nothing is registered then.
     """
     from shipgym.envs.environment import DEFAULT_MODEL, ENV_OPTIONS, read_options
 

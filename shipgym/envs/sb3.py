@@ -72,6 +72,9 @@ class ShipVecEnv(VecEnv):  # type: ignore[misc]  # stable-baselines3 is not type
     `episode` as stable-baselines3's Monitor writes it (return `r`, length `l`, time `t`) and, where paths
     are followed, `is_success`. Copy the list to keep infos beyond the next step.
 
+    Raises InputError for an environment that is not native, an unknown keyword or a value out of its range,
+    or options beside an environment that is made already.
+
     Parameters
     ----------
     env : str or VectorEnv
@@ -85,12 +88,6 @@ class ShipVecEnv(VecEnv):  # type: ignore[misc]  # stable-baselines3 is not type
         Entries of `info` that every step gives for every ship, which takes time.
     **options
         Of the environment, `threads` among them.
-
-    Raises
-    ------
-    InputError
-        For an environment that is not native, an unknown keyword or a value out of its range, or options
-        beside an environment that is made already.
     """
 
     def __init__(

@@ -28,6 +28,8 @@ class ShipEnv(ShipsEnv, gymnasium.Env[Observation, Any]):
     sum of its parts, which `info` has by name. What is asked, observed and paid is told by the task's file
     (`shipgym/tasks/course_keeping.py`, `shipgym/tasks/path_following.py`, or one of your own).
 
+    Raises InputError for an unknown model or keyword, or an argument out of its range.
+
     Parameters
     ----------
     model : str, Path or ShipModel
@@ -41,11 +43,6 @@ class ShipEnv(ShipsEnv, gymnasium.Env[Observation, Any]):
     **options
         Settings of the task, fields of `Task` and of `Randomisation`; `reward` and `sensors`, files with a
         reward and a sensor set of your own (`shipgym.tasks.contract`).
-
-    Raises
-    ------
-    InputError
-        For an unknown model or keyword, or an argument out of its range.
     """
 
     metadata: dict[str, Any] = {"render_modes": ["human", "rgb_array"], "render_fps": 30}  # noqa: RUF012 - Gymnasium declares it so
@@ -85,6 +82,8 @@ class ShipEnv(ShipsEnv, gymnasium.Env[Observation, Any]):
     ) -> tuple[Observation, dict[str, Any]]:
         """Begin an episode, straight ahead at service speed.
 
+        Raises InputError for other options, or a value that does not fit.
+
         Parameters
         ----------
         seed : int, optional
@@ -98,11 +97,6 @@ class ShipEnv(ShipsEnv, gymnasium.Env[Observation, Any]):
         observation : float32 array
         info : dict
             As `step` has it, the parts of the reward 0.
-
-        Raises
-        ------
-        InputError
-            For other options, or a value that does not fit.
         """
         super().reset(seed=seed)
         episodes = self._engine.episodes + np.uint64(1)
@@ -121,6 +115,8 @@ class ShipEnv(ShipsEnv, gymnasium.Env[Observation, Any]):
     def step(self, action: Any) -> tuple[Observation, SupportsFloat, bool, bool, dict[str, Any]]:
         """Hold a command over one control interval.
 
+        Raises InputError if the action is not a finite number for each command, or no episode has begun.
+
         Parameters
         ----------
         action : array of shape (n_commands,), or int
@@ -135,11 +131,6 @@ class ShipEnv(ShipsEnv, gymnasium.Env[Observation, Any]):
         info : dict
             The parts of the reward, `heading_error` in rad, `envelope_distance`, `extrapolating`, and what
             the environment's page names.
-
-        Raises
-        ------
-        InputError
-            If the action is not a finite number for each command, or no episode has begun.
         """
         if not self._begun:
             self._refuse_step()

@@ -26,6 +26,8 @@ Infos = dict[str, Any]
 class ShipVectorEnv(ShipsEnv, VectorEnv[Observation, Any, Floats]):
     """Many ships under a task; row i is the single environment reset with `seed + i`, bit for bit.
 
+    Raises InputError for an unknown model or keyword, or an argument out of its range.
+
     Parameters
     ----------
     num_envs : int
@@ -44,11 +46,6 @@ class ShipVectorEnv(ShipsEnv, VectorEnv[Observation, Any, Floats]):
         Gymnasium's name of `episode_steps`.
     **options
         As for the single environment.
-
-    Raises
-    ------
-    InputError
-        For an unknown model or keyword, or an argument out of its range.
     """
 
     def __init__(
@@ -90,6 +87,8 @@ class ShipVectorEnv(ShipsEnv, VectorEnv[Observation, Any, Floats]):
     ) -> tuple[Observation, Infos]:
         """Begin an episode in each row.
 
+        Raises InputError for other options, or seeds of another number than rows.
+
         Parameters
         ----------
         seed : int or sequence of int or None, optional
@@ -103,11 +102,6 @@ class ShipVectorEnv(ShipsEnv, VectorEnv[Observation, Any, Floats]):
         observations : float32 array of shape (num_envs, n_observations)
         infos : dict
             Arrays of shape (num_envs,) with their masks.
-
-        Raises
-        ------
-        InputError
-            For other options, or seeds of another number than rows.
         """
         super().reset(seed=seed if isinstance(seed, int) else None)
         mask = self._mask(options)
@@ -159,6 +153,9 @@ class ShipVectorEnv(ShipsEnv, VectorEnv[Observation, Any, Floats]):
     def step(self, actions: Any) -> tuple[Observation, Floats, Flags, Flags, Infos]:  # type: ignore[override]
         """One control interval of all rows.
 
+        Raises InputError if an action is not a number or their shape is another, a reward of your own is not
+        finite, or no episode has begun.
+
         Parameters
         ----------
         actions : array of shape (num_envs, n_commands), or int array of shape (num_envs,)
@@ -172,12 +169,6 @@ class ShipVectorEnv(ShipsEnv, VectorEnv[Observation, Any, Floats]):
         infos : dict
             Arrays of shape (num_envs,) with their masks; `final_obs` and `final_info` of episodes that ended
             where the next one begins in the same step.
-
-        Raises
-        ------
-        InputError
-            If an action is not a number or their shape is another, a reward of your own is not finite, or no
-            episode has begun.
         """
         if not self._begun:
             self._refuse_step()

@@ -29,6 +29,9 @@ def prbs_rudder(
 ) -> Trial:  # fmt: skip
     """Simulate a pseudo-random binary rudder: from one side to the other at multiples of a clock period.
 
+    Raises InputError for an amplitude beyond the rudder's limit, or a time that is not above 0. Raises
+    UnstableModelError if the ship runs away.
+
     Parameters
     ----------
     model : ShipModel
@@ -45,13 +48,6 @@ def prbs_rudder(
         m, for ships whose equations cover shallow water.
     weather : Weather or str, optional
         A weather or the name of a sea state, with the same seed; by default calm.
-
-    Raises
-    ------
-    InputError
-        For an amplitude beyond the rudder's limit, or a time that is not above 0.
-    UnstableModelError
-        If the ship runs away.
     """
     from scipy.signal import max_len_seq
 

@@ -78,6 +78,11 @@ def index_intervals(
 ) -> dict[str, IndexInterval]:  # fmt: skip
     """Indices of a manoeuvre with their 95 % intervals over the estimated covariance of a model.
 
+    Returns an IndexInterval by the name of each index, with its unit in the name. Draws that run away or
+    never get so far are counted. Raises InputError for a model without covariance, or a manoeuvre that is not
+    known or that the ship cannot sail. Raises UnstableModelError if the model itself runs away. Raises
+    ManoeuvreError if the model itself never reaches its switch heading or its speed.
+
     Parameters
     ----------
     model : ShipModel
@@ -89,20 +94,6 @@ def index_intervals(
         Models drawn (`ShipModel.sample`).
     seed : int or Generator
         Of the draw.
-
-    Returns
-    -------
-    dict of str to IndexInterval
-        By the name of the index, units in the names. Draws that run away or never get so far are counted.
-
-    Raises
-    ------
-    InputError
-        For a model without covariance, or a manoeuvre that is not known or that the ship cannot sail.
-    UnstableModelError
-        If the model itself runs away.
-    ManoeuvreError
-        If the model itself never reaches its switch heading or its speed.
 
     Examples
     --------

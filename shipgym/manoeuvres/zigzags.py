@@ -43,6 +43,10 @@ def zigzag(
 
     The trial has the rudder ordered from each sample on in `delta_command`.
 
+    Raises InputError for an angle, a duration or a step that is not above 0. Raises ManoeuvreError if the
+    heading of the first reversal is never reached; with the trial so far. Raises UnstableModelError if the
+    ship runs away.
+
     Parameters
     ----------
     model : ShipModel
@@ -64,15 +68,6 @@ def zigzag(
         motion in waves, as a helmsman does who sees through it.
     seed : int or Generator
         Of the weather.
-
-    Raises
-    ------
-    InputError
-        For an angle, a duration or a step that is not above 0.
-    ManoeuvreError
-        If the heading of the first reversal is never reached; with the trial so far.
-    UnstableModelError
-        If the ship runs away.
     """
     angle = np.radians(check_number(rudder_deg, "rudder_deg", above=0.0, at_most=90.0))
     threshold = np.radians(check_number(heading_deg, "heading_deg", above=0.0, at_most=180.0))

@@ -42,10 +42,8 @@ class GreyBox(Structure):
     reference ship's accelerations back to the target. The terms are added. Water is deep. The shaft turns as
     commanded, whatever lag the reference ship's has.
 
-    Raises
-    ------
-    InputError
-        For a table of forces, and for a reference ship that is a grey box itself or has no rudder.
+    Raises InputError for a table of forces, and for a reference ship that is a grey box itself or has no
+    rudder.
     """
 
     # the reference ship: with equations of its own or a table of terms, without heave or trim

@@ -58,10 +58,7 @@ class Kernel:
 
     x is v / U, r L / U, the rudder angle in rad and U / U0, less an offset, by a scale.
 
-    Raises
-    ------
-    InputError
-        For arrays that do not belong together, or too many centres.
+    Raises InputError for arrays that do not belong together, or too many centres.
     """
 
     offset: Floats  # of x, shape (4,)
@@ -113,10 +110,7 @@ def gaussians(x: Floats, centres: Floats) -> Floats:
 class KernelBox(GreyBox):
     """A reference ship's accelerations and, by U^2 / L (U^2 / L^2 of yaw), sums of features of a kernel.
 
-    Raises
-    ------
-    InputError
-        For no kernel, and as `GreyBox`.
+    Raises InputError for no kernel, and as `GreyBox`.
     """
 
     kernel: Kernel = field(default=None, repr=False)  # type: ignore[assignment]

@@ -144,6 +144,9 @@ class ManoeuvringModel:
     def derivatives(self, state: ArrayLike, command: ArrayLike, water_depth: float = np.inf) -> Floats:
         """Time derivative of the state, steering gear included.
 
+        Raises InputError for another number of states or commands, for those that are not finite or in other
+        units (degrees, revolutions per minute), or for water that is too shallow.
+
         Parameters
         ----------
         state : array-like of shape (..., n_state)
@@ -152,12 +155,6 @@ class ManoeuvringModel:
             In the order of `command_names`: rudder angle in rad, positive to starboard.
         water_depth : float
             In m; only deep water is known to identified structures.
-
-        Raises
-        ------
-        InputError
-            For another number of states or commands, for those that are not finite or in other units
-            (degrees, revolutions per minute), or for water that is too shallow.
         """
         depth = np.asarray(water_depth, dtype=float)
         self.check_depth(float(depth.min()))

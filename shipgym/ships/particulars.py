@@ -22,6 +22,8 @@ class Particulars(Mapping[str, Any]):
 
     What is not known is None. :meth:`completed` estimates what the models need.
 
+    Raises InputError for values that no ship has.
+
     Parameters
     ----------
     name : str
@@ -51,11 +53,6 @@ class Particulars(Mapping[str, Any]):
         rho L^4 / 2, N_rdot by rho L^5 / 2; about midship.
     estimated : frozenset of str
         Names of the values that were estimated.
-
-    Raises
-    ------
-    InputError
-        For values that no ship has.
     """
 
     length: float

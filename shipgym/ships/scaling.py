@@ -23,6 +23,9 @@ def scale_model(
     the service speeds, times with that of the times to sail a ship length; the steering gear follows.
     Scale effects (friction, wake) are not estimated.
 
+    Raises InputError for a length, speed or density that is not positive, and for reference ships, whose
+    equations are written for one length.
+
     Parameters
     ----------
     model : ShipModel
@@ -33,12 +36,6 @@ def scale_model(
         Its service speed, m/s; by default that of the same Froude number.
     water_density : float, optional
         Of its water, kg/m3; by default as it was.
-
-    Raises
-    ------
-    InputError
-        For a length, speed or density that is not positive, and for reference ships, whose equations are
-        written for one length.
 
     Notes
     -----

@@ -56,6 +56,9 @@ class ShipModel(ManoeuvringModel):
     ) -> Trial:  # fmt: skip
         """Simulate with commands held over each step (classical Runge-Kutta).
 
+        Raises UnstableModelError where the ship leaves every physical range; carries the time and the last
+        physical state.
+
         Parameters
         ----------
         commands : array-like of shape (n_steps, n_command)
@@ -79,11 +82,6 @@ class ShipModel(ManoeuvringModel):
             which is in `psi_wave`, `r_wave`, `phi_wave`, `p_wave`; `current_north`, `current_east`,
             `wind_speed` and `wind_from` tell the weather. What instruments show of it all:
             `shipgym.trials.sensors.Sensors`.
-
-        Raises
-        ------
-        UnstableModelError
-            Where the ship leaves every physical range; carries the time and the last physical state.
         """
         return simulate(self, commands, dt, state, water_depth, weather=weather, seed=seed)
 

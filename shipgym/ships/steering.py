@@ -25,6 +25,8 @@ class SteeringGear:
 
     In simulations the lag is at least 0.45 of a step (`frequency`).
 
+    Raises InputError for a value out of these bounds.
+
     Parameters
     ----------
     rudder_limit_deg : float
@@ -33,11 +35,6 @@ class SteeringGear:
         Largest rudder rate, degrees per second, above 0. SOLAS II-1 asks for 65 degrees in 28 s.
     time_constant : float
         Lag, s; 0 for a gear of constant rate.
-
-    Raises
-    ------
-    InputError
-        For a value out of these bounds.
     """
 
     rudder_limit_deg: float = 35.0

@@ -82,6 +82,9 @@ def register_structure(
 
     Models and their files carry their table, so only the process that identifies has to register it.
 
+    Raises InputError for a formula that cannot be read, a table that cannot be computed, or a name that
+    another table has.
+
     Parameters
     ----------
     name : str
@@ -97,11 +100,6 @@ def register_structure(
         Units of the terms; see `Structure`.
     quantity : {"acceleration", "force"}
         What the terms add up to; forces need the ship's mass and added mass.
-
-    Raises
-    ------
-    InputError
-        For a formula that cannot be read, a table that cannot be computed, or a name that another table has.
     """
     units = {"normalisation": normalisation, "quantity": quantity}
     table = {"name": name, "equations": equations, "source": source, **units}

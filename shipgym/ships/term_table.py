@@ -42,10 +42,7 @@ class Structure:
     Yaw may have a memory q: part of its acceleration that builds up, rdot = (terms of `r`) + q and
     qdot = (terms of `q`). It is the state that makes yaw of second order without sway.
 
-    Raises
-    ------
-    InputError
-        For a table that cannot be computed, naming equation and term.
+    Raises InputError for a table that cannot be computed, naming equation and term.
     """
 
     name: str  # name by which `identify` and model files know it

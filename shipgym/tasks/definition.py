@@ -144,17 +144,14 @@ _KNOWN: dict[TaskDefinition, TaskDefinition] = {}
 def read_definition(source: Any, reward: Any = None) -> TaskDefinition:
     """The task of a module, a file, or one of the package's by name.
 
+    Raises InputError if something is missing or of another form, naming it.
+
     Parameters
     ----------
     source : str, Path or module
         A name, the path of a Python file, or a module or object with the names of the contract.
     reward : str, Path or module, optional
         The path of a file, or a module, whose reward takes the place of the task's.
-
-    Raises
-    ------
-    InputError
-        If something is missing or of another form, naming it.
     """
     definition = source if isinstance(source, TaskDefinition) else _definition(*_named(source))
     if reward is not None:

@@ -35,10 +35,8 @@ class PathPosition(NamedTuple):
 class Path:
     """Straight legs from waypoint to waypoint.
 
-    Raises
-    ------
-    InputError
-        For fewer than two waypoints, one that is not finite, or one that repeats the one before it.
+    Raises InputError for fewer than two waypoints, one that is not finite, or one that repeats the one before
+    it.
     """
 
     waypoints: Floats  # shape (n_waypoints, 2); north and east, m
