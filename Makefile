@@ -22,12 +22,12 @@ DATA ?= ../shared/data
 demo: $(VENV)/demo-installed
 	$(BIN)/shipgym autopilot examples/mariner/ship.toml --agent mariner-calm-ppo --out report
 
-# Many loops and few steps of each: plain Python takes a tenth of the time that compiling them would. Tests of
-# these files that are marked as `compiled` take many steps, or state facts about compiled code.
-INTERPRETED = $(shell grep -l "^pytestmark = pytest.mark.interpreted" tests/shipgym/test_*.py)
+# Many loops and few steps of each: plain Python takes a tenth of the time that compiling them would. Tests that
+# are marked as `compiled` in files so marked take many steps, or state facts about compiled code.
+INTERPRETED = $(shell grep -lr "pytest.mark.interpreted" tests --include="test_*.py")
 
 test: lint type
-	NUMBA_DISABLE_JIT=1 OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n 2 -m "not compiled" $(INTERPRETED)
+	NUMBA_DISABLE_JIT=1 OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n 2 -m "interpreted and not compiled" $(INTERPRETED)
 	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n 2 --dist loadfile -m "compiled or not interpreted" --ignore=tests/test_site.py
 
 lint: $(VENV)/dev-installed

@@ -20,6 +20,7 @@ import types
 from pathlib import Path
 
 import document_api
+import numba
 import pytest
 import sklearn.linear_model  # noqa: F401 - what many pages need is loaded once, before they fork
 from plotly.basedatatypes import BaseFigure
@@ -37,6 +38,8 @@ PAGES = [
     for path in sorted((ROOT / "docs").rglob("*.md"))
     if "```python" in path.read_text(encoding="utf-8") and path.name != "gallery.md"  # made by its script
 ]
+#: Pages that take few steps, for which loops are not worth compiling.
+PLAIN = "docs/environments/"
 SMALLER = {
     "num_envs=1024": "num_envs=3", "range(1000)": "range(3)", "n_draws=200": "n_draws=3",
     "threads=2": "threads=1", ".engine(100)": ".engine(3)", "(task.seeds)": "(task.seeds[:3])",
@@ -52,6 +55,7 @@ def test_the_blocks_of_a_page_run(page, tmp_path, monkeypatch):
         (tmp_path / folder).symlink_to(ROOT / folder)
     if not (child := os.fork()):  # whatever a page registers ends with it
         status = 1
+        numba.config.DISABLE_JIT = page.relative_to(ROOT).as_posix().startswith(PLAIN)
         try:
             run(page)
             status = 0

@@ -46,6 +46,7 @@ def by_hand(env, base, seed, outputs):
     return np.array(shown), last, np.array(rewards)
 
 
+@pytest.mark.interpreted
 @pytest.mark.parametrize("name", BASES)
 def test_shows_and_does_what_is_worked_out_by_hand(name):
     env, base = BASES[name]

@@ -20,6 +20,8 @@ from shipgym.tasks.guidance import Path, line_of_sight, wrapped
 from shipgym.tasks.path_following_v0 import TURN_HORIZON, Settings, leg_from, observe
 from shipgym.tasks.task import path_following_task, ship_of
 
+pytestmark = pytest.mark.interpreted
+
 ID = "shipgym/PathFollowing-v0"
 LENGTH, SPEED = 160.93, 7.7175  # of the Mariner
 HOOK = [[0.0, 0.0], [1500.0, 0.0], [2600.0, 1100.0], [2600.0, 2800.0]]  # turns of 45 degrees
@@ -165,6 +167,7 @@ def test_running_aground_ends_the_episode_and_says_so():
 WIDE = {"ground": 40.0}  # a sea in which nobody runs aground
 
 
+@pytest.mark.compiled
 @pytest.mark.parametrize(
     ("name", "policy", "options"),
     [
@@ -193,6 +196,7 @@ def test_gaming_the_reward_does_not_pay(name, policy, options):
         assert not infos[-1]["success"]
 
 
+@pytest.mark.compiled
 @pytest.mark.parametrize(
     ("name", "policy"),
     [
