@@ -109,6 +109,12 @@ WEIGHT = ("parameters", "policy", "actor.mu.weight")
         (("ships", 0, "var"), "x", "agent.ships[0].var: 'x' found"),
         (("ships", 1, "states"), RANDOM_ARRAY, "agent.ships[1].states: ndarray of float64, shape (3,) found"),
         (("replay",), None, "agent.replay: None found, expected a table of 8"),
+        (
+            ("replay", "actions"),
+            None,
+            "agent.replay.actions: None found, expected ndarray of float32, shape (0,",
+        ),
+        (("replay", "actions"), np.zeros((), np.float32), "agent.replay.actions: float found"),
         (("replay", "pos"), 11, "agent.replay: not the 11 steps that its position 11 says"),
         (("replay", "pos"), 10**9, "agent.replay: not the"),
         (("replay", "full"), True, "agent.replay: not the 20 steps"),

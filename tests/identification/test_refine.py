@@ -64,6 +64,9 @@ def test_segments_cover_a_trial_and_the_second_set_begins_half_a_segment_later(
     assert min(starts[1:]) == pytest.approx(2.0 * travel, abs=0.5)
     assert all(segment.inputs[-1, 0] == cao_zigzag.t[-1] for segment in (segments[half - 1], segments[-1]))
     assert sum(len(s.measured) for s in segments[:half]) == len(cao_zigzag) + half - 1
+    block = int(0.05 * travel / np.diff(cao_zigzag.t)[0])  # residuals are averaged over 5 % of a ship length
+    assert block > 1
+    assert segments[0].blocks.tolist() == list(range(0, len(segments[0].measured), block))
 
 
 def test_edges_divide_a_trial_alike() -> None:

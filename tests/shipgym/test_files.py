@@ -6,7 +6,16 @@ from pathlib import Path
 import pytest
 
 from shipgym.errors import InputError
-from shipgym.files import named_values, parse_json, parse_toml, read_bytes, read_json, read_toml, toml_value
+from shipgym.files import (
+    named_values,
+    parse_json,
+    parse_toml,
+    read_bytes,
+    read_json,
+    read_text,
+    read_toml,
+    toml_value,
+)
 
 
 def said(read, *arguments):
@@ -93,6 +102,18 @@ def test_a_file_larger_than_its_kind_may_be_is_not_read(tmp_path):
         read_toml, path, "ship file"
     )
     assert read_bytes(path, "file", 2**18 + 1) == path.read_bytes()
+
+
+def test_a_sign_of_degrees_is_read_in_either_encoding_and_memory_as_none(tmp_path):
+    path = tmp_path / "log.csv"
+    for content in ("rudder (°)\n", "\ufeffrudder (°)\n"):
+        path.write_text(content, encoding="utf-8")
+        assert read_text(path, "x", 100) == "rudder (°)\n"
+    path.write_bytes(b"t\nrudder (\xb0)\n")
+    assert read_text(path, "x", 100, latin=True) == "t\nrudder (°)\n"
+    assert "line 2 holds byte 0xb0, which is not UTF-8 text" in said(read_text, path, "x", 100)
+    path.write_bytes(b"t\nrudder (\xb0)\n\xff\xff")
+    assert "line 2 holds byte 0xb0" in said(lambda: read_text(path, "x", 100, latin=True))
 
 
 def test_the_middle_of_an_endless_message_is_left_out():

@@ -119,6 +119,16 @@ def test_the_other_ships_run_straight_and_answer_small_rudder_as_linearised(name
     assert np.mean(turns) == pytest.approx(1.0, abs=0.03)
 
 
+def test_units_of_states_are_those_of_the_prime_system():
+    ship = load_model("container")
+    length, speed = ship.particulars["length"], ship.particulars["speed"]
+    units = dict(zip(ship.state_names, linear._scales(ship).tolist(), strict=True))
+    assert units == pytest.approx({
+        "x": 1.0, "y": 1.0, "psi": 1.0, "phi": 1.0, "delta": 1.0, "u": speed, "v": speed,
+        "r": speed / length, "p": speed / length, "n": ship.service_shaft_speed,
+    })  # fmt: skip
+
+
 def test_without_a_steady_speed_service_speed_is_held():
     surge = {name: 0.0 for name in MARINER.coefficients if name.startswith("X_")}
     neutral = straight_running(with_coefficients(**surge | {"X_dd": -0.01}))

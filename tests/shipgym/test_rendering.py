@@ -7,6 +7,7 @@ import pygame
 import pytest
 
 from shipgym import InputError
+from shipgym.envs.artist import scene
 from shipgym.envs.rendering import (
     CORRIDOR,
     CURRENT,
@@ -24,6 +25,7 @@ from shipgym.envs.rendering import (
     Scene,
 )
 from shipgym.sea import Current, Weather, Wind
+from shipgym.ships import load_model
 from shipgym.tasks.guidance import track
 
 LENGTH, BEAM = 160.0, 40.0
@@ -109,6 +111,14 @@ def sailed(env, steps=60):
 
 def shows(picture, colour):
     return bool(np.all(picture == colour, axis=-1).any())
+
+
+@pytest.mark.parametrize(("beam", "drawn"), [(23.17, 23.17), (None, 0.15 * 160.93)])
+def test_a_ship_without_a_known_beam_is_drawn_like_most(beam, drawn):
+    ship = load_model("mariner")
+    ship = replace(ship, particulars=replace(ship.particulars, beam=beam))
+    shown = scene(make(COURSE_KEEPING, model=ship).unwrapped._engine, 0, np.zeros((0, 2)))
+    assert (shown.length, shown.beam) == pytest.approx((160.93, drawn))
 
 
 @pytest.mark.parametrize(
