@@ -30,7 +30,6 @@ def new_ship_command(
     from shipgym.errors import InputError
     from shipgym.files import write_text
     from shipgym.pages import render
-    from shipgym.plots.trials import quantity
     from shipgym.trials.guesses import guess_trial
 
     if out.exists():
@@ -41,8 +40,8 @@ def new_ship_command(
         with suppress(InputError):  # `look` says what is wrong with it
             _, other, seen = guess_trial(log)
             side = other if other == "port" else side  # starboard is also what a log says that does not tell
-            if (known := quantity(seen, "speed")) is not None:
-                speeds.append(float(np.quantile(known, 0.9)))
+            known = [seen[name] for name in ("u", "stw", "sog") if name in seen.channels]
+            speeds += [float(np.quantile(speed, 0.9)) for speed in known[:1]]
     page = render(
         "shipgym.pages/ship.toml.jinja", name=out.name, length=length, guesses=guesses, side=side,
         trial=trial, speed=max(speeds, default=None),

@@ -54,6 +54,18 @@ def test_the_record_is_drawn_on_a_page(log, monkeypatch, capsys):
     assert "The channels over time." in page
 
 
+def test_service_speed_is_what_the_fastest_log_shows(log, monkeypatch, capsys):
+    rows = (log / "log.csv").read_text().splitlines()
+    for name, low, high in (("slow", 6.0, 7.0), ("fast", 8.0, 12.0)):
+        speeds = np.linspace(low, high, len(rows) - 1)  # kn
+        more = [f"{row};{speed:.3f}".replace(".", ",") for row, speed in zip(rows[1:], speeds, strict=True)]
+        (log / f"{name}.csv").write_text("\n".join([f"{rows[0]};STW [kn]", *more]))
+    code, said = command(monkeypatch, capsys, "new-ship", "fast.csv", "slow.csv", "--length", "150")
+    assert code == 0, said
+    written = ShipFile.load(log / "ship.toml").particulars["speed"]
+    assert written == pytest.approx(11.6 * 1852.0 / 3600.0, rel=5e-3)
+
+
 def test_a_log_that_is_none_is_one_message(log, monkeypatch, capsys):
     (log / "bad.csv").write_text("a;b\n1;2\n")
     code, said = command(monkeypatch, capsys, "look", "bad.csv")

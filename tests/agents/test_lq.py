@@ -9,7 +9,7 @@ from stable_baselines3.common.evaluation import evaluate_policy
 from stable_baselines3.common.monitor import Monitor
 
 from agents import LQ, sail, step_response
-from agents.controllers.linear_loop import SIGNALS, rate_weight, sample_ship
+from agents.controllers.linear_loop import SIGNALS, _crossing, rate_weight, sample_ship
 from agents.controllers.lq import lq_gain
 from shipgym.errors import InputError
 from shipgym.ships import load_model
@@ -89,6 +89,16 @@ def test_margins_are_where_the_sampled_loop_becomes_unstable():
     assert largest_pole(lq.margins.lowest_gain) == pytest.approx(1.0, abs=1e-5)
     assert lq.margins.gain_margin > 2.0 > 0.5 > lq.margins.lowest_gain
     assert lq.margins.phase_margin_deg > 35.0
+
+
+def test_the_bandwidth_ends_where_half_of_the_power_is_left():
+    omega = np.array([0.01, 0.1, 1.0, 10.0])
+    assert _crossing(omega, 1.0 / np.hypot(1.0, omega)) == pytest.approx(1.0)
+    assert _crossing(omega, np.array([1.0, 0.9, 0.5, 0.9])) == pytest.approx(
+        0.1 * 10 ** ((0.9 - 0.5**0.5) / 0.4)
+    )
+    assert _crossing(omega, np.ones(4)) == 10.0
+    assert _crossing(omega, np.array([0.5, 1.0, 0.1, 0.1])) == 0.01
 
 
 def test_a_course_change_ends_on_the_course_with_little_overshoot():

@@ -57,6 +57,16 @@ def test_series_are_in_the_units_that_are_read():
     assert shown["wind_from"] == pytest.approx(90.0)
 
 
+def test_shaft_speed_is_that_of_the_ship_else_what_is_ordered():
+    n = np.linspace(1.0, 1.5, STEPS + 1)
+    known = episode()
+    ordered = replace(known, commands={**known.commands, "n": n[1:]})
+    assert "shaft_speed" not in series(known)
+    assert series(ordered)["shaft_speed"] == pytest.approx(60.0 * np.append(n[1:], n[-1]))
+    turned = replace(ordered, states={**known.states, "n": 2.0 * n})
+    assert series(turned)["shaft_speed"] == pytest.approx(120.0 * n)
+
+
 def test_numbers_keep_seven_digits():
     values = np.array([0.0, -1234.56789, 1.0 / 3.0, 2e-7, 1e5 / 3.0])
     assert rounded(values) == [0.0, -1234.568, 0.3333333, 2e-7, 33333.33]

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import json
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -155,6 +156,16 @@ def test_result_is_saved_whole_and_read_back(noisy_fit: IdentificationResult, tm
     assert loaded.coefficients == noisy_fit.coefficients
     assert loaded.provenance == noisy_fit.model.provenance
     assert json.loads((tmp_path / "ship" / "metrics.json").read_text()) == noisy_fit.metrics
+
+
+def test_without_plotly_an_earlier_report_does_not_stay(
+    noisy_fit: IdentificationResult, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "report.html").write_text("of another model")
+    monkeypatch.setitem(sys.modules, "plotly", None)
+    with pytest.warns(UserWarning, match=r"plotly is not installed, so report.html .*'shipgym\[report\]'"):
+        noisy_fit.save(tmp_path)
+    assert {path.name for path in tmp_path.iterdir()} == {"metrics.json", "model.json", "settings.json"}
 
 
 def test_folder_that_cannot_be_written_is_named(noisy_fit: IdentificationResult, tmp_path: Path) -> None:

@@ -122,6 +122,8 @@ def test_states_that_do_not_fit_are_refused_and_change_nothing():
             env.set_state(given)
         with pytest.raises(InputError, match=message):
             env.reset(options={"state": given})
+    with pytest.raises(InputError, match=r"'state' found together with \['waypoints'\], expected it alone"):
+        env.reset(options={"state": state, "waypoints": HOOK})
     assert env.physical_state() == before
 
 

@@ -294,6 +294,28 @@ def test_a_reward_that_is_not_finite_is_named(tmp_path):
     assert re.search(f"my_reward.py: {message}", problem)
 
 
+def test_what_fails_in_plain_python_is_told_with_its_line_and_step(tmp_path):
+    text = "from math import acos\n\n" + REWARD.replace("** 2)", "** 2 + acos(2.0 + interval.dt))")
+    path = written(tmp_path, "my_reward.py", text)
+    line = next(k for k, one in enumerate(text.splitlines(), 1) if "interval.dt" in one)
+    (problem,) = check_task("CourseKeeping", reward=path).problems
+    assert re.search(rf"line {line}, in \w+: ValueError: .*, at step 1 in plain Python", problem)
+
+
+def test_what_is_often_clipped_is_remarked(tmp_path):
+    path = written(tmp_path, "my_sensors.py", SENSORS.replace("r=motion.r", "r=1000.0 * motion.r"))
+    found = check_task("CourseKeeping", sensors=path)
+    assert found.problems == ()
+    (remark,) = found.remarks
+    shown = (
+        r"Observation.helm.(\w+): (\S+) found in units of its scale, beyond its bounds (\S+) to (\S+) in "
+        r"(\d+) %"
+    )
+    _, furthest, low, high, part = re.match(shown, remark).groups()
+    assert not float(low) <= float(furthest) <= float(high)
+    assert 50 < float(part) < 100
+
+
 def test_ids_are_taken_once(fairway, tmp_path):
     register_task(fairway, tmp_path / "fairway.py", **SHIP)  # the same again changes nothing
     with pytest.raises(InputError, match=r"harbour/Fairway-v0: registered already, for .*fairway.py"):
