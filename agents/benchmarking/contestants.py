@@ -173,7 +173,7 @@ def contestants(given: Any) -> tuple[Contestant, ...]:
     elif isinstance(given, str):
         found = [_contestant(text) for text in given.split(",")]
     else:
-        single = hasattr(given, "predict") or isinstance(given, Contestant) or not isinstance(given, Iterable)
+        single = hasattr(given, "predict") or not isinstance(given, Iterable)
         found = [_contestant(one) for one in ([given] if single else given)]
     if not found:
         raise InputError("controllers: none found, expected at least one")

@@ -96,7 +96,7 @@ class _Summary:
     def _entry(self, who: int, on: str, by_task: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
         """What a contestant came to in the tasks of a set."""
         part = [k for k in self.sets[on] if (who, k) in self.costs]
-        scored = [k for k in part if np.isfinite(score(0.0, *self.reference.get(k, (0.0, 0.0))))]
+        scored = [k for k in part if k in self.reference and np.greater(*self.reference[k])]
         costs, known = [self.costs[who, k] for k in scored], [self.reference[k] for k in scored]
         found = [by_task[self.tasks[k]][self.names[who]] for k in part]
         relative = [one["relative_cost"] for one in found if one["relative_cost"]]

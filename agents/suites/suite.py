@@ -10,7 +10,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, replace
-from functools import cache, cached_property, lru_cache
+from functools import cache, cached_property
 from pathlib import Path
 from typing import Any
 
@@ -134,7 +134,7 @@ def list_suites() -> list[str]:
     return sorted(path.stem for path in FOLDER.glob("*.toml"))
 
 
-@lru_cache(maxsize=4)
+@cache
 def load_suite(name: str = DEFAULT_SUITE) -> Suite:
     """Read a shipped suite; raises InputError for an unknown name, or naming the field at fault."""
     return parse_suite(_suite_text(name), f"suite '{name}'")
@@ -190,7 +190,7 @@ def _sets(name: str, value: Any, where: str) -> list[BenchmarkTask]:
     """A task, and if it has a ship behind its model that on the model and that far from the design."""
     task = _task(name, value, where)
     if not task.behind:
-        return [replace(task, far={})]
+        return [task]
     far = _options(check_table(value.get("far", {}), f"{where}.far"), f"{where}.far")
     changes: dict[str, dict[str, Any]] = {"ship": {}, "model": {"behind": ""}, "far": {"far": far}}
     with placed(where):

@@ -1,7 +1,11 @@
+import hashlib
+import inspect
 import json
 import sys
+from copy import deepcopy
 from dataclasses import replace
 from functools import partial
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -9,12 +13,21 @@ from typer.testing import CliRunner
 
 from agents import LQ, PID, WheelOver, benchmark, load_results
 from agents.agent_file import PRETRAINED
-from agents.benchmarking.contestants import Contestant, contestants, pretrained
-from agents.benchmarking.replays import EpisodeId, rerun
-from agents.benchmarking.results import BenchmarkResult, check_new
+from agents.benchmarking.contestants import (
+    Contestant,
+    _is_like,
+    check_agents,
+    contestants,
+    names_code,
+    policy_hash,
+    pretrained,
+)
+from agents.benchmarking.replays import EpisodeId, _gathered, rerun
+from agents.benchmarking.results import BenchmarkResult, check_new, versions
+from agents.benchmarking.results_shape import check_summary
 from agents.benchmarking.run import _chosen, _run, checked_part, results_of
-from agents.benchmarking.summary import _place
-from agents.benchmarking.verification import verify
+from agents.benchmarking.summary import _count, _place, summary_of
+from agents.benchmarking.verification import Check, _compared, _sampled, verify
 from agents.cli import app
 from agents.cli.benchmark_tables import ranking_table
 from agents.controllers.designs import design
@@ -147,6 +160,7 @@ def test_one_that_cannot_take_part_is_said_and_the_rest_go_on():
     assert "scale of 'yaw_rate'" in refused
     assert result.ranking == ["pid", "other"]
     assert result.figures("other", "mariner-calm").size == 0
+    assert result.allow_code == ()
 
 
 def test_an_agent_that_observes_what_no_task_shows_is_refused_before_anything_is_run(tmp_path):
@@ -201,6 +215,7 @@ def test_functions_of_ones_own(tmp_path, monkeypatch):
         by_text.figures("gentle", "mariner-calm"), by_function.figures("gentle", "mariner-calm")
     )
     assert len(by_text.summary["contestants"]["gentle"]["files"]) == 1
+    assert (by_text.allow_code, by_function.allow_code) == (("my_autopilots:gentle",), ())
 
 
 def test_settings_that_were_tuned_and_costs_that_are_kept(tmp_path, monkeypatch):
@@ -260,12 +275,110 @@ def test_classical_controllers_are_designed_for_the_ship_of_the_task():
         ("x=nobody.json", "'nobody.json' found"),
         ("no_such_module:make", "'no_such_module:make' cannot be imported"),
         ({"a": 3}, "'a' is 3, expected a controller"),
+        ({"a": [LQ.from_model(load_model("mariner")), 3]}, "'a' is 3, expected a controller"),
         ([], "none found"),
+        ("=pid", "name '' found, expected one without any of , = /"),
+        ({"a,b": "pid"}, "name 'a,b' found, expected one without any of , = /"),
+        ("a/b=pid", "name 'a/b' found, expected one without any of , = /"),
+        ("tests+nobody.json", r"'tests\+nobody.json' found, expected .* a file of an agent that is there"),
     ],
 )
 def test_wrong_contestants(given, said):
     with pytest.raises(InputError, match=said):
         contestants(given)
+
+
+def test_contestants_are_told_by_texts_functions_controllers_and_names():
+    class Keeps(LQ):
+        def __iter__(self):
+            return iter(())
+
+    def make(task):
+        return pid
+
+    pid, lazy = PID.from_model(load_model("mariner")), Broken()
+    lazy.name = None
+    iterable = Keeps(**vars(LQ.from_model(load_model("mariner"))))
+    for given, expected in (
+        (" pid , mine = lq ", [("pid", "pid"), ("mine", "lq")]),
+        (pid, [("pid", pid)]),
+        (iterable, [("lq", iterable)]),
+        (make, [("make", make)]),
+        (Contestant("x", "lq"), [("x", "lq")]),
+        ([lazy, "pid", Contestant("x", make)], [("Broken", lazy), ("pid", "pid"), ("x", make)]),
+        ({"both": [pid, make]}, [("both", [pid, make])]),
+        ("{task}-pid-*.json", [("pid", "{task}-pid-*.json")]),  # found when a task is run
+        ("{task}.zip", [("agent", "{task}.zip")]),
+    ):
+        assert [(one.name, one.source) for one in contestants(given)] == expected
+    (both,) = contestants({"both": [pid, make]})
+    assert both.policies(load_suite().task("mariner-calm"), "any") == (pid, pid)
+
+
+@pytest.mark.parametrize(
+    ("text", "names"),
+    [
+        ("mine:make", True),
+        ("my.own:make", True),
+        ("make", False),
+        (":make", False),
+        ("mine:", False),
+        ("mine:two words", False),
+        ("my-own:make", False),
+        ("folder/mine:make", False),
+    ],
+)
+def test_code_is_named_by_a_module_and_a_function(text, names):
+    assert names_code(text) is names
+
+
+def test_a_path_is_like_a_pattern_of_as_many_folders():
+    assert _is_like(("runs", "a.json"), ("runs", "*.json"))
+    assert not _is_like(("runs", "a.json"), ("runs",))
+    assert not _is_like(("runs",), ("runs", "*.json"))
+    assert not _is_like(("runs", "a.json"), ("run", "*.json"))
+
+
+def test_files_that_have_the_name_of_a_contestant_are_not_its_own(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    for name in ("pid", "best-known", "tuned-lq"):
+        (tmp_path / name).write_text("")
+        assert Contestant(name, name).fingerprint(load_suite().task("mariner-calm")) == {}
+
+
+def test_an_agent_for_one_of_the_tasks_takes_part(tmp_path):
+    tasks = [load_suite().task(name) for name in ("mariner-calm", "mariner-current")]
+    WheelOver.from_model(tasks[1].ship, task=tasks[1].task).save(tmp_path / "guide.json")
+    (guide,) = contestants(str(tmp_path / "guide.json"))
+    check_agents(guide, tasks)
+    with pytest.raises(InputError, match="'guide' fits no task asked for"):
+        check_agents(guide, tasks[:1])
+
+
+@pytest.mark.parametrize(
+    ("source", "said"),
+    [
+        ("td3", "there is no file of a pretrained td3 agent for task 'mariner-calm'"),
+        ("{task}-x.json", "there is no file of '{task}-x.json' for task 'mariner-calm'"),
+        (int, "int: 3 found for task 'mariner-calm', expected a controller with `predict`"),
+    ],
+)
+def test_one_that_cannot_be_made_for_a_task_is_told(source, said, monkeypatch):
+    made = Contestant("x", (lambda task: 3) if source is int else source)
+    if source is int:
+        made.source.__name__ = "int"
+    with pytest.raises(InputError) as error:
+        made.policies(load_suite().task("mariner-calm"), "any")
+    assert str(error.value) == said
+
+
+def test_the_hash_of_a_controller_is_that_of_its_content(tmp_path):
+    pid = PID.from_model(load_model("mariner"))
+    pid.save(tmp_path / "pid.json")
+    content = json.dumps(json.loads((tmp_path / "pid.json").read_text()), sort_keys=True)
+    assert policy_hash(pid) == hashlib.sha256(content.encode()).hexdigest()
+    assert policy_hash(PID.from_model(load_model("mariner"), damping=0.9)) != policy_hash(pid)
+    assert policy_hash(Broken()) is None
 
 
 def test_agents_in_the_box_are_found_by_task_and_algorithm():
@@ -286,6 +399,105 @@ def test_what_the_results_say_is_true(folder):
     checks = verify(folder)
     assert [check.exact for check in checks] == [True, True]
     assert {check.episodes for check in checks} == {N}
+
+
+@pytest.mark.parametrize(
+    ("asked", "said"),
+    [
+        ({"sample": 0}, "sample: 0 found"),
+        ({"tolerance": -1e-9}, "tolerance: -1e-09 found"),
+        ({"tolerance": np.nan}, "tolerance: nan found"),
+    ],
+)
+def test_a_sample_of_nothing_and_a_tolerance_below_zero_are_refused(folder, asked, said):
+    with pytest.raises(InputError, match=said):
+        verify(folder, **asked)
+
+
+def test_results_of_another_version_of_a_suite_are_not_verified(copy):
+    summary = json.loads((copy / "results.json").read_text())
+    summary["suite"]["sha256"] = "0" * 64
+    (copy / "results.json").write_text(json.dumps(summary))
+    with pytest.raises(InputError, match="another suite 'shipgym-v1' than that of this version of shipgym"):
+        verify(copy)
+
+
+def told_of(runs=1, source="a"):
+    """What results say of four contestants in three tasks, of which one is an object and one ran nothing."""
+    sources = {"a": "pid", "b": "lq", "object": None, "idle": "los"}
+    found = {name: {"runs": 0 if name == "idle" else runs} for name in sources}
+    return SimpleNamespace(
+        summary={
+            "contestants": {name: {"source": one if source else None} for name, one in sources.items()},
+            "tasks": dict.fromkeys(("one", "two", "three"), found),
+        }
+    )
+
+
+def test_a_sample_takes_the_contestants_by_turns():
+    every = {(name, task) for name in "ab" for task in ("one", "two", "three")}
+    for seed in range(5):
+        pairs = _sampled(told_of(), 8, seed)
+        assert len(pairs) == 6
+        assert set(pairs) == every
+        for turn in (pairs[:2], pairs[2:4], pairs[4:]):
+            assert {name for name, _ in turn} == {"a", "b"}
+        assert _sampled(told_of(), 3, seed) == pairs[:3]
+    assert len({tuple(_sampled(told_of(), 6, seed)) for seed in range(5)}) > 1
+    for nothing in (told_of(runs=0), told_of(source=None)):
+        with pytest.raises(InputError, match="results: no contestant that can be made again; name them by"):
+            _sampled(nothing, 8, 0)
+    usual = inspect.signature(verify).parameters
+    assert (usual["sample"].default, usual["seed"].default, usual["workers"].default) == (8, 0, 1)
+
+
+COSTS = np.array([100.0, 50.0, 0.0])
+
+
+def compared(cost=COSTS, turns=(1.0, np.nan, 3.0), *, source="pid", tolerance=None, numpy=None, runs=1):
+    """What a check says of a contestant whose file holds `COSTS`, when it is run again."""
+    known = {**versions(), **({} if numpy is None else {"numpy": numpy})}
+    summary = {
+        "contestants": {"x": {"source": source}},
+        "tasks": {"calm": {}},
+        "seeds": {"count": 3},
+        "versions": known,
+    }
+    table = {"contestant": np.array(["x"] * 3), "task": np.array(["calm"] * 3), "cost": COSTS}
+    result = BenchmarkResult(summary, {**table, "reversals": np.array([1.0, np.nan, 3.0])})
+    again = {"cost": np.array(cost), "reversals": np.array(turns), "unknown": np.zeros(3)}
+    found = {"refused": "" if runs else "it is gone", "runs": [{"episodes": again}] * runs}
+    return _compared(result, "x", "calm", found, tolerance)
+
+
+def test_a_check_passes_up_to_what_is_allowed():
+    of = partial(Check, "x", "calm", 3)
+    assert compared() == of(0.0, True, 0.0, "")
+    near = COSTS + np.array([0.0, 50e-7, 0.0])
+    found = compared(near)
+    assert (found.difference, found.allowed, found.passed) == (pytest.approx(1e-7, rel=1e-6), 0.0, False)
+    assert compared(near, tolerance=1.001e-7).passed
+    assert not compared(near, tolerance=0.999e-7).passed
+    learned = compared(near, source="agent.json")
+    assert (learned.allowed, learned.exact, learned.passed) == (1e-6, False, True)
+    assert not compared(COSTS * (1.0 + 1.05e-6), source="agent.json").passed
+    assert compared(near, source="agent.json", tolerance=0.0).passed is False
+    other = compared(near, numpy="0.1")
+    assert (other.allowed, other.passed) == (1e-6, True)
+    assert other.note == "numpy differ from those of the file"
+    assert compared(COSTS + np.array([0.0, 0.0, 2e-13])).difference == pytest.approx(
+        0.2
+    )  # in units of 1e-12 at least
+
+
+def test_a_check_says_what_is_wrong_beside_the_costs():
+    of = partial(Check, "x", "calm", 3)
+    note = "the costs are the same, but another figure is not"
+    assert compared(turns=(1.0, np.nan, 4.0)) == of(np.inf, False, 0.0, note)
+    note = "numpy differ from those of the file"
+    assert compared(turns=(1.0, 2.0, 3.0), numpy="0.1") == of(np.inf, False, 1e-6, note)
+    assert compared(runs=2) == of(np.inf, False, 0.0, "2 training runs found, 1 in the file")
+    assert compared(runs=0, source="a.zip") == of(np.inf, False, 1e-6, "it is gone")
 
 
 def _rewritten(copy, change):
@@ -349,6 +561,13 @@ def test_results_run_no_code_that_they_name(renamed, source, tmp_path):
     assert sys.path == before
 
 
+def test_a_contestant_that_cannot_be_made_again_is_allowed_no_difference(renamed):
+    checks = {check.contestant: check for check in verify(renamed("evil_code:make"))}
+    note = "'evil_code:make' is code, run only if you name it: --allow-code evil_code:make"
+    assert checks["lq"] == Check("lq", "mariner-calm", N, np.inf, False, 0.0, note)
+    assert checks["lq"].to_dict()["difference"] is None
+
+
 def test_code_that_is_named_on_the_command_line_is_run(renamed, tmp_path):
     folder = renamed("evil_code:make")
     answer = shipgym("--verify", folder, "--workers", 1, "--allow-code", "evil_code:make")
@@ -370,6 +589,21 @@ def test_files_are_verified_by_their_hashes(tmp_path):
     (check,) = verify(out)
     assert (check.passed, check.episodes) == (False, 4)
     assert check.note == f"'{tmp_path}/mariner-calm-[pid]-1.json' is not the file that took part"
+    (tmp_path / "mariner-calm-[pid]-0.json").unlink()
+    (check,) = verify(out)
+    assert check.note == f"'{tmp_path}/mariner-calm-[pid]-0.json' is not the file that took part"
+
+
+def test_an_episode_run_again_costs_the_same_to_a_billionth():
+    costs = np.full(4, 1e6)
+    table = {"contestant": np.array(["a"] * 4), "task": np.array(["calm"] * 4), "cost": costs}
+    about = {"contestants": {"a": {}}, "tasks": {"calm": {}}, "seeds": {"first": 100, "count": 4}}
+    again = [1e6 + 0.99e-3, 1e6 + 1.05e-3, 1e6 - 1.05e-3, np.nan]  # the last failed at once
+    run = {"run": 0, "seeds": [100, 101, 102, 103], "costs": again, "episodes": [None] * 4}
+    found = {("a", "calm"): {"refused": "", "runs": [run]}, ("b", "calm"): {"refused": "it is gone"}}
+    done = _gathered(BenchmarkResult(about, table), found)
+    assert done.different == tuple(EpisodeId("a", "calm", 0, seed) for seed in (101, 102))
+    assert (done.episodes, done.refused) == ({}, {("b", "calm"): "it is gone"})
 
 
 @pytest.mark.parametrize(
@@ -429,6 +663,47 @@ def test_rows_of_nobody_in_the_summary_are_refused(copy):
         load_results(copy)
 
 
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (lambda one: one["seeds"].update(count=0), "r.json: seeds.count: 0 found"),
+        (lambda one: one["seeds"].update(count="4"), "r.json: seeds.count: '4' "),
+        (lambda one: one["ranking"][0].update(name="los"), "r.json: name of a contestant: 'los' found"),
+        (lambda one: one["improvement"].update(los={}), "r.json: name of a contestant: 'los' found"),
+        (lambda one: one["profile"]["shares"].update(los=[]), "r.json: name of a contestant: 'los' found"),
+        (lambda one: one["tasks"].update(rough={}), "r.json: name of a task: 'rough' found"),
+        (
+            lambda one: one["reference"].update(rough={"zero": 1, "best": 0}),
+            "r.json: name of a task: 'rough' found",
+        ),
+        (lambda one: one["ranking"].pop(0), "r.json: tasks.mariner-calm: name of a contestant: 'lq' found"),
+        (lambda one: one["tasks"]["mariner-calm"]["lq"].pop("runs"), r"tasks.mariner-calm.lq.*runs"),
+    ],
+)
+def test_a_summary_names_whom_and_what_it_knows(folder, change, said):
+    summary = deepcopy(load_results(folder).summary)
+    check_summary(summary, "r.json")
+    change(summary)
+    with pytest.raises(InputError, match=said):
+        check_summary(summary, "r.json")
+
+
+def test_what_the_table_of_episodes_needs_is_missed_before_the_work(folder, tmp_path, monkeypatch):
+    result = load_results(folder)
+    monkeypatch.setitem(sys.modules, "pyarrow.parquet", None)
+    for call in (lambda: check_new(tmp_path / "out", False, "v1"), lambda: result.save(tmp_path / "out")):
+        with pytest.raises(InputError, match=r"not installed; install it with: pip install 'shipgym\[bench"):
+            call()
+    assert not (tmp_path / "out").exists()
+
+
+def test_parts_alone_are_gone_on_with(tmp_path):
+    (tmp_path / "parts").mkdir()
+    assert check_new(tmp_path, True, "shipgym-v1") == tmp_path
+    with pytest.raises(InputError, match="already contains results; continue with --resume"):
+        check_new(tmp_path, False, "shipgym-v1")
+
+
 def test_a_folder_takes_the_results_of_one_suite_only(copy, tmp_path):
     assert check_new(tmp_path / "new", False, "shipgym-v1") == tmp_path / "new"
     assert check_new(copy, True, "shipgym-v1") == copy
@@ -456,7 +731,13 @@ def test_a_part_that_was_kept_is_of_its_job():
 
     whole = part(cost=np.zeros(2), overshoot=np.zeros(2))
     assert checked_part(whole, job) is whole
-    for wrong in (part(cost=np.zeros(3)), part(overshoot=np.zeros(2)), part(cost=np.zeros((2, 1)))):
+    for wrong in (
+        part(cost=np.zeros(3)),
+        part(overshoot=np.zeros(2)),
+        part(cost=np.zeros((2, 1))),
+        part(cost=np.array(["1", "2"])),
+        {"refused": "", "runs": [*whole["runs"], *part(cost=np.zeros(2))["runs"]]},  # which knows less
+    ):
         with pytest.raises(
             InputError, match="part of 'pid' on 'mariner-calm': expected cost and other figures"
         ):
@@ -470,6 +751,55 @@ def test_tasks_are_chosen_by_name_each_once():
     assert both == (whole[1], whole[0])
     with pytest.raises(InputError, match="tasks: none found, expected at least one"):
         _chosen("shipgym-v1", [])
+    for asked, ends in (("strong-current", ["", "-on-model", "-far"]), ("strong-current-far", ["-far"])):
+        assert [one.name for one in _chosen("shipgym-v2", [asked])] == [
+            f"strong-current{end}" for end in ends
+        ]
+
+
+@pytest.mark.parametrize("episodes", [0, 101, 2.5])
+def test_as_many_episodes_are_run_as_are_scored_at_most(episodes):
+    with pytest.raises(InputError, match=f"episodes: {episodes} found"):
+        benchmark("pid", tasks=TASKS, episodes=episodes)
+
+
+def test_a_summary_of_two_episodes_by_hand(monkeypatch):
+    """Of two tasks with a ship, in one of which 0 and 1 cost the same, and one far from the design."""
+    references = {"calm": (30.0, 20.0), "same": (5.0, 5.0), "calm-far": (40.0, 10.0)}
+    monkeypatch.setattr("agents.benchmarking.summary.reference_costs", lambda suite: references)
+    monkeypatch.setattr("agents.benchmarking.summary.N_EPISODES", 2)
+
+    def runs(*costs):
+        known = {"refused": "", "runs": [_run({"cost": np.array(costs)}, "", 1e-6, None)]}
+        return known if costs else {"refused": "no", "runs": []}
+
+    done = {
+        ("a", "calm"): runs(25.0, 20.0), ("a", "same"): runs(5.0, 5.0), ("a", "calm-far"): runs(10.0, 10.0),
+        ("b", "calm"): runs(30.0, 30.0), ("b", "same"): runs(10.0, 10.0), ("b", "calm-far"): runs(),
+    }  # fmt: skip
+    done["a", "calm"]["runs"] *= 2
+    done["a", "calm"]["runs"][1] = {**done["a", "calm"]["runs"][0], "seconds_per_action": 3e-6}
+    tasks = [SimpleNamespace(name=name, on="far" if "far" in name else "ship") for name in references]
+    found = summary_of("mine", tasks, ["b", "a"], done)
+    first, second = found["ranking"]
+    assert (first["name"], first["tasks"], first["scored_tasks"]) == ("a", 2, 1)
+    assert (first["score"]["value"], first["relative_cost"]) == pytest.approx((0.75, 1.0))
+    assert (second["score"]["value"], second["relative_cost"]) == pytest.approx((0.0, np.sqrt(8.0 / 3.0)))
+    assert first["elsewhere"]["far"]["score"]["value"] == pytest.approx(1.0)
+    assert (first["elsewhere"]["far"]["tasks"], second["elsewhere"]["far"]["tasks"]) == (1, 0)
+    assert found["tasks"]["calm"]["a"]["microseconds_per_action"] == pytest.approx(2.0)
+    assert found["reference"]["calm-far"] == {"zero": 40.0, "best": 10.0}
+    thresholds, shares = found["profile"]["thresholds"], found["profile"]["shares"]
+    at = [thresholds.index(one) for one in (-1.0, -0.05, 0.0, 0.5, 1.0)]
+    assert [shares["a"][k] for k in at] == [1.0, 1.0, 1.0, 0.5, 0.0]  # scores of 0.5 and 1 of `calm` alone
+    assert [shares["b"][k] for k in at] == [1.0, 1.0, 0.0, 0.0, 0.0]
+    assert found["improvement"]["a"]["b"]["value"] == 1.0
+
+
+def test_episodes_without_a_figure_are_not_counted():
+    lost = {"episodes": {"terminated": np.array([1.0, 0.0, np.nan])}}
+    assert _count([lost, lost], "terminated") == 2
+    assert _count([{"episodes": {}}] * 20, "terminated") == 0
 
 
 def test_a_factory_may_raise_anything_and_best_known_costs_are_kept_by_task(monkeypatch):
