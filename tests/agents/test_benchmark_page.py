@@ -123,8 +123,10 @@ def test_too_many_runs_are_cut_down(result, monkeypatch):
 
 def test_what_is_run_again_costs_the_same(result):
     episodes = [EpisodeId("pid", task, 0, FIRST + k) for task in TASKS for k in (0, 3)]
-    again = rerun(result, episodes)
+    told = []
+    again = rerun(result, episodes, progress=lambda *stage: told.append(stage))
     assert (again.different, again.refused) == ((), {})
+    assert told[-1] == ("episodes run again", 2, 2)
     for episode in episodes:
         found = again.episodes[episode]
         cost = result.figures("pid", episode.task)[0, episode.seed - FIRST]
@@ -222,6 +224,76 @@ def test_the_command_names_what_is_not_the_default(result):
     said = command(result)
     assert "pid,again=pid" in said
     assert "--tasks mariner-calm,mariner-current --episodes 4 --out results" in said
+
+
+def test_the_whole_suite_is_the_default_of_the_command():
+    tasks = dict.fromkeys(task.name for task in load_suite("shipgym-v1").tasks)
+    about = {"contestants": {"lq": {"source": "lq"}, "mine": {"source": None}}, "seeds": {"count": 100}}
+    about |= {"suite": {"name": "shipgym-v1"}, "tasks": tasks}
+    whole = "shipgym benchmark --controllers lq,mine=... --suite shipgym-v1 --out results"
+    assert command(SimpleNamespace(summary=about)) == whole
+    tasks.popitem()
+    some = command(SimpleNamespace(summary={**about, "seeds": {"count": 99}}))
+    assert some.endswith(f"--tasks {','.join(tasks)} --episodes 99 --out results")
+
+
+def test_the_same_text_is_packed_the_same_whenever():
+    packed = base64.b64decode(benchmark_page.packed("a page"))
+    assert gzip.decompress(packed) == b"a page"
+    assert packed[4:8] == bytes(4)  # the time at which it was packed
+
+
+def test_a_page_that_cannot_be_drawn_is_refused_before_episodes_are_run_again(result, tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "plotly.graph_objects", None)
+    monkeypatch.setattr(benchmark_page, "rerun", lambda *given: pytest.fail("was run again"))
+    with pytest.raises(InputError, match="plotly is not installed"):
+        write_page(result, tmp_path / "index.html")
+
+
+def test_a_page_holds_three_hundred_runs_at_most():
+    costs, count = np.arange(1.0, 312.0)[None], 311
+    result = SimpleNamespace(
+        ranking=["pid"],
+        tasks=["calm"],
+        summary={"tasks": {"calm": {"pid": {"cost": {"value": 1.0}}}}, "seeds": {"first": FIRST}},
+        figures=lambda name, task: costs,
+    )
+    for wanted, found in ((count, 300), (299, 299)):
+        assert replayable(result, wanted)[0] == found
+    assert len(replayable(result, count)[1]) == 300
+
+
+def test_a_task_that_only_the_best_known_ran_has_a_first_episode():
+    summary = {"tasks": {"calm": {"best-known": {"cost": {"value": 1.0}}}}, "seeds": {"first": FIRST}}
+    result = SimpleNamespace(ranking=["best-known"], summary=summary)
+    assert (hardest_of(result, "calm"), bests_of(result, "calm")) == (FIRST, [])
+
+
+def test_histories_are_as_fine_as_they_are_read():
+    """Heel to 0.01 deg, shaft speed to 0.1 1/min, wind to 0.1 m/s and 1 deg, current to 0.01 m/s."""
+    fine = {"x": 0.1, "y": 0.1, "psi": 0.1, "delta": 0.1, "heading_error": 0.1, "course_order": 0.1}
+    fine |= {"rudder_order": 0.1, "cross_track_error": 0.1, "speed": 0.01, "yaw_rate": 0.001, "heel": 0.01}
+    fine |= {"shaft_speed": 0.1, "wind_speed": 0.1, "wind_from": 1.0, "current_speed": 0.01}
+    fine |= {"current_towards": 1.0, "reward_so_far": 0.001}
+    values = [123.45678, 123.98766]
+    whole = {
+        "series": dict.fromkeys(fine, values),
+        "parts": {"a": values, "b": [0.0, 0.0]},
+        "rewards": values,
+    }
+    found = page_replays.short({**whole, "other": {"u": values}, "name": "pid"})
+
+    def told(packed):
+        decimals, *steps = packed
+        return np.cumsum(steps) / 10.0**decimals
+
+    for name, step in fine.items():
+        expected = np.round(np.array(values) / step) * step
+        assert told(found["series"][name]) == pytest.approx(expected, abs=1e-9), name
+    assert told(found["rewards"]) == pytest.approx([123.4568, 123.9877], abs=1e-9)
+    assert list(found["parts"]) == ["a"]  # what is 0 throughout is not kept
+    assert told(found["parts"]["a"]) == pytest.approx([123.4568, 123.9877], abs=1e-9)
+    assert (found["other"], found["name"]) == ({}, "pid")
 
 
 def test_the_page_holds_its_numbers_and_where_they_are_from(result, page):

@@ -76,3 +76,24 @@ def test_a_file_that_was_cut_short_and_a_table_too_large_are_refused(tmp_path, m
     path.write_bytes(path.read_bytes()[:-8])
     with pytest.raises(InputError, match=r"episodes.parquet: cannot be read as Parquet .*may be cut short"):
         read_episodes(path, 4)
+
+
+def test_tables_of_five_million_numbers_are_read_at_most(tmp_path):
+    path, rows = tmp_path / "episodes.parquet", 5_000_000 // 4 + 1
+    nothing = {name: pyarrow.nulls(rows) for name in ("contestant", "task", "run", "seed")}
+    parquet.write_table(pyarrow.table(nothing), path)
+    with pytest.raises(InputError, match=f"4 columns of {rows} rows found"):
+        read_episodes(path, rows)
+
+
+def test_whole_numbers_and_yes_or_no_are_figures_of_their_own(tmp_path):
+    """A number of events may be whole, a figure that is yes or no a truth; another may not."""
+    path = tmp_path / "episodes.parquet"
+    keys = {"contestant": ["a"], "task": ["c"], "run": [0], "seed": [1]}
+    parquet.write_table(pyarrow.table({**keys, "interventions": [3], "success": [True]}), path)
+    found = read_episodes(path, 1)
+    assert (found["interventions"].tolist(), found["success"].tolist()) == ([3.0], [1.0])
+    assert {str(found[name].dtype) for name in ("interventions", "success")} == {"float64"}
+    parquet.write_table(pyarrow.table({**keys, "cost": [True]}), path)
+    with pytest.raises(InputError, match="column 'cost' of bool"):
+        read_episodes(path, 1)

@@ -139,6 +139,11 @@ def test_one_that_failed_stands_at_the_edge_and_does_not_flatten_the_scale():
     assert (mark.x[0], mark.marker.symbol, mark.customdata[0]) == (-1.5, "triangle-left", -240.0)
     (mark,) = page_figures.scores_figure(result(ranking=[lost], reference=None)).data
     assert (mark.x[0], mark.marker.symbol) == (4.0, "triangle-right")
+    better = {"name": "pid", "score": {"value": 7.0, "low": 1.25, "high": 9.0}, "relative_cost": 0.0625}
+    (mark,) = page_figures.scores_figure(result(ranking=[better])).data
+    assert (mark.x[0], mark.marker.symbol, mark.error_x.arrayminus[0]) == (1.5, "triangle-right", 0.25)
+    (mark,) = page_figures.scores_figure(result(ranking=[better], reference=None)).data
+    assert (mark.x[0], mark.marker.symbol) == (0.0625, "circle")
 
 
 def test_costs_have_a_logarithmic_axis_where_they_differ_much():
@@ -152,6 +157,8 @@ def test_costs_have_a_logarithmic_axis_where_they_differ_much():
     near = result()
     near.figures = lambda name, task: np.array([[1.0, 19.0]])
     assert page_figures.costs_figure(near, "calm").layout.xaxis.type == "linear"
+    near.figures = lambda name, task: np.array([[1.0, 20.5]])
+    assert page_figures.costs_figure(near, "calm").layout.xaxis.type == "log"
     near.figures = lambda name, task: np.array([[0.0, 900.0]])
     assert page_figures.costs_figure(near, "calm").layout.xaxis.type == "linear"
 
@@ -198,6 +205,8 @@ def test_tracks_are_drawn_with_the_corridor_beside_them():
     np.testing.assert_allclose(along, [[20, 20, -20, -20], [0, 100, 100, 0]], atol=1e-5)
     np.testing.assert_allclose(across, [[0, 60, 60, 0], [80, 80, 120, 120]], atol=1e-5)
     np.testing.assert_allclose(np.hypot(disc[0], disc[1] - 100.0), 20.0, rtol=1e-5)
+    narrow = only(page_figures.tracks_figure({"pid": episode(corridor=None)}, ["pid"]), "corridor")
+    assert np.nanmax(np.abs(narrow.x) * np.abs(np.array(narrow.y) - 100.0)) == 0.0  # it lies on the path
     free = page_figures.tracks_figure({"pid": episode(waypoints=None)}, ["pid"])
     assert [trace.name for trace in free.data] == ["pid"]
 
@@ -216,4 +225,7 @@ def test_histories_are_cross_track_errors_or_headings_and_rudders():
     course = only(figure, "ordered course")
     np.testing.assert_allclose(course.y, np.degrees(2.0 * np.pi - 3.0), rtol=1e-6)  # beside the heading
     assert course.x[-1] == 500.0
+    short = episode(waypoints=None, n_steps=500)
+    figure = page_figures.histories_figure({"short": short, "pid": episode(waypoints=None)}, ["pid", "short"])
+    assert only(figure, "ordered course").x[-1] == 500.0  # up to the end of the longest
     assert not figure.layout.shapes

@@ -1,6 +1,7 @@
 """A suite with ships behind its models, and submissions: what is handed out, written and refused."""
 
 import json
+from dataclasses import replace
 from functools import partial
 from unittest.mock import Mock
 
@@ -118,6 +119,8 @@ def test_a_submission_is_verified(tmp_path):
         ("costs", {task: [[1.0]] for task in TASKS}, r"costs: episodes: \{1\} found, expected \{3\}"),
         ("costs", {task: [["1"]] for task in TASKS}, "costs"),
         ("kind", "shipgym-other", "kind 'shipgym-other' found"),
+        ("format", 2, "format 2 found, this version of shipgym reads format 1"),
+        ("contestant", {"name": "lq", "source": None, "files": {}}, "contestant.source: "),
     ],
 )
 def test_a_submission_of_other_seeds_suite_or_versions_is_refused(field, value, said, tmp_path):
@@ -137,6 +140,14 @@ def test_what_nobody_else_can_make_or_was_not_run_through_is_not_submitted(tmp_p
     some = benchmark("lq", suite="small", tasks=["turns-far"], episodes=N)
     with pytest.raises(InputError, match="no results in turns, turns-on-model found"):
         submit(some, "lq", tmp_path / "mine.json")
+    every = dict.fromkeys(TASKS, some.summary["tasks"]["turns-far"])
+    fewer = replace(some, summary={**some.summary, "tasks": every, "seeds": {"first": 1_000_000, "count": 2}})
+    said = "seeds {'first': 1000000, 'count': 2} found, expected a contestant .* with all 3 episodes of all"
+    with pytest.raises(InputError, match=said):
+        submit(fewer, "lq", tmp_path / "mine.json")
+    with pytest.raises(InputError, match="submit: 'lg' found, expected one of 'lq'"):
+        submit(fewer, "lg", tmp_path / "mine.json")
+    assert not (tmp_path / "mine.json").exists()
 
 
 def test_a_folder_of_another_suite_and_results_of_the_first_format_are_refused(tmp_path):

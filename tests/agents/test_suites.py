@@ -1,9 +1,21 @@
 """Suites of tasks: how they are read, and what is refused with its field."""
 
+import inspect
+import json
+
 import numpy as np
 import pytest
 
-from agents.suites.suite import FOLDER, list_suites, load_suite, parse_suite, suite_file, suite_hash
+from agents.suites.reference import best_known, load_tuned, reference_costs
+from agents.suites.suite import (
+    FOLDER,
+    BenchmarkTask,
+    list_suites,
+    load_suite,
+    parse_suite,
+    suite_file,
+    suite_hash,
+)
 from shipgym import InputError, Weather
 
 TEXT = """
@@ -57,6 +69,14 @@ def test_a_suite_is_read_task_by_task():
         ("options = { noise = 1.0 }", "options = 3", r"tasks\.calm\.options: 3 found"),
         ("options = { noise = 1.0 }", "options = { nois = 1.0 }", r"tasks\.calm: .*Did you mean 'noise'"),
         ("speed = 0.5", "sped = 0.5", r"tasks\.drift\.sea.*sped"),
+        ('sea = "rough"', 'sea = "rogh"', r"tasks\.rough: .*Did you mean 'rough'"),
+        ("options = { noise = 1.0 }", 'ship = ""', r"tasks\.calm\.ship: '' found"),
+        (
+            "options = { noise = 1.0 }",
+            'options = { reward = "mine:cost" }',
+            "calm.options.reward: .* is code",
+        ),
+        ('model = "kvlcc2"', 'model = "kvlcc2.py"', r"tasks\.drift\.model: 'kvlcc2.py' found, which is code"),
     ],
 )
 def test_a_wrong_field_is_named(old, new, message):
@@ -108,3 +128,59 @@ def test_a_ship_of_other_particulars_than_the_model_is_refused():
     text = (FOLDER / "shipgym-v2.toml").read_text().replace('ship = "kvlcc2"', 'ship = "tanker"')
     with pytest.raises(InputError, match=r"tasks.strong-current: .*expected a ship of the same particulars"):
         parse_suite(text, "suite")
+
+
+def test_a_ship_that_is_never_far_from_the_design_has_two_sets_of_episodes():
+    text = TEXT.replace('model = "mariner"\nsea', 'model = "mariner-tls-svm"\nship = "mariner"\nsea')
+    *alone, first, second = parse_suite(text, "mine").tasks
+    assert [(task.on, task.behind, dict(task.far)) for task in alone] == [("ship", "", {})] * 2
+    assert [(one.name, one.on, one.behind) for one in (first, second)] == [
+        ("rough", "ship", "mariner"), ("rough-on-model", "model", "")
+    ]  # fmt: skip
+    assert inspect.signature(BenchmarkTask.engine).parameters["threads"].default == 1
+
+
+@pytest.fixture
+def kept(tmp_path, monkeypatch):
+    """Writes a file that is kept with a suite."""
+    monkeypatch.setattr("agents.suites.reference.suite_file", lambda suite, what: tmp_path / f"{what}.json")
+    return lambda what, content: (tmp_path / f"{what}.json").write_text(json.dumps(content))
+
+
+def test_a_suite_without_best_known_costs_has_no_references(kept):
+    assert (best_known("mine"), reference_costs("mine")) == ({}, {})
+    with pytest.raises(InputError, match="there is no such file of tuned settings"):
+        load_tuned("mine")
+
+
+def test_references_are_the_cost_of_wheel_over_and_the_mean_of_the_best(kept):
+    kept("best", {"calm": {"zero": 30, "costs": [1.0, 3.0] * 50, "by": ["lq"] * 100}})
+    assert reference_costs("mine") == {"calm": (30.0, 2.0)}
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"zero": "30"}, r"best.json.*calm.zero: '30' "),
+        ({"costs": ["1"] * 100}, r"best.json.*calm.costs\[0\]: '1' "),
+        ({"costs": [1.0] * 99}, "best.json: calm: expected costs of 100 episodes, and by what"),
+        ({"by": ["lq"] * 99}, "best.json: calm: expected costs of 100 episodes, and by what"),
+        ({"costs": [1.0] * 101, "by": ["lq"] * 101}, "best.json: calm: expected costs of 100 episodes"),
+    ],
+)
+def test_best_known_costs_with_a_wrong_field_are_refused(kept, changes, said):
+    kept("best", {"calm": {"zero": 30.0, "costs": [1.0] * 100, "by": ["lq"] * 100} | changes})
+    with pytest.raises(InputError, match=said):
+        best_known("mine")
+
+
+def test_tuned_settings_are_tables_by_task(kept):
+    for content, said in (
+        ({"tasks": 3}, "tuned.json: tasks: 3 found"),
+        ({"tasks": {"calm": 3}}, "tasks.calm: 3"),
+    ):
+        kept("tuned", content)
+        with pytest.raises(InputError, match=said):
+            load_tuned("mine")
+    kept("tuned", {"tasks": {"calm": {"lq": {"cost": 1.0}}}})
+    assert load_tuned("mine") == {"calm": {"lq": {"cost": 1.0}}}
