@@ -5,24 +5,32 @@ import inspect
 import json
 import math
 import os
+import re
 import signal
 import socket
 import subprocess
 import sys
 import threading
 import time
+from collections import deque
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import nullcontext
+from functools import partial
 from http.server import BaseHTTPRequestHandler, HTTPServer
 from importlib.util import find_spec
 from pathlib import Path
+from types import SimpleNamespace
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
 
-from agents.engines import ray_engine
+from agents.engines import jobs as jobs_module
+from agents.engines import local, ray_engine
 from agents.engines.job import with_modules
-from agents.engines.jobs import JobEngine, JobError, WorkerDiedError, run_jobs
+from agents.engines.jobs import HERE, JobEngine, JobError, WorkerDiedError, run_jobs
 from agents.engines.ray_engine import check_answers
-from agents.engines.serialisation import pack, unpack
+from agents.engines.serialisation import KeptResults, pack, unpack
 from shipgym.errors import InputError
 
 JOBS = """
@@ -160,6 +168,21 @@ def test_what_is_kept_is_not_done_again(functions, tmp_path):
     assert len(list(kept.iterdir())) == 4
 
 
+def test_what_is_kept_is_of_its_function_and_version(functions, tmp_path):
+    log, kept = tmp_path / "log", tmp_path / "kept"
+    run_jobs(functions.logged, [{"k": 1, "log": str(log), "wrong": -1}], keep=kept)
+    (file,) = kept.iterdir()
+    assert re.fullmatch(r"[0-9a-f]{24}\.json", file.name)
+    text = json.dumps({"k": 1, "log": str(log), "wrong": -1})
+    assert KeptResults(kept, functions.logged).load(text) == {"value": 1}
+    assert KeptResults(kept, functions.divides).load(text) is None
+    file.write_text(json.dumps({**json.loads(file.read_text()), "shipgym": "0.0.1"}))
+    assert KeptResults(kept, functions.logged).load(text) is None
+    (tmp_path / "file").write_text("")
+    with pytest.raises(InputError, match="file: is not a folder, expected one for results; choose another"):
+        KeptResults(tmp_path / "file", functions.logged)
+
+
 def test_wrong_input_of_a_job_is_told_with_the_job(functions, tmp_path):
     jobs = [{"k": k, "log": str(tmp_path / "log"), "wrong": 2} for k in range(4)]
     with pytest.raises(InputError, match=r'job 2 \{"k": 2, .*\}: k: 2 found, expected another'):
@@ -216,6 +239,7 @@ def test_workers_end_with_the_process_that_started_them(functions, tmp_path, num
         ({"engine": "ray", "address": ":6379"}, "expected 'HOST:PORT'"),
         ({"engine": "ray", "address": "10.0.0.1:ray"}, "expected 'HOST:PORT'"),
         ({"function": lambda job: job}, "top level of a module"),
+        ({"function": partial(os.path.join, "a")}, "top level of a module"),
         ({"jobs": [{"k": object()}]}, r"jobs\[0\]: .* found, expected a dict of numbers"),
         ({"jobs": [{"k": math.nan}]}, r"jobs\[0\]"),
         ({"jobs": [3]}, r"jobs\[0\]: 3 found, expected a dict"),
@@ -232,7 +256,7 @@ def test_address_that_does_not_answer():
     with socket.socket() as silent:
         silent.bind(("127.0.0.1", 0))
         port = silent.getsockname()[1]
-        with pytest.raises(InputError, match=r"no ray cluster answers .* \(Connection refused\)"):
+        with pytest.raises(InputError, match=r"no ray cluster answers .* within 10 s \(Connection refused\)"):
             check_answers(f"127.0.0.1:{port}")
         silent.listen()
         with pytest.raises(InputError, match=r"no ray cluster answers .* \(no answer that ray"):
@@ -245,7 +269,7 @@ def test_what_ray_says_last_is_told(monkeypatch):
 
     monkeypatch.setattr(ray_engine.subprocess, "run", fails)
     with pytest.raises(
-        InputError, match=r"no ray cluster answers at 'auto' .*\(ConnectionError: wrong token\)"
+        InputError, match=r"no ray cluster answers at 'auto' within 30 s \(ConnectionError: wrong token\)"
     ):
         check_answers("auto")
 
@@ -297,3 +321,208 @@ def test_a_job_finds_modules_of_the_working_folder_registered(tmp_path, monkeypa
     monkeypatch.delattr(builtins, "registered_by_a_user")
     assert done == 42
     assert sys.path == path
+
+
+def test_a_module_of_the_working_folder_goes_before_others_of_its_name(tmp_path, monkeypatch):
+    for name in ("other", "here"):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "named_twice.py").write_text(f"where = {name!r}\n")
+    monkeypatch.syspath_prepend(tmp_path / "other")
+    monkeypatch.chdir(tmp_path / "here")
+    found = with_modules(lambda job: sys.modules["named_twice"].where, ["named_twice"], {})
+    monkeypatch.delitem(sys.modules, "named_twice")
+    assert found == "here"
+
+
+def test_an_engine_refuses_wrong_arguments_before_the_work():
+    HERE.check()
+    for engine, said in (
+        (JobEngine("rai"), "Did you mean 'ray'"),
+        (JobEngine(workers=0), "workers: 0 found, .* or None for as many as there are cores"),
+        (JobEngine(address="10.0.0.1:6379"), "it is for engine 'ray'"),
+    ):
+        with pytest.raises(InputError, match=said):
+            engine.check()
+
+
+def test_as_many_jobs_at_once_as_asked_or_as_there_are_cores(monkeypatch):
+    asked = []
+
+    def in_processes(function, texts, workers, retries):
+        asked.append((workers, retries))
+        return ((text, {"value": 1}) for text in texts)
+
+    monkeypatch.setattr(jobs_module, "in_processes", in_processes)
+    monkeypatch.setattr(jobs_module, "cpu_count", lambda: 7)
+    for workers in (5, None):
+        assert run_jobs(os.path.join, [{}, {"k": 1}], workers=workers, retries=3) == [1, 1]
+    assert run_jobs(os.path.join, [], workers=5) == []
+    assert asked == [(5, 3), (7, 3)]
+
+
+def test_workers_get_one_job_at_a_time(monkeypatch):
+    asked = []
+
+    class Pool:
+        def __init__(self, jobs, **options):
+            asked.append((jobs, options["pre_dispatch"], options["batch_size"]))
+
+        def __call__(self, calls):
+            return ((text, {"value": 1}) for _, (_, text), _ in calls)
+
+    monkeypatch.setattr(local, "Parallel", Pool)
+    for workers, at_once in ((1, 2), (2, 2), (3, 3)):  # one would be this process
+        doing = set()
+        outcomes = list(local._until_broken(len, deque(["a", "b"]), doing, workers))
+        assert (outcomes, doing) == ([("a", {"value": 1}), ("b", {"value": 1})], set())
+        assert asked.pop() == (at_once, at_once, 1)
+
+
+@pytest.mark.parametrize(("deaths", "retries"), [(0, 2), (2, 2), (3, 2), (1, 0), (1, 1), (2, 1)])
+def test_jobs_whose_worker_died_are_done_again_the_last_time_alone(monkeypatch, deaths, retries):
+    batches, pool = [], Mock()
+
+    def until_broken(function, waiting, doing, workers):
+        batches.append(sorted(waiting))
+        doing.update(waiting)
+        waiting.clear()
+        if "bad" in doing and sum("bad" in batch for batch in batches) <= deaths:
+            raise BrokenProcessPool
+        for text in sorted(doing):
+            doing.remove(text)
+            yield text, {}
+
+    monkeypatch.setattr(local, "_until_broken", until_broken)
+    monkeypatch.setattr(local, "get_reusable_executor", lambda: pool)
+    run = local.in_processes(len, ["a", "bad", "c"], 2, retries)
+    if deaths > retries:
+        with pytest.raises(WorkerDiedError, match=rf"job bad: its worker died {retries + 1} times"):
+            list(run)
+    else:
+        assert sorted(text for text, _ in run) == ["a", "bad", "c"]
+        together = min(deaths + 1, max(retries, 1))
+        assert batches[:together] == [["a", "bad", "c"]] * together
+        assert sorted(batches[together:]) == ([["a"], ["bad"], ["c"]] if deaths == retries else [])
+    pool.shutdown.assert_called_once_with(wait=True, kill_workers=True)
+
+
+class Ray:
+    """As much of ray as the engine needs; jobs are done as soon as one waits for them, the last one first."""
+
+    def __init__(self, resources=None, crash=None):
+        self.exceptions = SimpleNamespace(
+            WorkerCrashedError=type("WorkerCrashedError", (Exception,), {}),
+            OutOfMemoryError=type("OutOfMemoryError", (Exception,), {}),
+        )
+        self.resources, self.crash = resources or {}, crash
+        self.most, self.cancelled, self.options = 0, [], {}
+        self.initialised, self.given, self.ended = False, [], 0
+
+    def cluster_resources(self):
+        return self.resources
+
+    def remote(self, **options):
+        self.options = options
+        return lambda function: SimpleNamespace(remote=lambda job, text: text)
+
+    def wait(self, doing, num_returns):
+        self.most = max(self.most, len(doing))
+        return doing[-num_returns:], doing[:-num_returns]
+
+    def get(self, text):
+        if text == "bad":
+            raise getattr(self.exceptions, self.crash)
+        return text, {"value": 1}
+
+    def cancel(self, text, force):
+        self.cancelled.append((text, force))
+
+    def is_initialized(self):
+        return self.initialised
+
+    def init(self, **options):
+        if self.crash:
+            raise RuntimeError("no memory")
+        self.given.append((options, dict(os.environ)))
+
+    def shutdown(self):
+        self.ended += 1
+
+
+@pytest.mark.parametrize(
+    ("workers", "resources", "most"),
+    [(2, {"CPU": 5.0}, 2), (None, {"CPU": 3.0}, 3), (None, {"CPU": 0.5}, 1), (None, {}, 1), (9, {}, 5)],
+)
+def test_ray_gets_as_many_jobs_at_once_as_asked_or_as_it_has_cores(monkeypatch, workers, resources, most):
+    ray = Ray(resources)
+    monkeypatch.setattr(ray_engine, "_connected", lambda *where: nullcontext(ray))
+    done = list(ray_engine.on_ray(len, list("abcde"), workers, None, 4))
+    assert sorted(done) == [(text, {"value": 1}) for text in "abcde"]
+    assert (ray.most, ray.options, ray.cancelled) == (most, {"num_cpus": 1, "max_retries": 4}, [])
+
+
+@pytest.mark.parametrize("crash", ["WorkerCrashedError", "OutOfMemoryError"])
+def test_a_job_that_kills_rays_workers_is_named_and_the_others_are_cancelled(monkeypatch, crash):
+    ray = Ray(crash=crash)
+    monkeypatch.setattr(ray_engine, "_connected", lambda *where: nullcontext(ray))
+    with pytest.raises(WorkerDiedError, match="job bad: its worker died 5 times"):
+        list(ray_engine.on_ray(len, ["a", "b", "bad", "c"], 3, None, 4))
+    assert ray.cancelled == [("a", True), ("b", True)]
+
+
+@pytest.fixture
+def own_ray(monkeypatch):
+    """Ray in place of the installed one, and an environment without its variables."""
+    ray = Ray()
+    monkeypatch.setitem(sys.modules, "ray", ray)
+    for name in ("RAY_USAGE_STATS_ENABLED", "RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO"):
+        monkeypatch.setenv(name, "1")
+        monkeypatch.delenv(name)
+    return ray
+
+
+def test_ray_is_started_here_on_one_thread_each_and_ended(own_ray, monkeypatch):
+    monkeypatch.setenv("OMP_NUM_THREADS", "7")
+    with ray_engine._connected(3, None) as ray:
+        assert (ray, ray.ended) == (own_ray, 0)
+    ((options, environment),) = ray.given
+    quiet = {"log_to_driver": False, "configure_logging": False}
+    assert options == {"address": "local", "num_cpus": 3, "include_dashboard": False, **quiet}
+    assert environment["OMP_NUM_THREADS"] == environment["MKL_NUM_THREADS"] == "1"
+    assert environment["PYTHONPATH"].split(os.pathsep) == [path for path in sys.path if path]
+    assert environment["RAY_USAGE_STATS_ENABLED"] == "0"  # nothing is told to others
+    assert (os.environ["OMP_NUM_THREADS"], ray.ended) == ("7", 1)
+    monkeypatch.setenv("RAY_USAGE_STATS_ENABLED", "1")  # unless the user wishes so
+    with ray_engine._connected(3, None):
+        assert ray.given[1][1]["RAY_USAGE_STATS_ENABLED"] == "1"
+
+
+def test_a_cluster_is_asked_for_before_it_is_joined(own_ray, monkeypatch):
+    asked = []
+    monkeypatch.setattr(ray_engine, "check_answers", asked.append)
+    with ray_engine._connected(3, "10.0.0.1:6379"):
+        ((options, _),) = own_ray.given
+    assert asked == [options.pop("address")] == ["10.0.0.1:6379"]
+    assert options == {"log_to_driver": False, "configure_logging": False}
+
+
+def test_ray_that_runs_already_is_neither_started_nor_ended(own_ray):
+    own_ray.initialised = True
+    with ray_engine._connected(3, None) as ray:
+        assert ray is own_ray
+    assert (ray.given, ray.ended) == ([], 0)
+
+
+def test_ray_that_does_not_start_or_is_not_there_is_told(own_ray, monkeypatch):
+    own_ray.crash = "RuntimeError"
+    with (
+        pytest.raises(InputError, match="engine: 'ray' found, but it does not start here: no memory"),
+        ray_engine._connected(3, None),
+    ):
+        pass
+    monkeypatch.setitem(sys.modules, "ray", None)
+    with (
+        pytest.raises(InputError, match="engine: 'ray' found, but it is not installed: pip install"),
+        ray_engine._connected(3, None),
+    ):
+        pass
