@@ -3,13 +3,24 @@ import os
 import re
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
+from filelock import FileLock
 
 from agents import output
 from agents.cli.doctor import left_findings
-from agents.output import check_file, check_folder, check_page, in_use, whole_folder
+from agents.output import (
+    check_file,
+    check_folder,
+    check_page,
+    check_writable,
+    in_use,
+    locks_and_drafts,
+    present,
+    whole_folder,
+)
 from shipgym import InputError
 from shipgym.files import remove_drafts
 
@@ -195,4 +206,145 @@ def test_a_lock_without_words_is_another_process(tmp_path):
     assert re.fullmatch(
         rf"process {os.getpid()} on \S+ since [-0-9]+ [0-9:+-]+ \(shipgym identify 'a b' x .*\)", told
     )
-    assert len(told.partition(" (")[2]) == output.LONGEST_COMMAND + 1
+    assert len(told.partition(" (")[2]) == 200 + len(")")
+
+
+def test_what_a_link_leads_to_is_not_replaced(tmp_path):
+    (tmp_path / "own").mkdir()
+    (tmp_path / "linked").symlink_to(tmp_path / "own")
+    with pytest.raises(InputError, match="linked: is not a folder, expected one to write the results to"):
+        check_folder(tmp_path / "linked", NAMES)
+    (tmp_path / "file").write_text("")
+    (tmp_path / "own" / "model.json").symlink_to(tmp_path / "file")
+    with pytest.raises(InputError, match=r"own: holds 'model.json', which is not a result of this command"):
+        check_folder(tmp_path / "own", NAMES)
+    (tmp_path / "own" / "model.json").unlink()
+    (tmp_path / "own" / "model.json").write_text("")
+    check_folder(tmp_path / "own", NAMES)
+
+
+def test_what_cannot_be_written_is_refused(tmp_path, monkeypatch):
+    check_writable(tmp_path / "a" / "b")
+    monkeypatch.setattr(output.os, "access", lambda path, mode: path != tmp_path)
+    for folder in ("b", "a/b"):
+        with pytest.raises(InputError, match=rf"b: {tmp_path} cannot be written to; choose another folder"):
+            check_writable(tmp_path / folder)
+    with pytest.raises(InputError, match=r"page.txt: its folder does not exist or cannot be written"):
+        check_file(tmp_path / "page.txt")
+    (tmp_path / "ship").mkdir()
+    check_writable(tmp_path / "ship")  # which is written to itself, nothing beside it
+
+
+def test_where_nothing_can_be_beside_a_folder_locks_and_drafts_are_in_it(tmp_path, monkeypatch):
+    (tmp_path / "ship").mkdir()
+    monkeypatch.setattr(output.os, "access", lambda path, mode: path != tmp_path)
+    with in_use(tmp_path / "ship") as home:
+        assert home == tmp_path / "ship"
+        assert everything(tmp_path) == ["ship", "ship/.ship.lock"]
+        assert present(tmp_path / "ship") == []
+    assert everything(tmp_path) == ["ship"]
+
+
+def test_results_are_told_in_order_without_locks_and_drafts(tmp_path):
+    for name in ("b", "a", ".ship.lock", ".a.0123abcd-7.draft", ".old.lock"):
+        (tmp_path / name).write_text("")
+    assert present(tmp_path) == [".old.lock", ".ship.lock", "a", "b"]
+
+
+def test_one_is_told_at_once_that_a_folder_is_in_use(tmp_path):
+    lock = FileLock(tmp_path / ".ship.lock")
+    began = time.monotonic()
+    with lock:
+        (tmp_path / ".ship.lock").write_text("process 7 on ship")
+        with pytest.raises(InputError, match="ship: in use by process 7 on ship; wait until"):
+            write_half(tmp_path / "ship", RuntimeError())
+        assert list(locks_and_drafts(tmp_path)) == [(f"{tmp_path / '.ship.lock'}: process 7 on ship", False)]
+    assert time.monotonic() - began < 0.9
+
+
+def test_locks_of_others_are_not_spoken_of(tmp_path, monkeypatch):
+    (tmp_path / ".apt.lock").write_text("7")
+    assert list(locks_and_drafts(tmp_path)) == []
+    (tmp_path / ".ship.lock").write_text("process 7 on ship since then")
+    ((told, dead),) = locks_and_drafts(tmp_path)
+    assert dead
+    assert told.endswith(
+        "lock: left by process 7 on ship since then, which is dead; the next run there removes it"
+    )
+
+    def refuses(*given, **more):
+        raise PermissionError
+
+    monkeypatch.setattr(output, "FileLock", refuses)
+    assert list(locks_and_drafts(tmp_path)) == []
+
+
+@pytest.mark.parametrize("error", [NotImplementedError(), OSError(errno.ENOLCK, "No locks available")])
+def test_a_disk_without_locks_takes_results(tmp_path, monkeypatch, error):
+    def refuses(*given, **more):
+        raise error
+
+    monkeypatch.setattr(FileLock, "acquire", refuses)
+    (tmp_path / "a").mkdir()
+    with whole_folder(tmp_path / "a" / "ship", NAMES) as draft:
+        (draft / "model.json").write_text("new")
+        assert not (tmp_path / "a" / ".ship.lock").exists()
+    assert everything(tmp_path) == ["a", "a/ship", "a/ship/model.json"]
+
+
+def test_a_lock_is_given_back_and_folders_that_were_there_stay(tmp_path, monkeypatch):
+    locks = []
+
+    class Noted(FileLock):
+        def __init__(self, *given, **more):
+            super().__init__(*given, **more)
+            locks.append(self)
+
+    monkeypatch.setattr(output, "FileLock", Noted)
+    (tmp_path / "a").mkdir()
+    with pytest.raises(RuntimeError):
+        write_half(tmp_path / "a" / "b" / "ship", RuntimeError())
+    assert everything(tmp_path) == ["a"]
+    assert [lock.is_locked for lock in locks] == [False]
+
+
+def test_a_folder_below_a_file_is_not_used(tmp_path):
+    (tmp_path / "file").write_text("")
+    with (
+        pytest.raises(
+            InputError, match=r"ship: cannot be written \(File exists|ship: cannot .*Not a directory"
+        ),
+        in_use(tmp_path / "file" / "ship"),
+    ):
+        pass
+
+
+def test_what_a_killed_process_set_aside_goes_where_results_are_there_again(tmp_path):
+    for name in ("ship", ".ship.0-1.old", ".other.0-1.old"):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "model.json").write_text(name)
+    draft = tmp_path / ".ship.00000000-1.draft"
+    draft.mkdir()
+    os.utime(draft, (0.0, 0.0))  # a week ago and more
+    remove_drafts.cache_clear()
+    with in_use(tmp_path / "ship"):
+        assert everything(tmp_path) == [
+            ".other.0-1.old", ".other.0-1.old/model.json", ".ship.lock", "ship", "ship/model.json"
+        ]  # fmt: skip
+    assert (tmp_path / "ship" / "model.json").read_text() == "ship"
+
+
+@pytest.mark.parametrize(
+    ("error", "said"),
+    [
+        (
+            OSError(errno.ENOSPC, "No space left on device"),
+            "ship: cannot be written (No space left on device)",
+        ),
+        (OSError("broken"), "ship: cannot be written (broken)"),
+    ],
+)
+def test_a_full_disk_is_told(tmp_path, error, said):
+    with pytest.raises(InputError, match=re.escape(said)):
+        write_half(tmp_path / "ship", error)
+    assert everything(tmp_path) == []
