@@ -95,6 +95,21 @@ def test_the_table_is_tidy(folder):
     assert table.column_names[:4] == ["contestant", "task", "run", "seed"]
     assert str(table.schema.field("success").type) == "bool"
     assert table.column("cross_track_rmse_m").null_count == 2 * N  # course keeping has no path
+    assert table.column("seed").to_pylist() == 2 * [1_000_000 + k for k in range(N)]
+    assert table.column("run").to_pylist() == 2 * N * [0]
+
+
+@pytest.mark.parametrize(
+    ("asked", "said"),
+    [
+        (("pdi", "mariner-calm"), "contestant: 'pdi' found, expected one of 'pid', 'lq'"),
+        (("pid", "mariner-clam"), "task: 'mariner-clam' found, expected one of 'mariner-calm'"),
+        (("pid", "mariner-calm", "cots"), "figure: 'cots' found"),
+    ],
+)
+def test_figures_of_nobody_are_refused(folder, asked, said):
+    with pytest.raises(InputError, match=said):
+        load_results(folder).figures(*asked)
 
 
 def test_workers_find_the_same_bit_for_bit(folder, tmp_path):

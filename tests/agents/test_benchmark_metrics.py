@@ -1,3 +1,4 @@
+from dataclasses import replace
 from itertools import count
 from types import SimpleNamespace
 
@@ -9,6 +10,8 @@ from agents.rollouts import rollout as rollout_module
 from agents.rollouts.metrics import (
     course_changes,
     evaluate,
+    fuel_per_distance,
+    metrics,
     path_following,
     reversals,
     steering,
@@ -90,6 +93,40 @@ def test_fuel_goes_by_the_cube_of_the_shaft_over_the_way():
     expected = power * slow.ship.particulars["speed"] / speed.mean(axis=0)
     np.testing.assert_allclose(found.figures["fuel"], expected, rtol=5e-3)
     assert shaft[-1] == pytest.approx(0.5 * slow.ship.service_shaft_speed, rel=0.02)
+
+
+def made_up(task, way=None, **states):
+    """Two episodes of 3 and 1 intervals of 10 s of a ship of 5 m/s and 2 1/s; later nothing counts."""
+    sailing = np.array([[1, 1], [1, 0], [1, 0]], dtype=np.bool_)
+    known = {"u": np.full((4, 2), 5.0), "v": np.zeros((4, 2)), "n": np.full((4, 2), 2.0)}
+    model = SimpleNamespace(service_shaft_speed=2.0, state_names=("u", "n"), particulars={"speed": 5.0})
+    infos = {"heading_error": np.zeros((4, 2)), "distance_made_good": way}
+    states = {name: np.array(value, dtype=np.float64) for name, value in (known | states).items()}
+    return SimpleNamespace(
+        task=task.task, model=model, dt=10.0, sailing=sailing, steps=sailing.sum(axis=0).astype(float),
+        states=states, infos=infos,
+    )  # fmt: skip
+
+
+def test_fuel_per_mile_by_hand():
+    assert fuel_per_distance(made_up(KEEPING)) == pytest.approx([1.0, 1.0])
+    slow = made_up(KEEPING, u=[[9, 9], [5, 2.5], [5, 9], [2.5, 9]], n=[[9, 9], [2, 1], [2, 9], [0, 9]])
+    assert fuel_per_distance(slow) == pytest.approx([2.0 / 2.5, 0.125 / 0.5])
+    drifting = made_up(KEEPING, v=np.full((4, 2), 5.0))
+    drifting.infos["heading_error"] += np.radians(30.0)  # the course is to starboard, and so she drifts
+    assert fuel_per_distance(drifting) == pytest.approx(1.0 / (np.cos(np.pi / 6) + np.sin(np.pi / 6)))
+    drifting.model.state_names = ("u",)  # without a shaft its speed is that of service
+    drifting.states["n"] *= 0.5
+    assert fuel_per_distance(drifting) == pytest.approx(1.0 / (np.cos(np.pi / 6) + np.sin(np.pi / 6)))
+    path = made_up(PATH, np.array([[0.0, 0.0], [60.0, 25.0], [100.0, 900.0], [90.0, 900.0]]))
+    assert fuel_per_distance(path) == pytest.approx([1.5, 2.0])
+
+
+def test_without_way_made_good_there_is_no_fuel_per_mile():
+    assert np.isnan(fuel_per_distance(made_up(KEEPING, u=np.zeros((4, 2))))).all()
+    assert np.isnan(fuel_per_distance(made_up(KEEPING, u=np.full((4, 2), -3.0)))).all()
+    assert np.isnan(fuel_per_distance(made_up(PATH, np.full((4, 2), -0.05)))).all()
+    assert np.isnan(fuel_per_distance(made_up(PATH, np.zeros((4, 2))))).all()
 
 
 def test_hard_over_makes_no_way_along_the_course_and_costs_more_fuel(lq):
@@ -224,6 +261,7 @@ def test_a_controller_that_fails_is_charged_for_the_rest_and_the_others_go_on(ho
     )
     for name, values in found.figures.items():
         np.testing.assert_array_equal(values[~concerned], sails.figures[name][~concerned], err_msg=name)
+    assert (found.run.actions[~found.run.sailing] == 0.0).all()  # what is over is not steered
 
 
 def test_the_time_of_a_command_is_that_of_a_call_by_the_ships_that_sail(monkeypatch):
@@ -233,6 +271,8 @@ def test_the_time_of_a_command_is_that_of_a_call_by_the_ships_that_sail(monkeypa
     run = evaluate(steady(0.0), KEEPING, SEEDS[:2]).run
     calls = run.sailing.shape[0]
     assert run.seconds_per_action == pytest.approx(0.5 * calls / run.sailing.sum(), rel=0.01)
+    failed = evaluate(Steers(lambda call, seen: None), KEEPING, SEEDS[:1]).run
+    assert failed.seconds_per_action == 0.5  # it was asked once
 
 
 def test_a_controller_that_fails_at_once_has_a_cost_and_no_figures():
@@ -240,6 +280,22 @@ def test_a_controller_that_fails_at_once_has_a_cost_and_no_figures():
     assert found.figures["failed"].all()
     np.testing.assert_allclose(found.figures["cost"], 250 * worst_step_cost(KEEPING.task))
     assert np.isnan(found.figures["heading_rmse_deg"]).all()
+
+
+def test_the_time_and_interventions_of_a_shield_by_hand(lq):
+    """It steers one ship in the first interval, and again in the fourth and fifth; another in the second."""
+    run = evaluate(lq, KEEPING, SEEDS[:3]).run
+    steps = run.sailing.shape[0]
+    shielded = np.zeros((steps, 3), dtype=np.bool_)
+    shielded[[0, 3, 4], 0], shielded[[1, 2], 1] = True, True
+    figures = metrics(replace(run, shielded=shielded))
+    assert figures["interventions"].tolist() == [2.0, 1.0, 0.0]
+    np.testing.assert_allclose(figures["shielded"], [3.0 / steps, 2.0 / steps, 0.0])
+    over = run.sailing.copy()
+    over[3:, 0] = False
+    cut = metrics(replace(run, shielded=shielded, sailing=over))
+    assert cut["interventions"].tolist() == [1.0, 1.0, 0.0]
+    np.testing.assert_allclose(cut["shielded"][0], 1.0 / 3.0)
 
 
 def test_a_shield_is_counted(lq):

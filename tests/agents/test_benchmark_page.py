@@ -2,6 +2,7 @@
 
 import base64
 import gzip
+import inspect
 import json
 import re
 import sys
@@ -155,6 +156,10 @@ def test_an_episode_run_again_is_that_of_the_single_environment():
         assert found.states[name] == pytest.approx([state[name] for state in states[::3]], abs=1e-6)
 
 
+def test_a_history_has_three_hundred_samples_at_most():
+    assert inspect.signature(recorded).parameters["samples"].default == 300
+
+
 def test_the_last_interval_is_filled_up():
     task = load_suite().task("mariner-current")
     (whole,), _ = recorded(
@@ -258,6 +263,7 @@ def test_a_page_holds_three_hundred_runs_at_most():
         summary={"tasks": {"calm": {"pid": {"cost": {"value": 1.0}}}}, "seeds": {"first": FIRST}},
         figures=lambda name, task: costs,
     )
+    assert inspect.signature(write_page).parameters["worst"].default == 3  # fewer where they are too many
     for wanted, found in ((count, 300), (299, 299)):
         assert replayable(result, wanted)[0] == found
     assert len(replayable(result, count)[1]) == 300
@@ -312,6 +318,15 @@ def test_the_page_says_why_one_cannot_be_replayed(page):
     assert "Not to be replayed: a &lt;b&gt;lazy one" in page.read_text(encoding="utf-8")
     names = {entry["who"] for entry in json.loads(unpacked(page, "replay-data"))["entries"]["mariner-calm"]}
     assert names == {"", "pid", "again"}
+
+
+def test_an_episode_to_replay_has_its_cost_to_the_hundredth(result, page):
+    data = json.loads(unpacked(page, "replay-data"))
+    assert len(data["entries"]["mariner-calm"]) == 1 + 2 * 2
+    for task, entries in data["entries"].items():
+        for entry in entries:
+            costs = result.figures(entry["who"] or data["runs"][entry["runs"][0]]["name"], task)
+            assert entry["cost"] == round(float(costs[0, entry["seed"] - FIRST]), 2)
 
 
 def test_a_page_that_cannot_be_written_is_refused_at_once(result, tmp_path):

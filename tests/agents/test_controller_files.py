@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from agents import LQ, PID, load_agent
+from agents.agent_file import PRETRAINED, find_agent, list_pretrained
 from agents.controllers.controller import check_scales
 from agents.controllers.registry import BUILT_IN, controller_class
 from shipgym.errors import InputError
@@ -124,6 +125,28 @@ def test_a_file_that_is_none_is_refused(content, message, tmp_path):
 def test_a_missing_file_is_refused(tmp_path):
     with pytest.raises(InputError, match="there is no such controller file"):
         load_agent(tmp_path / "pid.json")
+
+
+def test_an_agent_is_found_by_its_file_its_folder_or_its_name(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    DESIGNS["pid"].save(tmp_path / "agent.json")
+    (tmp_path / "run").mkdir()
+    for name in ("run/agent.json", "pid", "mariner-calm-ppo"):
+        (tmp_path / name).write_bytes((tmp_path / "agent.json").read_bytes())
+    for name in ("agent.json", "run", "pid", "mariner-calm-ppo"):
+        assert load_agent(name).gains == DESIGNS["pid"].gains
+    assert find_agent("no.json") == Path("no.json")
+    (tmp_path / "mariner-calm-ppo").unlink()
+    assert find_agent("mariner-calm-ppo") == PRETRAINED / "mariner-calm-ppo.json"
+    known = list_pretrained()
+    assert known == sorted(known)
+    assert len(known) == len(list(PRETRAINED.glob("*.json")))
+    with pytest.raises(InputError) as error:
+        load_agent("mariner-clam-ppo")
+    assert str(error.value) == (
+        f"agent: 'mariner-clam-ppo' found, expected a file, or one of {len(known)} pretrained agents, "
+        f"such as '{known[0]}'. Did you mean 'mariner-calm-ppo'?"
+    )
 
 
 def test_a_controller_of_another_ship_is_refused_with_the_difference(tmp_path):

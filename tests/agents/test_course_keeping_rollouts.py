@@ -64,6 +64,8 @@ def test_seeds_give_the_results_their_shape():
     grid = sail(PILOT, ships, SHORT, seeds=np.arange(12).reshape(3, 4))
     assert grid.cost.shape == grid.terminated.shape == grid.heading_rmse_deg.shape == (3, 4)
     assert grid.cost[2, 1] == sail(PILOT, ships[2], SHORT, seeds=9).cost
+    assert sail(PILOT, MARINER, SHORT).cost == sail(PILOT, MARINER, SHORT, seeds=0).cost
+    assert grid.seeds.tolist() == np.arange(12).reshape(3, 4).tolist()
     assert sail(PILOT, ships, SHORT, seeds=7).cost.tolist() == [
         float(sail(PILOT, ship, SHORT, seeds=7).cost) for ship in ships
     ]

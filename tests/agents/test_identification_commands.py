@@ -3,14 +3,16 @@
 import json
 import re
 from pathlib import Path
+from types import SimpleNamespace
 
 import document_options
 import pytest
 from typer.testing import CliRunner
 
+from agents import identifying
 from agents.cli import app
 from agents.cli.identify_options import parsed_options
-from agents.identifying import identification_settings, identify_ship
+from agents.identifying import compare_ship, identification_settings, identify_ship, reduce_ship
 from identification.estimators.methods import METHODS
 from identification.validation import selection
 from shipgym import InputError, ShipFile, list_structures, load_model
@@ -149,6 +151,91 @@ def test_a_reference_model_is_found_from_the_ship_file_s_folder(ship):
     chosen = identification_settings(ShipFile.load(path), {})
     assert Path(chosen["reference_model"]) == path.parent / "own" / "ship.json"
     assert "reference_model" not in identification_settings(ShipFile.load(path), {"structure": "abkowitz"})
+
+
+def test_only_names_of_files_are_found_from_the_ship_file_s_folder(ship):
+    path = ship('prior = "own/prior.json"', 'anchor = "anchor.json"', 'reference_model = "tanker"')
+    chosen = identification_settings(ShipFile.load(path), {})
+    assert (chosen["prior"], chosen["anchor"]) == (
+        str(path.parent / "own" / "prior.json"), str(path.parent / "anchor.json")
+    )  # fmt: skip
+    assert (chosen["reference_model"], chosen["structure"]) == ("tanker", "auto")
+
+
+@pytest.mark.parametrize(
+    ("lines", "given", "structure", "reference"),
+    [
+        (['structure = "grey-box"'], {}, "grey-box", "auto"),
+        (['structure = "grey-box"', 'reference_model = "tanker"'], {}, "grey-box", "tanker"),
+        (['structure = "grey-box"', 'reference_model = "tanker"'], {"structure": "norrbin"}, "norrbin", None),
+        (
+            ['structure = "norrbin"', 'reference_model = "tanker"'],
+            {"structure": "nomoto", "reference_model": "mariner"},
+            "nomoto",
+            "mariner",
+        ),
+        (['structure = "norrbin"', 'reference_model = "tanker"'], {"structure": None}, "norrbin", "tanker"),
+        (['method = "rm-svm"', 'reference_model = "tanker"'], {}, "grey-box", "tanker"),
+        (['method = "rm-svm"'], {}, "auto", None),
+        (['method = "rm-svm"'], {"reference_model": "mariner"}, "grey-box", "mariner"),
+        (
+            ['method = "rm-svm"', 'structure = "norrbin"', 'reference_model = "tanker"'],
+            {},
+            "norrbin",
+            "tanker",
+        ),
+        (['method = "ls"', 'reference_model = "tanker"'], {}, "auto", "tanker"),
+    ],
+)
+def test_a_reference_ship_belongs_to_the_structure_that_it_was_named_for(
+    ship, lines, given, structure, reference
+):
+    chosen = identification_settings(ShipFile.load(ship(*lines)), given)
+    assert (chosen["structure"], chosen.get("reference_model")) == (structure, reference)
+
+
+def own_ship(path):
+    """A ship file of three trials and a structure of its own."""
+    trials = {name: SimpleNamespace(name=name) for name in ("zigzag.csv", "circle.csv", "spiral.csv")}
+    return SimpleNamespace(
+        path=path, particulars={"length": 100.0}, steering="gear", structure=SimpleNamespace(name="mine"),
+        trials=lambda: list(trials.values()), trial=trials.__getitem__,
+    )  # fmt: skip
+
+
+def test_a_comparison_is_told_structures_and_methods_but_no_method_of_its_own(monkeypatch, tmp_path):
+    asked = []
+    monkeypatch.setattr(identifying, "compare_methods", lambda *given, **named: asked.append((given, named)))
+    ship = own_ship(tmp_path / "ship.toml")
+    settings = {"method": "ls", "structure": "nomoto", "C": 2.0, "extra_trials": ["circle.csv"]}
+    for structures, methods in ((None, None), ("nomoto, mine", " ls ,svr"), ("mine", "all")):
+        compare_ship(ship, settings, structures, methods)
+    (usual, as_usual), (named, arguments), (every, _) = asked
+    assert [trial.name for trial in usual[0]] == ["zigzag.csv", "spiral.csv"]
+    assert [trial.name for trial in as_usual.pop("extra_trials")] == ["circle.csv"]
+    assert (usual[1:], as_usual) == (
+        (None, None), {"particulars": {"length": 100.0}, "steering": "gear", "structure": "nomoto", "C": 2.0}
+    )  # fmt: skip
+    assert named[1:] == (["ls", "svr"], ["nomoto", ship.structure])
+    assert "structure" not in arguments
+    assert every[1:] == (list(METHODS), [ship.structure])
+
+
+@pytest.mark.parametrize("what", ["identify", "compare_methods", "identify_reduced"])
+def test_what_is_wrong_with_trials_is_told_with_the_ship_file(monkeypatch, tmp_path, what):
+    def fails(trials, *given, particulars, steering, **settings):
+        raise InputError(f"{len(trials)} trials, {given}, {settings}")
+
+    monkeypatch.setattr(identifying, what, fails)
+    ship, settings = own_ship(tmp_path / "ship.toml"), {"structure": "nomoto"}
+    call, given = {
+        "identify": (lambda: identify_ship(ship, settings), "()"),
+        "compare_methods": (lambda: compare_ship(ship, settings, None, "ls"), "(['ls'], None)"),
+        "identify_reduced": (lambda: reduce_ship(ship, settings, "backward", 0.25), "('backward', 0.25)"),
+    }[what]
+    with pytest.raises(InputError) as error:
+        call()
+    assert str(error.value) == f"{ship.path}: 3 trials, {given}, {{'structure': 'nomoto'}}"
 
 
 def test_rm_svm_on_the_command_line_goes_before_the_structure_of_the_ship_file(demo):

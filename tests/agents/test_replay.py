@@ -9,7 +9,7 @@ from typer.testing import CliRunner
 
 from agents.cli import app
 from agents.rollouts.replay_page import names, replay_page, write_replay
-from agents.rollouts.replay_series import outcome, rounded, series
+from agents.rollouts.replay_series import outcome, quantities, rounded, series
 from shipgym import Episode, InputError
 
 STEPS, DT = 40, 5.0
@@ -70,6 +70,48 @@ def test_shaft_speed_is_that_of_the_ship_else_what_is_ordered():
 def test_numbers_keep_seven_digits():
     values = np.array([0.0, -1234.56789, 1.0 / 3.0, 2e-7, 1e5 / 3.0])
     assert rounded(values) == [0.0, -1234.568, 0.3333333, 2e-7, 33333.33]
+    assert rounded(np.array([123456789.4, 6e-10, 4e-10])) == [123456789.0, 1e-9, 0.0]
+
+
+def test_angles_are_read_to_a_tenth_of_a_degree_and_speeds_to_a_centimetre_per_second():
+    known = episode()
+    states = {**known.states, "phi": known.states["psi"], "n": known.states["u"]}
+    shown = quantities(data_of(replay_page({"first": replace(known, states=states)}))["runs"])
+    assert [(one["label"], one["unit"], one["decimals"]) for one in shown] == [
+        ("heading", "deg", 1), ("cross-track error", "m", 1), ("heading error", "deg", 1),
+        ("rudder", "deg", 1), ("speed through water", "m/s", 2), ("yaw rate", "deg/s", 2), ("heel", "deg", 1),
+        ("shaft speed", "1/min", 1), ("reward so far", "", 2),
+    ]  # fmt: skip
+    assert series(replace(known, states=states))["heel"][-1] == pytest.approx(np.degrees(0.002 * STEPS * DT))
+
+
+def test_headings_start_within_a_turn_and_speeds_are_of_any_direction():
+    known = episode().states
+    for first, shown in ((-0.1, 360.0 - np.degrees(0.1)), (7.0, np.degrees(7.0 - 2.0 * np.pi)), (0.0, 0.0)):
+        heading = series(episode(states={**known, "psi": known["psi"] + first}))["psi"]
+        assert heading[0] == pytest.approx(shown)
+        assert heading[-1] - heading[0] == pytest.approx(np.degrees(0.002 * STEPS * DT))
+    states = {**known, "u": -known["u"], "v": np.full_like(known["u"], 12.0)}
+    assert series(episode(states=states))["speed"] == pytest.approx(13.0)
+    del states["v"]
+    assert series(episode(states=states))["speed"] == pytest.approx(5.0)  # astern
+    del states["u"]
+    assert "speed" not in series(episode(states=states))
+
+
+def test_wind_and_current_are_told_from_0_to_360_degrees():
+    known = episode().states
+    none, half = np.zeros(STEPS + 1), np.full(STEPS + 1, 0.5)
+    for (north, east), towards in zip(((half, none), (none, half), (-half, none)), (0, 90, 180), strict=True):
+        states = {**known, "wind_from": -half * np.pi, "current_north": north, "current_east": east}
+        shown = series(episode(states=states))
+        assert shown["current_towards"] == pytest.approx(towards)
+        assert shown["current_speed"] == pytest.approx(0.5)
+        assert shown["wind_from"] == pytest.approx(270.0)
+    shown = series(episode(states={**known, "current_north": none, "current_east": none}))
+    assert "current_speed" not in shown
+    states = {name: values for name, values in known.items() if name not in ("wind_from", "current_east")}
+    assert not {"wind_speed", "current_speed"} & series(episode(states=states)).keys()
 
 
 def test_the_error_is_the_short_way_round():
@@ -104,6 +146,8 @@ def test_a_page_holds_all_of_an_episode_that_is_shown():
     assert "cross_track" not in run["other"]
     assert run["total"] == -0.5 * STEPS
     assert run["beam"] == 20.0
+    assert (run["rudderLimit"], run["corridor"], run["dt"]) == (pytest.approx(35.0), 50.0, DT)
+    assert (run["rewards"][:2], run["parts"]["reward_rudder"][:2]) == ([0.0, -0.5], [0.0, -0.1])
 
 
 def test_a_ship_of_unknown_beam_is_drawn_as_slender_as_ships_are():
@@ -136,6 +180,7 @@ def test_runs_are_called_by_what_tells_their_files_apart():
     assert names(paths) == ["lq/episode-00000", "pid/episode-00000"]
     assert names([Path("a/one.json"), Path("b/two.json")]) == ["one", "two"]
     assert names([Path("a/one.json")] * 2) == ["one", "one (2)"]
+    assert names([Path("/one.json"), Path("/a/one.json")]) == ["/one", "a/one"]
 
 
 def test_the_page_loads_nothing():

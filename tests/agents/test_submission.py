@@ -11,7 +11,7 @@ import pytest
 from agents import LQ, Shielded, WheelOver, benchmark, load_results
 from agents.benchmarking import results, run, submission
 from agents.benchmarking.contestants import Contestant
-from agents.benchmarking.submission import submit
+from agents.benchmarking.submission import read_submission, submit
 from agents.benchmarking.verification import verify
 from agents.suites import suite
 from agents.suites.suite import load_suite, parse_suite
@@ -104,6 +104,10 @@ def test_a_submission_is_verified(tmp_path):
     assert {check.task for check in checks} == set(TASKS)
     assert all(check.exact for check in checks)
     content = json.loads((tmp_path / "mine.json").read_text())
+    read = read_submission(content, "mine.json")
+    assert read.episodes["seed"].tolist() == [1_000_000, 1_000_001, 1_000_002] * len(TASKS)
+    for task in TASKS:
+        np.testing.assert_array_equal(read.figures("wheel-over", task), found.figures("wheel-over", task))
     content["costs"]["turns"][0][1] *= 0.9
     (tmp_path / "mine.json").write_text(json.dumps(content))
     assert [check.task for check in verify(tmp_path / "mine.json") if not check.passed] == ["turns"]
