@@ -94,9 +94,8 @@ def costs_figure(result: BenchmarkResult, task: str) -> Figure:
                 fillcolor=translucent(colour, 0.1), hoverinfo="x",
             )
         )  # fmt: skip
-    least, most = (costs.min(), costs.max()) if len(costs) else (0.0, 0.0)
-    kind = "log" if least > 0.0 and most > LOGARITHMIC * least else "linear"
-    marks: dict[str, Any] = {"tickvals": _one_two_five(least, most)} if kind == "log" else {}
+    kind = "log" if len(costs) and 0.0 < LOGARITHMIC * costs.min() < costs.max() else "linear"
+    marks: dict[str, Any] = {"tickvals": _one_two_five(costs.min(), costs.max())} if kind == "log" else {}
     costs_axis = axis("cost of an episode", type=kind, **marks)
     panel = Panel(boxes, costs_axis, axis(autorange="reversed", automargin=True))
     return bare_panels([panel], 34 * len(names) + 70, hovermode="closest")

@@ -71,7 +71,7 @@ class Draws:
         random = np.random.default_rng([self.seed, 1, task, who])
         return random.integers(n_runs, size=(self.n_draws, n_runs))
 
-    def means(self, costs: Floats, task: int, who: int = 0) -> Floats:
+    def means(self, costs: Floats, task: int, who: int) -> Floats:
         """Mean cost of each run that is drawn, over the episodes that are drawn, shape (n_draws, n_runs)."""
         by_run = self.episodes[task] @ costs.T
         return np.take_along_axis(by_run, self.runs(task, len(costs), who), axis=1)

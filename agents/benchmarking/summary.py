@@ -16,7 +16,7 @@ from shipgym.arrays import Floats
 #: By contestant and task what `agents.benchmarking.run.results_of` answers.
 Done = Mapping[tuple[str, str], Mapping[str, Any]]
 
-THRESHOLDS = np.linspace(-1.0, 1.5, 51)  # scores of the performance profile
+THRESHOLDS = np.arange(-20, 31) / 20.0  # scores of the performance profile
 
 
 def summary_of(
@@ -132,7 +132,7 @@ class _Summary:
             every = every[np.isfinite(every)]
             if len(every):
                 shares[name] = statistics.performance_profile(every, THRESHOLDS).tolist()
-        return {"thresholds": THRESHOLDS.round(6).tolist(), "shares": shares}
+        return {"thresholds": THRESHOLDS.tolist(), "shares": shares}
 
 
 def _count(runs: Sequence[Mapping[str, Any]], figure: str) -> int:

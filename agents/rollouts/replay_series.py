@@ -151,7 +151,7 @@ def _before_steps(values: Floats) -> Floats:
 def rounded(values: Floats) -> list[Any]:
     """Numbers with the digits that the page keeps."""
     array = np.asarray(values, dtype=float)
-    size = np.floor(np.log10(np.maximum(np.abs(array), 1e-12)))
+    size = np.floor(np.log10(np.maximum(np.abs(array), np.finfo(float).tiny)))
     power = 10.0 ** np.clip(DIGITS - 1.0 - size, 0.0, DIGITS + 2.0)
     short: list[Any] = (np.round(array * power) / power).tolist()
     return short

@@ -289,6 +289,8 @@ def test_classical_controllers_are_designed_for_the_ship_of_the_task():
         ("pid,pid", "'pid' found twice"),
         ("x=nobody.json", "'nobody.json' found"),
         ("no_such_module:make", "'no_such_module:make' cannot be imported"),
+        ("json:no_such_thing", "'json:no_such_thing' cannot be imported"),
+        ("math:pi", r"'math:pi' is 3.14\d*, expected a controller"),
         ({"a": 3}, "'a' is 3, expected a controller"),
         ({"a": [LQ.from_model(load_model("mariner")), 3]}, "'a' is 3, expected a controller"),
         ([], "none found"),
@@ -463,7 +465,12 @@ def test_a_sample_takes_the_contestants_by_turns():
         with pytest.raises(InputError, match="results: no contestant that can be made again; name them by"):
             _sampled(nothing, 8, 0)
     usual = inspect.signature(verify).parameters
-    assert (usual["sample"].default, usual["seed"].default, usual["workers"].default) == (8, 0, 1)
+    assert (usual["sample"].default, usual["seed"].default) == (8, 0)
+
+
+@pytest.mark.parametrize("function", [benchmark, rerun, verify])
+def test_work_is_done_in_one_process_unless_more_are_asked_for(function):
+    assert inspect.signature(function).parameters["workers"].default == 1
 
 
 COSTS = np.array([100.0, 50.0, 0.0])
@@ -710,6 +717,14 @@ def test_what_the_table_of_episodes_needs_is_missed_before_the_work(folder, tmp_
         with pytest.raises(InputError, match=r"not installed; install it with: pip install 'shipgym\[bench"):
             call()
     assert not (tmp_path / "out").exists()
+
+
+def test_results_are_written_to_folders_that_are_made(folder, tmp_path):
+    result = load_results(folder)
+    assert result.save(None) is result
+    saved = result.save(tmp_path / "a" / "b")
+    assert load_results(tmp_path / "a" / "b").summary == saved.summary
+    assert len(saved.summary["episodes"]["sha256"]) == 64
 
 
 def test_parts_alone_are_gone_on_with(tmp_path):

@@ -1,3 +1,4 @@
+import inspect
 from dataclasses import replace
 from itertools import count
 from types import SimpleNamespace
@@ -7,6 +8,7 @@ import pytest
 
 from agents import LQ, PID, sail
 from agents.rollouts import rollout as rollout_module
+from agents.rollouts.episodes import _episode, recorded
 from agents.rollouts.metrics import (
     course_changes,
     evaluate,
@@ -55,6 +57,10 @@ def test_costs_and_errors_are_those_of_course_keeping(lq):
     np.testing.assert_allclose(found["heading_rmse_deg"], alone.heading_rmse_deg, rtol=1e-14)
     np.testing.assert_allclose(found["rudder_travel_deg_min"], alone.rudder_travel_deg_min, rtol=1e-12)
     np.testing.assert_array_equal(found["duration_s"], alone.duration_s)
+
+
+def test_a_history_has_three_hundred_samples_at_most():
+    assert inspect.signature(recorded).parameters["samples"].default == 300
 
 
 def test_an_episode_does_not_depend_on_those_beside_it(lq):
@@ -189,6 +195,12 @@ def test_a_change_of_course_counts_from_five_degrees_on(error_deg, counts):
     )
 
 
+def test_an_episode_without_an_interval_has_no_change_of_course():
+    states = {"psi": np.zeros((1, 1)), "set_point": np.full((1, 1), 0.5)}
+    run = SimpleNamespace(seeds=[0], steps=np.zeros(1), states=states, dt=1.0)
+    assert all(np.isnan(values).all() for values in course_changes(run).values())
+
+
 def test_figures_of_steering_and_of_paths_by_hand():
     """Two episodes of 4 and 2 intervals of 3 s; what is recorded later or at the beginning does not count."""
     sailing = np.array([[1, 1], [1, 1], [1, 0], [1, 0]], dtype=np.bool_)
@@ -210,6 +222,22 @@ def test_figures_of_steering_and_of_paths_by_hand():
         "cross_track_rmse_m": [2.5, 1.0], "outside_corridor": [0.5, 0.0], "left_corridor": [1.0, 0.0],
         "grounded": [0.0, 0.0], "success": [1.0, 1.0],
     }  # fmt: skip
+
+
+def test_what_is_recorded_after_an_episode_is_not_replayed(lq):
+    engine = PATH.engine(2)
+    run = rollout_module.rollout(lq, engine, SEEDS[:2], record=True)
+    steps = run.steps.astype(int)
+    after = np.arange(len(run.states["x"]))[:, None] > steps
+    assert after.any()
+    known = [_episode(run, PATH, lane, engine, 3) for lane in (0, 1)]
+    assert [episode.success for episode in known] == [True, True]
+    infos = {**run.infos, "success": after.astype(np.float64)}
+    later = replace(run, infos=infos, rewards=np.where(after[1:], 99.0, run.rewards))
+    found = [_episode(later, PATH, lane, engine, 3) for lane in (0, 1)]
+    for one, other, cost in zip(known, found, run.costs, strict=True):
+        assert other.success is False
+        assert one.rewards.sum() == other.rewards.sum() == pytest.approx(-cost)
 
 
 def test_overshoot_and_settling_of_a_run_are_those_of_its_recorded_heading(lq):
@@ -279,7 +307,8 @@ def test_a_controller_that_fails_at_once_has_a_cost_and_no_figures():
     found = evaluate(Steers(lambda call, seen: None), KEEPING, SEEDS[:2])
     assert found.figures["failed"].all()
     np.testing.assert_allclose(found.figures["cost"], 250 * worst_step_cost(KEEPING.task))
-    assert np.isnan(found.figures["heading_rmse_deg"]).all()
+    for name in ("heading_rmse_deg", "overshoot_percent", "settling_s", "unsettled", "fuel"):
+        assert np.isnan(found.figures[name]).all(), name
 
 
 def test_the_time_and_interventions_of_a_shield_by_hand(lq):

@@ -135,6 +135,7 @@ def test_what_is_run_again_costs_the_same(result):
         assert found.rewards.sum() == pytest.approx(-cost)
         assert (found.seed, found.terminated) == (episode.seed, bool(lost) or bool(found.success))
         assert (found.waypoints is None) == (episode.task == "mariner-calm")
+        assert found.truncated == (not found.terminated)
 
 
 def test_an_episode_run_again_is_that_of_the_single_environment():
@@ -154,10 +155,6 @@ def test_an_episode_run_again_is_that_of_the_single_environment():
     assert cost == pytest.approx(-sum(rewards))
     for name in ("x", "y", "psi", "u", "delta", "set_point"):
         assert found.states[name] == pytest.approx([state[name] for state in states[::3]], abs=1e-6)
-
-
-def test_a_history_has_three_hundred_samples_at_most():
-    assert inspect.signature(recorded).parameters["samples"].default == 300
 
 
 def test_the_last_interval_is_filled_up():
@@ -263,7 +260,8 @@ def test_a_page_holds_three_hundred_runs_at_most():
         summary={"tasks": {"calm": {"pid": {"cost": {"value": 1.0}}}}, "seeds": {"first": FIRST}},
         figures=lambda name, task: costs,
     )
-    assert inspect.signature(write_page).parameters["worst"].default == 3  # fewer where they are too many
+    usual = inspect.signature(write_page).parameters
+    assert (usual["worst"].default, usual["workers"].default) == (3, 1)
     for wanted, found in ((count, 300), (299, 299)):
         assert replayable(result, wanted)[0] == found
     assert len(replayable(result, count)[1]) == 300

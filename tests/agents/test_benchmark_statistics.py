@@ -151,6 +151,12 @@ def test_performance_profile_by_hand():
     assert shares.tolist() == [1.0, 0.75, 0.75, 0.25, 0.0]
 
 
+def test_runs_are_drawn_for_each_contestant_and_the_first_by_default():
+    costs, draws = RANDOM.normal(50.0, 9.0, (3, 20)), Draws(1, 20, n_draws=50)
+    for statistic in (mean_cost, interquartile_cost):
+        assert statistic(costs, draws, 0) == statistic(costs, draws, 0, 0) != statistic(costs, draws, 0, 1)
+
+
 def test_percentile_interval():
     assert interval(1.0, np.arange(1001.0)) == pytest.approx((1.0, 25.0, 975.0))
 

@@ -193,6 +193,24 @@ def test_a_model_found_unstable_is_steered_only_where_asked():
         )
 
 
+def test_about_a_thousand_ships_are_steered_at_once(monkeypatch):
+    class AskedError(Exception):
+        pass
+
+    def engine(ships, num_envs, *given, **more):
+        raise AskedError(len(ships), num_envs)
+
+    monkeypatch.setattr("agents.rollouts.course_keeping.Engine", engine)
+    for ships, seeds, asked in (
+        (MARINER, np.arange(2000), (1, 1024)),
+        ([MARINER] * 50, np.arange(2000).reshape(50, 40), (1024, 1024)),
+        (MARINER, np.arange(1000), (1, 1000)),
+    ):
+        with pytest.raises(AskedError) as caught:
+            sail(PILOT, ships, SHORT, seeds)
+        assert caught.value.args == asked
+
+
 def test_more_ships_than_are_steered_at_once_are_steered_in_groups(monkeypatch):
     seeds = np.arange(5)
     whole = sail(PILOT, MARINER, SHORT, seeds)

@@ -12,6 +12,7 @@ import subprocess
 import sys
 import threading
 import time
+import warnings
 from collections import deque
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import nullcontext
@@ -178,6 +179,11 @@ def test_what_is_kept_is_of_its_function_and_version(functions, tmp_path):
     assert KeptResults(kept, functions.divides).load(text) is None
     file.write_text(json.dumps({**json.loads(file.read_text()), "shipgym": "0.0.1"}))
     assert KeptResults(kept, functions.logged).load(text) is None
+    own = KeptResults(kept, functions.spectrum)
+    own.save(text, {"value": pack(np.ones(3))})
+    assert own.load(text) is not None
+    own.save(text, {"value": {"__array__": ["<f8", [3], ""]}})
+    assert own.load(text) is None  # broken, and computed again
     (tmp_path / "file").write_text("")
     with pytest.raises(InputError, match="file: is not a folder, expected one for results; choose another"):
         KeptResults(tmp_path / "file", functions.logged)
@@ -274,6 +280,22 @@ def test_what_ray_says_last_is_told(monkeypatch):
         check_answers("auto")
 
 
+def test_why_no_cluster_answers_is_told_in_any_case(monkeypatch):
+    def patiently(place, timeout):
+        raise TimeoutError(f"{timeout:g} s are over")
+
+    monkeypatch.setattr(ray_engine.socket, "create_connection", patiently)
+    with pytest.raises(InputError, match=r"no ray cluster answers .* within 10 s \(10 s are over\)"):
+        check_answers("10.0.0.1:65535")
+
+    def fails(command, **options):
+        raise subprocess.CalledProcessError(3, command, stderr="")
+
+    monkeypatch.setattr(ray_engine.subprocess, "run", fails)
+    with pytest.raises(InputError, match=r"no ray cluster answers .* within 7 s \(exit code 3\)"):
+        check_answers("auto", 7.0)
+
+
 def test_nothing_is_left_where_no_cluster_answers(functions, tmp_path):
     with pytest.raises(InputError, match=r"no ray cluster answers|not installed"):
         run_jobs(
@@ -336,6 +358,7 @@ def test_a_module_of_the_working_folder_goes_before_others_of_its_name(tmp_path,
 
 def test_an_engine_refuses_wrong_arguments_before_the_work():
     HERE.check()
+    assert JobEngine("local", 1, None, None) == HERE
     for engine, said in (
         (JobEngine("rai"), "Did you mean 'ray'"),
         (JobEngine(workers=0), "workers: 0 found, .* or None for as many as there are cores"),
@@ -366,16 +389,34 @@ def test_workers_get_one_job_at_a_time(monkeypatch):
     class Pool:
         def __init__(self, jobs, **options):
             asked.append((jobs, options["pre_dispatch"], options["batch_size"]))
+            warnings.warn("2 tasks which were still being processed are cancelled", UserWarning, stacklevel=1)
 
         def __call__(self, calls):
             return ((text, {"value": 1}) for _, (_, text), _ in calls)
 
+    threads = []
     monkeypatch.setattr(local, "Parallel", Pool)
+    monkeypatch.setattr(
+        local, "parallel_config", lambda backend, **named: threads.append((backend, named)) or nullcontext()
+    )
     for workers, at_once in ((1, 2), (2, 2), (3, 3)):  # one would be this process
         doing = set()
         outcomes = list(local._until_broken(len, deque(["a", "b"]), doing, workers))
         assert (outcomes, doing) == ([("a", {"value": 1}), ("b", {"value": 1})], set())
         assert asked.pop() == (at_once, at_once, 1)
+        assert threads.pop() == ("loky", {"inner_max_num_threads": 1})
+
+
+def test_a_worker_asks_twice_a_second_whether_it_is_still_wanted(monkeypatch):
+    parents, slept, ended = [7, 7, 7, 1], [], []
+    monkeypatch.setattr(local.os, "getppid", lambda: parents.pop(0))
+    monkeypatch.setattr(local.os, "_exit", ended.append)
+    monkeypatch.setattr(local.time, "sleep", slept.append)
+    monkeypatch.setattr(
+        local.threading, "Thread", lambda target, daemon: SimpleNamespace(start=target, daemon=daemon)
+    )
+    local._end_with_parent.__wrapped__()
+    assert (slept, ended, parents) == ([0.5, 0.5], [1], [])
 
 
 @pytest.mark.parametrize(("deaths", "retries"), [(0, 2), (2, 2), (3, 2), (1, 0), (1, 1), (2, 1)])
@@ -443,6 +484,7 @@ class Ray:
     def init(self, **options):
         if self.crash:
             raise RuntimeError("no memory")
+        warnings.warn("ray warns of what is coming", FutureWarning, stacklevel=1)
         self.given.append((options, dict(os.environ)))
 
     def shutdown(self):
@@ -491,6 +533,7 @@ def test_ray_is_started_here_on_one_thread_each_and_ended(own_ray, monkeypatch):
     assert environment["OMP_NUM_THREADS"] == environment["MKL_NUM_THREADS"] == "1"
     assert environment["PYTHONPATH"].split(os.pathsep) == [path for path in sys.path if path]
     assert environment["RAY_USAGE_STATS_ENABLED"] == "0"  # nothing is told to others
+    assert environment["RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO"] == "0"
     assert (os.environ["OMP_NUM_THREADS"], ray.ended) == ("7", 1)
     monkeypatch.setenv("RAY_USAGE_STATS_ENABLED", "1")  # unless the user wishes so
     with ray_engine._connected(3, None):

@@ -157,6 +157,10 @@ def test_costs_have_a_logarithmic_axis_where_they_differ_much():
     near = result()
     near.figures = lambda name, task: np.array([[1.0, 19.0]])
     assert page_figures.costs_figure(near, "calm").layout.xaxis.type == "linear"
+    near.figures = lambda name, task: np.zeros((0, 2))
+    assert page_figures.costs_figure(near, "calm").layout.xaxis.type == "linear"
+    near.figures = lambda name, task: np.array([[0.003, 25.0]])
+    assert page_figures.costs_figure(near, "calm").layout.xaxis.type == "log"
     near.figures = lambda name, task: np.array([[1.0, 20.5]])
     assert page_figures.costs_figure(near, "calm").layout.xaxis.type == "log"
     near.figures = lambda name, task: np.array([[0.0, 900.0]])

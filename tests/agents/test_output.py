@@ -61,6 +61,22 @@ def test_after_an_error_the_earlier_result_is_still_there(tmp_path):
     assert (tmp_path / "ship" / "model.json").read_text() == "old"
 
 
+def test_an_interruption_while_a_folder_takes_its_place_leaves_the_earlier_result(tmp_path, monkeypatch):
+    rename, target = Path.replace, tmp_path / "ship"
+
+    def replace(self, to):
+        if to == target and self.name.endswith(".draft"):
+            raise KeyboardInterrupt
+        return rename(self, to)
+
+    target.mkdir()
+    (target / "metrics.json").write_text("old")
+    monkeypatch.setattr(Path, "replace", replace)
+    with pytest.raises(KeyboardInterrupt), whole_folder(target, NAMES) as draft:
+        (draft / "model.json").write_text("new")
+    assert everything(tmp_path) == ["ship", "ship/metrics.json"]
+
+
 def test_an_earlier_result_is_replaced_as_a_whole(tmp_path):
     (tmp_path / "ship").mkdir()
     (tmp_path / "ship" / "metrics.json").write_text("old")
