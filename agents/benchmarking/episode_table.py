@@ -83,7 +83,7 @@ def _column(arrow: Any, name: str, values: Any) -> NDArray[Any]:
     """A column of the file as an array; ValueError or TypeError if it is of another type."""
     if name in KEYS[:2]:
         texts = values.cast(arrow.string()).to_pylist()
-        if len(texts) * max(map(len, texts), default=0) > MOST_NUMBERS:
+        if len(texts) * len(max(texts, key=len, default="")) > MOST_NUMBERS:
             raise ValueError(f"column '{name}' of long texts")
         return np.array(texts, dtype=np.str_)
     if not (arrow.types.is_integer(values.type) or arrow.types.is_floating(values.type) or name in FLAGS):

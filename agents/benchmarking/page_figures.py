@@ -132,7 +132,7 @@ def _corridor(path: Floats, half: float) -> Floats:
     NaN parts one from the next. Returns an array of shape (2, n).
     """
     ahead = np.diff(path, axis=0)
-    ahead /= np.maximum(np.hypot(*ahead.T), 1e-9)[:, None]
+    ahead /= np.maximum(np.hypot(*ahead.T), np.finfo(float).tiny)[:, None]
     aside = half * np.stack([-ahead[:, 1], ahead[:, 0]], axis=-1)
     strips = np.stack([path[:-1] + aside, path[1:] + aside, path[1:] - aside, path[:-1] - aside], axis=1)
     angles = np.linspace(0.0, 2.0 * np.pi, 25)

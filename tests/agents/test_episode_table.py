@@ -47,6 +47,8 @@ def test_what_a_contestant_lacks_is_missing_and_comes_back_missing(tmp_path):
         ({"cost": [[1.0], [2.0]]}, 2, "column 'cost' of list"),
         ({"seed": [1, None]}, 2, "column 'seed' has rows without a value"),
         ({"task": ["calm", "c" * 30]}, 2, "column 'task' of long texts"),
+        ({"task": ["calm", None]}, 2, "cannot be read as Parquet"),
+        ({"success": ["maybe", "not"]}, 2, "cannot be read as Parquet"),
     ],
 )
 def test_other_tables_are_refused(changes, rows, message, tmp_path, monkeypatch):

@@ -209,6 +209,9 @@ def test_tracks_are_drawn_with_the_corridor_beside_them():
     np.testing.assert_allclose(along, [[20, 20, -20, -20], [0, 100, 100, 0]], atol=1e-5)
     np.testing.assert_allclose(across, [[0, 60, 60, 0], [80, 80, 120, 120]], atol=1e-5)
     np.testing.assert_allclose(np.hypot(disc[0], disc[1] - 100.0), 20.0, rtol=1e-5)
+    twice = np.array([[0.0, 0.0], [0.0, 0.0], [100.0, 0.0]])  # a waypoint that is there twice
+    shape = only(page_figures.tracks_figure({"pid": episode(waypoints=twice)}, ["pid"]), "corridor")
+    assert (np.nanmin(shape.x), np.nanmax(shape.x), np.nanmax(shape.y)) == pytest.approx((-20.0, 20.0, 100.0))
     narrow = only(page_figures.tracks_figure({"pid": episode(corridor=None)}, ["pid"]), "corridor")
     assert np.nanmax(np.abs(narrow.x) * np.abs(np.array(narrow.y) - 100.0)) == 0.0  # it lies on the path
     free = page_figures.tracks_figure({"pid": episode(waypoints=None)}, ["pid"])
