@@ -437,7 +437,8 @@ def test_jobs_whose_worker_died_are_done_again_the_last_time_alone(monkeypatch, 
     monkeypatch.setattr(local, "get_reusable_executor", lambda: pool)
     run = local.in_processes(len, ["a", "bad", "c"], 2, retries)
     if deaths > retries:
-        with pytest.raises(WorkerDiedError, match=rf"job bad: its worker died {retries + 1} times"):
+        named = "bad" if retries else "(a|bad|c)"  # at once it is not known whose fault it was
+        with pytest.raises(WorkerDiedError, match=rf"job {named}: its worker died {retries + 1} times"):
             list(run)
     else:
         assert sorted(text for text, _ in run) == ["a", "bad", "c"]
