@@ -55,15 +55,13 @@ class ResidualVecEnv(VecEnvWrapper):  # type: ignore[misc]  # stable-baselines3 
             low, high = np.append(low, venv.action_space.low), np.append(high, venv.action_space.high)
         super().__init__(venv, observation_space=spaces.Box(low.astype(np.float32), high.astype(np.float32)))
         self._past = np.zeros((venv.num_envs, self.frame_stack, *venv.observation_space.shape), np.float32)
-        self._state: Any = None
         self._proposed: Numbers = np.zeros((venv.num_envs, 0), np.float32)
-        self._outputs: Any = None
         self._in_force = np.zeros((venv.num_envs, *(venv.action_space.shape or (1,))), np.float32)
 
     def reset(self) -> Numbers:
         """Begin an episode in each row; shape (num_envs, frame_stack * n_observations + n_commands)."""
         observations = self.venv.reset()
-        self._state = None
+        self._state: Any = None
         self._in_force[:] = 0.0
         return self._begin(observations, np.ones(self.num_envs, dtype=np.bool_))
 
@@ -128,7 +126,6 @@ class ResidualVecEnv(VecEnvWrapper):  # type: ignore[misc]  # stable-baselines3 
 
     def _begin(self, observations: Numbers, starts: Flags) -> Numbers:
         """What the agent sees where some rows begin an episode."""
-        self._past[:, -1] = observations
         self._past[starts] = observations[starts, None]
         return self._shown(starts)
 

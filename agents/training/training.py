@@ -173,7 +173,7 @@ class _Training(BaseCallback):  # type: ignore[misc]  # stable-baselines3 is not
         #: What evaluations found so far.
         self.found: dict[str, Any] = {"best_cost": None, "best_steps": 0, "curve": []}
         self.seconds_before = 0.0
-        self.kept_at = -CHECKPOINT_SECONDS
+        self.kept_at = -np.inf
         self.resumed_from: int | None = None
 
     def run(self) -> TrainingResult:

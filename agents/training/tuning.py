@@ -42,7 +42,6 @@ CONFIGURATION, STUDY, KEPT, BEST = "study.json", "study.db", "trials", "best.tom
 #: Settings that stand behind parameters of other names.
 STANDS_FOR = {"one_minus_gamma": "gamma", "minibatches": "batch_size"}
 
-LAST = 2**62  # steps, after all evaluations
 #: What a training returns.
 TRIAL: Shape = {"cost": (int, float, NoneType), "curve": [[(int,), (int, float)]], "ended": (str,)}
 
@@ -157,7 +156,7 @@ def limits(trials: Sequence[Trial], total_steps: int) -> list[tuple[int, float]]
     return [(mark, float(np.median([lowest(curve, mark) for curve in finished]))) for mark in marks]
 
 
-def lowest(curve: Sequence[tuple[int, float]], steps: int) -> float:
+def lowest(curve: Sequence[tuple[int, float]], steps: float) -> float:
     """The lowest cost by some steps; of limits, the largest best cost with which a training goes on."""
     return min((cost for mark, cost in curve if mark <= steps), default=np.inf)
 
@@ -170,7 +169,7 @@ def _trial(number: int, parameters: Mapping[str, Any], settings: Mapping[str, An
 
 def _best(trials: Sequence[Trial]) -> Trial:
     """The finished trial of the lowest cost; one that was stopped early only where none has finished."""
-    return min(trials, key=lambda trial: (trial.cost is None, lowest(trial.curve, LAST)))
+    return min(trials, key=lambda trial: (trial.cost is None, lowest(trial.curve, np.inf)))
 
 
 def _proposed(

@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 import torch
+from gymnasium.spaces import Box
 from stable_baselines3 import PPO
-from stable_baselines3.common.vec_env import VecNormalize
+from stable_baselines3.common.vec_env import VecEnv, VecNormalize
 
 from agents import LQ, LQG, IntegralLineOfSight, LearnedPolicy, load_agent
 from agents.training.residual import ResidualVecEnv
@@ -112,6 +113,146 @@ def test_a_held_output_is_that_many_steps_with_it_and_none_after_an_episode_s_en
             np.testing.assert_array_equal(infos[k]["terminal_observation"], ends[k]["terminal_observation"])
         endings += over.sum()
     assert endings == SHIPS * (3 * STEPS // 5)
+
+
+class Counting(VecEnv):
+    """Two rows that show the number of the step and keep what they are commanded; row 1 ends at `end`."""
+
+    def __init__(self, end=99, commands=1, bound=1.0):
+        super().__init__(2, Box(-100.0, 100.0, (1,)), Box(-bound, bound, (commands,)))
+        self.end, self.commanded, self.number = end, [], 0
+
+    def reset(self):
+        self.number = 0
+        return self.shown()
+
+    def shown(self):
+        return np.array([[self.number], [self.number]], np.float32)
+
+    def step_async(self, actions):
+        self.commanded.append(np.round(actions.astype(float), 6).tolist())
+
+    def step_wait(self):
+        self.number += 1
+        ends, infos = np.array([False, self.number == self.end]), [{}, {}]
+        seen = self.shown()
+        if ends[1]:
+            infos[1]["terminal_observation"], seen[1] = seen[1].copy(), -1.0
+        return seen, np.full(2, 0.5, np.float32), ends, infos
+
+    def close(self): ...
+    def env_method(self, *_, **__): ...
+    def env_is_wrapped(self, *_, **__): ...
+    def get_attr(self, *_):
+        return [None, None]
+
+    def set_attr(self, *_): ...
+
+
+class Steady:
+    """Proposes 0.9, and keeps which states it was asked with, and who began."""
+
+    def __init__(self):
+        self.asked = []
+
+    def predict(self, observation, state=None, episode_start=None, deterministic=True):
+        self.asked.append((state, episode_start.tolist()))
+        return np.full((2, 1), 0.9), len(self.asked)
+
+
+def test_without_a_base_outputs_are_limited_in_rate_from_nothing_on():
+    inner = Counting(end=2)
+    limited = ResidualVecEnv(inner, rate_limit=0.25)
+    limited.reset()
+    for output in (1.0, 1.0, 5.0):
+        limited.step(np.full((2, 1), output))
+    assert inner.commanded == [[[0.25], [0.25]], [[0.5], [0.5]], [[0.75], [0.25]]]  # row 1 began anew
+    kept = limited.memory()
+    limited.reset()
+    limited.step(np.full((2, 1), -1.0))
+    assert inner.commanded[-1] == [[-0.25], [-0.25]]
+    limited.remember(kept)
+    limited.step(np.full((2, 1), 1.0))
+    assert inner.commanded[-1] == [[1.0], [0.5]]
+
+
+def test_without_limit_and_base_outputs_are_handed_on_as_they_are():
+    inner = Counting(commands=2)
+    plain = ResidualVecEnv(inner, frame_stack=2)
+    plain.reset()
+    plain.step(np.array([[3.0, -2.0], [0.5, 0.0]]))
+    assert inner.commanded == [[[3.0, -2.0], [0.5, 0.0]]]
+    assert plain.memory().keys() == {"past", "state", "proposed"}
+    assert plain.memory()["proposed"].shape == (2, 0)
+    limited = ResidualVecEnv(Counting(commands=2), rate_limit=0.5)
+    limited.reset()
+    assert limited.memory()["in_force"].tolist() == [[0.0, 0.0], [0.0, 0.0]]
+
+
+def test_the_base_and_what_is_added_are_no_more_than_the_whole_range():
+    inner, base = Counting(), Steady()
+    residual = ResidualVecEnv(inner, base, authority=0.5)
+    assert residual.reset().tolist() == [[0.0, np.float32(0.9)]] * 2
+    residual.step(np.array([[1.0], [-1.0]]))
+    residual.step(np.array([[0.1], [-9.0]]))
+    assert inner.commanded == [[[1.0], [0.4]], [[0.95], [0.4]]]
+    assert (residual.observation_space.low.tolist(), residual.observation_space.high.tolist()) == (
+        [-100.0, -1.0],
+        [100.0, 1.0],
+    )
+    residual.reset()
+    assert base.asked[0] == base.asked[-1] == (None, [True, True])  # episodes begin with no state
+    assert base.asked[1:-1] == [(1, [False, False]), (2, [False, False])]
+
+
+def test_an_episode_that_ends_shows_its_last_observations_and_then_those_of_the_next():
+    inner, base = Counting(end=2), Steady()
+    residual = ResidualVecEnv(inner, base, frame_stack=3)
+    proposed = np.float32(0.9)
+    assert residual.reset().tolist() == [[0.0, 0.0, 0.0, proposed]] * 2
+    assert residual.step(np.zeros((2, 1)))[0].tolist() == [[0.0, 0.0, 1.0, proposed]] * 2
+    seen, _, dones, infos = residual.step(np.zeros((2, 1)))
+    assert seen.tolist() == [[0.0, 1.0, 2.0, proposed], [-1.0, -1.0, -1.0, proposed]]
+    assert infos[1]["terminal_observation"].tolist() == [0.0, 1.0, 2.0, proposed]
+    assert dones.tolist() == [False, True]
+    seen, *_ = residual.step(np.zeros((2, 1)))
+    assert seen.tolist() == [[1.0, 2.0, 3.0, proposed], [-1.0, -1.0, 3.0, proposed]]
+    assert base.asked[2:4] == [(2, [False, False]), (2, [False, True])]  # asked of the end, then of the next
+
+
+def test_rewards_of_a_decision_are_summed_up_to_the_end_of_the_episode():
+    for base, after in ((None, 1.0), (Steady(), 0.9)):  # after an end the base alone, or the output
+        inner = Counting(end=2)
+        held = ResidualVecEnv(inner, base, action_repeat=3)
+        held.reset()
+        _, rewards, dones, _ = held.step(np.ones((2, 1)))
+        assert (rewards.tolist(), dones.tolist()) == ([1.5, 1.0], [False, True])
+        assert inner.commanded == [[[1.0], [1.0]], [[1.0], [1.0]], [[1.0], [after]]]
+
+
+@pytest.mark.parametrize(("bound", "fits"), [(0.5, True), (1.0, True), (1.05, False)])
+def test_a_base_needs_commands_within_the_whole_range(bound, fits):
+    if fits:
+        assert ResidualVecEnv(Counting(bound=bound), Steady()).base is not None
+        return
+    for low, high in ((-1.0, bound), (-bound, 1.0)):
+        inner = Counting()
+        inner.action_space = Box(low, high, (1,))
+        with pytest.raises(InputError, match=r"^venv: actions in Box.* found, expected a Box within \[-1, 1\]"):
+            ResidualVecEnv(inner, Steady())
+
+
+def test_observations_are_a_flat_row_of_numbers():
+    inner = Counting()
+    inner.observation_space = Box(-1.0, 1.0, (2, 2))
+    with pytest.raises(InputError, match=r"venv: observations in Box.* found, expected a flat Box of numbers"):
+        ResidualVecEnv(inner)
+
+
+def test_one_ship_alone_is_steered_by_a_base_too():
+    env, base = BASES["lq"]
+    seen = ResidualVecEnv(ships(env, 1), base).reset()
+    assert seen[0, -1] == base.predict(seen[:, :-1])[0][0, 0]
 
 
 def test_an_output_beyond_its_limits_counts_as_the_limit():

@@ -2,7 +2,10 @@
 
 import json
 import random
+import sqlite3
 import sys
+from dataclasses import replace
+from types import SimpleNamespace
 
 import pytest
 from typer.testing import CliRunner
@@ -16,6 +19,9 @@ from agents.training.settings import ALGORITHMS, load_settings
 from agents.training.tuning import (
     Trial,
     Tuning,
+    _best,
+    _proposed,
+    _write_best,
     evaluated_evenly,
     limits,
     lowest,
@@ -53,6 +59,10 @@ def bowl(job):
 def diverges(job):
     why = f"not finite, gamma {job['configuration']['settings']['gamma']}"
     return {"cost": None, "curve": [], "ended": "diverged", "why": why}
+
+
+def broken(job):
+    return {"cost": "low", "curve": [], "ended": "finished"}
 '''
 
 
@@ -83,6 +93,12 @@ def test_better_settings_are_found_and_written_for_training(trainings, tmp_path)
     assert found.best.cost == min(trial.cost for trial in found.trials if trial.cost is not None)
     settings = make_plan(Given("ppo", settings_file=folder / "best.toml")).settings
     assert settings.to_dict() == dict(found.best.settings)
+    head, _, written = (folder / "best.toml").read_text().partition("\n")
+    assert head == (
+        f"# Trial {found.best.number} of 10: mean cost held out {found.best.cost:.6g}, seed 0, ppo on "
+        "course-keeping with mariner."
+    )
+    assert "evaluate_every" not in written
     assert found.trials[0].settings == plan().settings.to_dict()
     study = optuna.load_study(study_name="shipgym", storage=f"sqlite:///{folder / 'study.db'}")
     assert len(study.trials) == 10
@@ -189,6 +205,95 @@ def test_folder_of_something_else_is_refused(trainings, tmp_path):
         tune(plan(), tmp_path / "other", 5, training=trainings.diverges)
     with pytest.raises(InputError, match="trials: 0 found, expected a whole number of at least 1"):
         tune(plan(), tmp_path / "none", 0, training=trainings.bowl)
+
+
+def test_an_empty_folder_becomes_a_study_and_a_file_does_not(trainings, tmp_path):
+    (tmp_path / "empty").mkdir()
+    assert tune(plan(), tmp_path / "empty", 1, training=trainings.bowl).best.number == 0
+    (tmp_path / "file").write_text("mine")
+    with pytest.raises(InputError, match="file: exists and is not a tuning study; name another folder"):
+        tune(plan(), tmp_path / "file", 1, training=trainings.bowl)
+    assert (tmp_path / "file").read_text() == "mine"
+
+
+def test_a_study_with_another_table_of_trials_is_no_study_of_optuna(trainings, tmp_path):
+    tune(plan(), tmp_path / "study", 1, training=trainings.bowl)
+    with sqlite3.connect(tmp_path / "study" / "study.db") as database:
+        database.execute("ALTER TABLE trials RENAME COLUMN number TO place")
+    database.close()
+    with pytest.raises(InputError, match=r"study\.db: not a study of Optuna .*written again from .*trials$"):
+        tune(plan(), tmp_path / "study", 1, training=trainings.bowl)
+
+
+def test_what_a_training_returns_has_to_be_a_result(trainings, tmp_path):
+    with pytest.raises(InputError, match=r"trial 0\.cost: 'low' found, expected a whole number or a number"):
+        tune(plan(), tmp_path / "study", 1, training=trainings.broken)
+
+
+def test_what_was_found_decides_what_is_proposed_next():
+    """Of the same trials with the costs the other way round, and of another seed, others follow."""
+    first = [
+        Trial(k, parameters, settings, 1.0 + k, ((10, 1.0 + k),), "finished")
+        for k, (parameters, settings) in enumerate(_proposed(plan(), [], 4, ()))
+    ]
+    turned = [replace(trial, cost=10.0 - trial.cost) for trial in first]
+    rates = [
+        [parameters["learning_rate"] for parameters, _ in _proposed(asked, found, 2, ())]
+        for asked, found in ((plan(), first), (plan(), turned), (replace(plan(), seed=1), first))
+    ]
+    assert rates[0] == [parameters["learning_rate"] for parameters, _ in _proposed(plan(), first, 2, ())]
+    assert rates[0] != rates[1]
+    assert rates[0] != rates[2]
+
+
+def test_one_that_was_stopped_early_is_the_best_only_where_none_has_finished(tmp_path):
+    settings = plan().settings.to_dict()
+    diverged = Trial(0, {}, settings, None, (), "diverged")
+    stopped = [Trial(k, {}, settings, None, ((5, 9.0 - k), (7, 12.0)), "stopped early") for k in (1, 2)]
+    finished = Trial(3, {}, settings, 20.0, ((10, 20.0),), "finished")
+    assert _best([diverged, *stopped]) is stopped[1]
+    assert _best([diverged, *stopped, finished]) is finished
+    on_task = make_plan(Given("ppo", task="mariner-calm", seed=4, settings={"base": "none"}))
+    _write_best(tmp_path, on_task, [diverged, *stopped])
+    lines = (tmp_path / "best.toml").read_text().splitlines()
+    assert lines[0] == "# Trial 2 of 3: no trial has finished, seed 4, ppo on mariner-calm with mariner."
+
+
+@pytest.mark.parametrize(("total_steps", "every"), [(1, 1), (9, 1), (19, 1), (20, 2), (1000, 100)])
+def test_a_trial_is_evaluated_ten_times_on_the_way(total_steps, every):
+    assert evaluated_evenly(plan(total_steps=total_steps)).settings.evaluate_every == every
+
+
+def told_by(monkeypatch, *told, rows=()):
+    """What a trial with a limit of 6 at a hundred steps comes to if its training tells this, and its plan."""
+    training, plans = pytest.importorskip("agents.training.training"), []
+
+    def stand_in(asked, tell):
+        plans.append(asked)
+        for steps, cost, evaluated in told:
+            if cost == "not finite":
+                raise InputError("training diverged")
+            tell(training.Progress(steps, 300, 1.0, cost, cost, None, evaluated))
+        return SimpleNamespace(curve=rows)
+
+    monkeypatch.setattr(training, "train", stand_in)
+    return train_trial({"configuration": plan().configuration(), "limits": [(100, 6.0)]}), plans
+
+
+def test_a_trial_is_compared_at_its_evaluations_and_may_cost_as_much_as_the_limit(monkeypatch):
+    stopped, (asked,) = told_by(
+        monkeypatch, (0, 1.0, True), (1, 8.0, True), (50, 2.0, False), (100, 6.0, True), (200, 6.5, True),
+        (100, 7.0, False), rows=[{"steps": 0, "cost": 1.0}, {"steps": 1, "cost": 8.0}],
+    )  # fmt: skip
+    assert stopped == {"cost": 8.0, "curve": [(1, 8.0)], "ended": "finished"}
+    assert asked.threads == 1  # trials are trained side by side
+    stopped, _ = told_by(monkeypatch, (0, 1.0, True), (50, 9.0, True), (100, 6.01, True), (200, 3.0, True))
+    assert stopped == {"cost": None, "curve": [(50, 9.0), (100, 6.01)], "ended": "stopped early"}
+
+
+def test_a_trial_that_diverges_says_why(monkeypatch):
+    found, _ = told_by(monkeypatch, (10, 7.0, True), (20, "not finite", True))
+    assert found == {"cost": None, "curve": [(10, 7.0)], "ended": "diverged", "why": "training diverged"}
 
 
 def test_trials_are_trainings_that_stop_when_they_fall_behind():
