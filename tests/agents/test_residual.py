@@ -238,14 +238,18 @@ def test_a_base_needs_commands_within_the_whole_range(bound, fits):
     for low, high in ((-1.0, bound), (-bound, 1.0)):
         inner = Counting()
         inner.action_space = Box(low, high, (1,))
-        with pytest.raises(InputError, match=r"^venv: actions in Box.* found, expected a Box within \[-1, 1\]"):
+        with pytest.raises(
+            InputError, match=r"^venv: actions in Box.* found, expected a Box within \[-1, 1\]"
+        ):
             ResidualVecEnv(inner, Steady())
 
 
 def test_observations_are_a_flat_row_of_numbers():
     inner = Counting()
     inner.observation_space = Box(-1.0, 1.0, (2, 2))
-    with pytest.raises(InputError, match=r"venv: observations in Box.* found, expected a flat Box of numbers"):
+    with pytest.raises(
+        InputError, match=r"venv: observations in Box.* found, expected a flat Box of numbers"
+    ):
         ResidualVecEnv(inner)
 
 

@@ -1,13 +1,18 @@
 """Settings and plans of learning: what is allowed, where a value comes from, what is refused."""
 
+import json
 from dataclasses import fields
 
 import pytest
 
+from agents.benchmarking.contestants import pretrained
 from agents.suites.suite import ENVIRONMENTS, load_suite
 from agents.training.plan import (
+    EVALUATION_SEED,
+    N_EVALUATIONS,
     Given,
     Plan,
+    _read,
     check_same,
     first_difference,
     make_plan,
@@ -27,6 +32,8 @@ from agents.training.settings import (
     read_settings_file,
 )
 from shipgym import InputError
+from shipgym.sea import Current, Weather
+from shipgym.ships.conversions import nomoto1_ship
 from tests.golden.texts import flat, same_text
 
 FREE = {"base": "none", "authority": 1.0}
@@ -66,7 +73,10 @@ def test_settings_reach_to_their_bounds_and_no_further(algorithm, name, allowed,
         ({"ent_coef": "auto_x"}, "found, expected a number, 'auto' or such as 'auto_0.1'"),
         ({"ent_coef": "auto_-1"}, "found, expected a number, 'auto' or such as 'auto_0.1'"),
         ({"ent_coef": "otto"}, "ent_coef: 'otto'"),
-        ({"target_entropy": "auto_1"}, "target_entropy: 'auto_1'"),
+        ({"target_entropy": "auto_1"}, "target_entropy: 'auto_1' .* found, expected a number .*; or 'auto'$"),
+        ({"target_entropy": "auto1"}, "target_entropy: 'auto1' .* found, expected a number .*; or 'auto'$"),
+        ({"ent_coef": "auto_0"}, "found, expected a number, 'auto' or such as 'auto_0.1'"),
+        ({"ent_coef": True}, "ent_coef: True found"),
         ({"schedule": "liner"}, "Did you mean 'linear'"),
         ({"activation": "elu"}, "activation: 'elu' found, expected one of"),
         ({"ships": 10, "buffer_size": 9}, "buffer_size: 9 found, expected one for each of 10 ships"),
@@ -78,6 +88,37 @@ def test_settings_reach_to_their_bounds_and_no_further(algorithm, name, allowed,
 def test_settings_that_cannot_be_meant_are_refused(given, message):
     with pytest.raises(InputError, match=message):
         changed(load_settings("sac", given=FREE), given)
+
+
+@pytest.mark.parametrize("algorithm", ["sac", "td3", "tqc"])
+def test_the_store_of_past_steps_has_room_for_a_step_of_every_ship(algorithm):
+    settings = load_settings(algorithm, given=FREE)
+    assert changed(settings, {"ships": 10, "buffer_size": 10}).buffer_size == 10
+    with pytest.raises(InputError, match="buffer_size: 9 found, expected one for each of 10 ships at least"):
+        changed(settings, {"ships": 10, "buffer_size": 9})
+
+
+def test_a_base_is_a_kind_of_controller_or_a_file_of_one():
+    settings = load_settings("ppo")
+    assert changed(settings, {"base": "designs/mine.json"}).base == "designs/mine.json"
+    for wrong in ("designs/mine.toml", "lqq", ""):
+        with pytest.raises(InputError, match=f"base: '{wrong}' found"):
+            changed(settings, {"base": wrong})
+    with pytest.raises(InputError, match=r"authority: 0\.5 found without a base, expected 1, or a base"):
+        changed(settings, {"base": "none", "authority": 0.5})
+    assert changed(settings, {"base": "none", "authority": 1.0}).authority == 1.0
+
+
+@pytest.mark.parametrize(
+    ("asked", "message"),
+    [
+        (("pqo",), "algorithm: 'pqo' found.* Did you mean 'ppo'"),
+        (("ppo", "harbour"), "environment: 'harbour' found"),
+    ],
+)
+def test_settings_of_what_is_not_known_are_refused(asked, message):
+    with pytest.raises(InputError, match=message):
+        load_settings(*asked)
 
 
 def test_every_setting_has_a_meaning_in_the_section_of_its_class_and_nothing_else_stands_there():
@@ -166,6 +207,18 @@ def test_the_first_difference_of_two_configurations_is_told():
     with pytest.raises(InputError, match=r"run: a run of another configuration: b.c is 2 there, 0 here"):
         check_same(one | {"b": {"c": 0, "d": [3]}}, one, "run")
     check_same(one, one, "run")
+    with pytest.raises(InputError, match="run: unknown key 'e'"):
+        check_same(one | {"e": None}, one, "run")
+
+
+def test_seas_and_lists_in_the_options_of_a_run_come_back_from_json():
+    weather = Weather(name="stream", current=Current(speed=1.5, towards_deg=90.0))
+    assert _read([weather.to_dict(), ["calm", 2.0]], "sea") == [weather, ["calm", 2.0]]
+    plan = make_plan(Given("ppo", task="mariner-current", seed=2, randomise=True))
+    again = Plan.from_configuration(json.loads(json.dumps(plan.configuration())), 3)
+    assert again.configuration() == plan.configuration()
+    assert again.task.options == plan.task.options
+    assert (again.seed, again.randomise, again.threads) == (2, True, 3)
 
 
 def test_environments_are_known_by_short_name_and_by_id():
@@ -198,6 +251,41 @@ def test_what_is_not_given_is_as_it_was():
     assert make_plan(Given("ppo")).configuration()["task"] == ""
 
 
+def test_all_agents_were_chosen_on_the_same_hundred_episodes():
+    seeds = [EVALUATION_SEED, EVALUATION_SEED + N_EVALUATIONS - 1]
+    paths = [path for task in load_suite().tasks for path in pretrained(task.name, "ppo")]
+    assert [json.loads(path.read_text())["training"]["evaluation_seeds"] for path in paths] == [seeds] * 12
+    assert min(min(task.seeds) for task in load_suite().tasks) >= EVALUATION_SEED + N_EVALUATIONS
+    assert make_plan(Given("ppo", seed=799)).training_seed + 1000 <= EVALUATION_SEED
+
+
+def test_the_file_of_settings_goes_before_the_tuned_ones_and_the_command_before_the_file(tmp_path):
+    (tmp_path / "mine.toml").write_text("gamma = 0.7\nclip_range = 0.3\n")
+    settings = make_plan(
+        Given("ppo", settings_file=tmp_path / "mine.toml", settings={"gamma": 0.6, "n_epochs": 2})
+    ).settings
+    assert (settings.gamma, settings.clip_range, settings.n_epochs) == (0.6, 0.3, 2)
+    assert settings.n_steps == load_settings("ppo").n_steps
+
+
+def test_domain_randomisation_draws_ships_seas_and_speeds_and_leaves_what_was_asked(tmp_path):
+    plan = make_plan(Given("ppo", model="mariner-tls-svm", sea="moderate", randomise=True))
+    assert plan.task.options == {"sea": "moderate"}
+    options = training_options(plan)
+    assert [sea.name for sea in options["sea"]] == ["moderate", "calm", "slight", "rough"]  # each once
+    assert options["model_uncertainty"] == "covariance"
+    asked = {"speed_range": (0.5, 0.6)}
+    own = training_options(make_plan(Given("ppo", model="mariner-tls-svm", options=asked, randomise=True)))
+    assert {name: own[name] for name in asked} == asked
+    alone = {"model_uncertainty": "covariance"}
+    drawn = training_options(make_plan(Given("ppo", model="mariner-tls-svm", settings=alone)))
+    assert drawn == alone  # neither seas nor speeds
+    assert training_options(make_plan(Given("ppo", model="mariner", settings=alone))) == {}
+    nomoto1_ship(0.1, 20.0, {"length": 160.0, "speed": 7.0}).save(tmp_path / "ship.json")
+    unknown = training_options(make_plan(Given("ppo", model=str(tmp_path / "ship.json"), randomise=True)))
+    assert [sea.name for sea in unknown["sea"]] == ["calm"]  # no beam, no weather
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
@@ -205,6 +293,11 @@ def test_what_is_not_given_is_as_it_was():
         ({"seed": -1}, "seed: -1 found"),
         ({"threads": 0}, "threads: 0 found"),
         ({"settings": {"ships": 1001, "batch_size": 1001}}, "ships: 1001 found, .* at most 1000"),
+        ({"settings": {"ships": 0}}, "ships: 0 found"),
+        ({"settings": {"action_repeat": 601}}, "action_repeat: 601 found, .* at most 600, no longer than an"),
+        ({"options": {"action": "rudder-shaft"}}, "action: 'rudder-shaft' found, but 'mariner' has no shaft"),
+        ({"task": "mariner-calm", "options": {"noise": 1.0}}, "--task: found together with --option, which"),
+        ({"task": "mariner-calm", "model": "kvlcc2"}, "--task: found together with --model, which"),
         ({"options": {"action": "rudder-shaft"}, "model": "kvlcc2", "settings": {"base": "lq"}},
          "base: 'lq' found with action 'rudder-shaft', expected 'none', or action 'rudder'"),
     ],
@@ -213,6 +306,16 @@ def test_plans_that_cannot_be_are_refused(arguments, message):
     with pytest.raises(InputError, match=message):
         make_plan(Given("ppo", **arguments))
     assert make_plan(Given("ppo", seed=799, threads=1)).training_seed == 799_000
+    assert make_plan(Given("ppo", settings={"action_repeat": 600})).settings.action_repeat == 600
+
+
+def test_an_unknown_algorithm_is_told_before_an_unknown_task():
+    with pytest.raises(InputError, match="algorithm: 'pqo' found"):
+        make_plan(Given("pqo", task="mariner-clam"))
+    with pytest.raises(InputError, match="which sac does not learn; take ppo"):
+        make_plan(Given("sac", environment="shipgym/CourseKeepingDiscrete-v0", settings=FREE))
+    discrete = make_plan(Given("ppo", environment="shipgym/CourseKeepingDiscrete-v0", settings=FREE))
+    assert discrete.task.options == {"action": "rudder-discrete"}
 
 
 def test_a_plan_has_the_settings_of_its_algorithm():
