@@ -9,10 +9,10 @@ import pytest
 import torch
 from safetensors import safe_open
 
-from agents.training import checkpoints
+from agents.training import checkpoints, run_folder
 from agents.training.algorithms import make_agent
 from agents.training.plan import Given, make_plan
-from agents.training.safe_file import CONTENT, SHA256, _unpacked, read_values, write_values
+from agents.training.safe_file import CONTENT, SHA256, _unpacked, check_like, read_values, write_values
 from shipgym.errors import InputError
 
 SHORT = {"episode_steps": 20, "change_interval_steps": 10}
@@ -66,6 +66,7 @@ def test_of_an_optimiser_only_rates_and_moments_are_put_back(fresh, memory):
 
 
 RANDOM_ARRAY = np.zeros(3)
+ROW = {"steps": 0, "seconds": 1.0, "cost": 2.0, "mean_return": None}
 WEIGHT = ("parameters", "policy", "actor.mu.weight")
 
 
@@ -102,7 +103,7 @@ WEIGHT = ("parameters", "policy", "actor.mu.weight")
         (("counters", "_last_obs"), None, "_last_obs: None found, expected ndarray of float32, shape (4, 8)"),
         (("counters", "__class__"), 1, "agent.counters: a table of 7"),
         (("episodes",), [{"r": 1.0, "l": 5}], "agent.episodes[0]: a table of 2 found, expected a table of 3"),
-        (("episodes",), "rlt", "agent.episodes: 'rlt' found, expected list"),
+        (("episodes",), "rlt", "agent.episodes: 'rlt' found, expected list of 0"),
         (("successes",), ["x"], "agent.successes[0]: 'x' found"),
         (("successes",), [float("inf")], "agent.successes[0]: inf found"),
         (("ships",), [], "agent.ships: list of 0 found, expected list of 2"),
@@ -191,6 +192,19 @@ def test_observations_that_no_environment_shows_are_refused(fresh, memory):
         checkpoints.put_back(fresh, changed)
 
 
+def test_weights_reach_to_a_thousand_millions_and_deviations_to_e_to_the_20th():
+    allowed = {"weight": torch.tensor([1e9, -1e9]), "log_std": torch.tensor([-20.0, 20.0]), "steps": 3}
+    checkpoints._check_weights({"policy": allowed | {"counts": torch.tensor([2**40])}})
+    for name, value, most in (
+        ("weight", 1.05e9, r"1e\+09"),
+        ("log_std", 20.5, "20"),
+        ("log_std", -21.0, "20"),
+    ):
+        wrong = {"policy": allowed, "actor": {name: torch.tensor([0.0, value])}}
+        with pytest.raises(ValueError, match=rf"^parameters\.actor\.{name}: .* of magnitude {most} at most$"):
+            checkpoints._check_weights(wrong)
+
+
 @pytest.mark.parametrize("memory", [None, "/etc/passwd", [], {}, {"parameters": {}}])
 def test_what_is_no_memory_is_refused(fresh, memory):
     with pytest.raises(ValueError, match=r"^agent: .* found, expected a table of 8"):
@@ -201,7 +215,9 @@ def test_what_is_no_memory_is_refused(fresh, memory):
     ("change", "said"),
     [
         ({"curve": [{"steps": 1}]}, r"run.curve\[0\]: a table of 1"),
-        ({"curve": {}}, "run.curve: a table of 0"),
+        ({"curve": {}}, "run.curve: a table of 0 found, expected list of 0"),
+        ({"curve": [{**ROW, "mean_return": "low"}]}, r"run.curve\[0\].mean_return: 'low' found"),
+        ({"curve": [{**ROW, "cost": None}]}, r"run.curve\[0\].cost: None found"),
         ({"best_cost": "low"}, "run.best_cost: 'low' found"),
         ({"best_steps": -1}, "run.best_steps: -1 found"),
         ({"seconds": float("nan")}, "run.seconds: nan found"),
@@ -209,8 +225,7 @@ def test_what_is_no_memory_is_refused(fresh, memory):
     ],
 )
 def test_so_is_another_record(change, said):
-    row = {"steps": 0, "seconds": 1.0, "cost": 2.0, "mean_return": None}
-    record = {"best_cost": 2.0, "best_steps": 0, "curve": [row, {**row, "mean_return": -1.0}], "seconds": 3.0}
+    record = {"best_cost": 2.0, "best_steps": 0, "curve": [ROW, {**ROW, "mean_return": -1.0}], "seconds": 3.0}
     checkpoints.check_record(record)
     checkpoints.check_record({**record, "best_cost": None, "curve": []})
     with pytest.raises(ValueError, match=said):
@@ -240,6 +255,51 @@ def test_values_come_back_and_older_files_without_a_hash_too(file):
     assert torch.equal(found[4][0], torch.ones(2))
     rewritten(file, lambda header: header["__metadata__"].pop(SHA256))
     np.testing.assert_array_equal(read_values(file, "thing")["a"], np.arange(3.0))
+
+
+def test_values_of_every_kind_come_back_as_they_were(tmp_path):
+    inner = {"x": np.arange(6.0).reshape(2, 3).T, "y": np.float32(0.5)}
+    value = {"a": inner, "b": {"x": np.arange(3)}, "c": [inner["x"][0], [inner["x"][1]]], "d": np.int64(3)}
+    write_values(value, tmp_path / "values.safetensors")
+    found = read_values(tmp_path / "values.safetensors", "thing")
+    np.testing.assert_array_equal(found["a"]["x"], [[0.0, 3.0], [1.0, 4.0], [2.0, 5.0]])
+    assert found["b"]["x"].tolist() == [0, 1, 2]  # of the same name in another table
+    assert [found["c"][0].tolist(), found["c"][1][0].tolist()] == [[0.0, 3.0], [1.0, 4.0]]
+    assert (found["a"]["y"], found["d"]) == (0.5, 3)
+    write_values([np.ones(1)], tmp_path / "list.safetensors")
+    assert read_values(tmp_path / "list.safetensors", "thing")[0].tolist() == [1.0]
+
+
+def test_what_cannot_be_written_is_named(tmp_path):
+    with pytest.raises(TypeError, match=r"^a\.b\.1: object cannot be written$"):
+        write_values({"a": {"b": [1, object()]}}, tmp_path / "values.safetensors")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_what_is_found_is_told_in_short():
+    with pytest.raises(ValueError, match=r"^place: 'x{79} found, expected int$"):
+        check_like("x" * 500, 0, "place")
+    many = {f"{'n' * 9}{k:03}": 0 for k in range(99)}
+    with pytest.raises(ValueError, match=r"^place\.steps: nothing found, beside ") as error:
+        check_like(many, {"steps": 0} | dict.fromkeys(list(many)[:98], 0), "place")
+    assert len(str(error.value)) == len("place.steps: nothing found, beside ") + 200
+
+
+@pytest.mark.parametrize(
+    ("found", "own"),
+    [(0, 7), (np.int64(2), 0), (np.float32(1.0), -2.0), (0.0, 3.0), (np.zeros(2), np.ones(2)), ((), ())],
+)
+def test_numbers_of_a_kind_are_alike(found, own):
+    check_like(found, own, "place")
+
+
+@pytest.mark.parametrize(
+    ("found", "own"),
+    [(-1, 0), (1.0, 0), (0, 1.0), (np.inf, 1.0), (np.zeros(2), np.zeros(3)), ([], ()), ("a", "b")],
+)
+def test_numbers_of_other_kinds_are_not(found, own):
+    with pytest.raises(ValueError, match=r"^place: .* found, expected "):
+        check_like(found, own, "place")
 
 
 def test_values_that_have_changed_are_refused(file):
@@ -318,3 +378,67 @@ def test_values_within_values_are_read_twenty_deep():
         "a": (1, 2),
         "b": 5,
     }
+
+
+@pytest.fixture
+def run(tmp_path):
+    run_folder.begin_folder(tmp_path / "run", PLAN, "shipgym train sac")
+    return tmp_path / "run"
+
+
+def test_a_run_is_read_as_it_was_begun(run):
+    assert run_folder.read_plan(run).configuration() == PLAN.configuration()
+    content = json.loads((run / "run.json").read_text())
+    assert (content["command"], content["threads"]) == ("shipgym train sac", 1)
+    run_folder.check_resumable(run, PLAN)
+    assert run_folder.other_versions(run) == []
+
+
+@pytest.mark.parametrize(
+    ("place", "value", "said"),
+    [
+        (["format"], 2, r"run\.json: format 2 found, this version of shipgym reads format 1"),
+        (["versions"], None, r"run\.json: field 'versions' is missing; start a new run in another folder"),
+        (["more"], 1, r"run\.json: unknown key 'more'"),
+        (["configuration"], 3, r"run\.json: configuration: 3 found, expected a table"),
+        (["configuration", "seed"], None, r"run\.json: configuration: 'seed' is missing"),
+        (["configuration", "seed"], "3", r"run\.json: configuration\.seed: '3' found"),
+        (["configuration", "seed"], 801, r"run\.json: seed: 801 found"),
+        (["configuration", "settings", "gamma"], None, r"run\.json: .*field 'gamma' is missing"),
+        (["configuration", "model_sha256"], "0", r"run: a run of another configuration: model_sha256 is '0'"),
+        (["threads"], 0, r"run\.json: threads: 0 found"),
+    ],
+)
+def test_a_broken_file_of_a_run_is_refused(run, place, value, said):
+    content = json.loads((run / "run.json").read_text())
+    inside = content
+    for name in place[:-1]:
+        inside = inside[name]
+    inside[place[-1]] = value
+    if value is None:
+        del inside[place[-1]]
+    (run / "run.json").write_text(json.dumps(content))
+    with pytest.raises(InputError, match=said):
+        run_folder.read_plan(run)
+
+
+def test_a_new_run_begins_in_a_new_or_an_empty_folder(run, tmp_path):
+    run_folder.check_new(tmp_path / "new")
+    (tmp_path / "empty").mkdir()
+    run_folder.check_new(tmp_path / "empty")
+    (tmp_path / "file").write_text("mine")
+    for wrong, said in (
+        (run, "run: contains a run already; resume it with --resume, or name another folder"),
+        (tmp_path, "exists and is not a training run; name another folder"),
+        (tmp_path / "file", "file: exists and is not a training run; name another folder"),
+        (tmp_path / "file" / "run", "file cannot be written to; choose another folder"),
+    ):
+        with pytest.raises(InputError, match=said):
+            run_folder.check_new(wrong)
+
+
+def test_a_package_that_is_not_installed_has_no_version(monkeypatch):
+    monkeypatch.setattr(run_folder, "PACKAGES", ("numpy", "no-such-package-of-shipgym"))
+    found = run_folder.versions()
+    assert found.pop("python").startswith("3.")
+    assert found == {"numpy": np.__version__, "no-such-package-of-shipgym": "not installed"}

@@ -7,19 +7,23 @@ import subprocess
 import sys
 import time
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
+import torch
+from stable_baselines3.common.logger import KVWriter, Logger
 from typer.testing import CliRunner
 
 from agents import load_agent
 from agents.cli import app
 from agents.controllers.designs import design_base
 from agents.rollouts.rollout import episode_costs
-from agents.training import training
-from agents.training.algorithms import make_agent, make_ships, sb3_arguments, set_deviation
+from agents.training import run_folder, training
+from agents.training.algorithms import algorithm_class, make_agent, make_ships, sb3_arguments, set_deviation
 from agents.training.plan import EVALUATION_SEED, Given, make_plan, training_options
-from agents.training.run_folder import other_versions
+from agents.training.run_folder import begin_folder, other_versions
+from agents.training.safe_file import read_values
 from agents.training.settings import ALGORITHMS, load_settings
 from agents.training.training import train
 from shipgym.errors import InputError
@@ -113,6 +117,16 @@ def test_the_file_is_the_policy_of_the_lowest_cost_held_out(tmp_path):
     seeds = EVALUATION_SEED + np.arange(10)
     costs = episode_costs(load_agent(tmp_path / "run" / "agent.json"), plan.task.engine(10), seeds)
     assert costs.mean() == result.best_cost == min(row["cost"] for row in result.curve)
+    assert result.policy.training["steps"] == result.best_steps
+    assert result.policy.training["cost"] == result.best_cost
+    run = json.loads((tmp_path / "run" / "run.json").read_text())
+    assert (run["command"], run["threads"]) == ("train('ppo')", 1)
+    seconds = [row["seconds"] for row in result.curve]
+    assert seconds == [round(one, 3) for one in sorted(seconds)]
+    assert seconds[-1] - 0.001 <= result.seconds < 60.0
+    kept = read_values(tmp_path / "run" / "checkpoint.safetensors", "checkpoint")
+    deviation = kept["agent"]["parameters"]["policy"]["log_std"].item()
+    assert deviation == pytest.approx(-2.5 - 2.0 / 3.0, abs=0.05)  # of -2.5 to -3.5, then learned from
     record = load_agent(tmp_path / "run" / "agent.json").training
     learned_from = ("cost", "curve", "versions")  # which differ from computer to computer
     told = {name: value for name, value in record.items() if name not in learned_from}
@@ -130,6 +144,8 @@ def test_the_residual_of_nothing_costs_what_its_base_does():
     plan = tiny(base="lq", authority=1e-9, total_steps=1)
     result = train(plan)
     assert result.curve[0]["cost"] == pytest.approx(result.lq_cost, rel=1e-5)
+    assert result.steps == 8 * 32  # a whole rollout
+    assert result.resumed_from is None
 
 
 def test_time_that_is_up_is_made_up_for(tmp_path):
@@ -139,6 +155,7 @@ def test_time_that_is_up_is_made_up_for(tmp_path):
     finished = train(plan, tmp_path / "run", resume=True)
     assert (finished.finished, finished.steps, finished.resumed_from) == (True, 768, 0)
     assert costs(finished) == costs(train(plan))
+    assert stopped.seconds < finished.seconds < 60.0
 
 
 def test_randomised_ships_sail_all_seas_at_many_speeds():
@@ -177,6 +194,30 @@ def test_what_the_algorithms_are_given_is_as_golden():
     assert same_text("arguments of the algorithms", "\n".join(flat(told, "")))
 
 
+def test_noise_of_exploration_is_of_one_command_where_none_is_said():
+    assert sb3_arguments(load_settings("td3"))["action_noise"]().shape == (1,)
+
+
+def test_an_algorithm_that_is_not_installed_is_reported_with_its_extra(monkeypatch):
+    monkeypatch.setitem(sys.modules, "sb3_contrib", None)
+    assert algorithm_class("sac").__name__ == "SAC"
+    with pytest.raises(InputError, match=r"sb3-contrib is not installed, tqc needs it: pip install 'shipgym"):
+        algorithm_class("tqc")
+
+
+def test_what_learns_from_nothing_does_not_begin_with_nothing():
+    agent = make_agent(replace(tiny("sac"), seed=2), None)
+    assert agent.actor.mu.weight.abs().max() > 0.0
+    assert agent.seed == 2000
+
+
+def test_ships_are_seen_through_a_wrapper_only_where_they_have_to_be():
+    names = []
+    for settings in ({}, {"frame_stack": 2}, {"action_repeat": 2}, {"rate_limit": 0.5}):
+        names.append(type(make_ships(tiny(**settings), None).venv).__name__)
+    assert names == ["StaggeredShips", "ResidualVecEnv", "ResidualVecEnv", "ResidualVecEnv"]
+
+
 def test_agents_have_the_settings():
     agent = make_agent(tiny("tqc", gamma=0.9, tau=0.1, activation="tanh"), None)
     assert (agent.gamma, agent.tau, agent.policy_kwargs["net_arch"]) == (0.9, 0.1, {"pi": [8], "qf": [12]})
@@ -207,6 +248,9 @@ def test_exploration_falls_to_what_is_asked():
     assert agent.policy.log_std.item() == pytest.approx(-2.0)
     set_deviation(agent, tiny(log_std_end="learned").settings)
     assert agent.policy.log_std.item() == pytest.approx(-2.0)
+    agent.num_timesteps = 800  # the last rollout ends after the last step
+    set_deviation(agent, tiny(log_std_init=-1.0, log_std_end=-3.0).settings)
+    assert agent.policy.log_std.item() == -3.0
 
 
 def test_rewards_are_divided_by_their_scale():
@@ -229,6 +273,137 @@ def test_a_diverged_training_says_so(monkeypatch):
         train(tiny())
 
 
+@pytest.mark.parametrize(("said", "kind"), [("expected invalid values", InputError), ("mine", ValueError)])
+def test_only_torch_s_refusal_to_draw_is_a_training_that_diverged(said, kind):
+    def tell(now):
+        raise ValueError(said)
+
+    with pytest.raises(kind, match="diverged after 0 steps" if kind is InputError else "^mine$"):
+        train(tiny(), tell=tell)
+
+
+class Heard(KVWriter):
+    """Keeps what is logged."""
+
+    def __init__(self):
+        self.told, self.closed = [], False
+
+    def write(self, key_values, key_excluded, step=0):
+        self.told.append(key_values.get("evaluation/cost"))
+
+    def close(self):
+        self.closed = True
+
+
+def test_each_evaluation_is_told_to_the_log_which_is_closed_at_the_end(monkeypatch):
+    heard = Heard()
+    monkeypatch.setattr(training, "_logger", lambda folder: Logger(None, [heard]))
+    result = train(tiny())
+    assert heard.told == [cost for _, cost in costs(result)][:3]
+    assert heard.closed
+
+
+def test_the_log_is_of_tensorboard_in_the_folder_of_the_run(monkeypatch, tmp_path):
+    monkeypatch.setattr(training, "TensorBoardOutputFormat", lambda folder: folder)
+    assert training._logger(tmp_path).output_formats == [str(tmp_path / "tensorboard")]
+    assert training._logger(None).output_formats == []
+
+
+def at_boundary(steps, *evaluated, kept_at=0.0, **more):
+    """What is done at a boundary after evaluations at these steps, on a clock that stands at 1000 s."""
+    done = []
+    own = {
+        "plan": SimpleNamespace(settings=SimpleNamespace(evaluate_every=100, total_steps=500)),
+        "agent": SimpleNamespace(num_timesteps=steps), "held_out": SimpleNamespace(lq_cost=7.0),
+        "found": {"best_cost": 5.0, "curve": [{"steps": one, "cost": 9.0} for one in evaluated]},
+        "evaluate": lambda: done.append("evaluated"), "keep": lambda: done.append("kept"),
+        "tell": lambda now: done.append(now), "started": 900.0, "seconds": 130.0, "max_seconds": None,
+        "kept_at": 1000.0 - kept_at,
+    }  # fmt: skip
+    run = SimpleNamespace(**own | more)
+    run._evaluated = lambda name, otherwise: training._Training._evaluated(run, name, otherwise)
+    try:
+        training._Training._on_rollout_start(run)
+    except training._TimeIsUpError:
+        done.append("time is up")
+    return done
+
+
+@pytest.fixture
+def at_1000_s(monkeypatch):
+    monkeypatch.setattr(training, "time", SimpleNamespace(monotonic=lambda: 1000.0))
+    monkeypatch.setattr(training, "set_deviation", lambda agent, settings: None)
+
+
+@pytest.mark.usefixtures("at_1000_s")
+@pytest.mark.parametrize(
+    ("steps", "evaluated", "due"),
+    [(0, [], True), (99, [0], False), (100, [0], True), (199, [0, 120], False), (200, [0, 199], True)],
+)
+def test_an_evaluation_is_due_in_each_stretch_of_steps(steps, evaluated, due):
+    *first, now = at_boundary(steps, *evaluated)
+    assert first == ["evaluated"] * due
+    assert (now.steps, now.total, now.seconds, now.evaluated) == (steps, 500, 130.0, due)
+    assert (now.cost, now.best_cost, now.lq_cost) == (9.0 if evaluated else None, 5.0, 7.0)
+
+
+@pytest.mark.usefixtures("at_1000_s")
+def test_a_run_is_kept_every_45_s_and_when_its_time_is_up():
+    assert at_boundary(50, 0, tell=None, kept_at=44.9) == []
+    assert at_boundary(50, 0, tell=None, kept_at=45.0) == ["kept"]
+    assert at_boundary(50, 0, tell=None, kept_at=np.inf) == ["kept"]  # never before
+    assert at_boundary(50, 0, tell=None, max_seconds=100.1) == []
+    assert at_boundary(50, 0, tell=None, max_seconds=100.0) == ["kept", "time is up"]
+    run = SimpleNamespace(folder=None, seconds_before=7.0, started=900.0)
+    training._Training.keep(run)
+    assert run.kept_at == 1000.0
+    assert training._Training.seconds.fget(run) == 107.0  # with those before it was resumed
+
+
+def test_a_run_is_kept_at_its_first_boundary_and_resumed_from_it(tmp_path):
+    plan, run = tiny(), tmp_path / "run"
+    begin_folder(run, plan, "")
+    assert train(plan, run, resume=True, max_seconds=0.0).resumed_from == 0  # killed before the first one
+    again = train(plan, run, resume=True, tell=lambda now: None, max_seconds=0.0)
+    assert (again.resumed_from, again.steps, again.finished) == (0, 0, False)
+    (run / "checkpoint.safetensors").unlink()
+    with pytest.raises(StopError):
+        train(plan, run, resume=True, tell=stopping_at(1))
+    assert (
+        read_values(run / "checkpoint.safetensors", "checkpoint")["agent"]["counters"]["num_timesteps"] == 0
+    )
+
+
+def test_folders_are_checked_before_anything_is_learned(tmp_path):
+    plan, run = tiny(), tmp_path / "run"
+    with pytest.raises(InputError, match="resume: found without a folder, expected the one of the run"):
+        train(plan, resume=True)
+    with pytest.raises(InputError, match="no run of training is there"):
+        train(plan, run, resume=True)
+    begin_folder(run, plan, "")
+    with pytest.raises(InputError, match="contains a run already"):
+        train(plan, run)
+    with pytest.raises(InputError, match=r"settings\.gamma is 0\.99 there, 0\.5 here"):
+        train(tiny(gamma=0.5), run, resume=True)
+    assert [path.name for path in run.iterdir()] == [run_folder.RUN]
+
+
+def test_torch_has_the_threads_of_the_plan_and_afterwards_its_own():
+    before = torch.get_num_threads()
+    with pytest.raises(StopError), training._torch_threads(before + 1):
+        assert torch.get_num_threads() == before + 1
+        raise StopError
+    assert torch.get_num_threads() == before
+
+
+@pytest.mark.parametrize(("cost", "reached"), [(10.0, True), (10.0099, True), (10.0101, False)])
+def test_lq_is_reached_by_what_costs_a_thousandth_more_at_most(cost, reached):
+    curve = ({"steps": 0, "cost": 11.0}, {"steps": 5, "cost": cost}, {"steps": 9, "cost": 9.0})
+    result = training.TrainingResult(None, None, curve, 9.0, 9, 9, 10.0, 1.0, True, None)
+    assert result.lq_reached["steps"] == (5 if reached else 9)
+    assert replace(result, lq_cost=None).lq_reached is None
+
+
 def shipgym(*words):
     outcome = CliRunner().invoke(app, [str(word) for word in words])
     return outcome.exit_code, outcome.output
@@ -244,6 +419,7 @@ def test_the_command_trains_and_resumes(tmp_path):
     written = json.loads((run / "run.json").read_text())
     assert written["configuration"] == told["configuration"]
     assert written["format"] == 1  # which later versions read
+    assert written["command"].startswith("shipgym ")
     assert {path.suffix for path in run.iterdir() if path.is_file()} == {".json", ".safetensors"}
     before = learned(run)
     settings = written["configuration"]["settings"]
