@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 
 from agents import LQ, Shielded
 from agents.cli import app
-from agents.policies.onnx_export import export_onnx
+from agents.policies.onnx_export import export_onnx, onnx_model
 from shipgym.errors import InputError
 from tests.agents.policies import MARINER, random_network, random_policy
 
@@ -69,6 +69,15 @@ def test_the_metadata_say_what_it_observes(tmp_path):
     assert found["model"] == {"name": "mariner", "sha256": policy.model_sha256}
     assert found["environment"]["id"] == "shipgym/CourseKeeping-v0"
     assert (found["frame_stack"], found["authority"], found["base"]["kind"]) == (2, 0.6, "lq")
+    assert (found["history"], found["hold"], found["action_repeat"]) == (2, 1, 1)  # older names too
+    assert not found.keys() & {"training", "network", "format", "kind"}
+
+
+def test_what_runs_on_ships_need_not_be_new():
+    """Runtimes of 2022 read the operators of opset 17 in files of version 8."""
+    model = onnx_model(HELD)
+    assert [(one.domain, one.version) for one in model.opset_import] == [("", 17)]
+    assert (model.ir_version, model.producer_name) == (8, "shipgym")
 
 
 def test_the_command_writes_it(tmp_path):

@@ -1,6 +1,7 @@
 """Agents of stable-baselines3 and their policies without torch command the same."""
 
 from copy import deepcopy
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -14,7 +15,7 @@ from stable_baselines3.common.vec_env import VecFrameStack, VecNormalize
 
 from agents import LQ, LearnedPolicy, load_agent
 from agents.policies.policy import order_numbers
-from agents.policies.policy_extraction import actor_network
+from agents.policies.policy_extraction import _environment, _residual, actor_network
 from agents.training.residual import ResidualVecEnv
 from shipgym import ShipVecEnv
 from shipgym.errors import InputError
@@ -192,6 +193,46 @@ def test_an_agent_that_commands_otherwise_than_its_layers_is_refused(monkeypatch
         LearnedPolicy.from_sb3(agent)
     agent.observation_space = Box(-1.0, 1.0, (9,))
     with pytest.raises(InputError, match=r"shape \(9,\) found, expected \(8,\), as its network has inputs"):
+        LearnedPolicy.from_sb3(agent)
+
+
+def test_what_adds_to_a_controller_is_known_by_what_it_has():
+    added = {
+        "base": LQ.from_model(MARINER),
+        "authority": 1,
+        "frame_stack": 2.0,
+        "action_repeat": 3,
+        "rate_limit": 1,
+    }
+    found = _residual([SimpleNamespace(), SimpleNamespace(**added), object.__new__(type("Ships", (), {}))])
+    assert found == added
+    assert [type(found[name]) for name in list(added)[1:]] == [float, int, int, float]
+    assert _residual([SimpleNamespace(**added | {"base": None})])["base"] is None
+    assert _residual([SimpleNamespace(base=None, authority=1.0)]) == {}
+    with pytest.raises(
+        InputError, match="base: Doubled found, expected a controller of shipgym, which a file"
+    ):
+        _residual([SimpleNamespace(**added | {"base": object.__new__(Doubled)})])
+
+
+def test_an_environment_that_is_not_registered_is_that_of_its_task():
+    shown = {"observation_names": ["cross_track"], "observation_scales": [2], "model": MARINER}
+    bare = SimpleNamespace(**shown, task=SimpleNamespace(action="rudder"), spec=None)
+    found = _environment(bare)
+    assert (found["env_id"], found["env_options"]) == ("shipgym/PathFollowing-v0", {})
+    assert (found["observation_scales"], found["action"], found["model_name"]) == (
+        (2.0,),
+        "rudder",
+        "mariner",
+    )
+    bare.spec = SimpleNamespace(id="my/Ships-v0", kwargs={"threads": 2, "model": "tanker", "noise": (1.0,)})
+    assert _environment(bare)["env_options"] == {"noise": [1.0]}
+    assert _environment(bare)["env_id"] == "my/Ships-v0"
+
+
+def test_an_agent_without_an_environment_is_refused():
+    agent = SimpleNamespace(get_env=lambda: None)
+    with pytest.raises(InputError, match="env: none found and the agent has none, expected the environment"):
         LearnedPolicy.from_sb3(agent)
 
 

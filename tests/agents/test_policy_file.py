@@ -124,6 +124,13 @@ NAMES = list(POLICIES["plain"].observation_names)
         ("weight", {}, "unknown key 'weight'. Did you mean 'weights'"),
         ("weights", {"sha": "1"}, "weights: unknown key 'sha'"),
         ("weights__sha256", "00", r"safetensors: SHA-256 .* found in \d+ bytes, expected 00.*cut short"),
+        (
+            "weights__sha256",
+            "5" * 64,
+            r"SHA-256 [0-9a-f]{12}\.\.\. found in \d+ bytes, expected 5{12}\.\.\., ",
+        ),
+        ("network__sizes", [8], r"network.sizes: \[8\] found, expected a list of two numbers or more"),
+        ("network__sizes", [8, 0, 1], r"network.sizes\[1\]: 0 found, expected a whole number of at least 1"),
         ("network__activation", "sigmoid", "network.activation: 'sigmoid' found"),
         (
             "network__sizes",
@@ -180,6 +187,18 @@ def test_a_wrong_field_of_a_shield_is_named(field, value, message, tmp_path):
     with pytest.raises(InputError, match=message) as caught:
         load_agent(path)
     assert str(caught.value).startswith(str(path))
+
+
+def test_a_shield_of_an_older_file_knows_of_no_planned_turns(tmp_path):
+    path = tmp_path / "agent.json"
+    POLICIES["shielded"].save(path)
+    edited(path, "limits__turn_lengths", None)
+    edited(path, "dt", 0.05)
+    found = load_agent(path)
+    assert (found.limits.turn_lengths, found.limits.runaway_deg, found.dt) == (0.0, 12.0, 0.05)
+    edited(path, "limits__calm_lengths", None)
+    with pytest.raises(InputError, match=r"limits\.calm_lengths: None found, expected a number"):
+        load_agent(path)
 
 
 def rewritten(path, change):

@@ -4,6 +4,8 @@ import base64
 import io
 import json
 import pickle
+import struct
+import sys
 import zipfile
 from copy import deepcopy
 from pathlib import Path
@@ -17,7 +19,16 @@ from stable_baselines3.common.vec_env import VecFrameStack, VecNormalize
 from agents import benchmark
 from agents.benchmarking.contestants import check_agents, contestants
 from agents.benchmarking.verification import verify
-from agents.policies.sb3_zip import read_sb3
+from agents.policies.network import Network
+from agents.policies.sb3_zip import (
+    Sb3Agent,
+    _activation,
+    _bounds,
+    _check_not_scaled,
+    _opened,
+    _weights,
+    read_sb3,
+)
 from agents.suites.suite import load_suite
 from shipgym import ShipVecEnv
 from shipgym.errors import InputError
@@ -164,3 +175,129 @@ def test_what_is_no_such_zip_is_refused(tmp_path):
             read_sb3(path)
     with pytest.raises(InputError, match=r"no_such\.zip' found, expected one of"):
         contestants(str(tmp_path / "no_such.zip"))
+
+
+def zipped(compression=zipfile.ZIP_STORED, **members):
+    """The bytes of a zip."""
+    file = io.BytesIO()
+    with zipfile.ZipFile(file, "w", compression) as one:
+        for name, content in members.items():
+            one.writestr(name, content)
+    return file.getvalue()
+
+
+def test_members_are_as_they_are_and_together_no_larger_than_the_zip():
+    noise = np.random.default_rng(0).bytes(1000)
+    assert _opened(zipped(a=noise, b=noise)).read("b") == noise
+    claimed = zipped(a=noise).replace(struct.pack("<II", 1000, 1000), struct.pack("<II", 1000, 5000))
+    for content in (zipped(zipfile.ZIP_DEFLATED, a=noise), claimed):
+        with pytest.raises(ValueError, match="compressed members found, expected them as `save` writes them"):
+            _opened(content)
+
+
+def saved_tensors(value):
+    """What torch writes of it."""
+    file = io.BytesIO()
+    torch.save(value, file)
+    return file.getvalue()
+
+
+def test_weights_are_of_single_precision_and_fill_the_file():
+    full = saved_tensors({"a": torch.arange(50_000.0)})
+    assert len(full) < 5 * 50_000
+    assert _weights(full)["a"][-1] == 49_999.0
+    thin = len(saved_tensors({"a": torch.zeros(1).expand(1000)})) // 2  # a number, shown so often
+    double = torch.zeros(3, dtype=torch.float64)
+    for wrong in ({"a": torch.zeros(1).expand(thin)}, {"a": double}, {3: torch.zeros(3)}):
+        with pytest.raises(ValueError, match=r"weights .*: expected numbers of type float32"):
+            _weights(saved_tensors(wrong))
+
+
+KNOWN = {"__module__": "stable_baselines3.sac.policies"}
+
+
+@pytest.mark.parametrize(
+    ("kwargs", "found"),
+    [
+        ({}, None),
+        ({"net_arch": [8]}, None),
+        ({"activation_fn": "<class 'torch.nn.modules.activation.ReLU'>"}, "ReLU"),
+        ({"activation_fn": "Tanh", "use_sde": False}, "Tanh"),
+    ],
+)
+def test_what_stands_between_the_layers_is_told_by_its_name(kwargs, found):
+    assert _activation({"policy_class": KNOWN, "policy_kwargs": kwargs}) == found
+
+
+@pytest.mark.parametrize(
+    ("about", "message"),
+    [
+        ({"policy_kwargs": {"use_sde": True}}, r"state-dependent exploration \(use_sde\) found"),
+        ({"use_sde": True}, r"state-dependent exploration \(use_sde\) found"),
+        ({"policy_kwargs": {"extra": 1, "also": 2}}, "policy_kwargs 'also', 'extra' found, expected 'MlpPol"),
+        ({"policy_kwargs": 3}, "data: policy_kwargs: 3 found, expected a table"),
+        ({"policy_class": None}, "data: policy_class: None found, expected a table"),
+        ({"policy_class": {}}, "policy of None found, expected 'MlpPolicy' of stable-baselines3"),
+        ({"policy_class": {"__module__": "my.stable_baselines3.sac.policies"}}, "policy of 'my.stable_base"),
+    ],
+)
+def test_other_policies_are_refused_by_what_their_zip_says(about, message):
+    with pytest.raises(InputError, match=message):
+        _activation({"policy_class": KNOWN, "policy_kwargs": {}} | about)
+
+
+def test_bounds_of_observations_are_read_from_their_texts():
+    space = {"low": "[-1.  -2.5]", "high": "[1. 2.]"}
+    assert _bounds({"observation_space": space}).tolist() == [[-1.0, 1.0], [-2.5, 2.0]]
+
+
+@pytest.mark.parametrize(
+    ("length", "known"), [(1.0, True), (1.00009, True), (0.9999, True), (1.000115, False), (0.99988, False)]
+)
+def test_sine_and_cosine_of_an_angle_are_of_length_1(length, known):
+    angle = np.array([0.3, 2.0, -1.0])
+    seen = np.zeros((3, 4), np.float32)
+    seen[:, 0], seen[:, 1], seen[:, 2] = length * np.sin(angle), length * np.cos(angle), 5.0
+    about = {"_last_obs": {":serialized:": base64.b64encode(pickle.dumps(seen)).decode()}}
+    if known:
+        assert _check_not_scaled(about, 4) is None
+        about = {"_last_obs": {}}
+    with pytest.raises(InputError, match="last observations found that are scaled, or not of shipgym"):
+        _check_not_scaled(about, 4)
+
+
+def test_a_task_with_other_bounds_is_another_task():
+    shown = TASK.task.observed(TASK.ship)
+    weight, bias = np.zeros((1, len(shown)), np.float32), np.zeros(1, np.float32)
+    bounds = np.array([(one.low, one.high) for one in shown])
+    agent = Sb3Agent(Path("model.zip"), Network(((weight, bias),)), bounds)
+    policy = agent.policy(TASK.task, TASK.ship)
+    assert (policy.env_id, policy.model_name, policy.name) == (
+        "shipgym/CourseKeeping-v0",
+        "mariner",
+        "learned",
+    )
+    assert policy.observation_scales == tuple(one.scale for one in shown)
+    wider = Sb3Agent(agent.path, agent.network, bounds * 1.001)
+    with pytest.raises(
+        InputError, match=r"^model\.zip: 8 observations within .* found, expected the task's 8"
+    ):
+        wider.policy(TASK.task, TASK.ship)
+
+
+def test_without_torch_the_extra_is_named(tmp_path, monkeypatch):
+    (tmp_path / "model.zip").write_bytes(zipped(data="{}", **{"policy.pth": saved_tensors({})}))
+    with pytest.raises(InputError, match=r"model\.zip: data: policy_class: None found"):
+        read_sb3(tmp_path / "model.zip")
+    monkeypatch.setitem(sys.modules, "torch", None)
+    with pytest.raises(
+        InputError, match=r"model\.zip: needs torch, not installed: pip install 'shipgym\[rl\]'"
+    ):
+        read_sb3(tmp_path / "model.zip")
+
+
+def test_what_is_wrong_with_a_zip_is_told_in_a_line(tmp_path):
+    (tmp_path / "model.zip").write_bytes(zipped(data="{}"))
+    with pytest.raises(InputError, match=r"\(.KeyError: .*policy\.pth.*\); save the agent again$") as error:
+        read_sb3(tmp_path / "model.zip")
+    assert "\n" not in str(error.value)

@@ -226,6 +226,48 @@ def test_another_ship_is_refused():
         Shielded.from_model(MARINER, random_policy(), fallback=Always(0.0))
 
 
+class ForHer(Always):
+    """Knows one ship by her name, and no more than the names of what it sees."""
+
+    observation_names = GOOD.observation_names
+
+    def check_fits_model(self, model):
+        if model.name != self.command:
+            raise InputError(f"not for {model.name}")
+
+
+def test_policy_and_fallback_are_asked_whether_they_fit_the_ship():
+    assert Shielded.from_model(MARINER, ForHer("mariner")).observation_names == GOOD.observation_names
+    with pytest.raises(InputError, match=r"^not for mariner$"):
+        Shielded.from_model(MARINER, ForHer("kvlcc2"))
+    other = LQ.from_model(load_model("kvlcc2"))
+    with pytest.raises(InputError, match="model 'mariner': the scale of 'yaw_rate'"):
+        Shielded.from_model(MARINER, Always(0.0), fallback=other)
+    names, scales = list(GOOD.observation_names), list(GOOD.observation_scales)
+    for shield in (Shielded(Always(0.0), GOOD, 1.0), Shielded(GOOD, GOOD, 1.0)):
+        shield.check_fits(names, scales)
+        with pytest.raises(InputError, match="place: the scale of 'heading_error_sin' is 2, but"):
+            shield.check_fits(names, [2.0 * scale for scale in scales], "place")
+
+
+def test_times_are_in_ship_lengths_and_one_interval_at_least():
+    length_time = MARINER.particulars["length"] / MARINER.particulars["speed"]
+    shield = Shielded.from_model(MARINER, Always(0.0), dt=0.5)
+    assert shield._intervals(2.0) == pytest.approx(2.0 * length_time / 0.5)
+    assert shield._intervals(0.0) == shield._intervals(1e-6) == 1.0
+    assert Shielded.from_model(MARINER, Always(0.0), dt=0.05).dt == 0.05
+    with pytest.raises(InputError, match="dt: 0 found, expected a number > 0"):
+        Shielded.from_model(MARINER, Always(0.0), dt=0.0)
+
+
+def test_a_limit_of_no_time_calls_it_at_the_first_interval_beyond():
+    shield = Shielded.from_model(IDENTIFIED, Always(0.0), limits=Limits(runaway_deg=180.0, out_lengths=0.0))
+    u, v, r, delta = IDENTIFIED.envelope.centre
+    shown = np.array([0.0, 1.0, r, v, 2.0 * u, delta, delta, 0.0]) / shield.observation_scales
+    _, state = shield.predict(shown.astype(np.float32))
+    assert interventions(state).steering
+
+
 def test_a_shield_waits_a_quarter_and_a_whole_ship_length():
     assert Limits() == Limits(1.5, 1.1, 0.25, 10.0, 5.0, 1.0, 8.0)
     wrong = {"envelope_out": 0.9, "envelope_back": 1.5, "runaway_deg": 181.0, "back_deg": 10.0}

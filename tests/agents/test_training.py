@@ -389,11 +389,16 @@ def test_folders_are_checked_before_anything_is_learned(tmp_path):
 
 
 def test_torch_has_the_threads_of_the_plan_and_afterwards_its_own():
-    before = torch.get_num_threads()
-    with pytest.raises(StopError), training._torch_threads(before + 1):
-        assert torch.get_num_threads() == before + 1
-        raise StopError
-    assert torch.get_num_threads() == before
+    before, during = torch.get_num_threads(), []
+
+    def stopped():
+        with training._torch_threads(before + 1):
+            during.append(torch.get_num_threads())
+            raise StopError
+
+    with pytest.raises(StopError):
+        stopped()
+    assert (during, torch.get_num_threads()) == ([before + 1], before)
 
 
 @pytest.mark.parametrize(("cost", "reached"), [(10.0, True), (10.0099, True), (10.0101, False)])
