@@ -150,26 +150,27 @@ class LearnedPolicy:
         """
         n = len(self.observation_names)
         given = checked_observation(observation, self.observation_names, np.float32)
-        rows = given.reshape(-1, given.shape[-1])
+        rows = np.atleast_2d(given)
         if (self.frame_stack, self.base, self.action_repeat, self.rate_limit) == (1, None, 1, NO_LIMIT):
             action = self.commands(self.network(rows[:, :n]), None)
-            return action.reshape(*given.shape[:-1], -1), state
+            return (action if given.ndim == 2 else action[0]), state
         seen, inner, held = self._recalled(state, episode_start, rows[:, :n], given.ndim)
         window = np.concatenate([seen, rows[:, None, :n]], axis=1)
         inputs, proposed = window.reshape(len(rows), -1), None
         if self.base is not None:
             order, inner = self.base.predict(given, inner, episode_start, deterministic)
-            proposed = np.asarray(order, dtype=np.float32).reshape(len(rows), -1)
+            proposed = np.asarray(order, dtype=np.float32).reshape(len(rows), 1)
             inputs = np.concatenate([inputs, proposed], axis=1)
         held = self._decided(inputs, held)
         action = self.commands(held[:, 1 + OUTPUTS[self.action] :], proposed)
         kept = window[:, 1:].copy()
-        memory = Memory(kept, inner, held) if given.ndim == 2 else Memory(kept[0], inner, held[0])
-        return action.reshape(*given.shape[:-1], -1), memory
+        if given.ndim == 2:
+            return action, Memory(kept, inner, held)
+        return action[0], Memory(kept[0], inner, held[0])
 
     def _decided(self, inputs: Numbers, held: Numbers) -> Numbers:
         """Outputs in use: new ones of the ships whose last decision is over, or was not a number."""
-        due = (held[:, 0] <= 0.0) | ~np.isfinite(held).all(axis=1)
+        due = (held[:, 0] < 1.0) | ~np.isfinite(held).all(axis=1)
         left, outputs, before = np.split(held, [1, 1 + OUTPUTS[self.action]], axis=1)
         if due.any():
             left = np.where(due[:, None], np.float32(self.action_repeat), left)
@@ -182,7 +183,7 @@ class LearnedPolicy:
     def commands(self, output: Numbers, proposed: Numbers | None) -> Action:
         """What is commanded for the network's outputs and the base's action, each of shape (n, ...)."""
         if self.action == "rudder-discrete":
-            return ORDERS[output.argmax(axis=-1), None]
+            return ORDERS[output.argmax(axis=1), None]
         limited = np.clip(output, -1.0, 1.0)
         if proposed is None:
             return limited

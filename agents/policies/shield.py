@@ -83,7 +83,7 @@ def interventions(state: ShieldState) -> Interventions:
     """Read from the state that `Shielded.predict` returned how often and how long the fallback steered."""
     watch = records(state.watch, WATCH)
     count, intervals = (watch[name].astype(np.int64) for name in ("count", "intervals"))
-    return Interventions(count, intervals, watch["steered"] > 0.0)
+    return Interventions(count, intervals, watch["steered"] != 0.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -180,7 +180,7 @@ class Shielded:
         watch, _ = begun(watch, episode_start, given.shape[:-1], size_of(WATCH))
         known = records(watch, WATCH)
         self._update(given, np.asarray(~np.isfinite(action).all(axis=-1)), known)
-        action[..., 0] = np.where(known["steered"] > 0.0, ours[..., 0], action[..., 0])
+        action[..., 0] = np.where(known["steered"] != 0.0, ours[..., 0], action[..., 0])
         return np.where(np.isfinite(action), action, 0.0), ShieldState(inner, outer, watch)
 
     def _update(self, observation: NDArray[Any], broken: Flags, watch: Records) -> None:
@@ -203,7 +203,7 @@ class Shielded:
             watch["outside"] = np.where(beyond, watch["outside"] + 1.0, 0.0)
             out |= beyond & (watch["outside"] >= self._intervals(limits.out_lengths))
             calm &= distance <= limits.envelope_back
-        steered = watch["steered"] > 0.0
+        steered = watch["steered"] != 0.0
         watch["quiet"] = np.where(steered & calm, watch["quiet"] + 1.0, 0.0)
         over = watch["quiet"] >= self._intervals(limits.calm_lengths)
         now = (steered & ~over) | out

@@ -54,6 +54,20 @@ def test_a_discrete_policy_gives_the_order_with_the_largest_output():
     np.testing.assert_array_equal(order_numbers(actions), best)
 
 
+def test_an_order_has_the_number_of_the_nearest_in_the_list():
+    assert len(ORDERS) == 9
+    assert order_numbers([0.04]) == 4
+    assert order_numbers([[-9.0], [-0.4], [0.3], [9.0]]).tolist() == [0, 1, 6, 8]
+    assert order_numbers(ORDERS[:, None]).tolist() == list(range(9))
+
+
+def test_a_share_of_the_rudder_however_small_is_a_share():
+    small = random_policy(base=LQ_MARINER, authority=0.05, rate_limit=0.05)
+    base, _ = LQ_MARINER.predict(SEEN)
+    steered, _ = small.predict(SEEN)
+    assert 0.0 < np.abs(steered - base)[np.abs(base) < 0.9].max() <= 0.05 * 0.05 + 1e-6
+
+
 def test_rudder_and_shaft_are_two_commands():
     assert random_policy(action="rudder-shaft").predict(SEEN)[0].shape == (30, 2)
     assert random_policy(action="rudder-shaft").predict(SEEN[0])[0].shape == (2,)

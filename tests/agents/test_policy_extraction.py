@@ -188,7 +188,7 @@ def test_an_agent_that_commands_otherwise_than_its_layers_is_refused(monkeypatch
     predict = agent.predict
     monkeypatch.setattr(agent, "predict", lambda x, **more: (predict(x, **more)[0] + 0.9e-4, None))
     LearnedPolicy.from_sb3(agent)
-    monkeypatch.setattr(agent, "predict", lambda x, **more: (predict(x, **more)[0] - 1.1e-4, None))
+    monkeypatch.setattr(agent, "predict", lambda x, **more: (predict(x, **more)[0] - 1.05e-4, None))
     with pytest.raises(InputError, match="gives other commands than its layers do"):
         LearnedPolicy.from_sb3(agent)
     agent.observation_space = Box(-1.0, 1.0, (9,))

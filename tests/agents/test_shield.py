@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from agents import LQ, PID, Shielded, WheelOver, check_controller, interventions
-from agents.policies.shield import Limits
+from agents.controllers.memory import records
+from agents.policies.shield import WATCH, Limits
 from shipgym.envs.engine import Engine
 from shipgym.errors import InputError
 from shipgym.ships import load_model
@@ -158,6 +159,34 @@ def test_an_early_turn_that_is_planned_is_no_running_away_and_a_turn_the_wrong_w
     wrong = Shielded.from_model(MARINER, Away(**vars(early)))
     *_, states = sailed(wrong, task=task, steps=900)
     assert interventions(states[-1]).count.sum() > 0
+
+
+@pytest.mark.parametrize("turn_deg", [60.0, -60.0, 0.0])
+def test_before_a_turn_headings_up_to_the_course_beyond_it_are_on_course(turn_deg, monkeypatch):
+    """Within 5 degrees of them a ship that turns away is not counted as running away."""
+    errors = np.arange(-90.0, 91.0, 4.0)
+    low, high = min(-turn_deg, 0.0) - 5.0, max(-turn_deg, 0.0) + 5.0
+    shown = np.zeros((len(errors), 8), np.float32)
+    shown[:, 0], shown[:, 1], shown[:, 4] = np.sin(np.radians(errors)), np.cos(np.radians(errors)), 1.0
+    shown[:, 2] = -np.sign(errors + 0.5 * turn_deg)  # away from the middle of the turn
+    shield = Shielded(Always(0.2), GOOD, dt=1.0)
+    monkeypatch.setattr(Shielded, "_planned_turn", lambda self, seen: np.radians(turn_deg))
+    _, state = shield.predict(shown)
+    turned = records(state.watch, WATCH)["turned"]
+    np.testing.assert_array_equal(turned > 0.0, (errors < low) | (errors > high))
+    yaw_rate = GOOD.observation_scales[2]
+    assert turned.max() == pytest.approx(0.5 * 1.0 * yaw_rate)  # from no rate of turn to that, in a second
+
+
+def test_a_shaft_command_that_is_no_number_is_none():
+    class Broken(Always):
+        def predict(self, observation, state=None, episode_start=None, deterministic=True):
+            return np.array([[0.3, np.nan], [0.3, 0.7]]), state
+
+    shown = np.tile(np.eye(8)[1], (2, 1)).astype(np.float32)
+    action, state = Shielded(Broken(0.0), GOOD, dt=1.0).predict(shown)
+    assert action[:, 1].tolist() == [0.0, np.float32(0.7)]
+    assert interventions(state).steering.tolist() == [True, False]
 
 
 def test_counts_begin_anew_with_an_episode():
