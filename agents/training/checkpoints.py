@@ -22,6 +22,7 @@ COUNTERS = (
     "num_timesteps", "_n_updates", "_episode_num", "_last_obs", "_last_episode_starts", "_last_original_obs",
 )  # fmt: skip
 LARGEST_WEIGHT, LARGEST_LOG_STD = 1e9, 20.0
+WHOLE, REAL = 0, 0.0  # what numbers of a kind are like
 STORED = ("observations", "next_observations", "actions", "rewards", "dones", "timeouts")
 #: What is kept of the scales of rewards, and where they have it.
 SCALES = {
@@ -89,14 +90,14 @@ def _check_weights(parameters: Memory) -> None:
 
 def check_record(record: Any) -> None:
     """Raise ValueError, naming the place, unless this is what a training tells of its evaluations."""
-    row: Memory = {"steps": 0, "seconds": 0.0, "cost": 0.0, "mean_return": _maybe}
-    own = {"best_cost": _maybe, "best_steps": 0, "curve": _every(row), "seconds": 0.0}
+    row: Memory = {"steps": WHOLE, "seconds": REAL, "cost": REAL, "mean_return": _maybe}
+    own = {"best_cost": _maybe, "best_steps": WHOLE, "curve": _every(row), "seconds": REAL}
     check_like(record, own, "run")
 
 
 def _maybe(found: Any) -> float | None:
     """What is expected where a number or none may stand."""
-    return None if found is None else 0.0
+    return None if found is None else REAL
 
 
 def _every(one: Any) -> Callable[[Any], list[Any]]:
@@ -124,7 +125,7 @@ def _own(agent: Any) -> Memory:
     agent._last_episode_starts = np.zeros(agent.n_envs, np.bool_)
     agent.ep_info_buffer = agent.ep_success_buffer = ()
     own = take(agent)
-    own["episodes"], own["successes"] = _every({"r": 0.0, "l": 0, "t": 0.0}), _every(0.0)
+    own["episodes"], own["successes"] = _every({"r": REAL, "l": WHOLE, "t": REAL}), _every(REAL)
     for name, one in own["parameters"].items():
         if "param_groups" in one:
             groups = recursive_getattr(agent, name).param_groups

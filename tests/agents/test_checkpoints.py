@@ -2,6 +2,7 @@
 
 import copy
 import json
+import random
 import struct
 
 import numpy as np
@@ -54,6 +55,19 @@ def test_what_fits_is_put_back(fresh, memory):
     )
     np.testing.assert_array_equal(again["ships"][1]["states"], memory["ships"][1]["states"])
     assert again["replay"]["pos"] == memory["replay"]["pos"] == 10
+
+
+def test_random_numbers_go_on_where_they_were(fresh, memory):
+    random.getrandbits(8)
+    np.random.rand(3)
+    torch.rand(3)
+    fresh.action_space.sample()
+    checkpoints.put_back(fresh, copy.deepcopy(memory))
+    found, kept = checkpoints.take(fresh)["random"], memory["random"]
+    assert (found["python"], found["actions"]) == (kept["python"], kept["actions"])
+    assert found["numpy"][1].tolist() == kept["numpy"][1].tolist()
+    assert found["numpy"][2] == kept["numpy"][2]
+    assert torch.equal(found["torch"], kept["torch"])
 
 
 def test_of_an_optimiser_only_rates_and_moments_are_put_back(fresh, memory):

@@ -4,6 +4,7 @@ import json
 import sys
 
 import numpy as np
+import onnx
 import onnxruntime
 import pytest
 from typer.testing import CliRunner
@@ -78,6 +79,29 @@ def test_what_runs_on_ships_need_not_be_new():
     model = onnx_model(HELD)
     assert [(one.domain, one.version) for one in model.opset_import] == [("", 17)]
     assert (model.ir_version, model.producer_name) == (8, "shipgym")
+
+
+def test_operators_have_the_attributes_that_all_runtimes_know():
+    told = {
+        (node.op_type, one.name, one.i)
+        for name in ("residual", "discrete")
+        for node in onnx_model(POLICIES[name]).graph.node
+        for one in node.attribute
+    }
+    assert told == {
+        ("Concat", "axis", 1), ("Gemm", "transB", 1), ("ArgMax", "axis", 1), ("ArgMax", "keepdims", 1),
+        ("Gather", "axis", 0),
+    }  # fmt: skip
+
+
+def test_a_graph_that_onnx_refuses_is_not_written(tmp_path, monkeypatch):
+    def refused(model, full_check):
+        raise onnx.checker.ValidationError("no such operator" if full_check else "")
+
+    monkeypatch.setattr(onnx.checker, "check_model", refused)
+    with pytest.raises(onnx.checker.ValidationError, match="no such operator"):
+        export_onnx(POLICIES["relu"], tmp_path / "policy.onnx")
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_the_command_writes_it(tmp_path):

@@ -211,6 +211,8 @@ def test_weights_are_of_single_precision_and_fill_the_file():
     for wrong in ({"a": torch.zeros(1).expand(thin)}, {"a": double}, {3: torch.zeros(3)}):
         with pytest.raises(ValueError, match=r"weights .*: expected numbers of type float32"):
             _weights(saved_tensors(wrong))
+    with pytest.raises(TypeError, match="Sparse"):
+        _weights(saved_tensors({"a": torch.eye(3).to_sparse()}))
 
 
 KNOWN = {"__module__": "stable_baselines3.sac.policies"}
@@ -301,3 +303,7 @@ def test_what_is_wrong_with_a_zip_is_told_in_a_line(tmp_path):
     with pytest.raises(InputError, match=r"\(.KeyError: .*policy\.pth.*\); save the agent again$") as error:
         read_sb3(tmp_path / "model.zip")
     assert "\n" not in str(error.value)
+    double = {"w" * 400: torch.zeros(3, dtype=torch.float64)}
+    (tmp_path / "model.zip").write_bytes(zipped(data="{}", **{"policy.pth": saved_tensors(double)}))
+    with pytest.raises(InputError, match=r"""\("ValueError: weights 'w{179}"\); save the agent again$"""):
+        read_sb3(tmp_path / "model.zip")

@@ -23,7 +23,7 @@ from agents.training import run_folder, training
 from agents.training.algorithms import algorithm_class, make_agent, make_ships, sb3_arguments, set_deviation
 from agents.training.plan import EVALUATION_SEED, Given, make_plan, training_options
 from agents.training.run_folder import begin_folder, other_versions
-from agents.training.safe_file import read_values
+from agents.training.safe_file import read_values, write_values
 from agents.training.settings import ALGORITHMS, load_settings
 from agents.training.training import train
 from shipgym.errors import InputError
@@ -372,6 +372,27 @@ def test_a_run_is_kept_at_its_first_boundary_and_resumed_from_it(tmp_path):
     assert (
         read_values(run / "checkpoint.safetensors", "checkpoint")["agent"]["counters"]["num_timesteps"] == 0
     )
+
+
+def test_a_checkpoint_with_another_record_is_refused_with_the_place(tmp_path):
+    plan, kept = tiny(total_steps=1), tmp_path / "run" / "checkpoint.safetensors"
+    train(plan, tmp_path / "run")
+    values = read_values(kept, "checkpoint")
+    write_values({**values, "run": {**values["run"], "best_steps": "x"}}, kept)
+    with pytest.raises(
+        InputError, match=r"does not fit this run \(run\.best_steps: 'x' found, expected int\);"
+    ):
+        train(plan, tmp_path / "run", resume=True)
+    write_values({"run": values["run"]}, kept)
+    with pytest.raises(InputError, match=r"does not fit this run \('agent'\); start a new run"):
+        train(plan, tmp_path / "run", resume=True)
+
+
+def test_the_time_of_a_run_is_counted_from_its_beginning():
+    before, over = time.monotonic(), []
+    train(tiny(total_steps=1), tell=lambda now: over.append(now.seconds - (time.monotonic() - before)))
+    assert len(over) == 1
+    assert -5.0 < over[0] <= 0.0
 
 
 def test_folders_are_checked_before_anything_is_learned(tmp_path):
