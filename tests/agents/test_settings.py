@@ -204,6 +204,8 @@ def test_the_first_difference_of_two_configurations_is_told():
     assert first_difference(one | {"b": {"c": 2, "d": [4]}}, one) == "b.d is [3] there, [4] here"
     assert first_difference(one | {"e": 5}, one) == "e is None there, 5 here"
     assert first_difference({"b": one["b"]}, one) == "a is 1 there, None here"
+    assert first_difference({"a": 1, "b": 3}, one) == "b is {'c': 2, 'd': [3]} there, 3 here"
+    assert first_difference({"a": {"c": 1}, "b": one["b"]}, one) == "a is 1 there, {'c': 1} here"
     with pytest.raises(InputError, match=r"run: a run of another configuration: b.c is 2 there, 0 here"):
         check_same(one | {"b": {"c": 0, "d": [3]}}, one, "run")
     check_same(one, one, "run")
@@ -307,6 +309,7 @@ def test_plans_that_cannot_be_are_refused(arguments, message):
         make_plan(Given("ppo", **arguments))
     assert make_plan(Given("ppo", seed=799, threads=1)).training_seed == 799_000
     assert make_plan(Given("ppo", settings={"action_repeat": 600})).settings.action_repeat == 600
+    assert make_plan(Given("sac", settings={"ships": 1, "action_repeat": 1})).settings.ships == 1
 
 
 def test_an_unknown_algorithm_is_told_before_an_unknown_task():

@@ -1,5 +1,6 @@
 """Tuning proposes valid settings, goes on after any end as if nothing had happened, stops what is worse."""
 
+import inspect
 import json
 import random
 import sqlite3
@@ -281,13 +282,15 @@ def told_by(monkeypatch, *told, rows=()):
 
 
 def test_a_trial_is_compared_at_its_evaluations_and_may_cost_as_much_as_the_limit(monkeypatch):
-    stopped, (asked,) = told_by(
-        monkeypatch, (0, 1.0, True), (1, 8.0, True), (50, 2.0, False), (100, 6.0, True), (200, 6.5, True),
-        (100, 7.0, False), rows=[{"steps": 0, "cost": 1.0}, {"steps": 1, "cost": 8.0}],
-    )  # fmt: skip
-    assert stopped == {"cost": 8.0, "curve": [(1, 8.0)], "ended": "finished"}
+    rows = [{"steps": 0, "cost": 1.0}, {"steps": 1, "cost": 8.0}, {"steps": 2, "cost": 9.0}]
+    equal, (asked,) = told_by(monkeypatch, (0, 1.0, True), (50, 9.0, True), (100, 6.0, True), rows=rows)
+    assert equal == {"cost": 8.0, "curve": [(1, 8.0), (2, 9.0)], "ended": "finished"}
     assert asked.threads == 1  # trials are trained side by side
-    stopped, _ = told_by(monkeypatch, (0, 1.0, True), (50, 9.0, True), (100, 6.01, True), (200, 3.0, True))
+    once, _ = told_by(monkeypatch, (1, 5.0, True), (100, 7.0, True), (200, 8.0, False), rows=rows)
+    assert once == equal  # better at any time
+    stopped, _ = told_by(
+        monkeypatch, (0, 1.0, True), (50, 9.0, True), (60, 2.0, False), (100, 6.01, True), (200, 3.0, True)
+    )
     assert stopped == {"cost": None, "curve": [(50, 9.0), (100, 6.01)], "ended": "stopped early"}
 
 
@@ -341,6 +344,7 @@ def test_the_command_asks_for_what_it_was_told_and_shows_trials_best_first(tmp_p
         asked.append((out, trials_asked, fixed, where.workers, progress))
         return Tuning(trials, trials[2])
 
+    assert inspect.signature(tune).parameters["trials"].default == 20  # as the command has it
     monkeypatch.setattr(tuning, "tune", stand_in)
     words = ["tune", "ppo", "--total-steps", "100000", "--set", "gamma=0.9", "--out", str(tmp_path)]
     told = json.loads(CliRunner().invoke(app, [*words, "--json"]).stdout)
