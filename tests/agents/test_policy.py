@@ -181,6 +181,8 @@ def test_another_environment_is_refused_with_the_difference():
     other = mariner(service_speed=4.0)
     with pytest.raises(InputError, match=r"model 'mariner': the scale of 'yaw_rate' is .* policy 'learned'"):
         random_policy().check_fits_model(other)
+    with pytest.raises(InputError, match="action: 'rudder-shaft' found, but 'mariner' has no shaft speed"):
+        random_policy(action="rudder-shaft").check_fits_model(MARINER)
     with pytest.raises(InputError, match="the scale of 'yaw_rate'"):
         sail(random_policy(), load_model("kvlcc2"))
     with pytest.raises(InputError, match=r"8 observations found, expected 13; .*: cross_track, course_error"):
