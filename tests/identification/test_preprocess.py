@@ -1,13 +1,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import pytest
 from scipy.interpolate import make_smoothing_spline
+from scipy.signal import savgol_filter
 
 from identification import identify
 from identification.regression.preprocess import (
+    kinematics,
     median,
     noise_level,
     outliers,
@@ -234,3 +237,182 @@ def test_channels_are_smoothed_as_named_but_for_the_rudder() -> None:
     np.testing.assert_array_equal(smoothed_channels(trial, ["u"], "none")["u"], trial["u"])
     with pytest.raises(InputError, match="preprocessing: 'splines' found"):
         smoothed_channels(trial, ["u"], "splines")
+
+
+@pytest.mark.parametrize("step", [0.1, 10.0])
+def test_steps_of_more_than_one_and_a_half_usual_ones_are_dropouts(step: float) -> None:
+    """Up to ten usual ones and a half, whatever the unit of time."""
+    usual = np.arange(60.0)
+    for hole, missing in ((1.0, 0), (1.45, 0), (1.55, 1), (2.0, 1), (10.45, 9), (10.52, 0)):
+        t = step * np.concatenate([usual, usual + usual[-1] + hole])
+        filled = repair._filled_times(t)
+        assert len(filled) == len(t) + missing, hole
+        assert set(t) <= set(filled)
+        inside = filled[59 : 61 + missing]
+        np.testing.assert_allclose(np.diff(inside), step * hole / (missing + 1))
+
+
+def test_what_is_sound_stays_to_the_bit_beside_what_is_repaired() -> None:
+    t = np.cumsum(np.random.default_rng(3).uniform(0.9, 1.1, 200))
+    truth = 3.0 + np.sin(t / 7.0)
+    spiked = truth.copy()
+    spiked[[50, 120]] += 9.0
+    kept = np.arange(200) != 80
+    found = repaired(Trial(t[kept], {"u": spiked[kept], "wind_speed": truth[kept]}, name="spiked"))
+    sound = np.flatnonzero(kept & ~np.isin(np.arange(200), [50, 120]))
+    at = np.searchsorted(found.t, t[sound])
+    assert len(found) == 200
+    np.testing.assert_array_equal(found["u"][at], truth[sound])
+    np.testing.assert_array_equal(found["wind_speed"][at], truth[sound])
+    assert found.repaired == {"u": 3, "wind_speed": 1}
+    gusts = repaired(Trial(t, {"u": truth, "wind_speed": spiked}, name="gusts"))  # of the wind none is one
+    np.testing.assert_array_equal(gusts["wind_speed"], spiked)
+
+
+def test_rounding_is_no_outlier_on_a_channel_without_noise() -> None:
+    """Up to a thousand-millionth of what the channel changes by."""
+    t = np.arange(100.0)
+    for off, found in ((0.95e-9, []), (1.05e-9, [70]), (-0.95e-9, []), (-1.05e-9, [70])):
+        values = np.minimum(t, 40.0)
+        values[70] += 40.0 * off
+        assert np.flatnonzero(outliers(t, values)).tolist() == found
+
+
+def test_a_sample_may_be_away_by_what_the_channel_moves_in_half_the_median_s_width(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """On a ramp of one a sample, beside the noise: three and a half from the median of seven."""
+    monkeypatch.setattr(repair, "noise_level", lambda t, values: 0.0)
+    t = np.arange(60.0)
+    for off, found in ((4.45, []), (4.55, [30]), (-4.45, []), (-4.55, [30])):
+        values = t.copy()
+        values[30] += off  # the median goes with it by one sample
+        assert np.flatnonzero(outliers(t, values)).tolist() == found
+
+
+@pytest.mark.parametrize("end", [0, -1])
+def test_an_end_is_an_outlier_beyond_seven_times_the_largest_step_inside(end: int) -> None:
+    """Where the step in time to it is longer, so much more; where it is shorter, not less."""
+    for wait, size, found in (
+        (1.0, 0.68, False), (1.0, 0.72, True), (3.0, 2.05, False), (3.0, 2.15, True), (0.5, 0.68, False),
+        (0.5, 0.72, True),
+    ):  # fmt: skip
+        t = np.arange(40.0)
+        t[end] = t[1] - wait if end == 0 else t[-2] + wait
+        values = 0.1 * np.arange(40.0)
+        values[end] = values[1] + size if end == 0 else values[-2] - size
+        flags = np.zeros(40, dtype=bool)
+        flags[end] = found
+        np.testing.assert_array_equal(outliers(t, values, may_step=False), flags)
+        assert not outliers(t, values).any()
+
+
+def test_ends_are_compared_in_records_of_21_samples_and_a_median_takes_seven(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(repair, "noise_level", lambda t, values: 0.1)
+    for count, found in ((20, []), (21, [0])):
+        values = 0.01 * np.arange(count) ** 2 / count
+        values[0] += 5.0
+        assert np.flatnonzero(outliers(np.arange(float(count)), values, may_step=False)).tolist() == found
+    for count, found in ((6, []), (7, [3])):
+        spike = np.where(np.arange(count) == 3, 5.0, 0.0)
+        assert np.flatnonzero(outliers(np.arange(float(count)), spike)).tolist() == found
+
+
+def test_five_samples_tell_noise_and_four_do_not() -> None:
+    """One of the five off by 1: 1 / sqrt(70 / 36) of its own and the cubic's spread, by a median."""
+    spike = np.array([0.0, 0.0, 1.0, 0.0, 0.0])
+    assert noise_level(np.arange(5.0), spike) == pytest.approx(6.0 / np.sqrt(70.0) / 0.6745)
+    assert noise_level(np.arange(4.0), spike[:4]) == 0.0
+    assert noise_ratio(np.arange(4.0), spike[:4]) == 0.0
+    zigzag = np.array([0.0, 1.0, -1.0, 1.0, 0.0])
+    assert not np.array_equal(smooth(np.arange(5.0), zigzag), zigzag)
+    np.testing.assert_array_equal(smooth(np.arange(4.0), zigzag[:4]), zigzag[:4])
+
+
+def test_a_width_that_is_given_is_used_on_clean_and_on_short_records() -> None:
+    t = np.linspace(0.0, 4.0, 20)
+    for values in (np.exp(t), np.random.default_rng(0).standard_normal(20)):
+        filtered = savitzky_golay(t, values, 7)
+        np.testing.assert_allclose(filtered, savgol_filter(values, 7, 3), atol=1e-12)
+        assert not np.array_equal(filtered, values)
+        np.testing.assert_array_equal(savitzky_golay(t, values), values)
+
+
+@pytest.mark.parametrize(("unevenness", "even"), [(0.95e-3, True), (1.05e-3, False)])
+def test_steps_alike_to_a_thousandth_are_even(unevenness: float, even: bool) -> None:
+    steps = np.full(99, 0.5)
+    steps[40] += 0.5 * unevenness
+    t = np.concatenate([[0.0], np.cumsum(steps)])
+    values = np.random.default_rng(0).standard_normal(100)
+    assert np.array_equal(savitzky_golay(t, values, 9), savgol_filter(values, 9, 3)) == even
+
+
+def states(trial: Trial, monkeypatch: pytest.MonkeyPatch) -> list[tuple[int, Any]]:
+    """What the smoothers are asked for while a trial is smoothed: rows, and the arguments."""
+    asked: list[tuple[int, Any]] = []
+
+    def smoother(*given: Any) -> tuple[np.ndarray, float]:
+        asked.append((len(given[4]), given))
+        return np.zeros((len(given[4]), len(given[5]))), -1.0
+
+    monkeypatch.setattr(kinematics, "smooth_linear", smoother)
+    smooth_kinematics(trial)
+    return asked
+
+
+def test_the_roughness_of_the_motion_is_found_on_the_first_500_samples(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Within four decades of a guess, its square root: a change in a twentieth of the record."""
+    t = 2.0 * np.arange(701.0)
+    r = 0.3 * np.sin(t / 50.0) + 0.05 * np.random.default_rng(0).standard_normal(701)
+    asked = states(Trial(t, {"r": r}, name="long"), monkeypatch)
+    assert {rows for rows, _ in asked[:-1]} == {500}
+    assert [given[7] for _, given in asked] == [True] * (len(asked) - 1) + [False]
+    assert asked[-1][0] == 701
+    guess = np.ptp(r) ** 2 / (1400.0 / 20.0) ** 3
+    unit = 2.0  # of the acceleration after a step of 2 s
+    decades = [np.log10(given[1][0, 2, 2] / unit / guess) for _, given in asked]
+    assert min(decades) >= -4.0
+    assert max(decades) <= 4.0
+    assert decades[0] == pytest.approx(-4.0 + 8.0 * 0.381966, abs=1e-5)  # golden section
+    *_, observation, variances, _, start, start_variances, _ = asked[-1][1]
+    np.testing.assert_array_equal(observation, [[0.0, 1.0, 0.0]])
+    np.testing.assert_allclose(variances, [noise_level(t, r) ** 2])
+    np.testing.assert_array_equal(start, [0.0, r[0], 0.0])
+    np.testing.assert_array_equal(start_variances, [1.0, 1e-2, 1.0])
+
+
+def test_a_channel_has_the_noise_of_its_resolution_at_least(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A ten-thousandth of its range, and a thousand-millionth where it does not change."""
+    t = np.arange(60.0)
+    r = 0.01 * np.random.default_rng(0).standard_normal(60)
+    given = states(Trial(t, {"psi": t, "r": r}, name="ramp"), monkeypatch)[-1][1]
+    np.testing.assert_allclose(given[3], [(1e-4 * 59.0) ** 2, noise_level(t, r) ** 2])
+    still = states(Trial(t, {"psi": np.sin(7.0 * t), "r": 0.0 * t}, name="still"), monkeypatch)[-1][1]
+    assert still[3][1] == pytest.approx(1e-18)
+
+
+def test_a_clean_yaw_rate_alone_gives_the_heading_that_it_turns_through() -> None:
+    t = np.arange(0.0, 60.0, 0.5)
+    r = 0.02 * np.sin(t / 8.0)
+    heading = kinematics._smooth_heading(Trial(t, {"r": r}, name="gyro"))
+    np.testing.assert_allclose(heading["psi"], 0.16 * (1.0 - np.cos(t / 8.0)), atol=2e-4)
+    np.testing.assert_allclose(heading["r"], r, atol=2e-5)
+
+
+def test_a_ship_of_constant_acceleration_goes_where_mechanics_say() -> None:
+    """Ahead on a heading of 30 deg: x by half a t^2; the covariances are the integrals of white noise."""
+    h, psi = np.array([2.0]), np.radians([30.0, 30.0])
+    ahead = kinematics._plane_transitions(h, psi)[0] @ [1.0, 2.0, 3.0, -0.5, 0.2, 0.4]
+    cosine, sine = np.cos(psi[0]), np.sin(psi[0])
+    far = np.array([3.0 * 2.0 + 0.5 * 0.2 * 4.0, -0.5 * 2.0 + 0.5 * 0.4 * 4.0])  # ahead and to starboard
+    place = [1.0 + far[0] * cosine - far[1] * sine, 2.0 + far[0] * sine + far[1] * cosine]
+    np.testing.assert_allclose(ahead, [*place, 3.4, 0.3, 0.2, 0.4])
+    np.testing.assert_allclose(kinematics._integrators(h)[0] @ [1.0, 3.0, 0.2], [7.4, 3.4, 0.2])
+    later = np.linspace(0.0, 2.0, 20_001)
+    kernel = np.stack([0.5 * later**2, later, np.ones_like(later)])
+    expected = np.trapezoid(kernel[:, None] * kernel, later)
+    np.testing.assert_allclose(kinematics._random_walk(h)[0], expected, rtol=1e-6)
