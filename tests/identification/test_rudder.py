@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from identification.regression import rudder
-from identification.regression.rudder import estimated_gear, rebuild
+from identification.regression.rudder import estimated_gear, rebuild, straight
 from shipgym import ShipModel, SteeringGear, Trial
 from shipgym.manoeuvres import zigzag
 
@@ -95,3 +95,87 @@ def test_limit_of_an_estimated_gear_is_the_largest_recorded_angle() -> None:
     gear = estimated_gear([Trial(t, {"u": still + 5.0, "v": still, "r": still, "delta": delta})])
     assert gear.rudder_limit_deg == pytest.approx(42.0)
     assert gear.rudder_rate_deg_s == pytest.approx(4.0)
+
+
+def test_a_rudder_taken_straight_has_no_gear_and_no_corners() -> None:
+    t = np.arange(5.0, 9.0)
+    found = straight(t, np.array([0.0, 0.1, 0.3, 0.2]))
+    assert (found.rate, found.time_constant, found.follows_gear) == (0.0, 0.0, False)
+    for row in (found.before, found.after, found.switch, found.corners, found.smoothness):
+        assert row.shape == (0,)
+    assert found.smoothness.dtype == np.int64
+    np.testing.assert_allclose(found([5.5, 6.25, 8.0]), [0.05, 0.15, 0.2])
+
+
+def test_four_samples_are_the_fewest_that_a_gear_explains() -> None:
+    """A ramp goes on; a rudder that never moved has no gear."""
+    ramp = 0.1 * np.arange(5.0)
+    shares = [rudder._explained(np.arange(float(n)), ramp[:n], 0.1, 0.0) for n in (3, 4, 5)]
+    assert shares == [0.0, 1.0, 1.0]
+    assert rudder._explained(np.arange(5.0), ramp, 0.0, 0.0) == 0.0
+
+
+@pytest.mark.parametrize(
+    ("orders", "delta", "goes_on"),
+    [
+        ([np.inf, np.inf], [0.0, 0.1, 0.2], True),  # one ramp
+        ([np.inf, -np.inf], [0.0, 0.1, 0.0], False),
+        ([np.inf, 0.15], [0.0, 0.1, 0.15], True),  # it arrives
+        ([np.inf, 0.1], [0.0, 0.1, 0.1], True),
+        ([np.inf, 0.05], [0.0, 0.1, 0.05], False),
+        ([-np.inf, -0.15], [0.0, -0.1, -0.15], True),
+        ([-np.inf, -0.05], [0.0, -0.1, -0.05], False),
+        ([0.1, 0.1009], [0.0, 0.1, 0.1009], True),  # within the tolerance
+        ([0.1, 0.1011], [0.0, 0.1, 0.1011], False),
+        ([0.1, np.inf], [0.0, 0.1, 0.2], False),  # from rest to a ramp
+        ([0.0, np.inf], [0.0, 0.0, 0.1], False),
+    ],
+)
+def test_an_order_goes_on_where_the_rudder_moves_as_before(
+    orders: list[float], delta: list[float], goes_on: bool
+) -> None:
+    found = rudder._continues(np.array(orders), np.array(delta), 1e-3)
+    assert found.tolist() == [goes_on]
+
+
+def test_an_order_changes_when_the_rudder_then_ends_where_it_was_seen() -> None:
+    """Up for x s and down for the rest of 2 s at 0.1 rad/s: 0.1 x - 0.1 (2 - x)."""
+    time = rudder._switch_time(0.0, 0.14, np.inf, -np.inf, 2.0, 0.1, 0.0)
+    assert time == pytest.approx(1.7)
+    assert rudder._switch_time(0.0, 0.25, np.inf, -np.inf, 2.0, 0.1, 0.0) is None
+    assert rudder._switch_time(0.3, 0.3, 0.3, np.inf, 2.0, 0.1, 0.0) == pytest.approx(2.0)
+
+
+@pytest.mark.parametrize(("lag", "begin", "smoothness"), [(0.0, 3.0, 0), (0.4, 2.6, 1)])
+def test_a_ramp_ends_at_its_order_or_where_the_lag_takes_over(
+    lag: float, begin: float, smoothness: int
+) -> None:
+    """0.3 rad away at 0.1 rad/s: 3 s, less the lag; a second order begins in the middle of an interval."""
+    t, none = np.array([10.0, 20.0]), np.array([10.0])
+    one = (t, np.array([0.0, 0.3]), np.array([0.3]), np.array([0.3]), none, 0.1, lag)
+    ((time, kind),) = rudder._ramp_ends(*one)
+    assert (time, kind) == (pytest.approx(10.0 + begin), smoothness)
+    turned = (t, np.array([0.0, 0.2]), np.array([np.inf]), np.array([0.2]), np.array([5.0]), 0.1, lag)
+    ((time, kind),) = rudder._ramp_ends(*turned)
+    assert (time, kind) == (pytest.approx(15.0 + begin), smoothness)
+    early = begin - 0.1  # the order is taken back before the ramp has ended
+    back = (t, np.zeros(2), np.array([0.3]), np.array([0.0]), np.array([early]), 0.1, lag)
+    assert [time for time, _ in rudder._ramp_ends(*back)] == [pytest.approx(10.0 + 2.0 * early - lag)]
+
+
+def test_a_gear_of_rate_and_lag_ramps_and_then_creeps() -> None:
+    """0.1 rad/s and 2 s: from 0 to an order of 0.5 it ramps to 0.3, what is left falls by exp(-t / 2)."""
+    angles = rudder._flow(0.0, 0.5, np.array([1.0, 3.0, 5.0]), 0.1, 2.0)
+    np.testing.assert_allclose(angles, [0.1, 0.3, 0.5 - 0.2 * np.exp(-1.0)])
+    np.testing.assert_allclose(rudder._flow(0.0, -np.inf, np.array([1.0, 9.0]), 0.1, 2.0), [-0.1, -0.9])
+    np.testing.assert_allclose(rudder._flow(0.2, 0.2, np.array([4.0]), 0.1, 0.0), [0.2])
+    t = np.array([0.0, 1.0, 3.0, 5.0])
+    orders = rudder._orders(t, rudder._flow(0.0, 0.5, t, 0.1, 2.0), 0.1, 2.0)
+    np.testing.assert_allclose(orders, [np.inf, np.inf, 0.5])
+
+
+def test_no_rudder_goes_beyond_a_right_angle() -> None:
+    t = np.linspace(0.0, 40.0, 81)
+    still, delta = np.zeros_like(t), np.radians(np.clip(4.0 * t, 0.0, 110.0))
+    gear = estimated_gear([Trial(t, {"u": still + 5.0, "v": still, "r": still, "delta": delta})])
+    assert gear.rudder_limit_deg == 90.0

@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 
 from identification import IdentificationResult, Samples, build_samples, identify
-from identification.regression.samples import between_gaps
+from identification.regression.integrals import broken_spline, step_integrals, twice_integrated
+from identification.regression.rudder import straight
+from identification.regression.samples import between_gaps, default_window, without_memory
 from shipgym import InputError, Particulars, ShipModel, Trial
 from shipgym.manoeuvres import zigzag
 from shipgym.ships.simulate import open_loop
@@ -168,3 +170,56 @@ def test_six_long_steps_on_end_are_another_rate_and_five_are_gaps() -> None:
     assert pieces(*range(40, 46)) == [100]
     assert pieces(*range(40, 45)) == [41, 55]
     assert pieces(34, *range(40, 45)) == [35, 55]  # the sixth is not among the eleven around the fifth
+
+
+def test_euler_takes_the_start_of_each_step_and_the_trapezoid_rule_its_mean() -> None:
+    """Steps of 1 and 3 s; a moment is the integral times half the step that is left on average."""
+    t, channels = np.array([0.0, 1.0, 4.0]), {"u": np.array([2.0, 4.0, 10.0])}
+    for euler, expected in ((True, [2.0, 12.0]), (False, [3.0, 21.0])):
+        integrals, moments = step_integrals(t, channels, ["u"], lambda _, c: c["u"][:, None], euler)
+        np.testing.assert_allclose(integrals["u"][:, 0], expected)
+        np.testing.assert_allclose(moments["u"][:, 0], np.multiply(expected, [0.5, 1.5]))
+
+
+def test_an_integral_is_integrated_again_from_the_first_sample() -> None:
+    """Of 6 t: t^3 over each step, and 3 t^2 within it."""
+    t = np.array([0.0, 1.0, 3.0, 4.0])
+    integrals = np.diff(3.0 * t**2)[:, None]
+    moments = (np.diff(t**3) - 3.0 * t[:-1] ** 2 * np.diff(t))[:, None]
+    np.testing.assert_allclose(twice_integrated(t, integrals, moments)[:, 0], [1.0, 26.0, 37.0])
+
+
+def test_a_spline_through_few_samples_is_cubic_from_four_on() -> None:
+    t, fine = np.arange(4.0), np.linspace(0.0, 3.0, 31)
+    no_corners = straight(t, np.zeros(4))
+    np.testing.assert_allclose(broken_spline(t, t**3, no_corners)(fine), fine**3, atol=1e-12)
+    three = broken_spline(t[:3], t[:3] ** 3, no_corners)(fine[:21])
+    np.testing.assert_allclose(three, np.interp(fine[:21], t[:3], t[:3] ** 3), atol=1e-12)
+
+
+def test_a_window_is_a_third_of_a_ship_length_or_a_twentieth_of_a_trial_at_most() -> None:
+    """Of noise alone; a ship of 30 m at 3 m/s sails a third of her length in 3.3 s."""
+    ship, rng = Particulars(length=30.0, speed=3.0), np.random.default_rng(0)
+
+    def window(count: int, step: float) -> int:
+        channels = {name: rng.standard_normal(count) for name in "uvr"}
+        return default_window(Trial(step * np.arange(count), channels), ship)
+
+    assert window(400, 0.5) == 6
+    assert window(100, 0.5) == 5
+    assert window(39, 0.5) == 1
+    assert window(400, 9.0) == 1
+
+
+def test_the_memory_of_a_trial_falls_out_of_one_window_less_the_next() -> None:
+    """Mean accelerations of windows of 1 and 3 s, times the mean of both: 2 s."""
+    samples = Samples(
+        {"r": np.array([[1.0], [6.0], [4.0]])}, {"r": np.array([2.0, 9.0, 1.0])}, np.array([0.0, 1.0, 4.0]),
+        np.array([1.0, 3.0, 1.0]), np.zeros(3, dtype=np.int64), 1,
+    )  # fmt: skip
+    found = without_memory(samples)
+    np.testing.assert_allclose(found.features["r"][:, 0], [2.0 * (2.0 - 1.0), 2.0 * (4.0 - 2.0)])
+    np.testing.assert_allclose(found.targets["r"], [2.0 * (3.0 - 2.0), 2.0 * (1.0 - 3.0)])
+    np.testing.assert_array_equal(found.start, [0.0, 1.0])
+    with pytest.raises(InputError, match="window: a trial of 1 windows found, expected at least two"):
+        without_memory(samples.select(np.arange(3) == 2))
