@@ -6,15 +6,17 @@ import numpy as np
 import pytest
 from papers.dense_dual import dense_dual_solution, dense_truncated_solution
 from scipy.linalg import solve
+from sklearn.exceptions import NotFittedError
 from sklearn.kernel_ridge import KernelRidge
 from sklearn.linear_model import Ridge
 from sklearn.utils.estimator_checks import check_estimator
 
 from identification import LSSVM, ArtificialBeeColony, TruncatedLSSVM, TunedLSSVM, polynomial_coefficients
 from identification.estimators.comparators import LinearSupportVectorMachine
-from identification.estimators.decomposition import decompose_triangle, triangle
+from identification.estimators.decomposition import decompose, decompose_triangle, triangle
 from identification.estimators.l_curve import variance_rank
-from identification.estimators.robust import hampel_weights
+from identification.estimators.methods import METHODS, Adapted, get_method, without_constant
+from identification.estimators.robust import fit_weighted, hampel_weights
 from shipgym import InputError
 
 Floats = np.ndarray[Any, np.dtype[np.float64]]
@@ -367,3 +369,119 @@ def test_settings_of_kernels_are_checked(given, message):
     X = np.random.default_rng(0).standard_normal((10, 2))
     with pytest.raises(InputError, match=message):
         LSSVM(kernel="poly", **given).fit(X, X[:, 0])
+
+
+def test_weights_are_renewed_until_they_settle_for_fifty_rounds_at_most() -> None:
+    """The third fit of residuals that no longer change is none; those that never settle stop."""
+    y, given = np.array([0.1, -0.1, 0.2, -0.2, 0.3, 2.7]), []
+
+    def fit(weights: Floats | None) -> Floats:
+        given.append(weights)
+        return y
+
+    assert fit_weighted(fit, y, False).tolist() == [1.0] * 6
+    assert given == [None]
+    settled = fit_weighted(fit, y, True)
+    np.testing.assert_array_equal(settled, hampel_weights(y, 2.7))
+    assert settled[-1] == 1e-4
+    assert [weights is None for weights in given[1:]] == [True, False]
+
+    def swing(weights: Floats | None) -> Floats:
+        given.append(weights)
+        return y if len(given) % 2 else y[::-1]
+
+    given.clear()
+    last = fit_weighted(swing, y, True)
+    assert len(given) == 1 + 50 + 1
+    assert given[-1] is last
+
+
+@pytest.mark.parametrize(("change", "fits"), [(0.9e-3, 2), (1.05e-3, 3)])
+def test_weights_settle_where_none_changes_by_a_thousandth(change: float, fits: int) -> None:
+    outlying = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 1.4826, -1.4826])  # to either side, by the deviation
+    base = np.array([0.0, 1.0, -1.0, 1.0, -1.0, 0.0, 0.0]) + 2.75 * outlying
+    rounds: list[Any] = []
+
+    def fit(weights: Floats | None) -> Floats:
+        rounds.append(weights)
+        return base - 0.5 * change * outlying * (len(rounds) > 1)
+
+    assert fit_weighted(fit, base, True)[-1] == pytest.approx(0.5 + change * (fits == 3))
+    assert len(rounds) == fits
+
+
+def test_features_that_are_zero_throughout_have_no_coefficient() -> None:
+    y = np.arange(5.0)
+    problem = decompose(np.zeros((5, 2)), y, True, False)
+    assert problem.numerical_rank == 1
+    np.testing.assert_array_equal(problem.filters(np.inf, 2), [0.0, 0.0])
+    np.testing.assert_array_equal(problem.scale, [1.0, 1.0])
+    assert problem.outside + problem.projections @ problem.projections == pytest.approx(y @ y)
+    np.testing.assert_array_equal(LSSVM().fit(np.zeros((5, 2)), y).coef_, [0.0, 0.0])
+
+
+def test_a_feature_that_is_constant_but_for_rounding_is_constant() -> None:
+    """Within a hundred roundings of its size."""
+    y, up = np.arange(40.0), np.where(np.arange(40) % 2 == 0, 1.0, -1.0)
+    for rounding, constant in ((50.0, True), (200.0, False)):
+        X = np.column_stack([y, 1e3 * (1.0 + rounding * np.finfo(float).eps * up)])
+        assert (decompose(X, y, True, True).scale[1] == 1.0) == constant
+
+
+def test_what_was_not_fitted_has_no_polynomial_and_no_names() -> None:
+    with pytest.raises(NotFittedError, match="This LSSVM instance is not fitted yet"):
+        polynomial_coefficients(LSSVM(kernel="poly"))
+    with pytest.raises(NotFittedError, match="This TruncatedLSSVM instance is not fitted yet"):
+        TruncatedLSSVM().collinear_names_  # noqa: B018
+
+
+def test_names_of_columns_are_those_of_the_last_fit() -> None:
+    pandas = pytest.importorskip("pandas")
+    X, y, _ = regression(m=2)
+    twice = np.column_stack([X, X[:, 1]])
+    estimator = TruncatedLSSVM(selection="full").fit(pandas.DataFrame(twice, columns=["v", "r", "again"]), y)
+    assert estimator.collinear_names_ == (("r", "again"),)
+    assert estimator.fit(twice, y).collinear_names_ == (("x1", "x2"),)
+
+
+def test_methods_have_the_settings_that_they_are_known_for() -> None:
+    """Scikit-learn's penalty alpha is 1 / C; by default next to none, on columns as they are."""
+    ridge: Any = METHODS["ridge"].estimator()
+    assert (ridge.C, ridge.scale, ridge.fit_intercept) == (pytest.approx(1e6), False, False)
+    assert METHODS["ridge"].estimator(alpha=4.0).C == 0.25  # type: ignore[attr-defined]
+    least: Any = METHODS["ls"].estimator()
+    assert (least.C, least.selection, least.scale, least.robust) == (np.inf, "full", True, False)
+    assert METHODS["nisg"].estimator().omega == 0.5  # type: ignore[attr-defined]
+    own = get_method(LSSVM(C=3.0, fit_intercept=True))
+    assert (own.regularised, own.refined) == (False, False)
+    made: Any = own.estimator()
+    assert (type(made), made.C, made.fit_intercept) == (LSSVM, 3.0, False)
+
+
+def test_an_estimator_of_others_is_copied_without_its_constant_and_given_a_covariance() -> None:
+    """That of least squares on the features whose coefficients are not zero, by n less their number."""
+    theirs = Ridge(alpha=0.5)
+    adapted = without_constant(theirs)
+    assert isinstance(adapted, Adapted)
+    assert (theirs.fit_intercept, adapted.inner.fit_intercept, adapted.inner.alpha) == (True, False, 0.5)
+    rng = np.random.default_rng(0)
+    X = np.column_stack([rng.standard_normal((12, 2)), np.zeros(12)])
+    y = X @ [1.0, -2.0, 0.0] + 0.1 * rng.standard_normal(12)
+    adapted.fit(X, y)
+    moment = np.zeros((3, 3))
+    moment[:2, :2] = np.linalg.inv(X[:, :2].T @ X[:, :2])
+    residual = y - X @ adapted.coef_
+    np.testing.assert_allclose(adapted.inverse_moment_, moment, atol=1e-12)
+    np.testing.assert_allclose(adapted.covariance_, residual @ residual / 10.0 * moment, atol=1e-12)
+
+
+def test_the_noise_of_as_many_samples_as_directions_is_not_known() -> None:
+    X, y = np.array([[1.0, 0.2], [0.3, 1.0]]), np.array([1.0, 2.0])
+    exact = TruncatedLSSVM(selection="full", fit_intercept=False).fit(X, y)
+    assert np.isnan(exact.noise_variance_)
+    assert np.isnan(exact.covariance_).all()
+    three = TruncatedLSSVM(selection="full", fit_intercept=False).fit(
+        np.vstack([X, [1.0, 1.0]]), [1.0, 2.0, 4.0]
+    )
+    residual = np.array([1.0, 2.0, 4.0]) - np.vstack([X, [1.0, 1.0]]) @ three.coef_
+    assert three.noise_variance_ == pytest.approx(residual @ residual)

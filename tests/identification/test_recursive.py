@@ -7,10 +7,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+from sklearn.exceptions import NotFittedError
 from sklearn.utils.estimator_checks import check_estimator
 
 from identification import identify
-from identification.estimators.coefficient_history import coefficient_history
+from identification.estimators import recursive_kernels as kernels
+from identification.estimators.coefficient_history import CoefficientHistory, coefficient_history
 from identification.estimators.recursive import (
     MultiInnovationLeastSquares,
     RecursiveLeastSquares,
@@ -272,3 +274,79 @@ def test_settings_reach_to_their_bounds() -> None:
     for wrong in ({"start_interval": 0}, {"forgetting": 0.0}, {"C": 0.0}, {"start_C": 0.0}):
         with pytest.raises(InputError, match=f"{next(iter(wrong))}: 0 found"):
             RecursiveLeastSquares(**wrong).fit(*regression())
+
+
+def test_what_has_seen_no_sample_has_no_estimate() -> None:
+    for estimator in (RecursiveLeastSquares(), StochasticGradient()):
+        for name in ("theta", "covariance"):
+            with pytest.raises(NotFittedError, match=f"This {type(estimator).__name__} instance is not"):
+                getattr(estimator, name)
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        ({"forgetting": 1.1}, "forgetting: 1.1 found"),
+        ({"start_samples": -1}, "start_samples: -1 found"),
+        ({"C": 0.0}, "C: 0 found"),
+    ],
+)
+def test_settings_are_checked_sample_by_sample_too(settings: dict[str, Any], message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        RecursiveLeastSquares(**settings).update([[1.0, 2.0]], [3.0])
+
+
+def test_one_sample_of_one_regressor_by_hand() -> None:
+    """Of y = 6 at phi = 2, both by their size: P 1 / (1 / C + 1), theta the same share of 6 / 2."""
+    for C in (1.0, 4.0):
+        found = RecursiveLeastSquares(C=C).update([[2.0]], [6.0])
+        share = 1.0 / (1.0 / C + 1.0)
+        assert found.theta == pytest.approx([3.0 * share])
+        assert found.covariance == pytest.approx(np.array([[share / 4.0]]))
+    gradient = StochasticGradient(scale=[1.0]).update([[2.0]], [6.0]).update([1.0], 4.0)
+    assert gradient.theta == pytest.approx([3.0 + (4.0 - 3.0) / 5.0])
+    assert StochasticGradient().update([[0.0]], [6.0]).theta == pytest.approx([0.0])
+
+
+def test_an_innovation_is_bounded_by_one_over_omega_and_odd() -> None:
+    bounded = [kernels.innovation.py_func(error, 2.0) for error in (-50.0, -1e-6, 0.0, 1e-6, 0.3, 50.0)]
+    assert bounded == pytest.approx([-0.5, -1e-6, 0.0, 1e-6, np.tanh(0.6) / 2.0, 0.5], abs=1e-15)
+    assert kernels.innovation.py_func(7.0, 0.0) == 7.0
+
+
+@pytest.mark.parametrize(
+    ("variances", "expected"),
+    [
+        ([0.9, 0.5], [1.0, 0.5 / 0.9]),  # both may grow by the whole factor
+        ([0.95, 0.5], [1.0, 0.5 / 0.9]),  # the first up to where it began
+        ([1.0, 0.5], [1.0, 0.5 / 0.9]),
+        ([1.2, 0.5], [1.2, 0.5 / 0.9]),  # what is beyond stays
+        ([0.0, 0.95], [0.0, 1.0]),
+    ],
+)
+def test_a_covariance_forgets_up_to_where_it_began(variances: list[float], expected: list[float]) -> None:
+    """By 0.9, from ceilings of 1; rows and columns alike, so that the correlation stays."""
+    cross = 0.5 * np.sqrt(np.prod(variances))
+    P = np.array([[variances[0], cross], [cross, variances[1]]])
+    kernels.forget.py_func(P, 0.9, np.ones(2))
+    np.testing.assert_allclose(np.diag(P), expected)
+    np.testing.assert_allclose([P[0, 1], P[1, 0]], 0.5 * np.sqrt(np.prod(expected)))
+
+
+def test_a_history_ends_with_the_estimate_and_knows_its_coefficients() -> None:
+    found = CoefficientHistory(
+        ("a", "b"), np.array([1.0, 2.0]), np.zeros(2, dtype=np.int64), np.array([[1.0, 5.0], [2.0, 7.0]])
+    )
+    assert found.last == {"a": 2.0, "b": 7.0}
+    assert found["b"].tolist() == [5.0, 7.0]
+    with pytest.raises(InputError, match="coefficient history: no coefficient 'c', expected one of a, b"):
+        found["c"]
+
+
+def test_samples_count_by_how_often_and_how_long_ago_they_were_used() -> None:
+    """With three innovations the last sample once, the one before twice; forgetting 0.5 a step."""
+    X, y = regression(6)
+    found = MultiInnovationLeastSquares(forgetting=0.5, innovations=3).fit(X, y)
+    np.testing.assert_allclose(found.weights_, np.array([3, 3, 3, 3, 2, 1]) * 0.5 ** np.arange(5.0, -1.0, -1))
+    every = RecursiveLeastSquares(start_samples=2, start_interval=2).fit(X, y)
+    np.testing.assert_array_equal(every.weights_, [1.0, 0.0, 1.0, 0.0, 1.0, 1.0])

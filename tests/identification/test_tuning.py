@@ -21,7 +21,7 @@ from identification.search import get_optimiser
 from identification.search.objectives import held_out_error, time_blocks, training_error
 from identification.search.optimisers import _chances, _moved, _settle
 from identification.search.pattern_search import pattern_search
-from identification.search.search import Optimiser
+from identification.search.search import Optimiser, Recorder
 from shipgym import InputError
 
 Floats = np.ndarray[Any, np.dtype[np.float64]]
@@ -290,3 +290,64 @@ def test_an_optimiser_is_a_name_a_table_or_an_object() -> None:
     ):
         with pytest.raises(InputError, match=message):
             get_optimiser(wrong)  # type: ignore[arg-type]
+
+
+def test_a_particle_is_constricted_as_clerc_and_kennedy_say() -> None:
+    """With pulls of 2.05 each the factor is 2 / (phi - 2 + root(phi^2 - 4 phi)) of phi = 4.1."""
+    swarm, phi = ParticleSwarm(), 4.1
+    factor = 2.0 / (phi - 2.0 + np.sqrt(phi**2 - 4.0 * phi))
+    assert swarm.inertia == pytest.approx(factor, abs=5e-5)
+    assert (swarm.own, swarm.common) == (pytest.approx(2.05 * factor, abs=1e-5),) * 2
+
+
+@pytest.mark.parametrize(
+    ("name", "candidates", "rounds"), [("grid", 58, 2), ("pso", 1220, 61), ("de", 1220, 60)]
+)
+def test_a_search_costs_what_it_says(name: str, candidates: int, rounds: int) -> None:
+    """Two grids of 29 points; 20 particles or members in each dimension, 60 times after the first draw."""
+    found = minimise(lambda x: 1.0 + 1e-9 * x[:, 0], [(-1.0, 1.0)], optimiser=name)
+    assert (found.evaluations, len(found.history)) == (candidates, rounds)
+
+
+def test_a_grid_is_refined_between_the_neighbours_of_its_best_point() -> None:
+    seen: list[Floats] = []
+
+    def away(x: Floats) -> Floats:
+        seen.append(x[:, 0])
+        return np.abs(x[:, 0] - 0.9)
+
+    found = GridSearch(points=5, refinements=2).minimise(away, [(-1.0, 1.0)])
+    np.testing.assert_allclose(seen[0], [-1.0, -0.5, 0.0, 0.5, 1.0])
+    np.testing.assert_allclose(seen[1], np.linspace(0.5, 1.0, 5))  # none outside the bounds
+    np.testing.assert_allclose(seen[2], np.linspace(0.75, 1.0, 5))
+    assert found.x == pytest.approx([0.875])
+    np.testing.assert_allclose(found.history, [0.1, 0.025, 0.025])
+
+
+def test_a_record_keeps_the_first_of_the_best_candidates() -> None:
+    values = iter([[np.inf, np.nan], [3.0, 2.0], [2.0, 5.0], [1.0, 1.0]])
+    record = Recorder(lambda _: np.array(next(values)))
+    for k in range(4):
+        record(np.array([[10.0 * k], [10.0 * k + 1.0]]))
+        record.end_round()
+    found = record.result()
+    assert found.course.ravel().tolist() == [0.0, 11.0, 11.0, 30.0]
+    assert found.history.tolist() == [np.inf, 2.0, 2.0, 1.0]
+    assert (found.x.tolist(), found.value, found.evaluations) == ([30.0], 1.0, 8)
+    assert found.of(0, "depth").variable == "depth"
+
+
+def test_a_mesh_is_a_quarter_of_the_box_and_no_finer_than_a_64th() -> None:
+    """Polled are the neighbours in both directions, at most some two hundred points."""
+    seen: list[float] = []
+
+    def valley(x: Floats) -> float:
+        seen.append(float(x[0]))
+        return abs(float(x[0]) - 4.0)
+
+    found = pattern_search(valley, [4.0], [0.0], [8.0])
+    assert seen == [4.0, 6.0, 2.0, 5.0, 3.0, 4.5, 3.5, 4.25, 3.75, 4.125, 3.875]
+    assert found.history.tolist() == [0.0] * 6
+    endless = pattern_search(lambda x: -float(np.sum(x)), np.zeros(2), np.zeros(2), np.full(2, 1e9), mesh=1e-4,
+                             finest=1e-9)  # fmt: skip
+    assert 200 <= endless.evaluations <= 203
