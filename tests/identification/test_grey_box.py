@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -10,7 +11,9 @@ from sklearn.utils.estimator_checks import check_estimator
 
 import shipgym
 from identification import IdentificationResult, identify
-from identification.estimators.rm_svm import ERROR_TOLERANCE, RMSVM, heading_error, most_regularised
+from identification.estimators.estimator import FitTask
+from identification.estimators.rm_svm import ERROR_TOLERANCE, RMSVM, _Tuner, heading_error, most_regularised
+from identification.regression.samples import Samples
 from identification.report.figures import search_figure
 from identification.search.pattern_search import pattern_search
 from identification.simulation_error.similarity import (
@@ -341,3 +344,52 @@ def test_the_error_of_a_heading(
     monkeypatch.setattr("identification.estimators.rm_svm.predict", lambda model, trial: run)
     assert heading_error(target, trial, "rmse") == pytest.approx(rmse)
     assert heading_error(target, trial, "correlation") == pytest.approx(correlation)
+
+
+def tuner(rows: int, **settings: Any) -> _Tuner:
+    """One of a regression of so many rows, for two equations."""
+    features = dict.fromkeys("vr", np.zeros((rows, 1)))
+    samples = Samples(features, dict.fromkeys("vr", np.zeros(rows)), *np.zeros((3, rows)), 1)  # type: ignore[arg-type]
+    return _Tuner(RMSVM(**settings), FitTask(samples, SimpleNamespace(), ()))  # type: ignore[arg-type]
+
+
+def test_a_support_vector_regression_sees_six_hundred_rows_at_most() -> None:
+    assert [tuner(rows).thin for rows in (1, 600, 601, 1200, 1201)] == [1, 1, 2, 2, 3]
+    assert tuner(7).everything.tolist() == [True] * 7
+
+
+def test_bands_are_searched_for_only_where_none_is_given_and_there_is_something_to_correct(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """From a tenth of a standard deviation, between 0 and 1; the objective is the mean over the trials."""
+    for settings, weight in (({"epsilon": 0.3}, 1.0), ({}, 0.0), ({"regression": "ls-svm"}, 1.0)):
+        first = [settings.get("epsilon", 0.1)] * 2
+        assert tuner(9, **settings).bands(weight) == (first, None)
+    asked: list[Any] = []
+    searched = tuner(9, objective="correlation")
+    searched.trials = (1.0, 3.0)  # type: ignore[assignment]
+    monkeypatch.setattr(searched, "model", lambda *given: asked.append(given) or np.sum(given[1]))
+    monkeypatch.setattr(
+        "identification.estimators.rm_svm.heading_error",
+        lambda model, trial, objective: trial * abs(model - 1.25) * (objective == "correlation"),
+    )
+    bands, search = searched.bands(2.0)
+    assert asked[0][:2] == (2.0, [0.1, 0.1])
+    assert search is not None
+    assert search.history[0] == pytest.approx(2.0 * 1.05)
+    assert sum(bands) == pytest.approx(1.25, abs=1 / 64)
+    assert min(bands) >= 0.0
+    assert np.max([bands for _, bands, _ in asked]) <= 1.0
+
+
+def test_a_correction_without_settings_has_a_weight_of_one_and_a_band_of_a_tenth() -> None:
+    X = np.random.default_rng(0).standard_normal((40, 2))
+    y = X @ [1.0, -2.0]
+    default, named, none = (
+        RMSVM(**given).fit(X, y) for given in ({}, {"C": 1.0, "epsilon": 0.1}, {"C": 0.0})
+    )
+    np.testing.assert_array_equal(default.coef_, named.coef_)
+    assert none.coef_.tolist() == [0.0, 0.0]
+    weakest = RMSVM(C=0.01).fit(X, y)
+    np.testing.assert_array_equal(none.inverse_moment_, weakest.inverse_moment_)
+    np.testing.assert_allclose(none.covariance_, np.mean(y**2) * weakest.inverse_moment_)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import gymnasium
@@ -12,7 +13,19 @@ import numpy as np
 import pytest
 
 from identification import LSSVM, IdentificationResult, identify
-from identification.estimators.kernel_residual import chosen_centres, principal, stabilised
+from identification.estimators import kernel_residual
+from identification.estimators.kernel_residual import (
+    KernelFit,
+    _Search,
+    _thinned,
+    chosen_centres,
+    fit_kernel,
+    principal,
+    reference_options,
+    stabilised,
+)
+from identification.options import Options
+from identification.regression.samples import Samples
 from identification.report.page import report_page
 from shipgym import ShipModel, Trial
 from shipgym.errors import InputError
@@ -291,3 +304,118 @@ def worst_of(ship: ShipModel, damping: float) -> float:
     A = np.array([[c["b_v"], c["b_r"]], [c["c_v"], c["c_r"]]]) - damping * np.eye(2)
     drift, turn = np.linalg.inv(A) @ [c["b_d"], c["c_d"]] * GEAR.limit
     return max(1.2 + np.linalg.eigvals(A).real.max(), abs(drift) / 0.5, abs(turn) / 1.2)
+
+
+@pytest.mark.parametrize(
+    ("asked", "structure", "method"),
+    [
+        ({}, "linear", "tls-svm"),
+        ({"method": "rm-svm"}, "linear", "ls-svm"),
+        ({"method": "ls-svm", "structure": "norrbin"}, "norrbin", "ls-svm"),
+        ({"method": "rm-svm", "reference_model": "tanker"}, "grey-box", "rm-svm"),
+        ({"method": "rm-svm", "structure": "norrbin"}, "norrbin", "ls-svm"),
+        ({"regression": "ls-svm", "C": 3.0, "centres": 9, "kernel_length": 2.0}, "linear", "tls-svm"),
+    ],
+)
+def test_beneath_a_kernel_lies_a_linear_ship_unless_another_is_named(
+    asked: dict[str, Any], structure: str, method: str
+) -> None:
+    found = reference_options(Options(kernel="rbf", **asked))
+    assert (found.structure, found.method) == (structure, method)
+    assert (found.kernel, found.centres, found.kernel_length, found.C, found.folds) == (None,) * 5
+
+
+@pytest.mark.parametrize(
+    "band", [{"epsilon": 0.0}, {"epsilon": 0.1, "regression": "ls-svm"}, {"regression": "svr"}]
+)
+def test_a_kernel_has_no_insensitive_band(band: dict[str, Any]) -> None:
+    with pytest.raises(InputError, match="regression: epsilon-SVR found with kernel 'rbf', which is fitted"):
+        reference_options(Options(kernel="rbf", method="rm-svm", **band))
+
+
+def test_centres_are_sought_among_four_thousand_samples_at_most() -> None:
+    for count, every in ((4000, 1), (4001, 2), (8000, 2), (8001, 3)):
+        x = np.arange(float(count))[:, None]
+        np.testing.assert_array_equal(_thinned(x), x[::every])
+
+
+def two_folds(monkeypatch: pytest.MonkeyPatch) -> Any:
+    """A search over a regression of one term: of either trial the coefficient is the error of the other."""
+    X, y = np.array([[1.0], [2.0], [3.0]]), np.array([2.0, 4.0, 3.0])
+    samples = Samples({"r": X}, {"r": y}, np.arange(3.0), np.array([1.0, 2.0, 3.0]), np.array([0, 0, 1]), 1)
+    folds = [(samples.trial == k, f"trial {1 - k}") for k in (0, 1)]
+    monkeypatch.setattr(kernel_residual, "held_out_rows", lambda *_: folds)
+    monkeypatch.setattr(kernel_residual, "heading_error", lambda model, held, _: float(model["r"][0]))
+    blank: Any = SimpleNamespace(particulars=SHIP)
+    stage = SimpleNamespace(samples=samples, model=SimpleNamespace(with_accelerations=lambda found: found))
+    return _Search(blank, (), None, {}, "trials"), stage  # type: ignore[arg-type]
+
+
+def test_errors_are_weighed_over_a_ship_length_in_the_prime_system(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A weight of 1 is 1 / (L T U^3) of windows of T on average; the coefficient is that of a ridge."""
+    search, stage = two_folds(monkeypatch)
+    unit = 1.0 / (7.0 * 2.0 * 1.2**3)
+    assert search.unit(stage.samples) == pytest.approx(unit)
+    for weight in (0.0, 5.0):
+        C = weight * unit
+        errors = [C * 10.0 / (C * 5.0 + 1.0), C * 9.0 / (C * 9.0 + 1.0)]
+        assert search.error(stage, weight) == pytest.approx(np.mean(errors))
+    found = search.fitted(stage, 5.0)
+    C = 5.0 * unit
+    np.testing.assert_allclose(found.model["r"], [C * 19.0 / (C * 14.0 + 1.0)])  # type: ignore[index]
+    np.testing.assert_allclose(found.estimators["r"].inverse_moment_, [[C / (C * 14.0 + 1.0)]])
+
+
+@pytest.mark.parametrize(
+    ("errors", "chosen", "remarks"),
+    [
+        ((1.09, 1.0, 1.2, 2.0), (2.0, 0.1), []),  # the smoothest within a tenth of the best
+        ((1.12, 1.11, 1.2, 1.0), (1.0, 10.0), []),
+        ((1.12, 1.05, 1.2, 1.0), (1.0, 0.1), []),
+        ((3.0, 3.0, 3.0, 3.0), (2.0, 0.1), ["(1.7e+02 and 86 deg rms)"]),
+        ((1.5, 1.5, 1.5, 1.5), (2.0, 0.1), ["(86 and 86 deg rms)"]),
+        ((np.inf,) * 4, (2.0, 0.1), ["(inf and 86 deg rms)"]),
+    ],
+)
+def test_the_smoothest_kernel_nearly_as_good_as_the_best_is_taken_and_one_that_is_no_good_told(
+    errors: tuple[float, ...],
+    chosen: tuple[float, float],
+    remarks: list[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Of lengths 2 and 1 at weights 0.1 and 10; the reference ship alone misses by 1.5 rad."""
+    table = dict(zip([(2.0, 0.1), (1.0, 0.1), (2.0, 10.0), (1.0, 10.0)], errors, strict=True))
+    kernels = {
+        one: SimpleNamespace(centres=np.zeros((8, 4)), basis=np.zeros((8, 5)), one=one) for one in (2.0, 1.0)
+    }
+
+    class Search:
+        def __init__(self, *given: Any) -> None:
+            self.folds = given[-1]
+
+        def stage(self, kernel: Any) -> float:
+            return kernel.one
+
+        def error(self, stage: float, weight: float) -> float:
+            return table[stage, weight] if weight else 1.5
+
+        def fitted(self, stage: Any, weight: Any) -> Any:
+            return KernelFit((stage, weight), None)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(kernel_residual, "_Search", Search)
+    monkeypatch.setattr(kernel_residual, "_kernels", lambda *_: kernels)
+    monkeypatch.setattr(kernel_residual, "WEIGHTS", (0.1, 10.0))
+    none: Any = None
+    found = fit_kernel(none, (), none, Options(), {})
+    assert found.model == chosen
+    assert (found.report["length"], found.report["C"]) == chosen
+    assert (found.report["centres"], found.report["features"]) == (8, 5)
+    kernel = table[chosen] if np.isfinite(table[chosen]) else None
+    assert found.report["heading_errors_held_out"] == {"kernel": kernel, "reference": 1.5}
+    assert [remark.endswith(told) for remark, told in zip(found.report["remarks"], remarks, strict=True)] == (
+        [True] * len(remarks)
+    )
+    kernels.pop(1.0)
+    given = fit_kernel(none, (), none, Options(C=10.0), {})  # nothing is left to choose
+    assert given.model == (2.0, 10.0)
+    assert (given.report["heading_errors_held_out"], given.report["remarks"]) == ({"reference": 1.5}, [])
