@@ -11,6 +11,7 @@ from papers.xu2020_tank import PMM18, PMM38, TABLE_11, xu_ship
 import shipgym
 from identification import identify
 from identification.regression.forces import (
+    ForceRegression,
     _between_jumps,
     force_regression,
     force_variances,
@@ -209,3 +210,40 @@ def test_a_static_test_is_cut_where_a_velocity_jumps_by_twenty_usual_changes() -
     angle = np.repeat([0.0, 0.2, 0.4, 0.6], [5, 3, 4, 8])  # of three samples none tells an acceleration
     held = Trial(np.arange(20.0), {"u": np.ones(20), "v": -angle, "r": np.zeros(20)})
     assert _between_jumps(held) == [slice(0, 5), slice(8, 12), slice(12, 20)]
+
+
+def test_each_force_is_scaled_by_its_root_mean_square_and_one_that_is_zero_not_at_all() -> None:
+    regression = ForceRegression(
+        np.ones((6, 1)), np.array([0.0, 0.0, 3.0, 4.0, 5.0, -5.0]), ("a",), np.repeat(np.arange(3), 2),
+        np.tile([0, 1], 3),
+    )  # fmt: skip
+    np.testing.assert_allclose(regression.scales(), [1.0, 1.0, *[np.sqrt(12.5)] * 2, 5.0, 5.0])
+    found = regression.r_squared(np.array([3.5]))
+    assert (found["Y"], found["N"]) == (pytest.approx(0.0), pytest.approx(1.0 - (1.5**2 + 8.5**2) / 50.0))
+
+
+def test_a_test_of_jumps_alone_is_refused_and_rounding_is_none() -> None:
+    steps = np.repeat([0.0, 0.2, 0.4], 3)
+    run = {name: np.ones(9) for name in ("X", "Y", "N", "u")} | {"v": -steps, "r": np.zeros(9)}
+    with pytest.raises(InputError, match="trial 'held': nowhere 4 samples between jumps of the velocity"):
+        force_regression([Trial(np.arange(9.0), run, name="held")], PMM18, PARTICULARS)
+    for off, pieces in ((1.9e-9, 1), (2.1e-9, 2)):  # of the largest velocity
+        u = np.where(np.arange(12) < 6, 5.0, 5.0 * (1.0 + off))
+        held = Trial(np.arange(12.0), {"u": u, "v": np.zeros(12), "r": np.zeros(12)})
+        assert len(_between_jumps(held)) == pieces
+
+
+def test_forces_are_those_of_the_prime_system_less_the_inertia_of_the_ship() -> None:
+    """X by rho L^2 U^2 / 2 and N by another L; at constant velocities m' r' is what turns with her axes."""
+    length, density, U, n = 28.9, 1025.0, 2.0, 8
+    still = np.ones(n)
+    motion = {"u": 1.6 * still, "v": 1.2 * still, "r": 0.05 * still}
+    run = Trial(np.arange(float(n)), {**motion, "X": 1e4 * still, "Y": 2e4 * still, "N": 3e5 * still})
+    unit = 0.5 * density * length**2 * U**2
+    plain = force_regression([run], PMM18, PARTICULARS, model_inertia=False)
+    forces = [1e4 / unit, 2e4 / unit, 3e5 / unit / length]
+    np.testing.assert_allclose(plain.targets, np.repeat(forces, n))
+    mass, r, xg = 417e3 / PRIME_MASS, 0.05 * length / U, -0.5 / length
+    own = [-mass * (0.6 * r + xg * r**2), mass * 0.8 * r, mass * xg * 0.8 * r]
+    full = force_regression([run], PMM18, PARTICULARS)
+    np.testing.assert_allclose(full.targets, np.repeat(np.add(forces, own), n))

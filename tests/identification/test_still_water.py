@@ -5,12 +5,13 @@ from __future__ import annotations
 import json
 from dataclasses import replace
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 
 from identification import identify
-from identification.regression import still_water
+from identification.regression import current, still_water
 from identification.regression.still_water import in_still_water, through_water
 from identification.regression.wind import measured_wind
 from identification.report.sea import sea_sentences, track_figure
@@ -273,3 +274,99 @@ def test_the_wind_that_a_ship_feels_is_that_of_her_way_over_ground(mariner: Ship
     for name in ("wind_vdot", "wind_rdot"):
         np.testing.assert_allclose(felt[0][name], felt[1][name], rtol=1e-9)
         assert np.abs(felt[0][name]).max() > 0.0
+
+
+def jackknifed(
+    trials: int, shared: bool, residuals: np.ndarray, monkeypatch: pytest.MonkeyPatch
+) -> np.ndarray:
+    """Variance of the northern currents of trials that measure each window by 1, beside `residuals`."""
+    windows = len(residuals)
+    first = current.COEFFICIENTS
+    columns = first + 2 * np.arange(trials)[:, None] * (not shared) + np.arange(2)
+    unknowns = int(columns.max()) + 1
+    slopes, left = np.zeros((windows, 3, trials, unknowns)), np.zeros((windows, 3, trials))
+    for k in range(trials):
+        slopes[:, [0, 1], k, columns[k]] = 1.0
+    left[:, 0] = residuals
+    weights = np.where(np.arange(unknowns) < first, 1.0, 0.0)
+    runs = SimpleNamespace(
+        fitted=lambda: (np.full(unknowns, 0.5), slopes, left), weights=weights, columns=columns,
+        seen=np.zeros((windows, 3, trials)),
+    )  # fmt: skip
+    monkeypatch.setattr(current, "_Runs", lambda *_: runs)
+    found = current.estimate_current([None] * trials, 7.0, 2.0, shared)  # type: ignore[list-item]
+    np.testing.assert_allclose(found.mean, np.ones(2 * trials))  # by the speed of 2 m/s
+    np.testing.assert_allclose(found.covariance, found.covariance.T)
+    return found.covariance[::2, ::2]
+
+
+def test_of_three_trials_in_one_current_each_is_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of six windows with a sum of k the mean of the other twelve moves by k / 12."""
+    residuals = np.outer(np.ones(6), [0.3, -0.1, -0.2])
+    changes = residuals.sum(axis=0) / 12.0
+    expected = 2.0**2 * (2.0 / 3.0 * np.sum(changes**2) + 1.0 / 18.0)
+    np.testing.assert_allclose(jackknifed(3, True, residuals, monkeypatch), expected)
+
+
+@pytest.mark.parametrize(("trials", "shared"), [(1, True), (2, True), (2, False), (3, False)])
+def test_of_fewer_trials_in_one_current_or_of_one_current_each_thirds_are_left_out(
+    trials: int, shared: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    residuals = np.repeat(np.random.default_rng(0).normal(size=(3, trials)), 2, axis=0)
+    together = trials if shared else 1
+    residuals -= residuals.mean() if shared else residuals.mean(axis=0)
+    thirds = residuals[::2].T * 2.0 / (6.0 * together - 2.0)  # a row for each trial
+    n = 3 * trials
+    apart = thirds.ravel() if shared else None
+    for k in range(trials):
+        own = thirds[k] if apart is None else apart
+        expected = 2.0**2 * ((n - 1.0) / n * np.sum(own**2) + 1.0 / (6.0 * together))
+        found = jackknifed(trials, shared, residuals, monkeypatch)[k, k]
+        assert found == pytest.approx(expected)
+
+
+@pytest.mark.parametrize(
+    ("measured", "scale"), [([2.0, 2.0, 2.0], 0.003), ([1.9, 2.0, 2.1], 0.1), ([2.0, 2.0, 2.006], 0.0034641)]
+)
+def test_a_residual_of_a_current_is_three_thousandths_of_the_speed_at_least(
+    measured: list[float], scale: float
+) -> None:
+    """Else the root of the squares by the windows less the unknowns."""
+
+    class Mean(current._Runs):
+        def __init__(self) -> None:
+            self.centre, self.weights = np.zeros(1), np.array([1e-3])
+            self.seen = np.array(measured).reshape(-1, 1, 1)
+
+        def at(self, x: Any) -> tuple[Any, Any]:
+            return self.seen - x[0], np.ones((len(measured), 1, 1, 1))
+
+    x, slopes, residuals = Mean().fitted()
+    assert x == pytest.approx([np.mean(measured)], rel=1e-5)
+    np.testing.assert_allclose(1.0 / slopes, scale, rtol=2e-3)
+    np.testing.assert_allclose(residuals.ravel() * scale, measured - np.mean(measured), atol=2e-5)
+
+
+def test_values_differ_from_zero_by_their_covariance() -> None:
+    """Of two normal numbers the squared distance is exponential: exp(-d^2 / 2)."""
+    assert still_water._probability(np.zeros(2), np.eye(2)) == 1.0
+    assert still_water._probability(np.array([0.3, 0.0]), 0.01 * np.eye(2)) == pytest.approx(np.exp(-4.5))
+    alike = np.array([[2.0, 1.0], [1.0, 2.0]])
+    assert still_water._probability(np.array([3.0, 3.0]), alike) == pytest.approx(np.exp(-3.0))
+
+
+def test_captive_trials_and_those_of_unknown_speed_keep_their_current(mariner: ShipModel) -> None:
+    t = np.arange(50.0)
+    drift = {"current_north": np.full(50, 0.2), "current_east": np.zeros(50)}
+    track = {"x": 5.0 * t, "y": 0.0 * t, "psi": 0.0 * t}
+    towed = Trial(t, {**track, **drift, "u": 5.0 + 0.0 * t, "v": 0.0 * t}, name="towed", kind="captive")
+    (found,), report = in_still_water([towed], Options(), mariner.particulars)
+    assert found is towed
+    assert report == {}
+    slow = Trial(t, {**track, **drift}, name="slow")
+    (found,), report = in_still_water([slow], Options(), {"length": 7.0})
+    assert found is slow
+    assert report == {}
+    (found,), report = in_still_water([slow], Options(), {"length": 7.0, "speed": 2.0})
+    np.testing.assert_allclose(found["x"], 4.8 * t)
+    assert report["currents"]["slow"]["taken_out"]
