@@ -17,7 +17,13 @@ import shipgym
 from identification import IdentificationResult, identify
 from identification.options import Options
 from identification.simulation_error import maximum_a_posteriori
-from identification.simulation_error.maximum_a_posteriori import LARGEST, Estimate, _groups, _Problem
+from identification.simulation_error.maximum_a_posteriori import (
+    LARGEST,
+    Estimate,
+    _groups,
+    _Problem,
+    checked_mmg,
+)
 from identification.simulation_error.mmg_prior import (
     HULL_FORMULAS,
     formula_coefficients,
@@ -453,3 +459,65 @@ def test_errors_over_one_ship_length_are_one_error_and_no_scale_is_below_its_flo
 def test_segments_are_held_out_by_trials(trials: list[int], groups: list[int]) -> None:
     segments: Any = [SimpleNamespace(trial=trial) for trial in trials]
     assert _groups(segments).tolist() == groups
+
+
+class Linear(_Problem):
+    """Measured numbers of one channel, each a ship length of one segment, all to be met by one."""
+
+    def __init__(self, measured: list[float], floor: float = 1e-3) -> None:
+        self.measured, self.floors, self.kept = np.array(measured), np.array([floor]), {}
+        self.segments, self.renewed, self.sailed = [None] * len(measured), 0, 0
+
+    def _weight(self, segment: Any) -> float:
+        return 1.0
+
+    def simulated(self, z: Any, which: Any) -> tuple[Any, Any]:
+        self.sailed += 1
+        return (z[0] - self.measured[which])[:, None], np.ones((len(which), 1, 1))
+
+    def scales(self, errors: Any, which: Any) -> Any:
+        self.renewed += 1
+        return super().scales(errors, which)
+
+
+def test_the_most_probable_number_is_that_of_the_data_and_the_prior_by_their_scatter() -> None:
+    """The prior counts by its strength squared, for its own uncertainty by one; scales are renewed in between."""
+    problem = Linear([3.0, 5.0, 4.0])
+    found = problem.solve(np.zeros(1), 2.0)
+    s = found.scales[0]
+    assert found.z == pytest.approx([12.0 / s**2 / (3.0 / s**2 + 4.0)], rel=1e-6)
+    assert found.covariance == pytest.approx(np.array([[1.0 / (3.0 / s**2 + 1.0)]]))
+    assert (found.strength, problem.renewed) == (2.0, 3)
+    again = Linear([3.0, 5.0, 4.0])
+    near = again.solve(found.z, 2.0)
+    assert again.renewed == 2  # from an earlier fit
+    assert near.scales == pytest.approx(np.sqrt(np.mean((found.z - [3.0, 5.0, 4.0]) ** 2)), rel=0.05)
+    assert Linear([4.0, 4.0]).solve(np.zeros(1), 0.01).scales == pytest.approx([1e-3])  # of the floor
+
+
+def test_what_was_just_simulated_is_not_simulated_again() -> None:
+    problem, both, one = Linear([3.0, 5.0]), np.array([0, 1]), np.array([1])
+    for z, which in ((1.0, both), (1.0, both), (2.0, both), (2.0, one), (2.0, one)):
+        errors, _ = problem.at(np.array([z]), which)
+        assert errors[:, 0].tolist() == (z - problem.measured[which]).tolist()
+    assert problem.sailed == 3
+
+
+def test_ships_that_run_away_have_large_errors_and_no_slopes() -> None:
+    class Lost(Linear):
+        def simulated(self, z: Any, which: Any) -> tuple[Any, Any]:
+            errors = np.array([[np.nan], [np.inf], [-2e9], [6.0]])
+            return errors, np.array([np.inf, -np.inf, np.nan, 4.0])[:, None, None]
+
+    problem = Lost([0.0] * 4, floor=0.01)
+    rows, slopes = problem.rows(np.array([0.5]), np.arange(4), np.array([2.0]), 3.0)
+    assert rows.tolist() == [1e3, 1e3, -1e3, 3.0, 1.5]
+    assert slopes.ravel().tolist() == [0.0, 0.0, 0.0, 2.0, 3.0]
+    errors, _ = problem.simulated(np.zeros(1), np.arange(4))
+    assert problem.scales(errors, np.arange(4)).tolist() == [1.0]  # a hundred times the floor
+
+
+def test_the_method_of_the_mmg_form_is_map_whether_it_was_named_or_not() -> None:
+    assert [checked_mmg(one).method for one in (Options(), Options(method="map"))] == ["map", "map"]
+    for prior in ({"prior": "kijima"}, {"reference_model": "auto"}):
+        assert checked_mmg(Options(**prior)).method == "map"  # type: ignore[arg-type]

@@ -323,3 +323,58 @@ def test_formulas_are_those_printed() -> None:
         "N_v": -0.05 * 0.1, "N_r": -0.05 * (0.54 * 0.1 - 0.1**2),
     }  # fmt: skip
     assert kijima_derivatives(ship) == pytest.approx(kijima | rudder)
+
+
+@pytest.mark.parametrize(("steady", "told"), [(1.0, None), (3.0, 1.0), (np.inf, 1.0)])
+def test_a_strength_that_had_to_be_raised_is_told(steady: float, told: float | None) -> None:
+    """Infinity, which JSON does not know, as none."""
+
+    class Chosen(Errors):
+        def at(self, strength: float, samples: Any = None) -> Any:
+            return {"r": SimpleNamespace(strength=strength), "v": SimpleNamespace(strength=strength)}
+
+        def chosen_strength(self, folds: str = "trials") -> tuple[float, dict[str, float]]:
+            return 1.0, {folds: 0.5}
+
+        def steady_strength(self, least: float) -> float:
+            return steady
+
+    given: Any = SimpleNamespace(name="hers")
+    found = Chosen(given, given, given, given).fitted(None, "by luck")
+    expected = {"prior_source": "hers", "prior_scores": {"by luck": 0.5}}
+    expected |= {"prior_strength": None if np.isinf(steady) else steady}
+    expected |= {} if told is None else {"prior_raised_from": told}
+    for one in found.values():
+        assert (one.strength, one.prior_) == (steady, expected)  # type: ignore[attr-defined]
+    fixed = Chosen(given, given, given, given).fitted(2.0, "by luck")
+    assert fixed["r"].prior_ == {"prior_source": "hers", "prior_strength": 2.0}  # type: ignore[attr-defined]
+
+
+def test_turns_of_a_reference_ship_are_every_second_sample_of_her_virtual_ones(
+    target: ShipModel, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    runs = [Trial(np.arange(5.0), {"u": np.full(5, float(k))}, name=f"virtual-{k}") for k in range(7)]
+    monkeypatch.setattr(prior, "_at_target", lambda *_: target)
+    monkeypatch.setattr(prior, "virtual_trials", lambda _: runs)
+    turns = prior.reference_turns("tanker", target)
+    assert [turn["u"][0] for turn in turns] == [3.0, 4.0, 5.0, 6.0]
+    assert [turn.t.tolist() for turn in turns] == [[0.0, 2.0, 4.0]] * 4
+
+
+def test_the_prior_itself_leaves_only_what_it_does_not_know_to_the_data() -> None:
+    """Known: 2 of the first term. The second is fitted to what it leaves, and alone is uncertain."""
+    X = np.array([[1.0, 1.0], [2.0, 0.0], [0.0, 1.0], [1.0, -1.0]])
+    y = X @ [2.0, 3.0] + [0.1, 9.0, -0.1, 0.0]
+    pull = prior.Prior("hers", {"r": np.array([2.0, 0.0])}, {}, {"r": np.array([True, False])})
+    samples: Any = SimpleNamespace(features={"r": X}, targets={"r": y}, duration=np.ones(4))
+    full = TruncatedLSSVM(selection="full", fit_intercept=False)
+    found = prior._toward(full, samples, "r", pull, np.inf)
+    assert found.coef_ == pytest.approx([2.0, 3.0])
+    np.testing.assert_allclose(found.inverse_moment_, [[0.0, 0.0], [0.0, 1.0 / 3.0]])
+    np.testing.assert_allclose(found.covariance_, [[0.0, 0.0], [0.0, (0.02 + 81.0) / 3.0 / 3.0]])
+    assert found.predict(X) == pytest.approx(X @ [2.0, 3.0])
+    assert not TruncatedLSSVM(fit_intercept=False).fit(X, y).coef_ == pytest.approx([2.0, 3.0], abs=0.1)
+    known = replace(pull, known={"r": np.ones(2, dtype=bool)})
+    held = prior._toward(full, samples, "r", known, np.inf)
+    assert held.coef_ == pytest.approx([2.0, 0.0])
+    assert not held.covariance_.any()

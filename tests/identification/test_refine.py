@@ -2,27 +2,32 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 
+import identification.simulation_error.refine as refinement
 from identification import IdentificationResult, build_samples, identify
 from identification.estimators.estimator import FitTask
 from identification.estimators.methods import get_method
-from identification.simulation_error.refine import Refinement, refine
+from identification.simulation_error.refine import Refinement, refine, split_settings
 from identification.simulation_error.segments import (
     Shooter,
     _edges,
+    _states,
     _without_start,
     about_mean,
     averaged,
+    channel_units,
     compared_channels,
     cut,
 )
-from identification.validation.guard import guarded_fit
+from identification.validation.guard import GuardedFit, guarded_fit
 from shipgym import InputError, ShipModel, Trial
 from shipgym.manoeuvres import turning_circle, turning_indices, zigzag
+from shipgym.ships import get_structure
 
 
 def parameters(model: ShipModel) -> np.ndarray:
@@ -265,3 +270,120 @@ def test_extra_trials_need_the_channels_of_the_structure(mariner: ShipModel, cao
 def test_refinements_that_cannot_be_are_refused(name: str, value: Any) -> None:
     with pytest.raises(InputError, match=f"{name}: .* found"):
         Refinement(**{name: value})
+
+
+@pytest.mark.parametrize(("pull", "tried"), [(1e-3, [1e-3, 1e-2, 0.1, 1.0]), (0.0, [0.0, 1e-9, 1e-8, 1e-7])])
+def test_a_refined_model_that_runs_away_is_pulled_ten_times_harder_three_times(
+    pull: float, tried: list[float], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Then the start stays; each attempt is told with its reasons."""
+    asked: list[float] = []
+
+    def solve(strength: float) -> Any:
+        asked.append(strength)
+        return SimpleNamespace(parameters=strength)
+
+    problem = SimpleNamespace(
+        scales=np.ones(3), solve=solve, model=lambda strength: strength, estimators=lambda _: {}, width=2.5,
+        covariance=lambda *given: (given, []), report=lambda _: {"segments": 7},
+    )  # fmt: skip
+    monkeypatch.setattr(refinement, "_Problem", lambda *_: problem)
+    monkeypatch.setattr(refinement, "reasons_unstable", lambda *_: ["it spins"])
+    given: Any = "start"
+    start, task = GuardedFit(given, {}, True, {}), SimpleNamespace(trials=())
+    kept = refine(start, task, Refinement(pull=pull), 20.0)  # type: ignore[arg-type]
+    assert asked == pytest.approx(tried)
+    assert kept.fit is start
+    assert (kept.covariance, kept.influences, kept.width) == (None, [], 0.0)
+    assert kept.report["decision"] == "not refined: it runs away"
+    assert [one["pull"] for one in kept.report["rejected"]] == asked
+    assert [one["reasons"] for one in kept.report["rejected"]] == [["it spins"]] * 4
+    monkeypatch.setattr(
+        refinement, "reasons_unstable", lambda strength, _: ["it spins"] * (strength < tried[2])
+    )
+    refined = refine(start, task, Refinement(pull=pull), 20.0)  # type: ignore[arg-type]
+    assert (refined.fit.model, refined.report["pull"]) == (pytest.approx(tried[2]),) * 2
+    assert len(refined.report["rejected"]) == 2
+    assert refined.covariance[1:] == (refined.report["pull"], 20.0)  # type: ignore[index]
+    assert refined.width == 2.5
+
+
+def given_problem(**attributes: Any) -> Any:
+    """A refinement of which some attributes are known."""
+    problem = object.__new__(refinement._Problem)
+    vars(problem).update(attributes)
+    return problem
+
+
+def test_a_pull_counts_by_all_that_is_compared_and_an_offset_by_a_degree() -> None:
+    segments = [SimpleNamespace(measured=np.zeros((rows, 3))) for rows in (10, 20)]
+    problem = given_problem(own=segments, first=np.zeros(5), sizes=np.zeros(3))
+    expected = [*[np.sqrt(1e-2 * 90)] * 3, *[180.0 / np.pi] * 2]
+    np.testing.assert_allclose(problem._prior_weights(1e-2), expected)
+
+
+def test_scales_are_root_mean_squares_by_sample_of_the_trials_to_fit() -> None:
+    """Blocks stand for more samples than one: here two blocks for the 8 samples; extra trials do not count."""
+    segments = [SimpleNamespace(measured=np.zeros((8, 2)))]
+    problem = given_problem(own=segments, rows=4, shooter=SimpleNamespace(units=np.array([5.0, 0.1])))
+    shooting = SimpleNamespace(residuals=np.array([1.0, 0.0, 3.0, 0.0, 99.0, 99.0]))
+    found = problem._scales(shooting, np.array([2.0, 0.3]))
+    np.testing.assert_allclose(found, [np.sqrt((2.0**2 + 6.0**2) / 8.0), 1e-10])
+
+
+def test_a_term_of_size_one_makes_up_the_whole_change() -> None:
+    X = np.array([[1.0, 0.0, 2.0], [-1.0, 0.0, 4.0]])
+    samples: Any = SimpleNamespace(features={"r": X}, targets={"r": np.array([6.0, 8.0])})
+    sizes = refinement._term_sizes(samples, "r")
+    np.testing.assert_allclose(sizes, np.sqrt(50.0) / np.array([1.0, np.inf, np.sqrt(10.0)]), atol=1e-300)
+    assert sizes[1] > 0.0  # what is not seen is divided by all the same
+
+
+def test_scores_of_the_same_time_are_added_up_by_trial() -> None:
+    """In bins of 2 s from the first of each trial; the staggered set has the same times once more."""
+    segments: Any = [
+        SimpleNamespace(trial=0, times=np.array([0.0, 1.0, 2.0, 3.9])),
+        SimpleNamespace(trial=0, times=np.array([2.5, 7.0])),
+        SimpleNamespace(trial=1, times=np.array([5.0, 6.0, 9.0])),
+    ]
+    scores = 10.0 ** np.arange(9.0)[:, None]
+    first, second = refinement._in_bins(scores, segments, 2.0)
+    assert first.ravel().tolist() == [11.0, 1100.0 + 1e4, 0.0, 1e5]
+    assert second.ravel().tolist() == [1e6, 1e7, 1e8]
+
+
+def test_a_memory_of_yaw_cannot_be_refined() -> None:
+    blank: Any = SimpleNamespace(table=get_structure("nomoto2"), structure="nomoto2")
+    with pytest.raises(InputError, match="structure 'nomoto2' with a memory of yaw found, whose state no"):
+        refinement._check_refinable(blank, ())
+
+
+def test_settings_of_a_refinement_reach_to_their_bounds_and_stand_apart() -> None:
+    for least in ({"segment_lengths": 0.1}, {"segment_lengths": 1e6}, {"pull": 0.0}, {"extra_weight": 1e-12}):
+        assert Refinement(**least).plain()[next(iter(least))] == next(iter(least.values()))  # type: ignore[arg-type]
+    own, rest = split_settings({"pull": 0.5, "rank": 3, "staggered": False}, True)
+    assert own is not None
+    assert (own.pull, own.staggered, own.segment_lengths, own.segment_start) == (0.5, False, 3.4, "free")
+    assert (own.extra_weight, own.anchor_weight, own.rudder_offsets, own.anchor) == (1.0, 1e-3, False, None)
+    assert rest == {"rank": 3}
+    assert split_settings({"pull": 0.5}, False) == (None, {"pull": 0.5})
+
+
+def test_channels_are_compared_in_units_of_the_ship(mariner: ShipModel) -> None:
+    ship = mariner.particulars
+    rate = ship["speed"] / ship["length"]
+    found = channel_units(mariner, ("u", "v", "r", "p", "psi"))
+    np.testing.assert_allclose(found, [ship["speed"], ship["speed"], rate, rate, 1.0])
+
+
+def test_states_are_smoothed_but_for_the_rudder_and_begin_at_the_origin(
+    mariner: ShipModel, noisy_trials: list[Trial]
+) -> None:
+    trial = noisy_trials[0]
+    found = dict(zip(mariner.state_names, _states(trial, mariner).T, strict=True))
+    assert not found["x"].any()
+    assert not found["y"].any()
+    np.testing.assert_array_equal(found["delta"], trial["delta"])
+    for name in ("psi", "u", "v", "r"):
+        assert 0.0 < np.std(found[name] - trial[name]) < 0.5 * np.std(trial[name])
+        assert np.std(np.diff(found[name], 2)) < 0.5 * np.std(np.diff(trial[name], 2))

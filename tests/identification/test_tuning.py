@@ -348,6 +348,8 @@ def test_a_mesh_is_a_quarter_of_the_box_and_no_finer_than_a_64th() -> None:
     found = pattern_search(valley, [4.0], [0.0], [8.0])
     assert seen == [4.0, 6.0, 2.0, 5.0, 3.0, 4.5, 3.5, 4.25, 3.75, 4.125, 3.875]
     assert found.history.tolist() == [0.0] * 6
-    endless = pattern_search(lambda x: -float(np.sum(x)), np.zeros(2), np.zeros(2), np.full(2, 1e9), mesh=1e-4,
-                             finest=1e-9)  # fmt: skip
+    wide = np.full(2, 1e9)
+    endless = pattern_search(
+        lambda x: -float(np.sum(x)), 0.0 * wide, 0.0 * wide, wide, mesh=1e-4, finest=1e-9
+    )
     assert 200 <= endless.evaluations <= 203
