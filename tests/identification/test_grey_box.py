@@ -13,6 +13,8 @@ import shipgym
 from identification import IdentificationResult, identify
 from identification.estimators.estimator import FitTask
 from identification.estimators.rm_svm import ERROR_TOLERANCE, RMSVM, _Tuner, heading_error, most_regularised
+from identification.regression.grey_box import chosen_box
+from identification.regression.problem import _table
 from identification.regression.samples import Samples
 from identification.report.figures import search_figure
 from identification.search.pattern_search import pattern_search
@@ -393,3 +395,38 @@ def test_a_correction_without_settings_has_a_weight_of_one_and_a_band_of_a_tenth
     weakest = RMSVM(C=0.01).fit(X, y)
     np.testing.assert_array_equal(none.inverse_moment_, weakest.inverse_moment_)
     np.testing.assert_allclose(none.covariance_, np.mean(y**2) * weakest.inverse_moment_)
+
+
+def test_the_most_similar_ship_is_not_taken_unnamed_where_she_is_not_alike() -> None:
+    ship = Particulars(
+        length=100.0, beam=10.0, draught=5.0, block_coefficient=0.45, speed=10.0, rudder_area=8.0
+    )
+    run = Trial(np.arange(3.0), {c: np.ones(3) for c in ("u", "v", "r", "delta")})
+    with pytest.raises(InputError, match=r"none is like this ship; .* choose structure \"abkowitz\" or"):
+        chosen_box("auto", ship, [run])
+    box, found = chosen_box("kvlcc2", ship, [run.with_channels({"n": np.ones(3)})])
+    assert (box.ship.name, box.shaft, found) == ("kvlcc2", True, {})
+    assert not chosen_box("kvlcc2", ship, [run])[0].shaft  # which is not recorded
+    assert not chosen_box("kvlcc2", ship, [])[0].shaft
+
+
+def test_a_grey_box_needs_the_channels_of_steering() -> None:
+    run = Trial(np.arange(3.0), {c: np.ones(3) for c in ("v", "r", "delta")}, name="deaf")
+    with pytest.raises(InputError, match="trial 'deaf': channel 'u' is missing"):
+        _table("grey-box", "mariner", {"length": 7.0}, [run])
+
+
+def test_how_alike_ships_are_does_not_depend_on_the_units_of_what_is_compared() -> None:
+    """Each feature counts by its norm over all ships; what is not known of all is left out."""
+    units = np.array([1.0, 20.0, 0.01, 300.0, 1.0])
+    target = np.array([0.8, 6.0, 2.5, 35.0, np.nan])
+    rows = {"one": [0.6, 7.0, 3.0, 20.0, 5.0], "other": [0.9, 5.5, 2.8, 40.0, 6.0]}
+    found = correlations(target, rows)
+    assert correlations(units * target, {name: units * row for name, row in rows.items()}) == pytest.approx(
+        found
+    )
+    table = np.array([target, *rows.values()])[:, :4]
+    shares = table / np.sqrt(np.sum(table**2, axis=0))
+    assert found == pytest.approx({n: np.corrcoef(shares[0], shares[k])[0, 1] for k, n in enumerate(rows, 1)})
+    with pytest.raises(InputError, match=r"only 2 of block coefficient, .* are known, expected at least 3"):
+        correlations([0.8, 6.0, np.nan, np.nan, np.nan], rows)

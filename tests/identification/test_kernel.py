@@ -32,7 +32,7 @@ from shipgym.errors import InputError
 from shipgym.manoeuvres import zigzag
 from shipgym.ships.catalogue import fitted_box
 from shipgym.ships.checker import check_ship_model
-from shipgym.ships.kernel_boxes import Kernel, KernelBox, gaussians, kernel_box
+from shipgym.ships.kernel_boxes import Kernel, KernelBox, gaussians, kernel_box, kernel_inputs
 from shipgym.ships.linear import nomoto
 from shipgym.ships.particulars import Particulars
 from shipgym.ships.scaling import scale_model
@@ -296,6 +296,10 @@ def test_the_linear_ship_beneath_a_kernel_is_damped_as_little_as_steadies_her() 
         assert steady_at == [True, False]
     with pytest.raises(InputError, match="no damping stabilises the linear ship beneath it"):
         stabilised(linear_ship(c_d=1e4))
+    # by 100 in the prime system at most: a turn of 1.2 takes c_d limit / 1.2 of it
+    assert stabilised(linear_ship(c_d=190.0)).coefficients["c_r"] < -90.0
+    with pytest.raises(InputError, match="no damping stabilises the linear ship beneath it"):
+        stabilised(linear_ship(c_d=205.0))
 
 
 def worst_of(ship: ShipModel, damping: float) -> float:
@@ -419,3 +423,31 @@ def test_the_smoothest_kernel_nearly_as_good_as_the_best_is_taken_and_one_that_i
     given = fit_kernel(none, (), none, Options(C=10.0), {})  # nothing is left to choose
     assert given.model == (2.0, 10.0)
     assert (given.report["heading_errors_held_out"], given.report["remarks"]) == ({"reference": 1.5}, [])
+
+
+def test_a_kernel_has_two_centres_at_least_and_widths_in_root_mean_squares(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A length of 2 makes the scale twice as large and the centres half as far, in its units."""
+    rng, t = np.random.default_rng(0), np.arange(80.0)
+    sizes = {"u": 0.1, "v": 0.05, "r": 0.02, "delta": 0.3}
+    trial = Trial(t, {c: (c == "u") + s * rng.standard_normal(80) for c, s in sizes.items()}, name="random")
+    blank: Any = SimpleNamespace(particulars=SHIP)
+    search = _Search(blank, [trial], None, {"smooth": False}, "trials")  # type: ignore[arg-type]
+    for wrong, bound in ((1, "at least 2"), (0, "at least 2"), (101, "100")):
+        with pytest.raises(InputError, match=f"centres: {wrong} found, .*{bound}"):
+            kernel_residual._kernels(search, Options(centres=wrong))
+    kernels = kernel_residual._kernels(search, Options(centres=2))
+    assert list(kernels) == [2.8, 2.0, 1.4, 1.0, 0.7]  # the smoothest first
+    one, two = kernels[1.0], kernels[2.0]
+    np.testing.assert_allclose(two.scale, 2.0 * one.scale)
+    np.testing.assert_allclose(2.0 * two.centres, one.centres)
+    x = kernel_inputs(dict(trial.channels), SHIP)
+    np.testing.assert_allclose(one.scale, np.sqrt(np.mean((x - one.offset) ** 2, axis=0)), rtol=1e-9)
+    assert list(kernel_residual._kernels(search, Options(centres=2, kernel_length=0.9))) == [0.9]
+    asked: list[int] = []
+    monkeypatch.setattr(
+        kernel_residual, "chosen_centres", lambda x, count: asked.append(count) or chosen_centres(x, 2)
+    )
+    kernel_residual._kernels(search, Options())
+    assert asked == [64]

@@ -10,13 +10,16 @@ from sklearn.exceptions import NotFittedError
 from sklearn.kernel_ridge import KernelRidge
 from sklearn.linear_model import Ridge
 from sklearn.utils.estimator_checks import check_estimator
+from threadpoolctl import threadpool_info, threadpool_limits  # type: ignore[import-untyped]
 
 from identification import LSSVM, ArtificialBeeColony, TruncatedLSSVM, TunedLSSVM, polynomial_coefficients
 from identification.estimators.comparators import LinearSupportVectorMachine
 from identification.estimators.decomposition import decompose, decompose_triangle, triangle
+from identification.estimators.estimator import weights
 from identification.estimators.l_curve import variance_rank
 from identification.estimators.methods import METHODS, Adapted, get_method, without_constant
 from identification.estimators.robust import fit_weighted, hampel_weights
+from identification.estimators.threads import single_threaded
 from shipgym import InputError
 
 Floats = np.ndarray[Any, np.dtype[np.float64]]
@@ -473,6 +476,8 @@ def test_an_estimator_of_others_is_copied_without_its_constant_and_given_a_covar
     residual = y - X @ adapted.coef_
     np.testing.assert_allclose(adapted.inverse_moment_, moment, atol=1e-12)
     np.testing.assert_allclose(adapted.covariance_, residual @ residual / 10.0 * moment, atol=1e-12)
+    few: Any = without_constant(theirs).fit(np.eye(2), [1.0, 3.0])  # of two samples one is left at least
+    np.testing.assert_allclose(few.covariance_, np.sum(([1.0, 3.0] - few.coef_) ** 2) * np.eye(2))
 
 
 def test_the_noise_of_as_many_samples_as_directions_is_not_known() -> None:
@@ -485,3 +490,23 @@ def test_the_noise_of_as_many_samples_as_directions_is_not_known() -> None:
     )
     residual = np.array([1.0, 2.0, 4.0]) - np.vstack([X, [1.0, 1.0]]) @ three.coef_
     assert three.noise_variance_ == pytest.approx(residual @ residual)
+
+
+def test_tall_and_narrow_matrices_are_worked_at_by_one_thread() -> None:
+    def threads() -> set[int]:
+        return {one["num_threads"] for one in threadpool_info() if one["user_api"] == "blas"}
+
+    with threadpool_limits(2, user_api="blas"):
+        before = threads()
+        with single_threaded():
+            assert threads() == {1}
+        assert threads() == before
+
+
+def test_samples_weigh_alike_where_an_estimator_knows_no_weights() -> None:
+    X, y, _ = with_outliers()
+    plain = Ridge().fit(X, y)
+    assert weights(plain, X).tolist() == [1.0] * len(y)
+    robust = LSSVM(robust=True).fit(X, y)
+    assert weights(robust, X) is robust.weights_
+    assert robust.weights_.min() < 0.1

@@ -481,7 +481,7 @@ class Linear(_Problem):
 
 
 def test_the_most_probable_number_is_that_of_the_data_and_the_prior_by_their_scatter() -> None:
-    """The prior counts by its strength squared, for its own uncertainty by one; scales are renewed in between."""
+    """The prior counts by its strength squared, for the uncertainty by one; scales are renewed in between."""
     problem = Linear([3.0, 5.0, 4.0])
     found = problem.solve(np.zeros(1), 2.0)
     s = found.scales[0]

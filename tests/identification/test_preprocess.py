@@ -385,6 +385,27 @@ def test_the_roughness_of_the_motion_is_found_on_the_first_500_samples(
     np.testing.assert_array_equal(start_variances, [1.0, 1e-2, 1.0])
 
 
+def test_positions_begin_uncertain_and_accelerations_within_a_metre_per_second_squared(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """On a clean heading; what was not recorded begins at 0, and the roughness follows the way sailed."""
+    t, rng = 1.0 * np.arange(81.0), np.random.default_rng(0)
+    x, y = (5.0 * t + rng.standard_normal(81), 3.0 + rng.standard_normal(81))
+    asked = states(Trial(t, {"psi": 0.01 * t, "x": x, "y": y}, name="track"), monkeypatch)
+    _, process, observation, variances, measured, start, start_variances, _ = asked[-1][1]
+    np.testing.assert_array_equal(observation, np.eye(6)[:2])
+    np.testing.assert_array_equal(start, [x[0], y[0], 0.0, 0.0, 0.0, 0.0])
+    np.testing.assert_array_equal(start_variances, [1e4, 1e4, 1e2, 1e2, 1.0, 1.0])
+    np.testing.assert_array_equal(measured, np.column_stack([x, y]))
+    np.testing.assert_allclose(variances, [noise_level(t, x) ** 2, noise_level(t, y) ** 2])
+    of_one = process[0] / process[0, 4, 4]  # speeds and accelerations, ahead and aside alike
+    expected = np.zeros((6, 6))
+    expected[2:, 2:] = np.kron([[1.0 / 3.0, 0.5], [0.5, 1.0]], np.eye(2))
+    np.testing.assert_allclose(of_one, expected)
+    decade = np.log10(asked[0][1][1][0, 4, 4] / (np.ptp(x) ** 2 / (80.0 / 20.0) ** 3))
+    assert decade == pytest.approx(-4.0 + 8.0 * 0.381966, abs=1e-5)
+
+
 def test_a_channel_has_the_noise_of_its_resolution_at_least(monkeypatch: pytest.MonkeyPatch) -> None:
     """A ten-thousandth of its range, and a thousand-millionth where it does not change."""
     t = np.arange(60.0)

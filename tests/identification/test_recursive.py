@@ -350,3 +350,12 @@ def test_samples_count_by_how_often_and_how_long_ago_they_were_used() -> None:
     np.testing.assert_allclose(found.weights_, np.array([3, 3, 3, 3, 2, 1]) * 0.5 ** np.arange(5.0, -1.0, -1))
     every = RecursiveLeastSquares(start_samples=2, start_interval=2).fit(X, y)
     np.testing.assert_array_equal(every.weights_, [1.0, 0.0, 1.0, 0.0, 1.0, 1.0])
+
+
+def test_of_fewer_samples_than_coefficients_one_is_taken_to_tell_the_noise() -> None:
+    """All that is left of it is the variance."""
+    X, y = regression(2)
+    found = RecursiveLeastSquares(C=0.5).fit(X, y)
+    left = y - X @ found.coef_
+    assert found.noise_variance_ == pytest.approx(left @ left)
+    assert left @ left > 1e-3 * (y @ y)

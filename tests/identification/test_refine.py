@@ -28,6 +28,7 @@ from identification.validation.guard import GuardedFit, guarded_fit
 from shipgym import InputError, ShipModel, Trial
 from shipgym.manoeuvres import turning_circle, turning_indices, zigzag
 from shipgym.ships import get_structure
+from shipgym.ships.simulate import LONGEST_STEP
 
 
 def parameters(model: ShipModel) -> np.ndarray:
@@ -240,6 +241,7 @@ def test_a_start_that_runs_away_is_kept_and_told(mariner: ShipModel, cao_zigzag:
     [
         ({"segment_lengths": 0.0}, "segment_lengths: 0"),
         ({"segment_lengths": 1e100}, "segment_lengths: 1e[+]100"),
+        ({"segment_lengths": 1.05e6}, "segment_lengths: 1.05e[+]06"),
         ({"segment_start": "smoothed"}, "segment_start: 'smoothed'"),
         ({"pull": -1.0}, "pull: -1"),
         ({"extra_weight": float("nan")}, "extra_weight: nan"),
@@ -323,7 +325,7 @@ def test_a_pull_counts_by_all_that_is_compared_and_an_offset_by_a_degree() -> No
 
 
 def test_scales_are_root_mean_squares_by_sample_of_the_trials_to_fit() -> None:
-    """Blocks stand for more samples than one: here two blocks for the 8 samples; extra trials do not count."""
+    """Blocks stand for more samples than one, here two for eight; extra trials do not count."""
     segments = [SimpleNamespace(measured=np.zeros((8, 2)))]
     problem = given_problem(own=segments, rows=4, shooter=SimpleNamespace(units=np.array([5.0, 0.1])))
     shooting = SimpleNamespace(residuals=np.array([1.0, 0.0, 3.0, 0.0, 99.0, 99.0]))
@@ -387,3 +389,29 @@ def test_states_are_smoothed_but_for_the_rudder_and_begin_at_the_origin(
     for name in ("psi", "u", "v", "r"):
         assert 0.0 < np.std(found[name] - trial[name]) < 0.5 * np.std(trial[name])
         assert np.std(np.diff(found[name], 2)) < 0.5 * np.std(np.diff(trial[name], 2))
+
+
+def test_compared_samples_are_an_interval_apart_and_the_grid_no_coarser_than_the_longest_step(
+    mariner: ShipModel,
+) -> None:
+    """Steps of twice the longest are halved, and an interval of three of them is met to rounding."""
+    longest = LONGEST_STEP * mariner.travel_time
+    t = 2.0 * longest * np.arange(61.0)
+    channels = {name: np.full(61, 0.1 * k) for k, name in enumerate(("psi", "r", "v", "u"))}
+    trial = Trial(t, {**channels, "delta": 0.01 * np.sin(t), "wind_vdot": 1e-3 * t}, name="even")
+    travel = mariner.travel_time
+    every = cut([trial], mariner, ("u", "r"), 1e3, False)[0]
+    np.testing.assert_allclose(np.diff(every.inputs[:, 0]), longest)
+    assert every.samples.tolist() == [k // 2 if k % 2 == 0 else -1 for k in range(121)]
+    assert every.weight == 1.0
+    for factor in (1.0 - 1e-12, 1.0, 1.0 + 1e-12):
+        (third,) = cut([trial], mariner, ("u", "r"), 1e3, False, interval=factor * 6.0 * longest / travel)
+        np.testing.assert_allclose(third.measured, np.full((21, 2), [0.3, 0.1]))
+        np.testing.assert_allclose(third.inputs[:, 0], every.inputs[:, 0])
+        np.testing.assert_allclose(
+            third.inputs[:, 1], np.interp(third.inputs[:, 0], t, trial["delta"]), atol=1e-3
+        )
+        assert not third.inputs[:, [2, 3, 5]].any()  # no shaft speed, no wind ahead or in yaw
+        np.testing.assert_allclose(third.inputs[:, 4], 1e-3 * third.inputs[:, 0])
+        np.testing.assert_allclose(third.start, [0.0, 0.0, 0.0, 0.3, 0.2, 0.1, 0.0], atol=1e-12)
+        assert third.times[0] == 0.0

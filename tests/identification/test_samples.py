@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -223,3 +224,29 @@ def test_the_memory_of_a_trial_falls_out_of_one_window_less_the_next() -> None:
     np.testing.assert_array_equal(found.start, [0.0, 1.0])
     with pytest.raises(InputError, match="window: a trial of 1 windows found, expected at least two"):
         without_memory(samples.select(np.arange(3) == 2))
+
+
+@pytest.mark.parametrize(("corner", "smoothness"), [(5.3, 0), (5.3, 1), (9.8, 0), (1.4, 0), (7.0, 0)])
+def test_a_spline_breaks_where_the_rudder_does(corner: float, smoothness: int) -> None:
+    """Beyond a jump of the rudder's rate a square grows, of its acceleration a cube: both are met exactly."""
+    t, fine = np.arange(13.0), np.linspace(0.0, 12.0, 241)
+
+    def motion(times: np.ndarray) -> np.ndarray:
+        return 2.0 - 0.3 * times + 0.01 * times**3 + np.maximum(times - corner, 0.0) ** (2 + smoothness)
+
+    smooth = straight(t, np.zeros(13))
+    broken = replace(smooth, corners=np.array([corner]), smoothness=np.array([smoothness]))
+    np.testing.assert_allclose(broken_spline(t, motion(t), broken)(fine), motion(fine), atol=1e-9)
+    assert np.abs(broken_spline(t, motion(t), smooth)(fine) - motion(fine)).max() > 1e-3
+
+
+def test_corners_that_leave_too_few_samples_for_a_spline_are_passed_over() -> None:
+    """Beside an end, or the third within a step; the spline goes through all samples still."""
+    t, values = np.arange(9.0), np.random.default_rng(0).standard_normal(9)
+    for corners in ([0.02], [7.98], [4.1, 4.3, 4.6], [4.1, 4.3, 4.6, 4.8]):
+        rudder = replace(
+            straight(t, np.zeros(9)), corners=np.array(corners), smoothness=np.zeros(len(corners), dtype=int)
+        )
+        spline = broken_spline(t, values, rudder)
+        np.testing.assert_allclose(spline(t), values, atol=1e-9)
+        assert np.abs(spline(np.linspace(0.0, 8.0, 161))).max() < 10.0

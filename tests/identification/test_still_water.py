@@ -370,3 +370,37 @@ def test_captive_trials_and_those_of_unknown_speed_keep_their_current(mariner: S
     (found,), report = in_still_water([slow], Options(), {"length": 7.0, "speed": 2.0})
     np.testing.assert_allclose(found["x"], 4.8 * t)
     assert report["currents"]["slow"]["taken_out"]
+
+
+@pytest.mark.parametrize(("coefficient", "sign", "row", "left"), [
+    (0, 1.0, 0, 1.0 - 3.0), (0, -1.0, 0, 1.0 + 2.0), (8, 1.0, 1, -2.0), (8, -1.0, 1, 2.0),
+])  # fmt: skip
+def test_ships_tried_sail_no_faster_than_thrice_and_drift_or_go_astern_no_faster_than_twice_the_speed(
+    coefficient: int, sign: float, row: int, left: float
+) -> None:
+    """Of a ship on a steady northern course the rest is her own speed less that of one that runs away."""
+    t = np.arange(41.0)
+    still = np.zeros(41)
+    channels = {"u": 2.0 + still, "v": still, "r": still, "psi": still, "delta": still}
+    steady = Trial(t, channels, over_ground=True)
+    runs = current._Runs([steady], 10.0, 2.0, True, None)
+    assert runs.windows == 8  # of one ship length, 5 s
+    x = np.zeros(len(runs.weights))
+    wanted = sign * 1e3 * (np.arange(current.COEFFICIENTS) == coefficient)  # and none of the other forces
+    x[: current.COEFFICIENTS] = (wanted - current.PRIOR[0]) / current.PRIOR[1]
+    residuals, _ = runs.at(x)
+    np.testing.assert_allclose(residuals[1:, row, 0], left)
+    np.testing.assert_array_equal(residuals[:, 2], 0.0)  # no log of the speed through the water
+
+
+def test_what_a_ship_of_the_prior_does_is_the_same_to_both_sides() -> None:
+    """Her own neutral helm apart: sway changes its sign with drift, turn, rudder and wind; surge does not."""
+    c = np.random.default_rng(0).normal(size=18)
+    c[8] = 0.0
+    measured = np.array([0.4, 0.3, 1.1, 0.02, 0.05])
+    surge, sway = current._accelerations(0.9, 0.2, measured, c)
+    mirrored = current._accelerations(0.9, -0.2, measured * [-1.0, -1.0, 1.0, 1.0, -1.0], c)
+    assert mirrored == (pytest.approx(surge), pytest.approx(-sway))
+    # at her speed ahead on a straight course only the propeller and the wind act
+    steady = current._accelerations(1.1, 0.0, np.array([0.0, 0.0, 1.1, 0.02, 0.05]), c)
+    assert steady == (pytest.approx(c[0] + 0.02 * c[17]), pytest.approx(0.05 * c[17]))

@@ -353,3 +353,17 @@ def test_a_mesh_is_a_quarter_of_the_box_and_no_finer_than_a_64th() -> None:
         lambda x: -float(np.sum(x)), 0.0 * wide, 0.0 * wide, wide, mesh=1e-4, finest=1e-9
     )
     assert 200 <= endless.evaluations <= 203
+
+
+@pytest.mark.parametrize(
+    "setting",
+    [
+        (ArtificialBeeColony, "sources"), (ArtificialBeeColony, "rounds"), (ArtificialBeeColony, "limit"),
+        (ParticleSwarm, "particles"), (ParticleSwarm, "rounds"), (GridSearch, "points"),
+        (GridSearch, "refinements"), (DifferentialEvolution, "members"), (DifferentialEvolution, "rounds"),
+    ],
+)  # fmt: skip
+def test_a_search_of_more_than_a_hundred_thousand_is_refused(setting: tuple[Any, str]) -> None:
+    kind, name = setting
+    with pytest.raises(InputError, match=f"{name}: 100001 found, .* at most 100000"):
+        kind(**{name: 100_001}).minimise(sphere, BOX)
