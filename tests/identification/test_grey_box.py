@@ -14,7 +14,6 @@ from identification import IdentificationResult, identify
 from identification.estimators.estimator import FitTask
 from identification.estimators.rm_svm import ERROR_TOLERANCE, RMSVM, _Tuner, heading_error, most_regularised
 from identification.regression.grey_box import chosen_box
-from identification.regression.problem import _table
 from identification.regression.samples import Samples
 from identification.report.figures import search_figure
 from identification.search.pattern_search import pattern_search
@@ -408,12 +407,6 @@ def test_the_most_similar_ship_is_not_taken_unnamed_where_she_is_not_alike() -> 
     assert (box.ship.name, box.shaft, found) == ("kvlcc2", True, {})
     assert not chosen_box("kvlcc2", ship, [run])[0].shaft  # which is not recorded
     assert not chosen_box("kvlcc2", ship, [])[0].shaft
-
-
-def test_a_grey_box_needs_the_channels_of_steering() -> None:
-    run = Trial(np.arange(3.0), {c: np.ones(3) for c in ("v", "r", "delta")}, name="deaf")
-    with pytest.raises(InputError, match="trial 'deaf': channel 'u' is missing"):
-        _table("grey-box", "mariner", {"length": 7.0}, [run])
 
 
 def test_how_alike_ships_are_does_not_depend_on_the_units_of_what_is_compared() -> None:

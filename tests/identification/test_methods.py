@@ -10,7 +10,7 @@ from sklearn.neighbors import KNeighborsRegressor
 
 from identification import LSSVM, ArtificialBeeColony, cross_validate, identify
 from identification.estimators.l_curve import LCurve, corner_rank, gcv_rank
-from identification.estimators.methods import METHODS, get_method
+from identification.estimators.methods import METHODS, Adapted, get_method, without_constant
 from identification.estimators.tuned import free_running_error
 from shipgym import InputError, ShipModel, Trial
 from shipgym.manoeuvres import zigzag
@@ -244,3 +244,36 @@ def test_a_method_knows_its_settings_and_an_object_without_fit_is_none() -> None
     assert get_method(LSSVM()).name == "LSSVM"
     with pytest.raises(InputError, match="method: 'lsq' found"):
         get_method("lsq")
+
+
+def test_methods_have_the_settings_that_they_are_known_for() -> None:
+    """Scikit-learn's penalty alpha is 1 / C; by default next to none, on columns as they are."""
+    ridge: Any = METHODS["ridge"].estimator()
+    assert (ridge.C, ridge.scale, ridge.fit_intercept) == (pytest.approx(1e6), False, False)
+    assert METHODS["ridge"].estimator(alpha=4.0).C == 0.25  # type: ignore[attr-defined]
+    least: Any = METHODS["ls"].estimator()
+    assert (least.C, least.selection, least.scale, least.robust) == (np.inf, "full", True, False)
+    assert METHODS["nisg"].estimator().omega == 0.5  # type: ignore[attr-defined]
+    own = get_method(LSSVM(C=3.0, fit_intercept=True))
+    assert (own.regularised, own.refined) == (False, False)
+    made: Any = own.estimator()
+    assert (type(made), made.C, made.fit_intercept) == (LSSVM, 3.0, False)
+
+
+def test_an_estimator_of_others_is_copied_without_its_constant_and_given_a_covariance() -> None:
+    """That of least squares on the features whose coefficients are not zero, by n less their number."""
+    theirs = Ridge(alpha=0.5)
+    adapted = without_constant(theirs)
+    assert isinstance(adapted, Adapted)
+    assert (theirs.fit_intercept, adapted.inner.fit_intercept, adapted.inner.alpha) == (True, False, 0.5)
+    rng = np.random.default_rng(0)
+    X = np.column_stack([rng.standard_normal((12, 2)), np.zeros(12)])
+    y = X @ [1.0, -2.0, 0.0] + 0.1 * rng.standard_normal(12)
+    adapted.fit(X, y)
+    moment = np.zeros((3, 3))
+    moment[:2, :2] = np.linalg.inv(X[:, :2].T @ X[:, :2])
+    residual = y - X @ adapted.coef_
+    np.testing.assert_allclose(adapted.inverse_moment_, moment, atol=1e-12)
+    np.testing.assert_allclose(adapted.covariance_, residual @ residual / 10.0 * moment, atol=1e-12)
+    few: Any = without_constant(theirs).fit(np.eye(2), [1.0, 3.0])  # of two samples one is left at least
+    np.testing.assert_allclose(few.covariance_, np.sum(([1.0, 3.0] - few.coef_) ** 2) * np.eye(2))

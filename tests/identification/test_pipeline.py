@@ -11,7 +11,7 @@ import pytest
 import shipgym
 from identification import LSSVM, ArtificialBeeColony, IdentificationResult, identify
 from identification.options import Options, name_of, provenance_settings
-from identification.regression.problem import _at_constant_speed, _shaft_speed, _ship
+from identification.regression.problem import _at_constant_speed, _shaft_speed, _ship, _table
 from shipgym import InputError, ShipModel, SteeringGear, Trial
 from shipgym.manoeuvres import turning_circle, turning_indices, zigzag, zigzag_indices
 from shipgym.ships import get_structure
@@ -338,3 +338,9 @@ def test_provenance_says_whether_the_steering_gear_was_given(
     assert trial == {"name": cao_zigzag.name, "sha256": cao_zigzag.sha256, "derived": derived}
     assert fit.model.provenance["ranks"] == {"r": 2}
     assert "search" not in fit.model.provenance
+
+
+def test_a_grey_box_needs_the_channels_of_steering() -> None:
+    run = Trial(np.arange(3.0), {c: np.ones(3) for c in ("v", "r", "delta")}, name="deaf")
+    with pytest.raises(InputError, match="trial 'deaf': channel 'u' is missing"):
+        _table("grey-box", "mariner", {"length": 7.0}, [run])

@@ -265,6 +265,9 @@ def test_what_is_sound_stays_to_the_bit_beside_what_is_repaired() -> None:
     np.testing.assert_array_equal(found["u"][at], truth[sound])
     np.testing.assert_array_equal(found["wind_speed"][at], truth[sound])
     assert found.repaired == {"u": 3, "wind_speed": 1}
+    for phase in range(12):  # the last sample too, where a polynomial ends
+        wave = 3.0 + np.sin(t / 7.0 + phase)
+        assert repaired(Trial(t[kept], {"u": wave[kept]}))["u"][-1] == wave[-1]
     gusts = repaired(Trial(t, {"u": truth, "wind_speed": spiked}, name="gusts"))  # of the wind none is one
     np.testing.assert_array_equal(gusts["wind_speed"], spiked)
 
