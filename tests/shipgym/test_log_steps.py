@@ -10,8 +10,8 @@ import pytest
 from scipy.io import savemat
 
 from shipgym.errors import InputError
-from shipgym.trials import csv_reader, nmea, tables
-from shipgym.trials.clock_offsets import clock_offset
+from shipgym.trials import csv_reader, nmea, plausibility, tables
+from shipgym.trials.clock_offsets import _reverses, _turns_against, clock_offset
 from shipgym.trials.clock_texts import clock_text, read_angles, zone_seconds
 from shipgym.trials.columns import Column, Source
 from shipgym.trials.csv_reader import Table, read_table
@@ -95,6 +95,8 @@ def test_a_clock_is_ahead_of_utc_by_what_its_text_says():
             zone_seconds(text, "log")
     assert clock_text(34200.0) == "09:30:00"
     assert clock_text(1717148999.96) == "2024-05-31 09:50:00"
+    assert clock_text(2 * 86400.0 - 1.0) == "23:59:59"  # before the third day it is a time of the day
+    assert clock_text(2 * 86400.0) == "1970-01-03 00:00:00"
     with pytest.raises(ValueError, match="57 north"):
         read_angles(["57.5", "57 north"])
 
@@ -102,6 +104,36 @@ def test_a_clock_is_ahead_of_utc_by_what_its_text_says():
 def test_too_short_a_record_says_nothing_of_a_clock():
     t = np.arange(0.0, 20.0)
     assert clock_offset(t, np.sin(t), np.cos(t), {}) is None
+
+
+def test_too_long_a_record_is_not_searched_for_clocks():
+    """Beyond 200 000 steps, and 15 s at either end."""
+    t = np.arange(200_035.0)
+    assert clock_offset(t, np.sin(0.1 * t), 0.1 * np.cos(0.1 * t), {}) is None
+
+
+def test_a_rudder_that_goes_there_and_back_three_times_tells_a_clock():
+    """What stays within a quarter of its range about the middle is on neither side."""
+    sides = np.repeat([1.0, -1.0, 1.0, -1.0], 50)
+    assert _reverses(sides)
+    assert not _reverses(sides[:150])
+    assert _reverses(sides, 1.99)
+    assert not _reverses(sides, 2.01)
+    for middle, counts in ((0.49, False), (0.51, True)):
+        partly = np.repeat([1.0, -1.0, middle, -1.0], 50)
+        assert _reverses(partly) == counts
+    odd = np.r_[np.repeat([1.0, -1.0, 1.0, -1.0], 98), np.full(4, 30.0)]  # outliers do not count
+    assert _reverses(odd, 1.99)
+    assert not _reverses(odd, 2.01)
+
+
+def test_a_circle_has_its_rudder_on_one_side_for_nine_tenths_of_the_time():
+    psi = -np.linspace(0.0, 2.0, 100)
+    for others, against in ((10, True), (11, False)):
+        delta = np.full(100, 0.2)
+        delta[:others] = -0.1
+        assert _turns_against(psi, delta) == _turns_against(-psi, -delta) == against
+        assert not _turns_against(-psi, delta)
 
 
 # --- cuts
@@ -193,6 +225,20 @@ def turning(step_deg, dt=1.0, n=1):
     )
 
 
+def test_one_step_in_twenty_of_a_heading_may_be_faster():
+    t, rows = np.arange(0.0, 100.05, 0.1), source(range(1001), t="time", psi="gyro")
+    rows.columns["psi"] = Column("gyro", "deg")
+    for steps, message in ((50, ""), (52, "likely a wrong unit")):
+        psi = np.zeros(1001)
+        psi[10 : 10 + 10 * steps : 20] = 7.0 * DEGREE  # two steps each
+        assert np.count_nonzero(np.diff(psi)) == steps
+        if not message:
+            check_heading(t, psi, psi, rows)
+            continue
+        with pytest.raises(InputError, match=message):
+            check_heading(t, psi, psi, rows)
+
+
 def test_headings_turn_by_60_degrees_a_second_but_for_single_outliers_of_30():
     for right in (turning(59.0, n=9), turning(29.0, dt=0.1, n=2), turning(61.0, dt=1.02, n=9)):
         check_heading(*right)
@@ -207,6 +253,96 @@ def test_headings_turn_by_60_degrees_a_second_but_for_single_outliers_of_30():
     check_heading(t, psi, np.where(t == 50.0, 389.0 * DEGREE, 0.0), here)
     with pytest.raises(InputError, match=r"goes from 0 to 391 deg within 1 s, .* likely a wrong unit"):
         check_heading(t, psi, np.where(t >= 50.0, 391.0 * DEGREE, 0.0), here)
+
+
+def test_positions_within_a_tenth_of_a_second_are_as_far_apart_as_in_that_time():
+    """GNSS receivers write times in tenths of a second: 5 m are no jump."""
+    t, rows, here = 0.01 * np.arange(60.0), np.arange(60), source(range(60), t="time", lat="lat")
+    for size, found in ((4.9, []), (5.1, [30])):
+        track = np.zeros((2, 60))
+        track[0, 30] = size
+        assert find_outliers(t, track, here, rows).tolist() == found
+
+
+@pytest.mark.parametrize(
+    ("gain", "misfit", "message"),
+    [
+        (6.0, 0.51, ""),
+        (6.0, 0.49, "disagree: the heading changes 6 times as fast"),
+        (-1.0, 0.49, "have opposite signs, expected both to be positive"),
+        (-1.0, 0.51, ""),
+    ],
+)
+def test_a_heading_that_the_yaw_rate_explains_by_less_than_half_is_not_compared(
+    gain, misfit, message, monkeypatch
+):
+    monkeypatch.setattr(plausibility, "_fit", lambda *_: (complex(gain), misfit))
+    t = np.arange(100.0)
+    table = Table(Path("log.csv"), ("t", "psi", "r"), {}.__getitem__, range(100))
+    here = Source(table, {"psi": Column("psi", "rad"), "r": Column("r", "rad/s")}, np.arange(100))
+    log = Log(t, {"psi": np.sin(0.1 * t), "r": 0.1 * np.cos(0.1 * t)}, "", [])
+    if not message:
+        check_consistency(log, "body", here)
+        return
+    with pytest.raises(InputError, match=message):
+        check_consistency(log, "body", here)
+
+
+@pytest.mark.parametrize(
+    ("body", "earth", "message"),
+    [
+        ((1.0, 0.029), (1.0, 0.001), ""),  # both frames fit
+        ((1.0, 0.031), (1.0, 0.001), 'declare velocity_frame = "earth"'),
+        ((1.0, 0.5), (1.0, 0.099), 'declare velocity_frame = "earth"'),
+        ((1.0, 0.5), (1.0, 0.101), ""),  # neither fits well
+        ((1.0, 0.5), (0.81, 0.001), 'declare velocity_frame = "earth"'),
+        ((1.0, 0.5), (0.79, 0.001), ""),
+        ((1.0, 0.5), (1.24, 0.001), 'declare velocity_frame = "earth"'),
+        ((1.0, 0.5), (1.26, 0.001), ""),
+        ((2.0, 0.19), (9.0, 0.19), "the position changes 2 times as fast as the velocities say"),
+        ((2.0, 0.21), (9.0, 0.21), ""),
+    ],
+)
+def test_velocities_contradict_positions_where_they_follow_them_in_another_way(
+    body, earth, message, monkeypatch
+):
+    fits = iter([body, earth])
+    monkeypatch.setattr(plausibility, "_fit", lambda *_: next(fits))
+    t = np.arange(50.0)
+    log = Log(t, dict.fromkeys(("x", "y", "psi", "u", "v"), t), "", [])
+    here = source(range(50), t="time", x="x", y="y", u="u", v="v", psi="gyro")
+    if not message:
+        check_consistency(log, "body", here)
+        return
+    with pytest.raises(InputError, match=message):
+        check_consistency(log, "body", here)
+
+
+@pytest.mark.parametrize(("swing_deg", "refused"), [(44.0, True), (47.0, False)])
+def test_a_heading_that_swings_about_the_course_is_not_compared(swing_deg, refused):
+    """The mean of cos(45 deg) is 0.71."""
+    swing = swing_deg * DEGREE * np.where(np.arange(50) % 2, 1.0, -1.0)
+    arguments = np.zeros(50), swing + 0.6, Instruments(), source(range(50), t="time", psi="gyro")
+    if not refused:
+        _check_course(*arguments)
+        return
+    with pytest.raises(InputError, match="contradicts the course over ground by -34 deg"):
+        _check_course(*arguments)
+
+
+@pytest.mark.parametrize(("share", "counts"), [(0.29, False), (0.31, True)])
+def test_the_course_counts_from_three_tenths_of_the_speed_on(share, counts):
+    """At slow speed a ship has no course: here one to the other side."""
+    t, speed = np.arange(100.0), np.full(100, 5.0)
+    speed[50:] *= share
+    ground = speed * np.exp(1j * np.where(t < 50.0, 0.0, 1.4))
+    values = {"psi": np.zeros(100), "delta": t, "ground_north": ground.real, "ground_east": ground.imag}
+    arguments = Log(t, values, "", []), Instruments(), source(range(100), t="time", psi="gyro"), True
+    if not counts:
+        assert check_log(*arguments) == []
+        return
+    with pytest.raises(InputError, match="contradicts the course over ground by -40 deg"):
+        check_log(*arguments)
 
 
 def test_windows_are_thirty_at_most():
@@ -328,6 +464,8 @@ def test_files_of_one_log_overlap_in_time():
     check_overlap(mine, other(599.0), Path("b.csv"), "time")
     check_overlap(mine, other(-599.0), Path("b.csv"), "time")
     for begin, remedy in (
+        (14 * hour, r'zone = "\+14:00"'),
+        (14.5 * hour, "name files that were written at the same time"),
         (2 * hour + 10.0, r'zone = "\+02:00"'),
         (-1.5 * hour, r'zone = "-01:30"'),
         (900.0, "name files that were written at the same time"),
@@ -544,6 +682,27 @@ def test_sheets_and_parquet_files_are_refused_by_the_values_that_they_would_unpa
         monkeypatch.undo()
 
 
+def test_texts_count_by_what_they_unpack_to_and_sheets_by_their_parts(tmp_path, monkeypatch):
+    """Twenty texts of a thousand letters are 20 000 bytes, though they are 20 values only."""
+    texts = pd.DataFrame({"u": [f"{k:04d}" * 250 for k in range(20)]})
+    texts.to_parquet(tmp_path / "log.parquet", use_dictionary=False)
+    pd.DataFrame({"u": [1.0]}).to_excel(tmp_path / "log.xlsx", index=False)
+    for name, most in (("parquet", 19_000), ("xlsx", 1000)):
+        monkeypatch.setattr(tables, "LARGEST_UNPACKED", most)
+        with pytest.raises(InputError, match=f"log.{name}: over {most} bytes unpacked, expected less"):
+            read_log(tmp_path / f"log.{name}")
+
+
+def test_what_a_library_says_of_a_damaged_file_is_told_in_one_line_of_200_letters():
+    with pytest.raises(InputError) as refused, tables._damage_told(Path("log"), "Excel", "save it anew"):
+        raise ValueError("a\n\tb " + 300 * "c")
+    told = f"ValueError: a b {300 * 'c'}"[:200]
+    assert str(refused.value) == f"log: cannot be read as Excel ({told}); save it anew"
+    missing = pytest.raises(InputError, match="log: x, which reads Excel, is not installed")
+    with missing, tables._damage_told(Path("log"), "Excel", ""):
+        raise ModuleNotFoundError("none", name="x")
+
+
 def test_the_limits_of_a_log_are_those_of_the_page(tmp_path):
     """docs/ship_file.md: 32 MiB, Parquet 64 MiB; unpacked 256 MiB, 5,000,000 values."""
     for ending, most in (("xlsx", 32), ("mat", 32), ("parquet", 64)):
@@ -562,6 +721,15 @@ def test_the_limits_of_a_log_are_those_of_the_page(tmp_path):
     assert len(from_frame(pd.DataFrame({"u": values[1:]})).lines) == 5_000_000
     with pytest.raises(InputError, match="5000001 rows found, expected a table of at most 5000000 values"):
         from_frame(pd.DataFrame({"u": values}))
+
+
+def test_a_table_has_a_million_lines_at_most(tmp_path):
+    path = tmp_path / "run.csv"
+    path.write_text("t,u" + 999_998 * "\n" + "0,1\n")
+    assert read_table(path).lines == [999_999]
+    path.write_text("t,u" + 1_000_000 * "\n")
+    with pytest.raises(InputError, match=r"run\.csv: 1000001 lines found, expected at most 1000000"):
+        read_table(path)
 
 
 @pytest.mark.parametrize(
