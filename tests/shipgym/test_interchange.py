@@ -10,6 +10,7 @@ import pytest
 
 import shipgym
 from shipgym import Episode, InputError, Trial, interchange, load_model
+from shipgym.interchange import minari_datasets
 from shipgym.ships.catalogue import kvlcc2_l7
 
 TRIAL = Trial(
@@ -161,3 +162,55 @@ def test_k_and_t_come_back():
     assert kt["kt_params"] == pytest.approx({"K": 0.1848, "T": 107.2}, rel=1e-3)
     ship = interchange.from_shipmmg(kt, 7.7175, length=160.93)
     assert interchange.to_shipmmg(ship)["kt_params"] == pytest.approx(kt["kt_params"])
+
+
+def test_a_ship_of_shipmmg_keeps_what_her_parameters_say():
+    """KVLCC2's model of 7 m is 1.27 m broad; shipmmg knows neither shaft speed nor steering gear."""
+    ship = kvlcc2_l7("shipmmg")
+    parameters = interchange.to_shipmmg(ship)
+    basic = parameters["basic_params"]
+    assert basic["B"] == ship.particulars["beam"]
+    assert basic["I_zG"] == pytest.approx(basic["m"] * (7.0 / 4.0) ** 2)
+    assert basic["η"] == pytest.approx(basic["D_p"] / ship.coefficients["H_R"])
+    back = interchange.from_shipmmg(parameters, 1.179)
+    assert (back.name, back.service_shaft_speed) == ("shipmmg", 0.0)
+    assert (back.particulars["beam"], back.particulars["speed"]) == (basic["B"], 1.179)
+    assert back.steering == shipgym.SteeringGear()
+    assert back.coefficients["volume"] == pytest.approx(3.27)
+
+
+def test_a_set_of_mss_has_its_inertia_about_midship():
+    """That of a mass in one point, xG ahead of midship, leaves no gyradius."""
+    mariner = load_model("mariner")
+    known = interchange.to_mss(mariner)
+    p = mariner.particulars
+    assert known["Iz"] == pytest.approx(
+        known["m"] * ((p["yaw_gyradius"] / p["length"]) ** 2 + known["xG"] ** 2)
+    )
+    back = interchange.from_mss(known)
+    assert (back.name, back.particulars["water_density"], back.steering.time_constant) == ("mss", 1025.0, 1.0)
+    for share, gyradius in ((4.0, np.sqrt(3.0)), (2.0, 1.0)):
+        changed = interchange.from_mss(known | {"Iz": share * known["m"] * known["xG"] ** 2})
+        assert changed.particulars["yaw_gyradius"] == pytest.approx(-gyradius * p["xg"])
+
+
+def test_rewards_that_are_run_again_may_differ_by_rounding(monkeypatch, episodes):
+    """By one part in a million; here a made-up environment that says what it is asked."""
+    episode = episodes[0]
+
+    class Again:
+        def __init__(self, factor):
+            self.rewards = iter(factor * episode.rewards)
+
+        def reset(self, seed=None):
+            return np.zeros(3), {}
+
+        def step(self, action):
+            return np.zeros(3), next(self.rewards), False, False, {}
+
+    shown = minari_datasets._observations(Again(1.0 + 9e-7), episode, "episodes[0]")
+    assert shown.shape == (episode.n_steps + 1, 3)
+    worst = np.abs(episode.rewards).max()
+    off = 1.0 + 1.05e-6 * (1.0 + 1.0 / worst)
+    with pytest.raises(InputError, match=r"episodes\[0\]: cost"):
+        minari_datasets._observations(Again(off), episode, "episodes[0]")

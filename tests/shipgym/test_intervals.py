@@ -1,11 +1,13 @@
 """Indices with their intervals over the posterior, and what is judged by them."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from shipgym import InputError, load_model, manoeuvres
+from shipgym.manoeuvres import imo
 from shipgym.manoeuvres.imo import assess_draws, imo_criteria
 from shipgym.manoeuvres.intervals import IndexInterval, intervals_of, worst
 
@@ -163,3 +165,23 @@ def test_the_worst_of_two_runs_is_the_larger_draw_by_draw():
     np.testing.assert_array_equal(found.values, [2.0, 5.0, np.nan])
     assert found.ran_away.tolist() == [False, False, True]
     assert worst([one, index(None, [1.0, 1.0, 1.0])]).value is None
+
+
+def test_an_identified_ship_is_judged_by_a_hundred_draws_and_another_by_none(identified, monkeypatch):
+    drawn = []
+    monkeypatch.setattr(imo, "assess_draws", lambda model, draws: drawn.append(len(draws)))
+    manoeuvres.imo_assessment(identified)
+    manoeuvres.imo_assessment(load_model("mariner"))
+    manoeuvres.imo_assessment(identified, n_draws=3)
+    assert drawn == [100, 0, 3]
+    with pytest.raises(InputError, match="n_draws: -1 found"):
+        manoeuvres.imo_assessment(identified, n_draws=-1)
+
+
+def test_progress_counts_the_draws_done(identified):
+    done = []
+    ship = load_model("mariner")
+    evaluate = {"a": lambda ship: _only_advance(SimpleNamespace(advance_lengths=len(ship.name)))}
+    found = intervals_of({"a": {"advance_lengths": 7.0}}, [ship, identified, ship], evaluate, done.append)
+    assert done == [1, 2, 3]
+    assert found["a"]["advance_lengths"].values.tolist() == [7.0, len(identified.name), 7.0]

@@ -21,8 +21,8 @@ from shipgym.plots import (
     turning_figure,
     zigzag_figure,
 )
-from shipgym.plots.style import Panel, panels
-from shipgym.plots.trials import AXES
+from shipgym.plots.style import MEASURED, PALETTE, Panel, line_styles, panels, translucent
+from shipgym.plots.trials import AXES, thinned
 from tests.golden.texts import flat, same_text
 
 DERIVED = ("speed", "drift")  # channels that u and v give
@@ -170,3 +170,76 @@ def test_speed_and_drift_follow_from_surge_and_sway(circle):
     figure = history_figure({"turn": circle}, ["speed", "drift"])
     assert values(figure, "y", 0) == pytest.approx(np.hypot(circle["u"], circle["v"]), rel=1e-6)
     assert values(figure, "y", 1)[-1] > 0.0  # in a turn to starboard the ship moves to port of her heading
+
+
+def test_a_turn_to_starboard_has_its_marks_to_starboard(circle):
+    indices, figure = turning_indices(circle), turning_figure(circle)
+    x = {trace.name.rsplit(" ", 2)[0]: np.asarray(trace.x, dtype=float) for trace in figure.data}
+    assert x["advance"] == pytest.approx(np.full(2, indices.transfer_lengths))
+    assert x["transfer"] == pytest.approx([0.0, indices.transfer_lengths])
+    assert x["tactical diameter"] == pytest.approx([0.0, indices.tactical_diameter_lengths])
+
+
+def test_a_turn_that_ends_early_is_drawn_without_marks(circle):
+    short = turning_figure(circle.part(slice(0, 30)).with_(length=circle.length))
+    assert [trace.name for trace in short.data] == ["path"]
+
+
+def test_fifteen_hundred_samples_of_a_line_are_drawn_at_most():
+    assert [thinned(range(n)).step for n in (3, 1500, 1501, 3000, 3001)] == [1, 1, 2, 2, 3]
+
+
+def test_lines_beyond_the_palette_begin_with_it_again():
+    labels = [f"run {k}" for k in range(len(PALETTE) + 1)]
+    styles = line_styles([*labels[:1], "measured", *labels[1:]])
+    assert [styles[label]["colour"] for label in labels] == [*PALETTE, PALETTE[0]]
+    assert styles["measured"] == {"colour": MEASURED, "width": 1.5}
+    assert {styles[label]["width"] for label in labels} == {2.0}
+    assert translucent("#1d70b8", 0.25) == "rgba(29,112,184,0.25)"
+
+
+def test_a_spiral_to_one_side_has_no_loop():
+    t = np.arange(3.0)
+    one_side = np.array([3.0, 2.0, 1.0]), np.array([0.9, 0.6, 0.3])
+    for method, lines in (("reverse", ["reverse spiral"]), ("direct", ["there", "and back"])):
+        spiral = Spiral(Trial(t, {"delta": t, "r": t}), *one_side, method)
+        assert [trace.name for trace in spiral_figure(spiral).data] == lines
+
+
+def test_a_zigzag_that_never_reverses_has_no_switch_heading():
+    t = np.arange(50.0)
+    trial = Trial(t, {"psi": 0.001 * t, "delta": np.full(50, 0.1)}, kind="zigzag")
+    assert [trace.name for trace in manoeuvre_figure(trial).data] == ["heading change", "rudder"]
+
+
+def test_a_pull_out_is_drawn_from_the_end_of_its_turn():
+    """The rudder is amidships from where it is below half of what it was."""
+    t = np.arange(60.0)
+    delta = np.r_[np.full(20, 0.3), np.full(10, 0.16), np.full(10, 0.14), np.zeros(20)]
+    trial = Trial(t, {"delta": delta, "r": 0.02 - 1e-4 * t}, name="starboard", kind="pull-out")
+    (drawn,) = manoeuvre_figure(trial).data
+    assert np.asarray(drawn.x, dtype=float)[[0, 30]] == pytest.approx([-30.0, 0.0])
+    assert np.asarray(drawn.y, dtype=float)[0] == pytest.approx(np.degrees(0.02))
+    left = np.degrees(0.02 - 1e-4 * np.mean([57.0, 58.0, 59.0]))
+    assert drawn.name == f"starboard: {left:.3f} deg/s left"
+
+
+def test_a_ship_without_shaft_has_two_panels_of_speed():
+    t = np.arange(20.0)
+    channels = {"u": 5.0 - 0.1 * t, "v": 0.0 * t}
+    trial = Trial(t, channels, kind="straight", length=10.0)
+    assert len(manoeuvre_figure(trial).data) == 2
+    figure = manoeuvre_figure(Trial(t, channels | {"n": 1.0 + t}, kind="straight", length=10.0))
+    assert [trace.name for trace in figure.data] == ["surge speed", "surge speed", "shaft"]
+    assert values(figure, "x", 0)[:2] == pytest.approx([0.0, 0.495])  # ship lengths
+    assert values(figure, "y", 2) == pytest.approx(1.0 + t)
+
+
+def test_orders_that_never_change_are_not_drawn():
+    t = np.arange(20.0)
+    still = dict.fromkeys(("delta_command", "n_command", "n"), np.ones(20))
+    trial = Trial(t, still | {"delta": 0.01 * t, "psi": 0.0 * t, "r": 0.0 * t}, kind="random")
+    figure = manoeuvre_figure(trial)
+    titles = [figure.layout[f"yaxis{k}"].title.text for k in ("", 2, 3)]
+    assert (len(figure.data), titles) == (3, ["rudder, deg", "heading, deg", "yaw rate, deg/s"])
+    assert figure.layout.showlegend is False

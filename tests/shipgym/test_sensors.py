@@ -97,6 +97,27 @@ def test_instruments_feel_the_motion_in_waves_and_the_weather_is_not_logged():
     np.testing.assert_allclose(logged["psi"], 0.1 * t + np.cos(t))
 
 
+def test_a_sea_trial_has_instruments_for_roll_as_for_yaw():
+    """Gyros of 0.02 deg/s, angles to 0.1 deg; the shaft is counted to a tenth of a turn a minute."""
+    degree = np.radians(1.0)
+    noise = {name: sensor.noise for name, sensor in SEA_TRIAL.items() if sensor.noise}
+    assert noise == pytest.approx({
+        "x": 0.3, "y": 0.3, "psi": 0.1 * degree, "phi": 0.1 * degree, "r": 0.02 * degree, "p": 0.02 * degree,
+        "u": 0.03, "v": 0.02,
+    })  # fmt: skip
+    steps = {name: sensor.resolution for name, sensor in SEA_TRIAL.items() if sensor.resolution}
+    assert steps == pytest.approx({"delta": 0.1 * degree, "n": 0.1 / 60.0})
+    assert Sensor() == Sensor(drift_time_s=300.0)
+    assert Sensors().dropout_samples == 3.0
+
+
+def test_a_sensor_may_err_always_and_a_gap_be_of_one_sample(still):
+    always = Sensors({"v": Sensor(outlier_probability=1.0, outlier_size=1.0)}, dropout_samples=1.0)
+    assert np.count_nonzero(always.measure(still)["v"]) == N
+    with pytest.raises(InputError, match=r"outlier_probability: 1\.01 found"):
+        Sensor(outlier_probability=1.01)
+
+
 def test_sensors_do_not_change_with_the_mapping_that_they_were_given(zigzag):
     given = {"r": SEA_TRIAL["r"]}
     sensors = Sensors(given)

@@ -1,5 +1,6 @@
 """A ship with equations of her own from one file outside the package: the one of its documentation page."""
 
+import math
 import pickle
 import re
 import subprocess
@@ -7,12 +8,14 @@ import sys
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 import shipgym
 from shipgym import InputError, check_ship_model, load_model, manoeuvres, register_ship_equations
+from shipgym.engine.motion import Motion, Ship
 from shipgym.ships.linear import nomoto
 from shipgym.ships.structures import EQUATIONS, SHIPPED_EQUATIONS
 
@@ -123,3 +126,26 @@ def test_a_file_that_is_not_there(tmp_path: Path) -> None:
         match=r"barge\.py: no such file, expected a Python file that defines SHIP = ShipEquations\(\.\.\.\)",
     ):
         load_model(tmp_path / "barge.py")
+
+
+def test_her_equations_are_tried_in_a_turn_in_deep_water(tug: Path) -> None:
+    """At nine tenths of her service speed, drifting and turning, so that no term is left out by a zero."""
+    ship = register_ship_equations(tug)
+    seen: list[tuple[Motion, Ship]] = []
+    shafts: list[tuple[float, float]] = []
+
+    def accelerations(motion: Motion, c: Any, ship: Ship) -> tuple[float, float, float, float, float]:
+        seen.append((motion, ship))
+        return 0.0, 0.0, 0.0, 0.0, 0.0
+
+    def shaft(n: float, command: float, c: Any, ship: Ship) -> float:
+        shafts.append((n, command))
+        return 0.0
+
+    replace(ship, accelerations=accelerations, shaft_acceleration=shaft)
+    ((motion, her),) = seen
+    length, speed, n = ship.particulars["length"], ship.particulars["speed"], ship.service_shaft_speed
+    assert her == Ship(length, speed, ship.steering.limit, ship.steering.rate, 0.0, n, math.inf, speed)
+    assert (motion.u, motion.v, motion.r) == (0.9 * speed, 0.1 * speed, 0.1 * speed / length)
+    assert (motion.psi, motion.delta, motion.p, motion.phi, motion.n) == (0.1, 0.1, 0.01, 0.01, n)
+    assert shafts == [(n, 0.9 * n)]

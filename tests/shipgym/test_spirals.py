@@ -5,6 +5,8 @@ import pytest
 
 from shipgym import InputError, Trial, load_model, manoeuvres
 from shipgym.manoeuvres import Spiral
+from shipgym.manoeuvres.settling import Voyage
+from shipgym.ships.simulate import Conditions
 
 
 @pytest.mark.parametrize(
@@ -151,3 +153,63 @@ def test_what_a_trial_lacks_is_named():
         manoeuvres.spiral_indices(Spiral(still, np.array([1.0, 0, -1]), np.array([1.0, 0.1, -1.0]), "direct"))
     with pytest.raises(InputError, match="turns to both sides"):
         manoeuvres.spiral_indices(Spiral(still, np.array([1.0, 0, -1]), np.array([1.0, 0.5, 0.1]), "direct"))
+
+
+def test_the_rudder_of_a_pull_out_is_amidships_below_half_of_what_it_was():
+    t = np.arange(100.0)
+    rate = np.radians(np.where(t < 50.0, 0.5 + 0.01 * t, 0.2 - 0.001 * t))
+    for middle, end_of_turn in ((0.16, 60), (0.14, 50)):
+        delta = np.r_[np.full(50, -0.3), np.full(10, -middle), np.zeros(40)]
+        found = manoeuvres.pull_out_indices(Trial(t, {"delta": delta, "r": rate}))
+        last = slice(end_of_turn - end_of_turn // 10, end_of_turn)
+        assert found.turning_rate_deg_s == pytest.approx(np.degrees(rate)[last].mean())
+        rest = np.degrees(rate)[end_of_turn:]
+        assert found.residual_rate_deg_s == pytest.approx(rest[-(len(rest) // 10) :].mean())
+
+
+def test_a_leg_ends_after_sixty_stretches_of_five_lengths_steady_or_not(monkeypatch):
+    voyage = Voyage(load_model("mariner"), None, Conditions())
+    gone = []
+
+    def go(sail, n_steps):
+        gone.append(n_steps)
+        return np.full((n_steps, 7), 0.001 * len(gone)), np.full((n_steps, 2), 0.3)
+
+    monkeypatch.setattr(voyage, "go", go)
+    assert voyage.settle(None) == pytest.approx((0.3, 0.06))
+    assert gone == [200] * 60  # forty steps a length
+
+
+@pytest.mark.parametrize(("change", "stretches"), [(1.9e-5, 2), (2.1e-5, 60)])
+@pytest.mark.parametrize("what", ["u", "v", "r", "rudder"])
+def test_a_motion_is_steady_where_nothing_changes_by_two_parts_in_100_000(
+    what, change, stretches, monkeypatch
+):
+    """Speeds by that of service, yaw rate by that of service over the length, the rudder in rad."""
+    ship = load_model("mariner")
+    length, speed = ship.particulars["length"], ship.particulars["speed"]
+    unit = {"u": speed, "v": speed, "r": speed / length, "rudder": 1.0}[what]
+    voyage, gone = Voyage(ship, None, Conditions()), []
+
+    def go(sail, n_steps):
+        states, commands = np.zeros((n_steps, 7)), np.zeros((n_steps, 2))
+        gone.append(n_steps)
+        if what == "rudder":
+            commands[:, 0] = len(gone) * change
+        else:
+            states[:, ship.state_names.index(what)] = len(gone) * change * unit
+        return states, commands
+
+    monkeypatch.setattr(voyage, "go", go)
+    voyage.settle(None)
+    assert len(gone) == stretches
+
+
+def test_points_of_a_spiral_near_the_angles_asked_for_are_kept():
+    t = np.arange(250.0)
+    angles = np.repeat([10.0, 4.6, 4.4, 0.0, -10.0], 50)
+    trial = Trial(t, {"delta_command": np.radians(angles), "r": np.radians(0.1 * angles)})
+    found = manoeuvres.spiral_from_trial(trial, [10.0, 5.0, 0.0, -10.0])
+    assert found.rudder_deg == pytest.approx([10.0, 4.6, 0.0, -10.0])
+    every = manoeuvres.spiral_from_trial(trial, [10.0, 5.0, 0.0, -10.0], tolerance_deg=0.7)
+    assert every.rudder_deg == pytest.approx([10.0, 4.6, 4.4, 0.0, -10.0])

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from shipgym import InputError, Particulars, Waves, load_model, sea_states
 from shipgym.sea import slow_drift, wave_drift, wave_motion, wave_spectrum
-from shipgym.sea.drift import added_resistance, end_angle, reflection_coefficients
+from shipgym.sea.drift import _speed_factor, added_resistance, end_angle, reflection_coefficients
 from shipgym.sea.estimates import GRAVITY, weather_particulars
 from shipgym.sea.waves import draught_attenuation
 from shipgym.sea.weather_column import mobility_matrix, roll_inertia
@@ -76,6 +76,22 @@ def test_speed_and_breadth_count_within_the_formulas_range_only():
     ships = (replace(S175, draught=S175.beam / ratio) for ratio in (1.6, 1.99, 2.0, 2.01))
     deepest, deeper, deep, less = (added_resistance(0.25, 0.3, ship, 8.0) for ship in ships)
     assert deepest == deeper == deep != less  # in waves too long to be reflected, 0.25 rad/s
+
+
+def test_the_ends_of_the_fullest_hulls_are_those_of_a_prismatic_coefficient_of_0_95():
+    for fullness in (0.955, 0.99):
+        hull = replace(KVLCC2, block_coefficient=fullness, mass=None)
+        assert np.tan(end_angle(hull)) == pytest.approx(0.495 * 58.0 / (320.0 * 0.05))
+    less = replace(KVLCC2, block_coefficient=0.94, mass=None)
+    assert np.tan(end_angle(less)) < 0.99 * 0.495 * 58.0 / (320.0 * 0.05)
+
+
+def test_the_factor_of_speed_changes_its_law_at_a_froude_number_of_0_12():
+    """ITTC 7.5-04-01-01.1, equations G-18: the two laws meet there."""
+    froude = np.array([0.0, 0.1, 0.1199, 0.1201, 0.13, 0.3])
+    slow, fast = 0.0072 + 0.1676 * froude, froude**1.5 * np.exp(-3.5 * froude)
+    np.testing.assert_allclose(_speed_factor(froude), np.r_[slow[:3], fast[3:]], rtol=1e-12)
+    assert slow[2] == pytest.approx(fast[3], rel=2e-3)
 
 
 def test_short_waves_are_resisted_by_reflection_as_in_model_tests():

@@ -112,3 +112,72 @@ def test_saying_what_the_weather_is_loads_no_scipy():
     script = "import sys, shipgym; shipgym.Weather.from_sea_state('rough'); print('scipy' in sys.modules)"
     output = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
     assert output.stdout.strip() == "False"
+
+
+@pytest.mark.parametrize(
+    ("make", "most"),
+    [
+        (lambda x: Current(x), 10.0),
+        (lambda x: Current(1.0, variation=x), 5.0),
+        (lambda x: Current(1.0, x), 360.0),
+        (lambda x: Current(1.0, -x), 360.0),
+        (lambda x: Wind(x), 75.0),
+        (lambda x: Waves(x, 30.0), 20.0),
+        (lambda x: Waves(1.0, x), 40.0),
+        (lambda x: Waves(1.0, 8.0, peak_enhancement=x), 20.0),
+        (lambda x: Waves(x, 8.0), 9.80665 * 64.0 / (20.0 * np.pi)),  # a tenth of the wave's length
+    ],
+)
+def test_weather_is_refused_beyond_what_there_is(make, most):
+    make(most)
+    make(0.98 * most)
+    with pytest.raises(InputError, match=r"found"):
+        make(1.02 * most)
+
+
+def test_what_is_not_said_of_the_weather():
+    """A steady current whose variation, if any, takes ten minutes; gusts; a growing sea that is spread."""
+    assert Current(1.0) == Current(1.0, None, 0.0, 600.0)
+    assert Wind(5.0) == Wind(5.0, None, True, "harris", "blendermann")
+    assert Waves(1.0, 8.0) == Waves(1.0, 8.0, None, "jonswap", 3.3, "cosine-squared")
+    assert Waves(1.0, 8.0).gamma == 3.3
+    assert Waves(1.0, 8.0, spectrum="pierson-moskowitz").gamma == 1.0
+    assert [type(getattr(Waves(1, 8), name)) for name in ("significant_height", "peak_period")] == [
+        float,
+        int,
+    ]
+
+
+def test_parts_of_the_weather_begin_to_be_on_above_zero():
+    for part in (Current(1e-9), Current(0.0, variation=1e-9), Wind(1e-9), Waves(1e-9, 8.0)):
+        assert not part.calm
+    assert Weather(waves=Waves(0.0, 8.0), wind=Wind(3.0, 20.0)).random_directions == ()
+    assert Weather(waves=Waves(1.0, 8.0), wind=Wind(3.0, 20.0)).random_directions == ("waves",)
+    both = Weather(Current(1.0), Wind(3.0, 20.0), Waves(1.0, 8.0)).with_direction(70.0)
+    assert (both.current.towards_deg, both.wind.from_deg, both.waves.from_deg) == (None, 20.0, 70.0)
+
+
+@pytest.mark.parametrize(
+    ("rows", "message"),
+    [
+        ({"angles_deg": (0, 90, 90, 180)}, "at least three that rise from 0 to 180"),
+        ({"angles_deg": (0, 60, 120, 170)}, "at least three that rise from 0 to 180"),
+        ({"angles_deg": (10, 60, 120, 180)}, "at least three that rise from 0 to 180"),
+        ({"CY": (0.1, 1, 1, 0)}, "CY: 0.1 and 0 found at 0 and 180 degrees, expected 0"),
+        ({"CN": (0, 0, 0, 0.1)}, "CN: 0 and 0.1 found"),
+        ({"CK": (0.1, 0, 0, 0)}, "CK: 0.1 and 0 found"),
+        ({"CK": (0, 0, 0)}, "CK: 3 values found, expected 4, one for each angle"),
+        ({"CX": 3.0}, "CX: 3.0 found, expected a list of numbers"),
+        ({"CX": (0, "a", 0, 0)}, r"CX\[1\]: 'a'"),
+    ],
+)
+def test_tables_that_no_wind_has_are_refused(rows, message):
+    sound = {
+        "angles_deg": (0, 60, 120, 180),
+        "CX": (-1, -0.5, 0.5, 1),
+        "CY": (0, 1, 1, 0),
+        "CN": (0, 0.1, 0, 0),
+    }
+    assert WindTable(**sound).CX == (-1.0, -0.5, 0.5, 1.0)
+    with pytest.raises(InputError, match=f"wind table .*{message}"):
+        WindTable(**sound | rows)

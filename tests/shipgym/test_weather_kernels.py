@@ -262,6 +262,25 @@ def test_series_over_an_angle_are_fouriers(angle, a):
     assert sines == pytest.approx(np.sin(k * angle) @ a[1:], abs=1e-9)
 
 
+def test_what_decays_does_so_exponentially_and_is_gone_after_eight_time_constants():
+    x = np.linspace(0.0, 1.0, 41)
+    np.testing.assert_allclose([open_sea.decay(one) for one in x], np.exp(-x), rtol=0.0, atol=3e-9)
+    assert open_sea.decay(2.0) == pytest.approx(np.exp(-2.0), abs=1e-6)
+    assert open_sea.decay(20.0) == open_sea.decay(8.5) == open_sea.decay(8.0) < 4e-4
+    assert open_sea.decay(7.9) > open_sea.decay(8.0)
+
+
+def test_a_ship_meets_the_waves_at_a_tenth_of_their_frequency_at_least():
+    """In a following sea she may sail along with them: U = g / w."""
+    p = parameters()
+    w, k = p.wave_frequency, p.wave_number
+    for speed, met in ((0.0, w), (0.5 * w / k, 0.5 * w), (0.89 * w / k, 0.11 * w), (0.91 * w / k, 0.1 * w),
+                       (w / k, 0.1 * w), (1.09 * w / k, 0.1 * w), (3.0 * w / k, 2.0 * w)):  # fmt: skip
+        assert open_sea.encounter(-1.0, 0.0, speed, 0.3, p) == pytest.approx(met)
+        assert open_sea.encounter(0.0, -1.0, 0.3, speed, p) == pytest.approx(met)
+    assert open_sea.encounter(0.6, 0.8, 5.0, -2.0, p) == pytest.approx(w + k * (3.0 - 1.6))
+
+
 @given(st.floats(0.0, 2.0))
 def test_an_oscillator_in_waves_steps_exactly(turn):
     """Its transition is the matrix exponential; its noise keeps both variances at 1."""

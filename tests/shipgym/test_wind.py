@@ -9,7 +9,13 @@ from shipgym import InputError, Particulars, Wind, load_model
 from shipgym.sea import WindTable, gust_filter, gust_spectrum, gust_variance, wind_curves
 from shipgym.sea.estimates import weather_particulars
 from shipgym.sea.gusts import GaussMarkov
-from shipgym.sea.wind import BLENDERMANN, ISHERWOOD, coefficient_names, isherwood_coefficients
+from shipgym.sea.wind import (
+    BLENDERMANN,
+    ISHERWOOD,
+    blendermann_type,
+    coefficient_names,
+    isherwood_coefficients,
+)
 from tests.shipgym.harmonics import evaluate_cosines, evaluate_sines
 
 AREAS = {
@@ -136,6 +142,23 @@ def test_similar_ships_have_the_same_coefficients():
 def test_fullness_picks_the_type_of_ship():
     np.testing.assert_array_equal(wind_curves(KVLCC2).X, wind_curves(KVLCC2, "blendermann-tanker-loaded").X)
     np.testing.assert_array_equal(wind_curves(S175).X, wind_curves(S175, "blendermann-container-loaded").X)
+    types = [blendermann_type("blendermann", fullness) for fullness in (0.64, 0.65, 0.66, 0.74, 0.75, 0.76)]
+    assert types == ["container-loaded", *["cargo-loaded"] * 3, *["tanker-loaded"] * 2]
+    assert blendermann_type("blendermann-ferry", 0.9) == "ferry"
+
+
+def test_the_house_of_a_full_hull_stands_aft():
+    """From a block coefficient of 0.75 on."""
+    for fullness, aft in ((0.74, False), (0.75, True), (0.76, True)):
+        hull = Particulars(length=120.0, beam=20.0, draught=6.0, block_coefficient=fullness)
+        assert (weather_particulars(hull).lateral_centroid < 0.0) == aft
+
+
+def test_frequencies_of_norsoks_gusts_are_those_it_is_given_for():
+    """From 1/2400 Hz to 0.5 Hz."""
+    f = np.geomspace(1.0 / 2400.0, 0.5, 20_000)
+    integral = np.trapezoid(f * gust_spectrum(f, 20.0, "norsok"), np.log(f))
+    assert gust_variance(20.0, "norsok") == pytest.approx(integral, rel=1e-5)
 
 
 def test_estimates_are_marked_and_given_areas_are_used():
