@@ -142,10 +142,6 @@ def test_what_is_not_said_of_the_weather():
     assert Waves(1.0, 8.0) == Waves(1.0, 8.0, None, "jonswap", 3.3, "cosine-squared")
     assert Waves(1.0, 8.0).gamma == 3.3
     assert Waves(1.0, 8.0, spectrum="pierson-moskowitz").gamma == 1.0
-    assert [type(getattr(Waves(1, 8), name)) for name in ("significant_height", "peak_period")] == [
-        float,
-        int,
-    ]
 
 
 def test_parts_of_the_weather_begin_to_be_on_above_zero():

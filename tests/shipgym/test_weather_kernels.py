@@ -264,7 +264,7 @@ def test_series_over_an_angle_are_fouriers(angle, a):
 
 def test_what_decays_does_so_exponentially_and_is_gone_after_eight_time_constants():
     x = np.linspace(0.0, 1.0, 41)
-    np.testing.assert_allclose([open_sea.decay(one) for one in x], np.exp(-x), rtol=0.0, atol=3e-9)
+    np.testing.assert_allclose([open_sea.decay(one) for one in x], np.exp(-x), rtol=0.0, atol=1.2e-9)
     assert open_sea.decay(2.0) == pytest.approx(np.exp(-2.0), abs=1e-6)
     assert open_sea.decay(20.0) == open_sea.decay(8.5) == open_sea.decay(8.0) < 4e-4
     assert open_sea.decay(7.9) > open_sea.decay(8.0)
