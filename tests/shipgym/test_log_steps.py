@@ -26,11 +26,20 @@ from shipgym.trials.plausibility import (
     check_heading,
     check_log,
     check_overlap,
+    check_ranges,
     find_outliers,
 )
 from shipgym.trials.resampling import Log, have_own_clocks, on_one_clock, own_clock
 from shipgym.trials.tables import from_frame, read_log
-from shipgym.trials.trial_import import _cg_to_midship, _earth_to_body
+from shipgym.trials.trial_import import (
+    _cg_to_midship,
+    _check_holes,
+    _check_time,
+    _earth_to_body,
+    _fill,
+    _repaired,
+)
+from shipgym.trials.units import LIMITS
 
 NAN, DEGREE = math.nan, math.pi / 180.0
 
@@ -185,7 +194,78 @@ def test_a_manoeuvre_lasts_from_before_the_rudder_moves_until_it_is_quiet():
         assert len(cut_log("rudder", log(delta=delta), "")) == parts
 
 
+# --- what is missing
+
+
+@pytest.mark.parametrize(
+    ("rows", "step", "refused"),
+    [(19, 1.0, False), (20, 1.0, True), (10, 9.0, False), (11, 9.0, True), (11, 0.1, False)],
+)
+def test_a_hole_is_too_long_with_more_than_ten_rows_over_more_than_twenty_steps(rows, step, refused):
+    """Of 200 rows, 1 s apart but in the hole."""
+    steps = np.ones(199)
+    steps[99 : 100 + rows] = step
+    missing = (np.arange(200) >= 100) & (np.arange(200) < 100 + rows)
+    arguments = np.r_[0.0, np.cumsum(steps)], missing, "psi", source(range(2, 202), t="time", psi="gyro")
+    if not refused:
+        _check_holes(*arguments)
+        return
+    told = rf"line 102 .*'gyro': {rows} rows without a value, over {step * (rows + 1):g} "
+    with pytest.raises(InputError, match=told + r".*expected at most 20 time steps"):
+        _check_holes(*arguments)
+
+
+@pytest.mark.parametrize(
+    ("size", "whole", "enough"), [(20, 10, True), (20, 9, False), (4, 3, True), (4, 2, False)]
+)
+def test_half_of_the_rows_and_three_have_to_be_whole(size, whole, enough):
+    values = np.stack([np.arange(float(size)), np.arange(float(size))], axis=1)
+    lost = np.linspace(1, size - 2, size - whole).round().astype(int)
+    values[lost, 1] = NAN
+    here = source(range(size), t="time", u="speed")
+    here.columns["t"] = Column("time", "s")
+    if enough:
+        filled, _ = _repaired(values, here, "interpolate")
+        np.testing.assert_allclose(filled[:, 1], np.arange(size))
+        return
+    with pytest.raises(InputError, match=f"only {whole} of {size} rows have no missing values"):
+        _repaired(values, here, "interpolate")
+
+
+@pytest.mark.parametrize(("unit", "turn"), [("deg", 360.0), ("rad", 2.0 * math.pi)])
+def test_a_heading_is_filled_across_north(unit, turn):
+    t = np.arange(6.0)
+    column = (0.97 + 0.01 * np.array([0.0, 1.0, NAN, 3.0, 4.0, 5.0])) % 1.0 * turn
+    _fill(t, column, unwrap=True, unit=unit)
+    np.testing.assert_allclose(column, turn * (0.97 + 0.01 * t))
+
+
+def test_time_that_goes_on_by_less_than_a_nanosecond_stands_still():
+    for unit, second in (("s", 1.0), ("min", 1.0 / 60.0), ("ms", 1000.0)):
+        here = source(range(2, 6), t="time")
+        here.columns["t"] = Column("time", unit)
+        for step in (1.05e-9, 0.95e-9):
+            values = second * np.array([[0.0], [step], [1.0], [2.0]])
+            if step > 1e-9:
+                _check_time(values, here)
+                continue
+            with pytest.raises(InputError, match=rf"line 3 .*time stands still at .* {unit}, expected"):
+                _check_time(values, here)
+
+
 # --- what a log is checked for
+
+
+@pytest.mark.parametrize(
+    ("channel", "unit"), [("u", "m/s"), ("r", "rad/s"), ("lat", "deg"), ("delta", "rad")]
+)
+def test_a_value_at_its_limit_is_none_beyond_it(channel, unit):
+    here = source([2, 3], t="time", **{channel: "mine"})
+    here.columns[channel] = Column("mine", unit)
+    for size in (1.0, 1.0 + 5e-10):  # by rounding
+        check_ranges({channel: np.array([0.0, -size * LIMITS[channel]])}, here)
+    with pytest.raises(InputError, match=rf"line 3 .*'mine': {channel} = -.* found, expected at most"):
+        check_ranges({channel: np.array([0.0, -(1.0 + 2e-9) * LIMITS[channel]])}, here)
 
 
 def test_positions_that_no_ship_reaches_are_outliers():
@@ -597,6 +677,66 @@ def test_a_wind_told_as_the_true_one_is_turned_by_the_heading_and_preferred():
     for chosen in (apparent | told | motion, series | apparent):
         nmea._absolute_wind(chosen)
         assert not {"wind_from", "wind_speed"} & chosen.keys()
+
+
+# --- NMEA 0183
+
+
+def readings(count, begin=34_200.0):
+    """So many of one source, a second apart."""
+    return [nmea.Reading(k + 1, begin + k, 0.1) for k in range(count)]
+
+
+@pytest.mark.parametrize(
+    ("channel", "sources", "best"),
+    [
+        ("psi", {"HEHDT": 3, "HETHS": 9}, "HEHDT"),
+        ("psi", {"HETHS": 3, "VDVHW": 9}, "HETHS"),
+        ("psi", {"VDVHW": 3, "HCHDG": 9}, "VDVHW"),
+        ("psi", {"HEHDT": 3, "GPHDT": 9}, "GPHDT"),
+        ("psi", {"IIHDT": 9, "HEHDT": 3}, "HEHDT"),  # a display that passes others' sentences on
+        ("sog", {"GPRMC": 3, "GPVTG": 9}, "GPVTG"),
+    ],
+)
+def test_of_several_sources_the_better_one_is_read(channel, sources, best):
+    """True headings before those of compasses, then sources of their own, then those that say the most."""
+    told = {name: readings(count) for name, count in sources.items()}
+    table = nmea._assembled(Path("log"), {"t": {"GPGGA": readings(12)}, channel: told}, [])
+    (other,) = sources.keys() - {best}
+    assert table.notes == (f"{channel} is from {best}; {other} left out",)
+    assert np.isfinite(table.numbers(channel)).sum() == sources[best]
+
+
+def test_times_with_dates_go_before_many_without():
+    day = 19_000 * 86400.0
+    both = {"GPRMC": readings(3, day), "GPGGA": readings(9)}
+    table = nmea._assembled(Path("log"), {"t": both, "lat": dict(both)}, [])
+    assert table.notes == ("lat is from GPRMC; GPGGA left out",)
+    assert table.numbers("t").tolist() == [day, day + 1.0, day + 2.0]
+
+
+def test_readings_of_one_millisecond_are_of_one_time():
+    clock = [34_200.0001, 34_200.0004, 34_200.0006, 34_201.0]
+    told = [nmea.Reading(k + 1, time, 0.1) for k, time in enumerate(clock)]
+    table = nmea._assembled(Path("log"), {"t": {"GPRMC": told}, "psi": {"HEHDT": told}}, [])
+    np.testing.assert_allclose(table.numbers("t"), [34_200.0, 34_200.001, 34_201.0])
+    assert list(table.lines) == [1, 3, 4]
+
+
+def test_a_log_is_one_of_nmea_0183_by_two_sentences_at_its_beginning(tmp_path):
+    path, first, second = tmp_path / "log.txt", "$GPRMC,1\n", "$HEHDT,"
+    for text, told in (
+        (first, False),
+        (first + second, True),
+        (f"{'x' * 60}{first}" * 2, True),  # what a logger writes before a sentence
+        (f"{'x' * 61}{first}" * 2, False),
+        (first + 2040 * "x\n" + second, True),  # 4096 bytes
+        (first + 2040 * "x\n" + "\n" + second, False),
+        (f"{first}!AIVDM,", True),
+        ("t,psi\n0,1\n", False),
+    ):
+        path.write_text(text)
+        assert nmea.is_nmea(path) == told, text[-80:]
 
 
 # --- files

@@ -9,6 +9,7 @@ import shipgym
 from shipgym import InputError, ManoeuvreError, Trial, load_model, manoeuvres
 from shipgym.manoeuvres.execution import departure, execute_time, number_of_steps, reached, reversals
 from shipgym.manoeuvres.imo import overshoot_limits_deg
+from shipgym.manoeuvres.zigzags import _overshoot_deg
 
 
 @pytest.fixture(scope="module")
@@ -254,3 +255,42 @@ def test_the_standard_manoeuvres_in_shallow_water():
     )
     with pytest.raises(InputError, match="'mariner' is a deep-water model"):
         manoeuvres.standard_manoeuvres(load_model("mariner"), 25.0)
+
+
+@pytest.mark.parametrize(
+    ("headings", "overshoot"),
+    [
+        ((10.0, 12.0, 14.0, 13.0), 4.0),
+        ((10.0, 12.0, 14.0), None),  # it still grows
+        ((10.0, 12.0, 11.0), 2.0),
+        ((10.0, 9.0), None),  # too few to tell
+        ((10.5, 10.2, 10.1), 0.5),
+    ],
+)
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_an_overshoot_is_the_furthest_beyond_the_switch_before_the_end(headings, overshoot, side):
+    """Of a ship whose heading was 3 deg before the first order."""
+    psi = np.radians(3.0 + side * np.array([0.0, 0.0, 5.0, *headings]))
+    t = np.arange(float(len(psi)))
+    found = _overshoot_deg(Trial(t, {"psi": psi}), 1.0, 3.0, t[-1], 10.0)
+    assert found is None if overshoot is None else found == pytest.approx(overshoot)
+    assert _overshoot_deg(Trial(t, {"psi": psi}), 1.0, 3.0, t[-1], None) is None
+
+
+@pytest.mark.parametrize(("turned", "steady"), [(1.49, False), (1.51, True)])
+def test_a_turn_is_steady_after_three_quarters_of_a_circle(turned, steady):
+    """Speed and drift are those of the last quarter turn."""
+    psi = np.linspace(0.0, turned * np.pi, 1501)
+    last = psi >= psi[-1] - np.pi / 2
+    t, none = psi / 0.02, 0.0 * psi
+    channels = {
+        "x": none, "y": none, "psi": psi, "u": np.where(last, 4.0, 8.0), "v": np.where(last, -3.0, 0.0),
+        "r": np.where(last, 0.02, 0.05), "delta_command": none + 0.6,
+    }  # fmt: skip
+    found = manoeuvres.turning_indices(Trial(t, channels), length=100.0)
+    if not steady:
+        assert found.steady_diameter_lengths is found.steady_speed_ratio is found.steady_drift_deg is None
+        return
+    assert found.steady_diameter_lengths == pytest.approx(2.0 * 5.0 / 0.02 / 100.0)
+    assert found.steady_speed_ratio == pytest.approx(5.0 / 8.0)
+    assert found.steady_drift_deg == pytest.approx(np.degrees(np.arctan2(3.0, 4.0)))

@@ -13,7 +13,7 @@ from shipgym import InputError, ShipModel, UnstableModelError
 from shipgym.engine.envelope import Envelope as EngineEnvelope
 from shipgym.engine.envelope import Four, Triangle, envelope_distance, outside_range
 from shipgym.engine.motion import Motion
-from shipgym.ships import Envelope
+from shipgym.ships import Envelope, model_file
 from shipgym.ships.envelope import smallest_ellipsoid
 from shipgym.ships.simulate import open_loop
 
@@ -296,3 +296,41 @@ def test_states_and_commands_that_are_none_are_refused():
         tanker.derivatives(tanker.service_state, tanker.service_command, 18.0)
     many = mariner.derivatives(np.tile(state, (2, 3, 1)), np.zeros((3, 1)))
     assert many.shape == (2, 3, 7)
+
+
+@pytest.mark.parametrize(
+    ("matrix", "fault"),
+    [
+        ([[1.0, 1.0 + 0.95e-9], [1.0, 1.0]], ""),
+        ([[1.0, 1.0 + 1.05e-9], [1.0, 1.0]], "not symmetric"),
+        ([[1.0, 0.0], [1e-30, 1.0]], "not symmetric"),
+        ([[0.0, 0.0], [0.0, 1.0]], ""),
+        ([[1.0, 0.0], [0.0, -1e-30]], "a variance on the diagonal is negative"),
+    ],
+)
+def test_a_covariance_is_symmetric_to_nine_digits_and_has_no_negative_variance(matrix, fault):
+    if not fault:
+        np.testing.assert_array_equal(model_file._matrix(matrix, 2, "model.json"), matrix)
+        return
+    with pytest.raises(InputError, match=f"model.json: covariance: {fault}"):
+        model_file._matrix(matrix, 2, "model.json")
+
+
+@pytest.mark.parametrize(("count", "fits"), [(0, False), (1, True), (200, True), (201, False)])
+def test_an_equation_in_a_file_has_up_to_200_terms(count, fits):
+    listed = {"r": [{"name": "r", "powers": {"r": 1}}] * count}
+    if fits:
+        model_file._check_lists(listed, "uvr", ("r",), "equations")
+        return
+    with pytest.raises(InputError, match=r"equations\.r: expected a list of terms, 1 to 200"):
+        model_file._check_lists(listed, "uvr", ("r",), "equations")
+
+
+@pytest.mark.parametrize(("sign", "fits"), [(-1.0, True), (1.0, True), (1.05, False), (-1.05, False)])
+def test_a_share_in_a_file_has_a_sign(sign, fits):
+    listed = {"v": [{"coefficient": "Y_v", "name": "v", "powers": {"v": 1}, "sign": sign}]}
+    if fits:
+        model_file._check_lists(listed, "uvr", ("v",), "shares", "shares")
+        return
+    with pytest.raises(InputError, match=r"shares\.v\[0\]\.sign: .* found"):
+        model_file._check_lists(listed, "uvr", ("v",), "shares", "shares")

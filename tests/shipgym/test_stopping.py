@@ -5,6 +5,7 @@ import pytest
 
 from shipgym import InputError, ManoeuvreError, Trial, load_model
 from shipgym.manoeuvres import acceleration, acceleration_indices, stopping, stopping_indices
+from shipgym.manoeuvres.stopping import _stopping_order
 
 FULL_ASTERN = -80.0 / 60.0  # 1/s
 
@@ -126,3 +127,16 @@ def test_what_a_trial_lacks_is_named(indices, needed):
         channels = {name: 1.0 + t for name in needed if name != missing}
         with pytest.raises(InputError, match=f"channel '{missing}' is missing"):
             indices(Trial(t, channels, length=50.0))
+
+
+def test_a_shaft_is_ordered_astern_by_half_as_much_again_as_ahead():
+    tanker = load_model("tanker")
+    service = tanker.service_shaft_speed
+    for share in (-1.5, -0.1, 0.0, 0.99):
+        assert _stopping_order(tanker, share * service, 0.1) == share * service
+    for share in (-1.51, 1.0):
+        with pytest.raises(InputError, match=r"shaft_speed: .* found, .*less than at service speed"):
+            _stopping_order(tanker, share * service, 0.1)
+    assert _stopping_order(tanker, -0.1, 0.0) == -0.1
+    with pytest.raises(InputError, match="never dead in the water"):
+        _stopping_order(tanker, 0.0, 0.0)
