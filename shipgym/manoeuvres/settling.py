@@ -93,7 +93,7 @@ class Voyage:
 
         Returns the means over the last stretch of the rudder ordered, rad, and the yaw rate, rad/s.
         """
-        n_steps = max(round(STRETCH * self.length_time / self.dt), 2)
+        n_steps = round(STRETCH * self.length_time / self.dt)
         speed, length = self.model.particulars["speed"], self.model.particulars["length"]
         columns = [self.model.state_names.index(name) for name in "uvr"]
         before: Floats | None = None

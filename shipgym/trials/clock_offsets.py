@@ -77,9 +77,9 @@ def clock_offset(t: Floats, target: Floats, late: Floats, others: Mapping[str, F
 
     delays = np.arange(-LONGEST_S, LONGEST_S + 0.1, 0.25)
     errors = np.array([fitted(delay)[0] for delay in delays])
-    k = int(np.clip(np.argmin(errors), 1, delays.size - 2))
-    curve = errors[k - 1] - 2.0 * errors[k] + errors[k + 1]
-    if curve <= 1e-12 * power or not 0 < int(np.argmin(errors)) < delays.size - 1:
+    k = int(np.argmin(errors))
+    curve = errors[k - 1] - 2.0 * errors[k] + errors[k + 1] if 0 < k < delays.size - 1 else 0.0
+    if curve <= 1e-12 * power:
         return None
     best = float(delays[k] + 0.25 * 0.5 * (errors[k - 1] - errors[k + 1]) / curve)
     least, gain, left = fitted(best)

@@ -126,6 +126,26 @@ def test_a_heel_of_sixty_degrees_is_a_capsize(mariner, heel_deg, capsized, monke
     ] * capsized  # fmt: skip
 
 
+def test_a_ship_is_sailed_straight_for_30_lengths_and_in_hard_turns_for_40(mariner, monkeypatch):
+    sailed = []
+    monkeypatch.setattr(
+        checker, "_run", lambda model, rudder, lengths: sailed.append((rudder, lengths)) or {}
+    )
+    assert list(checker._wrong_courses(mariner)) == []
+    limit = np.radians(40.0)
+    assert sailed == [(0.0, 30.0), (pytest.approx(limit), 40.0), (pytest.approx(-limit), 40.0)]
+
+
+@pytest.mark.parametrize(("off", "problems"), [(0.95e-9, 0), (1.05e-9, 1)])
+def test_compiled_accelerations_are_those_of_the_table_to_nine_digits(mariner, off, problems, monkeypatch):
+    """By the largest of each."""
+    found = checker._accelerations(mariner, checker._states(mariner))
+    changed = found.copy()
+    changed[7] += off * np.abs(found).max(axis=0)
+    monkeypatch.setattr(checker, "_from_table", lambda *_: changed)
+    assert len(list(checker._wrong_accelerations(mariner))) == problems
+
+
 @pytest.mark.parametrize(("excess", "problems"), [(9e-7, 0), (1.05e-6, 1)])
 def test_correlations_may_be_off_by_a_millionth(mariner, excess, problems):
     """The least eigenvalue of [[1, 1 + e], [1 + e, 1]] is -e, whatever the units of the coefficients."""

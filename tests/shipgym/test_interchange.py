@@ -10,6 +10,7 @@ import pytest
 
 import shipgym
 from shipgym import Episode, InputError, Trial, interchange, load_model
+from shipgym.envs.ship_env import ShipEnv
 from shipgym.interchange import minari_datasets
 from shipgym.ships.catalogue import kvlcc2_l7
 
@@ -73,7 +74,10 @@ def test_a_frame_of_something_else_is_refused():
 
 def test_minari_has_the_observations_and_gives_the_episodes_back(tmp_path, monkeypatch, episodes):
     monkeypatch.setenv("MINARI_DATASETS_PATH", str(tmp_path))
+    closed, close = [], ShipEnv.close
+    monkeypatch.setattr(ShipEnv, "close", lambda env: closed.append(env) or close(env))
     dataset = interchange.to_minari(episodes, "shipgym/mariner/test-v0", **CARD)
+    assert len(closed) == 1
     assert [len(one) for one in dataset] == [5, 2]
     assert dataset[0].observations.shape == (6, *dataset.observation_space.shape)
     env = dataset.recover_environment()

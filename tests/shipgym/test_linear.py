@@ -180,3 +180,29 @@ def test_a_steady_speed_is_believed_within_a_quarter_of_service_speed(share, bel
 
     monkeypatch.setattr(linear, "_balance", balance)
     assert linear.straight_running(MARINER).surge == pytest.approx(7.7175 * (share if believed else 1.0))
+
+
+@pytest.mark.parametrize(("rate", "at_rest"), [(0.95e-8, True), (-1.05e-8, False)])
+def test_a_ship_is_at_rest_where_prime_accelerations_are_below_1e_8(rate, at_rest, monkeypatch):
+    monkeypatch.setattr(linear, "_rates", lambda model, states: np.full(states.shape, rate))
+    assert (linear._balance(MARINER, ["v", "delta"]) is not None) == at_rest
+
+
+def test_a_rudder_beyond_a_right_angle_counts_as_one():
+    """Where a search goes astray."""
+    states = np.tile(MARINER.service_state, (4, 1))
+    states[:, -1] = np.pi / 2, 2.0, -np.pi / 2, -2.0
+    seen = []
+
+    class Asked:
+        service_command, command_names, state_names = MARINER.service_command, ("delta",), MARINER.state_names
+        particulars, travel_time, service_shaft_speed = MARINER.particulars, MARINER.travel_time, 0.0
+
+        def derivatives(self, states, commands):
+            seen.append(commands[:, 0])
+            return np.ones_like(states)
+
+    rates = linear._rates(Asked(), states)
+    np.testing.assert_allclose(seen[0], [np.pi / 2, np.pi / 2, -np.pi / 2, -np.pi / 2])
+    assert rates[0, 3] == pytest.approx(LENGTH / SPEED**2)  # udot L / U^2
+    assert rates[0, 5] == pytest.approx((LENGTH / SPEED) ** 2)  # rdot L^2 / U^2

@@ -21,7 +21,7 @@ from shipgym.plots import (
     turning_figure,
     zigzag_figure,
 )
-from shipgym.plots.style import MEASURED, PALETTE, Panel, line_styles, panels, translucent
+from shipgym.plots.style import MEASURED, PALETTE, Panel, line_styles, panels, points, translucent
 from shipgym.plots.trials import AXES, thinned
 from tests.golden.texts import flat, same_text
 
@@ -196,6 +196,12 @@ def test_lines_beyond_the_palette_begin_with_it_again():
     assert styles["measured"] == {"colour": MEASURED, "width": 1.5}
     assert {styles[label]["width"] for label in labels} == {2.0}
     assert translucent("#1d70b8", 0.25) == "rgba(29,112,184,0.25)"
+
+
+def test_points_are_markers_of_seven_pixels():
+    for size, drawn in ((), 7.0), ((9.0,), 9.0):
+        found = points([0.0, 1.0], [2.0, 3.0], "measured", "#1f2a37", *size)
+        assert (found.mode, found.marker.size, found.marker.color) == ("markers", drawn, "#1f2a37")
 
 
 def test_a_spiral_to_one_side_has_no_loop():

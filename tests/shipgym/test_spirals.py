@@ -167,6 +167,14 @@ def test_the_rudder_of_a_pull_out_is_amidships_below_half_of_what_it_was():
         assert found.residual_rate_deg_s == pytest.approx(rest[-(len(rest) // 10) :].mean())
 
 
+def test_the_end_of_a_turn_of_few_samples_is_its_last_one():
+    delta = np.r_[np.zeros(20), np.full(5, 0.3), np.zeros(30)]
+    rate = np.r_[np.zeros(20), 0.01, 0.02, 0.03, 0.04, 0.05, np.linspace(0.05, 0.0, 30)]
+    found = manoeuvres.pull_out_indices(Trial(np.arange(55.0), {"delta": delta, "r": rate}))
+    assert found.turning_rate_deg_s == pytest.approx(np.degrees(0.05))
+    assert found.residual_rate_deg_s == pytest.approx(np.degrees(rate[-3:].mean()))
+
+
 def test_a_leg_ends_after_sixty_stretches_of_five_lengths_steady_or_not(monkeypatch):
     voyage = Voyage(load_model("mariner"), None, Conditions())
     gone = []

@@ -13,6 +13,7 @@ from shipgym import InputError, Particulars, ShipModel, SteeringGear
 from shipgym.engine.motion import Motion, Ship
 from shipgym.ships.linear import nomoto
 from shipgym.ships.structures import STRUCTURES, get_structure
+from shipgym.ships.term_functions import accelerations_function
 from shipgym.ships.term_table import Structure
 from shipgym.ships.terms import read_terms
 
@@ -304,3 +305,8 @@ def test_structures_are_listed_by_the_names_of_their_sources():
     assert {"abkowitz", "cubic", "nomoto", "nomoto2", "norrbin", "surge", "steering5", "steering7"} <= names
     assert {"linear-steering", "mmg4dof", "pmm18", "pmm38", "surge-perturbed"} <= names
     assert "zhu-11" not in names
+
+
+def test_a_source_that_nobody_wrote_is_refused_with_its_beginning():
+    with pytest.raises(ValueError, match=f"accelerations: '{'x' * 200}' found, expected sums of products"):
+        accelerations_function("x" * 300)

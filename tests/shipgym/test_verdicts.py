@@ -134,8 +134,9 @@ def test_no_ship_is_half_as_fast_again_or_as_fast_sideways_or_turns_three_radian
         if not wild:
             registry._check_physical(ship, trial)
             continue
-        with pytest.raises(UnstableModelError, match=rf"runs away after 1\.0 s \({channel} = -"):
+        with pytest.raises(UnstableModelError, match=rf"runs away after 1\.0 s \({channel} = -") as away:
             registry._check_physical(ship, trial)
+        assert (away.value.time_s, away.value.state) == (1.0, {channel: share * most})
 
 
 def test_standard_manoeuvres_last_forty_ship_lengths_in_steps_of_a_fiftieth():

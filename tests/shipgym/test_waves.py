@@ -5,6 +5,7 @@ import pytest
 
 from shipgym import InputError, Particulars, Waves, load_model
 from shipgym.sea import encounter_frequency, jonswap, pierson_moskowitz, sea_states, wave_filter, wave_motion
+from shipgym.sea.drift import wave_drift
 from shipgym.sea.estimates import GRAVITY, weather_particulars
 from shipgym.sea.harmonics import circle
 from shipgym.sea.motions import heading_response, roll_response
@@ -185,6 +186,23 @@ def test_motion_of_a_simulated_sea_has_the_variance_of_the_integral():
     response = heading_response(omega, np.radians(60.0), MARINER) * amplitude
     heading = np.cos(np.outer(t, omega) + rng.uniform(0.0, 2.0 * np.pi, len(omega))) @ response
     assert heading.var() == pytest.approx(wave_motion(sea, MARINER).heading_variance[60], rel=0.08)
+
+
+def test_series_of_the_motion_have_eight_harmonics():
+    motion = wave_motion(Waves(2.0, 8.0), MARINER)
+    assert len(motion.heading_variance_harmonics()) == len(motion.roll_variance_harmonics()) == 9
+    drift = wave_drift(Waves(2.0, 8.0), MARINER).harmonics()
+    assert [len(series) for series in drift] == [9, 8, 8, 8]
+    assert not drift.K.any()
+
+
+def test_without_a_service_speed_a_ship_lies_still_in_waves():
+    ship = Particulars(length=160.0, beam=23.0, draught=8.0, block_coefficient=0.6)
+    waves = Waves(2.0, 8.0)
+    for look, curve in ((wave_motion, "roll_variance"), (wave_drift, "X")):
+        unknown, still, under_way = (getattr(look(waves, ship, speed), curve) for speed in (None, 0.0, 7.0))
+        np.testing.assert_array_equal(unknown, still)
+        assert np.abs(under_way - still).max() > 1e-3 * np.abs(still).max()
 
 
 def test_motion_needs_proportions():

@@ -9,6 +9,7 @@ import pytest
 
 from shipgym import Current, InputError, Waves, Weather, Wind, sea_states
 from shipgym.sea import WindTable
+from shipgym.sea.weather_column import as_weather
 
 TABLE = WindTable((0, 90, 180), (-0.6, 0.0, 0.5), (0.0, 0.8, 0.0), (0.0, 0.05, 0.0))
 
@@ -177,3 +178,15 @@ def test_tables_that_no_wind_has_are_refused(rows, message):
     assert WindTable(**sound).CX == (-1.0, -0.5, 0.5, 1.0)
     with pytest.raises(InputError, match=f"wind table .*{message}"):
         WindTable(**sound | rows)
+
+
+def test_a_sea_state_by_name_comes_from_north_east():
+    weather = as_weather("rough", "weather")
+    assert (weather.name, weather.wind.from_deg, weather.waves.from_deg) == ("rough", 45.0, 45.0)
+    assert as_weather("rough", "weather", None).random_directions == ("wind", "waves")
+    assert as_weather(None, "weather").calm
+    assert as_weather(weather, "weather") is weather
+    with pytest.raises(
+        InputError, match=r"task weather: 3 found, expected a Weather of shipgym.sea or the name"
+    ):
+        as_weather(3, "task weather")
