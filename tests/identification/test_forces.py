@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -166,6 +167,8 @@ def test_trials_of_the_other_kind_are_refused() -> None:
         identify_forces(tank_tests(), "abkowitz", PARTICULARS)
     with pytest.raises(InputError, match="mass of the ship and the added mass"):
         ShipModel("wrong", "pmm18", PARTICULARS, SHIP.steering, TABLE_11 | {"Y_vdot": 1.0}).ship_numbers()
+    with pytest.raises(InputError, match="structure: name: ' ' found"):
+        replace(PMM18, name=" ")
 
 
 def test_rows_of_the_regression_know_their_force_and_their_trial() -> None:

@@ -241,6 +241,8 @@ def test_what_cannot_be(trials: list[Trial], reference: ShipModel, truth: ShipMo
         identify(trials, structure="linear", particulars=SHIP, method=LSSVM(kernel="rbf"))
     with pytest.raises(InputError, match="no kernel found"):
         replace(truth.table, kernel=None)
+    with pytest.raises(InputError, match="no reference found"):
+        replace(truth.table, reference=None)
 
 
 SIDES = np.array([-1.0, -1.0, -1.0, 1.0])  # of drift, turn, rudder and speed seen from the other side

@@ -182,6 +182,8 @@ def test_what_cannot_be_a_reference_is_refused(bare: ShipModel, tanker: ShipMode
         register_structure("grey-box", {"r": "r, delta"})
     with pytest.raises(InputError, match="expected 'acceleration'"):
         replace(grey_box(tanker), quantity="force")
+    with pytest.raises(InputError, match="equations 'w' found, expected some of 'u', 'v', 'r'"):
+        grey_box(tanker, {"w": "v"})
 
 
 def test_the_reference_ship_of_the_regression_is_the_one_that_sails(bare: ShipModel) -> None:

@@ -2,6 +2,7 @@
 
 import math
 import os
+import struct
 from pathlib import Path
 
 import numpy as np
@@ -32,12 +33,16 @@ from shipgym.trials.plausibility import (
 from shipgym.trials.resampling import Log, have_own_clocks, on_one_clock, own_clock
 from shipgym.trials.tables import from_frame, read_log
 from shipgym.trials.trial_import import (
+    Conventions,
     _cg_to_midship,
     _check_holes,
     _check_time,
     _earth_to_body,
     _fill,
+    _joined,
+    _Recorded,
     _repaired,
+    to_project_conventions,
 )
 from shipgym.trials.units import LIMITS
 
@@ -192,6 +197,48 @@ def test_a_manoeuvre_lasts_from_before_the_rudder_moves_until_it_is_quiet():
         delta = np.zeros(601)
         delta[100:140] = delta[begin:240] = 4.0 * DEGREE
         assert len(cut_log("rudder", log(delta=delta), "")) == parts
+
+
+# --- files of one log
+
+
+def recorded(name, start, **channels):
+    table = Table(Path(name), (), {}.__getitem__, range(3))
+    here = Source(table, {key: Column(key, "") for key in ("t", *channels)}, np.arange(3))
+    clock = np.array([0.0, 50.0, 100.0])
+    return _Recorded({key: (clock, np.full(3, value)) for key, value in channels.items()}, here, {}, start)
+
+
+def test_files_of_one_log_have_the_clock_of_the_first():
+    series = _joined(
+        [recorded("a", 1000.0, psi=1.0), recorded("b", 1030.0, u=2.0), recorded("c", 970.0, v=3.0)]
+    )
+    assert {name: clock.tolist() for name, (clock, _) in series.items()} == {
+        "psi": [0.0, 50.0, 100.0], "u": [30.0, 80.0, 130.0], "v": [-30.0, 20.0, 70.0]
+    }  # fmt: skip
+    undated = _joined([recorded("a", None, psi=1.0), recorded("b", None, u=2.0)])
+    assert undated["u"][0].tolist() == [0.0, 50.0, 100.0]
+    for other, message in (
+        (recorded("b", None, u=2.0), "b: one of the files of this log has a clock and the other has not"),
+        (recorded("b", 1000.0, psi=2.0), "b: 'psi' is also in another file of this log"),
+        (recorded("b", 1200.0, u=2.0), "b: begins 200 s after the other file of this log"),
+    ):
+        with pytest.raises(InputError, match=message):
+            _joined([recorded("a", 1000.0, psi=1.0), other])
+
+
+@pytest.mark.parametrize("size", [3, 4, 9])
+def test_a_heading_of_few_samples_follows_from_its_rate(size):
+    """Of a rate that grows by 0.01 rad/s a second."""
+    t = np.arange(float(size))
+    log = Log(t + 5.0, {"r": 0.01 + 0.01 * t}, "log", [])
+    to_project_conventions(log, Conventions())
+    np.testing.assert_allclose(log.channels["psi"], 0.01 * t + 0.005 * t**2, atol=1e-12)
+    assert log.derived == {"psi"}
+    still = Log(t, {"r": 0.01 * t, "x": t, "y": t}, "log", [])  # whose heading the track would have to tell
+    with pytest.raises(InputError, match="GNSS"):
+        to_project_conventions(still, Conventions(instruments=Instruments(forward=1.0)))
+    assert "psi" not in still.channels
 
 
 # --- what is missing
@@ -774,6 +821,21 @@ def test_of_a_matlab_file_numeric_vectors_of_the_commonest_length_are_read(tmp_p
     for kind in "bBhHiIqQfd":
         savemat(tmp_path / "log.mat", {"u": np.array([1, 2, 100], kind)})
         assert read_log(tmp_path / "log.mat").numbers("u").tolist() == [1.0, 2.0, 100.0]
+
+
+def test_elements_of_a_matlab_file_are_padded_to_eight_bytes_or_small_or_compressed():
+    """MAT-File Format 5: a small one has up to four bytes within its tag; compressed ones have no pad."""
+    plain = struct.pack("<II", 9, 12) + b"twelve bytes" + bytes(4)
+    small = struct.pack("<HH", 1, 3) + b"abc\0"
+    packed = struct.pack("<II", 15, 3) + b"xyz"
+    found = list(tables._elements(plain + small + packed + small, "<"))
+    assert found == [(9, b"twelve bytes"), (1, b"abc"), (15, b"xyz"), (1, b"abc")]
+    assert list(tables._elements(small + small[:7], "<")) == [(1, b"abc")]
+    assert list(tables._elements(struct.pack("<HH", 1, 9) + b"abcd" + small, "<")) == [
+        (1, b"abcd"),
+        (1, b"abc"),
+    ]
+    assert list(tables._elements(struct.pack(">HHI", 3, 1, 0), ">")) == [(1, bytes(3))]
 
 
 def test_complex_vectors_of_a_matlab_file_are_refused(tmp_path):

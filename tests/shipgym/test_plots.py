@@ -1,4 +1,5 @@
 import json
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -196,6 +197,18 @@ def test_lines_beyond_the_palette_begin_with_it_again():
     assert styles["measured"] == {"colour": MEASURED, "width": 1.5}
     assert {styles[label]["width"] for label in labels} == {2.0}
     assert translucent("#1d70b8", 0.25) == "rgba(29,112,184,0.25)"
+
+
+def test_rows_of_panels_have_a_gap_between_them():
+    """Of 0.36 of the height by the number of rows, of two rows at least."""
+    for count in (2, 3, 4):
+        figure = panels([Panel([])] * count, 400)
+        ends = [figure.layout[f"yaxis{k or ''}"].domain for k in ("", *range(2, count + 1))]
+        gaps = [above[0] - below[1] for above, below in pairwise(ends)]
+        assert gaps == pytest.approx([0.36 / count] * (count - 1))
+    empty = panels([], 400)
+    assert (len(empty.data), empty.layout.yaxis.domain) == (0, (0.0, 1.0))
+    assert "yaxis2" not in empty.layout
 
 
 def test_points_are_markers_of_seven_pixels():

@@ -1,5 +1,6 @@
 """The steering gear's limits, in degrees outside and radians inside."""
 
+import json
 import math
 from dataclasses import replace
 
@@ -25,6 +26,13 @@ def test_solas_asks_for_the_default_rate():
         35.0 + 30.0
     ) / gear.rudder_rate_deg_s <= 28.0  # from 35 deg to 30 deg on the other side, SOLAS II-1/29
     assert gear.time_constant == 0.0
+
+
+def test_numbers_of_numpy_are_plain_ones_in_files():
+    gear = SteeringGear(np.float32(35.0), np.int64(3), np.float32(0.5))
+    assert json.loads(json.dumps(gear.to_dict())) == {
+        "rudder_limit_deg": 35.0, "rudder_rate_deg_s": 3.0, "time_constant": 0.5
+    }  # fmt: skip
 
 
 def kvlcc2_with(lag):

@@ -190,3 +190,10 @@ def test_a_sea_state_by_name_comes_from_north_east():
         InputError, match=r"task weather: 3 found, expected a Weather of shipgym.sea or the name"
     ):
         as_weather(3, "task weather")
+
+
+def test_numbers_of_numpy_are_plain_ones_in_files():
+    five = np.float32(5.0)
+    weather = Weather(Current(five, five, five), Wind(five, five), Waves(five, 20.0, five))
+    assert Weather.from_dict(json.loads(json.dumps(weather.to_dict()))) == weather
+    assert type(weather.wind.speed) is float
