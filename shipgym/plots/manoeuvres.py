@@ -102,7 +102,7 @@ def pull_out_figure(trials: dict[str, Trial], height: int = 340) -> Figure:
     for (name, trial), colour in zip(trials.items(), PALETTE, strict=False):
         left = pull_out_indices(trial).residual_rate_deg_s
         angle = np.abs(rudder(trial))
-        release = trial.t[min(int(np.flatnonzero(angle > 0.5 * angle.max())[-1]) + 1, len(trial) - 1)]
+        release = trial.t[int(np.flatnonzero(angle > 0.5 * angle.max())[-1]) + 1]
         part = thinned(trial)
         residual = f"{name}: {left:.3f} deg/s left"
         lines.append(line(trial.t[part] - release, np.degrees(trial["r"][part]), residual, colour))

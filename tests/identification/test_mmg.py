@@ -99,6 +99,10 @@ def test_terms_beyond_the_standard_form_act_as_they_are_named() -> None:
     np.testing.assert_allclose(alike, 0.0, atol=1e-15)
     for x in (0.05, 0.4, 1.0, 1.5):
         assert mmg.power_law(x, -0.7) == pytest.approx(x**-0.7, rel=1e-11)
+    assert mmg.power_law(0.01, 1.0) == pytest.approx(0.01, rel=5e-10)  # from here to 4 times service speed
+    assert mmg.power_law(4.0, 1.0) == pytest.approx(4.0, rel=1e-14)
+    assert mmg.power_law(0.0, 1.0) == mmg.power_law(0.01, 1.0)
+    assert mmg.power_law(9.0, 1.0) == mmg.power_law(4.0, 1.0)
 
 
 def test_twin_screws_and_rudders_count() -> None:

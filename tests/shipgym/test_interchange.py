@@ -196,6 +196,8 @@ def test_a_set_of_mss_has_its_inertia_about_midship():
     for share, gyradius in ((4.0, np.sqrt(3.0)), (2.0, 1.0)):
         changed = interchange.from_mss(known | {"Iz": share * known["m"] * known["xG"] ** 2})
         assert changed.particulars["yaw_gyradius"] == pytest.approx(-gyradius * p["xg"])
+    with pytest.raises(InputError, match="yaw_gyradius: 0 found"):
+        interchange.from_mss(known | {"Iz": 0.9 * known["m"] * known["xG"] ** 2})
 
 
 def test_rewards_that_are_run_again_may_differ_by_rounding(monkeypatch, episodes):
