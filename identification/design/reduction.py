@@ -144,15 +144,14 @@ def forward_selection(
     features, targets, labels = _checked(X, y, names)
     check_number(tolerance, "tolerance", at_least=0.0)
     rest = features / np.sqrt(np.mean(features**2, axis=0))
-    left, power = targets.copy(), float(targets @ targets)
+    left = targets.copy()
     chosen, path = list[int](), list[ReductionStep]()
     while len(chosen) < min(most or len(labels), len(labels)):
         size = np.einsum("ij,ij->j", rest, rest)
-        size[chosen] = 0.0
         usable = size > len(targets) * JITTER  # what the terms before do not say already
         if not usable.any():
             break
-        ratio = np.where(usable, (rest.T @ left) ** 2 / np.where(usable, size, 1.0), -1.0) / power
+        ratio = np.where(usable, (rest.T @ left) ** 2 / np.where(usable, size, 1.0), -1.0)
         term = int(np.argmax(ratio))
         direction = rest[:, term] / np.sqrt(size[term])
         left = left - direction * (direction @ left)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import partial
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,7 +12,12 @@ import pytest
 import shipgym
 from identification import build_samples
 from identification.design.experiment import (
+    Advice,
+    TrialInformation,
+    _errors,
     _gains,
+    _most_felt,
+    _noise,
     _regression,
     advise,
     fisher_information,
@@ -169,3 +175,79 @@ def test_the_condition_of_a_trial_does_not_depend_on_units(ship: ShipModel) -> N
     assert known.condition_number["r"] == pytest.approx(np.linalg.cond(scaled), rel=1e-9)
     moment = np.linalg.inv(scaled.T @ scaled / len(scaled))
     np.testing.assert_allclose(list(known.inflation.values()), np.diag(moment), rtol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("samples", "dt", "window"), [(200, 0.5, 8), (40, 0.1, 4), (90, 20.0, 1), (9, 0.1, 1)]
+)
+def test_windows_last_a_fifth_of_a_ship_length_but_a_tenth_of_a_short_trial(
+    ship: ShipModel, samples: int, dt: float, window: int
+) -> None:
+    """A ship length takes 20.85 s, a fifth of it 4.17 s; a window has a step at least."""
+    t = dt * np.arange(samples)
+    swing = np.sin(2.0 * np.pi * t / t[-1])
+    trial = Trial(t, {"u": 7.0 + 0.0 * t, "v": 0.0 * t, "r": 0.01 * swing, "delta": 0.1 * swing})
+    assert _regression(ship, trial).window == window
+
+
+def test_noise_is_what_the_model_leaves_over_all_trials_and_of_exact_data_the_rounding(
+    ship: ShipModel,
+) -> None:
+    X = np.random.default_rng(0).standard_normal((50, 3))
+    exact = X @ (ship.acceleration_matrix @ np.array(list(ship.coefficients.values())))
+
+    def noise(*targets: np.ndarray) -> float:
+        return _noise(ship, [SimpleNamespace(features={"r": X}, targets={"r": one}) for one in targets])["r"]
+
+    assert noise(exact + 1e3, exact - 3e3) == pytest.approx((1e6 + 9e6) / 2.0)
+    assert noise(exact) == pytest.approx(1e-12 * np.mean(exact**2))
+    X = 0.0 * X
+    assert noise(0.0 * exact) == np.finfo(float).tiny
+
+
+def test_an_error_is_felt_by_the_acceleration_that_it_is_a_part_of() -> None:
+    """A tenth of the sway by the rudder is more in m/s^2, a third of the yaw more of its equation."""
+    given = {"b_v": -1.0, "b_r": -0.3, "b_d": -1.0, "c_v": -0.3, "c_r": -1.0, "c_d": 0.5}
+    model = ShipModel("virtual", "linear-steering", PARTICULARS, SteeringGear(35.0, 5.0, 1.0), given)
+    size = np.abs(list(given.values()))
+    assert _most_felt(model, size * [0.0, 0.0, 0.1, 0.0, 0.0, 0.3]) == "c_d"
+    assert _most_felt(model, size * [0.0, 0.0, 0.3, 0.0, 0.0, 0.1]) == "b_d"
+
+
+def test_what_is_not_excited_is_uncertain_beyond_measure_but_not_infinitely() -> None:
+    np.testing.assert_allclose(_errors(np.diag([4.0, 0.0]), np.array([1.0, 1.0])), [0.5, 0.5e7])
+    np.testing.assert_allclose(_errors(np.diag([4.0, 1.0]), np.array([2.0, 0.1])), [0.25, 10.0])
+
+
+def test_candidates_go_up_to_the_rudders_limit(ship: ShipModel) -> None:
+    def angles(limit: float) -> list[str]:
+        gear = replace(ship.steering, rudder_limit_deg=limit)
+        names = standard_candidates(replace(ship, steering=gear))
+        return [name.removeprefix("turning circle ") for name in names if name.startswith("turning")]
+
+    assert angles(40.0) == ["5", "10", "20", "35"]
+    assert angles(33.0) == ["5", "10", "20", "33"]
+    assert angles(20.0) == ["5", "10", "20"]
+    assert angles(9.0) == ["5", "9"]
+    times = standard_candidates(ship)["zigzag 5/5"].keywords  # type: ignore[attr-defined]
+    assert times["duration"] == pytest.approx(40.0 * 160.93 / 7.7175)
+    assert times["dt"] == pytest.approx(160.93 / 7.7175 / 60.0)
+
+
+@pytest.mark.parametrize(("told", "shares"), [((0.02, 0.03), ("40", "60")), ((0.0, 0.0), ("0", "0"))])
+def test_each_trial_has_its_share_of_the_information(
+    told: tuple[float, float], shares: tuple[str, str]
+) -> None:
+    trials = tuple(
+        TrialInformation(f"run {k}", {"r": 3.0}, {"c_r": 1.0, "c_d": 2.6}, np.diag([9.0, one]))
+        for k, one in enumerate(told)
+    )
+    errors = {"c_r": 0.1, "c_d": 0.5}
+    text = str(Advice("c", "c_d", trials, errors, ({"turn": 1.5, "zigzag": 2.0},), ("zigzag",), errors))
+    for k, share in enumerate(shares):
+        (row,) = (line for line in text.splitlines() if f"run {k}" in line)
+        assert [cell.strip() for cell in row.split("│")[1:-1]] == [
+            f"run {k}", "r 3", "3 (c_d)", f"{share} % of all"
+        ]  # fmt: skip
+    assert text.index("zigzag") < text.index("turn ")
+    assert "2.00 *" in text
