@@ -42,7 +42,7 @@ def joint_covariance(estimators: Estimators, samples: Samples, memory: float = 0
     for trial in np.unique(samples.trial):
         rows = samples.trial == trial
         spacing = float(np.median(np.diff(samples.start[rows]))) if rows.sum() > 1 else memory
-        total += newey_west(scores[rows], max(round(memory / spacing), 0))
+        total += newey_west(scores[rows], round(memory / spacing))
     return 0.5 * (total + total.T)
 
 

@@ -183,7 +183,7 @@ def variance_inflation(scaled: Floats) -> Floats:
 
 def without_overlap(samples: Samples) -> Integers:
     """Rows whose windows do not overlap."""
-    step = 1 if samples.window == 1 else int(np.ceil(samples.window / max(samples.window // 2, 1)))
+    step = int(np.ceil(samples.window / max(samples.window // 2, 1)))
     return np.arange(0, len(samples), step)
 
 

@@ -74,6 +74,7 @@ def test_blocks_keep_to_their_trial_and_to_their_order() -> None:
 def test_a_block_holds_the_rows_of_its_time() -> None:
     assert _rows_in(10.0, np.arange(0.0, 100.0, 0.4)) == 25
     assert _rows_in(10.0, np.array([0.0, 2.0])) == 5
+    assert _rows_in(10.0, np.arange(0.0, 100.0, 0.05)) == 200
     assert _rows_in(1.0, np.array([0.0, 4.0, 8.0])) == 1  # at least one
     assert _rows_in(10.0, np.array([3.0])) == _rows_in(10.0, np.zeros(3)) == 1
 

@@ -12,9 +12,11 @@ from certainty import case
 from identification import IdentificationResult, Samples, identify
 from identification.estimators.methods import METHODS, fit_all, get_method
 from identification.estimators.rm_svm import RMSVM
-from identification.pipeline import _left_out
+from identification.pipeline import _covariance, _left_out
 from identification.regression.grey_box import chosen_box
-from identification.uncertainty.model_error import DEFAULT, scale_of, without_trial
+from identification.uncertainty import model_error as errors_of
+from identification.uncertainty.bootstrap import influence_covariance
+from identification.uncertainty.model_error import DEFAULT, model_error, scale_of, without_trial
 from identification.validation.closed_loop import closed_loop
 from identification.validation.prediction import predict
 from identification.validation.warnings import (
@@ -62,11 +64,94 @@ def test_what_a_trial_moved_a_refinement_by_is_taken_back_as_from_a_mean(mariner
     assert _left_out(SimpleNamespace(model=mariner), problem, refined, covariance) == []
 
 
+@pytest.mark.parametrize(("width", "stretches"), [(2.0, 5), (4.0, 2), (7.0, 1), (50.0, 1)])
+def test_a_block_of_a_refinement_is_the_time_to_sail_a_ship_length_but_a_stretch_at_least(
+    width: float, stretches: int
+) -> None:
+    """Ten seconds; influences are on the accelerations, which are twice the coefficients."""
+    influences = [np.cumsum(np.random.default_rng(k).standard_normal((40, 2)), axis=0) for k in range(2)]
+    blank = SimpleNamespace(travel_time=10.0, acceleration_matrix=2.0 * np.eye(2))
+    refined = SimpleNamespace(covariance=np.diag([4.0, 8.0]), influences=influences, width=width)
+    drawn = _covariance(None, None, blank, refined, "bootstrap")
+    np.testing.assert_allclose(drawn, influence_covariance(influences, stretches) / 4.0)
+    np.testing.assert_allclose(_covariance(None, None, blank, refined, "analytic"), np.diag([1.0, 2.0]))
+
+
 def test_the_factor_is_that_at_which_errors_with_their_noise_are_of_size_one() -> None:
     rng = np.random.default_rng(0)
     variance, noise = rng.uniform(0.5, 2.0, 4000), rng.uniform(0.0, 4.0, 4000)
     errors = rng.standard_normal(4000) * np.sqrt(9.0 * variance + noise)
     assert scale_of(list(zip(errors**2, variance, noise, strict=True))) == pytest.approx(3.0, rel=0.05)
+
+
+def test_the_factor_is_the_mean_of_motion_and_indices_never_below_one_and_larger_for_few_trials(
+    noisy_fit: IdentificationResult, noisy_trials: list[Trial], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Student's t with three degrees of freedom is 3.182 where the normal distribution has 1.96."""
+    motion, indices = [(4.0, 1.0, 0.0)], [(16.0, 1.0, 0.0)]
+    monkeypatch.setattr(errors_of, "_motion_errors", lambda *_: motion)
+    monkeypatch.setattr(errors_of, "_index_errors", lambda *_: indices)
+
+    def found() -> dict[str, object]:
+        return model_error([noisy_fit.model] * 3, noisy_trials[:3])
+
+    few = 3.1824463 / 1.96
+    told = {"how": "trials left out in turn", "trials": 3, "for_few_trials": pytest.approx(few)}
+    both = {"motion": pytest.approx(2.0), "indices": pytest.approx(4.0)}
+    assert found() == {"factor": pytest.approx(few * np.sqrt(10.0)), **told, **both}
+    motion, indices = [(0.01, 1.0, 0.0)], []
+    assert found() == {"factor": 1.0, **told, "motion": pytest.approx(0.1)}
+    seen = iter([[], motion, motion])
+    monkeypatch.setattr(errors_of, "_motion_errors", lambda *_: next(seen))
+    why = "assumed: only 2 of 3 trials can be predicted when they are left out"
+    assert found() == {"factor": 2.5, "how": why}
+
+
+@pytest.mark.parametrize(("lost", "known"), [(10, True), (11, False)])
+def test_a_trial_says_something_where_half_of_the_models_drawn_can_sail_it(
+    lost: int, known: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Errors of 0.3 against draws that are 0.1 beside; half of squared normal numbers are below 0.455."""
+    t = np.arange(9.0)
+    trial = Trial(t, {"psi": 0.0 * t}, kind="zigzag")
+    monkeypatch.setattr(errors_of, "predict", lambda model, trial: model)
+    own, beside = {"psi": 0.0 * t + 0.3}, {"psi": 0.0 * t + 0.4}
+    drawn = [beside] * (20 - lost) + [None] * lost
+    found = errors_of._motion_errors(own, drawn, trial, trial)
+    assert found == ([pytest.approx((0.09, 0.01 / 0.455, 0.0))] if known else [])
+    assert errors_of._motion_errors(None, drawn, trial, trial) == []
+    assert errors_of._motion_errors(own, [own] * 20, trial, trial) == []  # no draw says how certain it is
+    monkeypatch.setattr(errors_of, "index_reader", lambda *_: lambda run: run)
+    monkeypatch.setattr(errors_of, "closed_loop", lambda model, trial: model)
+    monkeypatch.setattr(errors_of, "_reading_noise", lambda *_: 0.07)
+    measured = SimpleNamespace(overshoot_1_deg=7.0, overshoot_2_deg=None, advance_lengths=3.0)
+    model = SimpleNamespace(overshoot_1_deg=9.0, overshoot_2_deg=8.0, advance_lengths=None)
+    other = SimpleNamespace(overshoot_1_deg=10.0, overshoot_2_deg=8.5, advance_lengths=3.0)
+    runs = [other] * (20 - lost) + [None] * lost
+    indices = errors_of._index_errors(model, runs, trial, measured)  # type: ignore[arg-type]
+    assert indices == ([pytest.approx((4.0, 1.0 / 0.455, 0.07))] if known else [])
+
+
+def test_an_index_is_read_to_the_noise_of_its_channel_and_a_part_of_a_step(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A time that is known to a step of 6 s has a standard deviation of 6 s / sqrt(12)."""
+    t, noise = 6.0 * np.arange(9.0), {"psi": 0.02, "x": 40.0}
+    channels = {name: np.full(9, value) for name, value in {"u": 5.0, "r": -0.01, **noise}.items()}
+    channels["u"][3], channels["r"][5] = 8.0, 0.004
+    monkeypatch.setattr(errors_of, "noise_level", lambda t, values: values[0])
+    model = SimpleNamespace(particulars={"length": 100.0})
+
+    def variance(index: str, kind: str, *left_out: str) -> float:
+        kept = {name: values for name, values in channels.items() if name not in left_out}
+        return errors_of._reading_noise(Trial(t, kept, kind=kind), index, model)  # type: ignore[arg-type]
+
+    timing = 36.0 / 12.0
+    overshoot = np.degrees(1.0) ** 2 * (0.02**2 + timing * 0.01**2)
+    assert variance("overshoot_1_deg", "zigzag") == pytest.approx(overshoot)
+    assert variance("initial_turning_lengths", "zigzag") == pytest.approx(timing * 64.0 / 1e4)
+    assert variance("advance_lengths", "turning-circle") == pytest.approx((1600.0 + timing * 64.0) / 1e4)
+    assert variance("advance_lengths", "turning-circle", "x") == pytest.approx(timing * 64.0 / 1e4)
 
 
 def test_intervals_hold_the_truth_of_a_ship_of_other_equations() -> None:

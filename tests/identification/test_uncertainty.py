@@ -124,3 +124,28 @@ def test_without_memory_the_covariance_is_that_of_the_textbook() -> None:
     matrix = np.triu(rng.standard_normal((3, 3))) + 3.0 * np.eye(3)
     back = np.linalg.inv(matrix)
     np.testing.assert_allclose(coefficient_covariance(inverse, matrix), back @ inverse @ back.T, rtol=1e-9)
+
+
+def test_memory_of_each_trial_is_counted_in_its_own_steps_and_a_short_one_is_no_memory_at_all() -> None:
+    """Three trials in steps of 1 s, 1 s and 5 s, and one of a single row, correlated over 2 s."""
+    rng = np.random.default_rng(2)
+    X, y = rng.standard_normal((41, 2)), rng.standard_normal(41)
+    time = np.concatenate([np.arange(30.0), np.arange(8.0), [0.0, 5.0], [0.0]])
+    trial = np.repeat([0, 1, 2, 3], [30, 8, 2, 1])
+    samples = Samples({"v": X}, {"v": y}, time, np.ones(41), trial, 1)
+    fitted = fit_all(get_method("ls").estimator, samples)
+    inverse = np.linalg.inv(X.T @ X)
+    scores = X * (y - X @ inverse @ X.T @ y)[:, None] * np.sqrt(41.0 / 39.0)
+    for memory, lags in ((2.0, (2, 2, 0, 0)), (0.05, (0, 0, 0, 0))):
+        meat = sum(newey_west(scores[trial == k], lag) for k, lag in enumerate(lags))
+        np.testing.assert_allclose(
+            joint_covariance(fitted, samples, memory), inverse @ meat @ inverse, rtol=1e-6
+        )
+
+
+def test_as_many_terms_as_samples_leave_one_degree_of_freedom() -> None:
+    X = np.random.default_rng(3).standard_normal((3, 3))
+    samples = Samples(
+        {"v": X}, {"v": X.sum(axis=1)}, np.arange(3.0), np.ones(3), np.zeros(3, dtype=np.int64), 1
+    )
+    assert effective_freedom(fit_all(get_method("ls").estimator, samples)["v"], X) == 1.0
