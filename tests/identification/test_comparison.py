@@ -5,13 +5,14 @@ from __future__ import annotations
 import json
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from identification import Comparison, compare_methods
+from identification import Comparison, compare_methods, cross_validate
 from identification.regression.samples import build_samples
-from identification.report.comparison import comparison_page
+from identification.report.comparison import comparison_page, headings_figure
 from identification.validation.comparison import COMPARISON_FILES, _pairs
 from identification.validation.folds import held_out_rows
 from shipgym import InputError, ShipModel, Trial
@@ -89,6 +90,39 @@ def test_without_trials_to_validate_each_is_held_out_in_turn(
     found = compare_methods(noisy_trials[:3], ["ls", "tls-svm"], structure="linear-steering", **options)
     assert found.in_turn
     assert list(found.standings[0].errors) == [trial.name for trial in noisy_trials[:3]]
+
+
+def test_two_trials_are_enough_to_hold_each_out(noisy_trials: list[Trial], mariner: ShipModel) -> None:
+    options = {"structure": "nomoto", "particulars": mariner.particulars}
+    (first,) = compare_methods(noisy_trials[:2], ["ls"], **options).standings
+    seen = cross_validate(noisy_trials[:2], method="ls", **options)
+    assert list(first.errors) == list(seen) == [trial.name for trial in noisy_trials[:2]]
+    headings = [np.degrees(metrics["rmse"]["psi"]) for metrics in seen.values()]
+    assert first.heading_deg == pytest.approx(np.mean(headings))
+    with pytest.raises(InputError, match="trials: 1 to fit found, expected at least 2 to hold one out"):
+        cross_validate(noisy_trials[:1], **options)
+
+
+def test_the_four_best_are_drawn_with_the_error_of_their_headings() -> None:
+    """Running means over a hundredth of 250 samples, which are two; three panels in two rows."""
+    t = np.arange(250.0)
+    held = [Trial(t, {"psi": 0.1 * t}, name=f"runs/{k}.csv", use="validate") for k in range(3)]
+    others = [Trial(t, {"psi": t}, use="fit"), Trial(t, {"r": t}, use="validate")]
+    results = {
+        f"method {k}": SimpleNamespace(
+            trials=[*others, *held],
+            predictions={one.name: {"psi": 0.1 * t + np.radians(0.01 * k * t)} for one in held},
+        )
+        for k in range(6)
+    }
+    results["method 1"].predictions["runs/2.csv"] = None
+    figure = headings_figure(SimpleNamespace(results=results, best=results["method 0"]))  # type: ignore[arg-type]
+    assert figure.layout.height == 540
+    drawn = {axis: [one for one in figure.data if one.xaxis == axis] for axis in ("x", "x2", "x3")}
+    assert [len(lines) for lines in drawn.values()] == [4, 4, 3]
+    assert [line.name for line in drawn["x"]] == [f"method {k}" for k in range(4)]
+    np.testing.assert_allclose(drawn["x"][2].x, t[1:] - 0.5)
+    np.testing.assert_allclose(drawn["x"][2].y, 0.02 * (t[1:] - 0.5), rtol=1e-4)
 
 
 def test_what_cannot_be_compared_is_named(noisy_trials: list[Trial], mariner: ShipModel) -> None:

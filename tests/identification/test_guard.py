@@ -42,6 +42,33 @@ def test_a_ship_that_resonates_is_found_by_reversing_the_rudder(mariner: ShipMod
     assert all(re.match(r"rudder [+-]\d+ deg reversed every [\d.]+ L/U: ", reason) for reason in reasons)
 
 
+def test_ships_are_tried_to_both_sides_with_35_and_10_degrees_but_not_beyond_their_limit(
+    mariner: ShipModel, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Over 50 ship lengths in steps of a fiftieth, and with rudders reversed every 2.5 to 20 lengths."""
+    turns, reversals = list[Any](), list[Any]()
+    calm = Trial(np.arange(3.0), {"u": np.full(3, 5.0), "v": np.zeros(3), "r": np.zeros(3)})
+    monkeypatch.setattr(
+        guard, "turning_circle", lambda _, angle, **times: turns.append((angle, times)) or calm
+    )
+    monkeypatch.setattr(guard, "_reversed", lambda _, *given: reversals.append(given) or calm)
+    for limit, angles in ((40.0, (35.0, 10.0)), (30.0, (30.0, 10.0)), (8.0, (8.0,))):
+        turns.clear()
+        reversals.clear()
+        gear = replace(mariner.steering, rudder_limit_deg=limit)
+        assert reasons_unstable(replace(mariner, steering=gear), []) == []
+        sides = [side * angle for angle in angles for side in (1.0, -1.0)]
+        assert [angle for angle, _ in turns] == sides
+        assert reversals == [(side, gap) for side in sides for gap in (2.5, 5.0, 10.0, 20.0)]
+    length = 160.93 / 7.7175  # s
+    assert turns[0][1] == pytest.approx({"duration": 50.0 * length, "dt": 0.02 * length})
+
+
+def test_penalties_grow_by_sixths_of_a_decade_from_a_thousandth_to_all_that_terms_contribute() -> None:
+    assert guard.STRENGTHS[::6] == pytest.approx((1e-3, 1e-2, 0.1, 1.0))
+    np.testing.assert_allclose(np.diff(np.log10(guard.STRENGTHS)), 1.0 / 6.0)
+
+
 def test_size_of_a_term_in_the_hard_turn(mariner: ShipModel) -> None:
     p = mariner.particulars
     sizes = hard_turn_features(mariner.table, p)
@@ -85,6 +112,7 @@ def test_what_no_ship_does(channel: str, value: float, said: str) -> None:
 
     assert (found(**{channel: value}), found(**{channel: 0.99 * value})) == (said, None)
     assert (found(u=-0.1), found(-0.2, u=-0.1)) == ("surge speed from -0.1 to 8 m/s", None)
+    assert found(u=0.01) is None
 
 
 def test_the_rudder_is_reversed_at_intervals_by_the_ship_s_length() -> None:

@@ -17,7 +17,7 @@ from identification.regression.grey_box import chosen_box
 from identification.uncertainty import model_error as errors_of
 from identification.uncertainty.bootstrap import influence_covariance
 from identification.uncertainty.model_error import DEFAULT, model_error, scale_of, without_trial
-from identification.validation.closed_loop import closed_loop
+from identification.validation.closed_loop import _leg, closed_loop
 from identification.validation.prediction import predict
 from identification.validation.warnings import (
     _not_corrected,
@@ -191,6 +191,41 @@ def test_closed_loop_overshoots_do_not_depend_on_the_neutral_helm(mariner: ShipM
     assert found.overshoot_1_deg == pytest.approx(truth.overshoot_1_deg, abs=0.25)
     assert error < 0.4
     assert error < 0.5 * abs(open_loop.overshoot_2_deg - truth.overshoot_2_deg)
+
+
+def test_a_leg_ends_where_its_heading_is_reached_within_twice_the_measured_time() -> None:
+    """A ship that turns by 0.1 rad/s whatever is ordered, in steps of a fiftieth of a ship length, 0.2 s."""
+    orders: list[np.ndarray] = []
+
+    def simulate(commands: np.ndarray, dt: float, state: np.ndarray) -> dict[str, np.ndarray]:
+        orders.append(commands)
+        t = dt * np.arange(len(commands) + 1)
+        return {"psi": state[0] + state[1] * t, "u": state[1] + 0.0 * t, "x": t**2}
+
+    ship = SimpleNamespace(
+        travel_time=10.0, service_command=np.array([0.0, 9.0]), command_names=("delta", "n"),
+        state_names=("psi", "u", "x"), simulate=simulate,
+    )  # fmt: skip
+    trial = Trial(np.array([0.0, 50.0, 100.0]), {"n": [1.0, 1.5, 2.0]})
+
+    def sailed(duration: float, target: float | None, rate: float = 0.1) -> tuple[np.ndarray, np.ndarray]:
+        return _leg(ship, trial, np.array([0.0, rate, 0.0]), -0.3, 50.0, duration, target)  # type: ignore[arg-type]
+
+    times, states = sailed(1.0, None)
+    np.testing.assert_allclose(times, 50.0 + 0.2 * np.arange(1, 6))
+    np.testing.assert_allclose(states[:, 0], 0.1 * (times - 50.0))
+    np.testing.assert_allclose(orders[-1], np.column_stack([np.full(5, -0.3), 1.5 + 0.002 * np.arange(5)]))
+    assert len(sailed(0.1, None)[0]) == 2  # two steps at least
+    assert len(sailed(2.35, 0.5)[0]) == 0  # not reached in 4.8 s
+    for target, rate in ((0.51, 0.1), (-0.51, -0.1)):
+        times, states = sailed(2.6, target, rate)
+        assert (times[-1], states[-1, 0]) == pytest.approx((55.1, target))
+        assert states[-1, 2] == pytest.approx((5.0**2 + 5.2**2) / 2.0)  # between the two steps
+        assert len(times) == 26
+    assert sailed(2.6, 0.015)[0] == pytest.approx([50.15])  # within the first step
+    assert len(sailed(2.6, 0.0)[0]) == 0
+    rolling = SimpleNamespace(state_names=("u", "phi"))
+    assert closed_loop(rolling, trial) is None  # type: ignore[arg-type]
 
 
 def test_the_worst_errors_on_trials_held_out_are_said(noisy_fit: IdentificationResult) -> None:

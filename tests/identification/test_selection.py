@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
+import numpy as np
 import pytest
 
-from identification import IdentificationResult, identify
+from identification import IdentificationResult, Options, identify
 from identification.validation import selection
 from identification.validation.ranking import Standing
-from identification.validation.selection import _simplest
+from identification.validation.selection import _simplest, select
 from shipgym import InputError, ShipModel, Trial
 from shipgym.manoeuvres import zigzag
 
@@ -87,6 +90,30 @@ def test_a_method_or_setting_that_is_named_is_kept(auto: Auto, trials: list[Tria
         auto(trials[:2], epsilon=0.1)
 
 
+@pytest.mark.parametrize(("count", "sizes"), [(7, [2, 1, 2, 1, 1]), (3, [1, 1, 1]), (10, [2] * 5)])
+def test_trials_are_held_out_in_no_more_than_five_groups(
+    count: int, sizes: list[int], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    held, t = list[Any](), np.arange(6.0)
+    metrics = {"use": "validate", "diverged": False, "rmse": {"psi": 0.1, "r": None}}
+    trials = [Trial(t, {"psi": np.sin(t)}, name=f"run {k}") for k in range(count)]
+
+    def identified(parts: list[Trial], options: Options) -> Any:
+        held.append(options.hold_out)
+        model = SimpleNamespace(provenance={"structure": options.structure, "method": options.method})
+        told = {"trials": {trial.name: metrics for trial in parts}}
+        return SimpleNamespace(model=model, metrics=told, stable=True, coefficients={"c_r": 1.0})
+
+    monkeypatch.setattr(selection, "STRUCTURES", ("nomoto",))
+    monkeypatch.setattr(selection, "OTHERS", ())
+    _, told = select(identified, trials, Options(structure="auto"))
+    assert [len(names) for names in held] == sizes
+    assert [name for names in held for name in names] == [trial.name for trial in trials]
+    assert told["held_out"] == "each trial in turn"
+    assert told["ranking"][0]["error"] == pytest.approx(0.1 / np.std(np.sin(t)))
+    assert told["ranking"][0]["heading_deg"] == pytest.approx(np.degrees(0.1))
+
+
 def test_nothing_to_fit_is_refused(auto: Auto, trials: list[Trial]) -> None:
     with pytest.raises(InputError, match='none is marked use = "fit"'):
         auto([trials[0].with_(use="validate")])
@@ -97,6 +124,11 @@ def test_the_fewest_coefficients_among_errors_that_differ_by_chance() -> None:
     assert _simplest([best, small]) is small  # 0.003 +- 0.013
     assert _simplest([best, standing("nomoto", 2, 0.13, 0.14, 0.15)]) is best  # 0.027 +- 0.003
     assert _simplest([best, standing("cubic", 27, 0.102, 0.122, 0.112)]).structure == "cubic"  # 1.8 %
+    first, even = standing("abkowitz", 40, 0.14, 0.10, 0.10), standing("nomoto", 2, 0.136, 0.11, 0.11)
+    assert _simplest([first, even]) is first  # 0.0053 +- 0.0047
+    exact = standing("abkowitz", 40, 0.0, 0.0)
+    assert _simplest([exact, standing("nomoto", 2, 0.001, 0.001)]) is exact
+    assert _simplest([exact, standing("nomoto", 2, 0.0, 0.0)]).structure == "nomoto"
     usual = standing("abkowitz", 40, 0.10, 0.12, 0.112)
     other = standing("abkowitz", 40, 0.10, 0.12, 0.11, method="ls")
     assert _simplest([other, usual]) is usual
@@ -107,6 +139,7 @@ def test_ships_that_run_away_come_last_then_unstable_ones_then_by_error() -> Non
     unstable, lost = replace(good, stable=False), replace(good, ran_away=1, error=None)
     often = replace(lost, ran_away=2)
     unknown = replace(good, error=None)
-    in_order = [good, worse, unknown, unstable, lost, often]
-    shuffled = [often, unknown, good, lost, unstable, worse]
+    exact, better = replace(good, error=0.0), replace(good, error=0.05)
+    in_order = [exact, better, good, worse, unknown, unstable, lost, often]
+    shuffled = [often, unknown, better, good, lost, unstable, exact, worse]
     assert sorted(shuffled, key=lambda one: one.rank) == in_order

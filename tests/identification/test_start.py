@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
+from identification.validation import start
 from identification.validation.prediction import predict
 from identification.validation.start import with_start
-from shipgym import Trial, load_model
+from shipgym import Trial, UnstableModelError, load_model
 from shipgym.manoeuvres import turning_circle, zigzag
 
 
@@ -51,3 +52,25 @@ def test_measured_velocities_and_short_records_stay():
     rare = Trial(turn.t[::20], {name: turn[name][::20] for name in turn.channels}, length=turn.length)
     short = as_derived(rare, {"v": 0.5})
     assert with_start(ship, short) is short
+
+
+def test_three_samples_within_one_and_a_half_ship_lengths_tell_a_start():
+    """At service speed these take the Mariner 31 s."""
+    ship = load_model("mariner")
+    turn = turning_circle(ship, 20.0, 300.0, 1.0)
+    for step, found in ((15, True), (16, False)):
+        rare = Trial(turn.t[::step], {name: turn[name][::step] for name in turn.channels}, length=turn.length)
+        log = as_derived(rare, {"r": 0.008})
+        assert (with_start(ship, log) is not log) == found
+
+
+def test_a_ship_that_runs_away_starts_as_was_recorded(monkeypatch):
+    def lost(model, trial):
+        raise UnstableModelError("lost", 1.0, {})
+
+    ship = load_model("mariner")
+    t = np.arange(60.0)
+    channels = {name: np.zeros(60) for name in ("u", "v", "r", "psi", "delta")}
+    log = Trial(t, channels, derived=frozenset("r"))
+    monkeypatch.setattr(start, "open_loop", lost)
+    assert with_start(ship, log) is log
