@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import json
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -112,6 +113,16 @@ def test_provenance_tells_where_the_model_came_from(
     assert provenance["steering"] == "given"
 
 
+def test_a_model_without_covariance_has_coefficients_of_unknown_error(
+    noisy_fit: IdentificationResult,
+) -> None:
+    bare = replace(noisy_fit, model=replace(noisy_fit.model, covariance=None))
+    assert bare.standard_errors.keys() == noisy_fit.standard_errors.keys()
+    assert np.isnan(list(bare.standard_errors.values())).all()
+    variances = np.square(list(noisy_fit.standard_errors.values()))
+    np.testing.assert_allclose(variances, np.diag(noisy_fit.model.covariance))  # type: ignore[arg-type]
+
+
 def test_metrics_have_the_promised_form(noisy_fit: IdentificationResult, mariner: ShipModel) -> None:
     metrics = noisy_fit.metrics["trials"]["zigzag_15_15"]
     assert set(metrics) == {
@@ -163,8 +174,10 @@ def test_without_plotly_an_earlier_report_does_not_stay(
 ) -> None:
     (tmp_path / "report.html").write_text("of another model")
     monkeypatch.setitem(sys.modules, "plotly", None)
-    with pytest.warns(UserWarning, match=r"plotly is not installed, so report.html .*'shipgym\[report\]'"):
+    told = r"plotly is not installed, so report.html .*'shipgym\[report\]'"
+    with pytest.warns(UserWarning, match=told) as warned:
         noisy_fit.save(tmp_path)
+    assert warned[0].filename == __file__  # where it was asked for
     assert {path.name for path in tmp_path.iterdir()} == {"metrics.json", "model.json", "settings.json"}
 
 

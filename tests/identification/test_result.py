@@ -7,15 +7,29 @@ import os
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 
-from identification import IdentificationResult, identify
-from identification.report.figures import rudder_at_windows
-from identification.report.page import report_page
-from identification.report.view import fit_view, short_names
+from identification import IdentificationResult, Samples, TruncatedLSSVM, identify
+from identification.report.figures import (
+    _logarithmic,
+    coefficients_figure,
+    fit_figure,
+    l_curve_figure,
+    residual_figure,
+    rudder_at_windows,
+    search_figure,
+)
+from identification.report.figures import truncated as with_a_rank
+from identification.report.page import _shown, report_page
+from identification.report.summary import _coefficients as coefficients_table
+from identification.report.view import _coefficients, _errors, _heading, _trial, fit_view, short_names
 from identification.result import FILES
+from identification.search import SearchResult
+from identification.search.search import BAND, LOG_C
 from identification.validation.diagnostics import cross_correlation
 from shipgym import ShipFile, ShipModel, Trial
 from shipgym.ships.particulars import ADDED_MASSES
@@ -214,3 +228,188 @@ def test_short_names_are_those_without_folders_where_they_differ() -> None:
 
     assert named("a/one.csv", "b/two.csv") == {"a/one.csv": "one.csv", "b/two.csv": "two.csv"}
     assert named("a/one.csv", "b/one.csv") == {"a/one.csv": "a/one.csv", "b/one.csv": "b/one.csv"}
+
+
+def regression(rows: int, error: Any, equations: str = "r", **more: Any) -> Any:
+    """As much of a fit as figures look at: windows of 2 s, whose targets go up to 1 over the first trial."""
+    targets = np.linspace(0.0, 2.0, rows)
+    time, half = 2.0 * np.arange(rows), np.arange(rows) * 2 // rows
+    samples = Samples(
+        dict.fromkeys(equations, targets[:, None]), dict.fromkeys(equations, targets + error), time,
+        np.full(rows, 2.0), half, 1,
+    )  # fmt: skip
+    estimators = dict.fromkeys(equations, SimpleNamespace(predict=lambda X: X[:, 0]))
+    return SimpleNamespace(samples=samples, estimators=estimators, **more)
+
+
+def test_of_many_windows_so_few_are_drawn_that_a_page_stays_small() -> None:
+    """Of 5200 every second, with a gap between the trials; by the second, yaw in degrees."""
+    figure = fit_figure(regression(5200, 0.1, "vr"))
+    assert figure.layout.height == 95 * 4 + 80
+    sway, yaw = (figure.data[k] for k in (0, 4))
+    assert (sway.name, yaw.name, len(sway.y)) == ("trials", "trials", 2601)
+    assert np.flatnonzero(np.isnan(sway.y)).tolist() == [1300]
+    expected = np.linspace(0.0, 2.0, 5200)[::2] + 0.1
+    np.testing.assert_allclose(np.delete(sway.y, 1300), expected / 2.0, rtol=1e-5)
+    np.testing.assert_allclose(np.delete(yaw.y, 1300), np.degrees(expected / 2.0), rtol=1e-5)
+    assert len(fit_figure(regression(4900, 0.1)).data[0].y) == 4901
+    equal = next(trace for trace in figure.data if trace.name == "equal")
+    np.testing.assert_allclose(equal.x, [0.0, 1.05], rtol=1e-3)  # from the least to the largest of both
+
+
+@pytest.mark.parametrize(("alike", "reach"), [(0.0, 3.0 * 1.96 / 20.0), (0.6, 0.66), (0.99, 1.05)])
+def test_residuals_of_a_trial_without_a_rudder_are_drawn_with_themselves_alone(
+    alike: float, reach: float
+) -> None:
+    """Up to a tenth beyond the largest correlation, but to three bounds of white noise and to 1.05."""
+    rng = np.random.default_rng(0)
+    error = rng.choice([-1.0, 1.0], 400)
+    for k in range(1, 400):
+        error[k] = error[k - 1] if rng.random() < alike else error[k]
+    t = np.arange(9.0)
+    figure = residual_figure(regression(400, error, trials=[Trial(t, {"r": t}, use="fit")]))
+    bars, *bounds = figure.data
+    assert (len(bars.x), bars.x[0], len(bounds)) == (24, 1, 2)
+    assert sorted(bound.y[0] for bound in bounds) == pytest.approx([-0.098, 0.098])
+    assert list(bounds[0].x) == [0.5, 24.5]
+    low, high = figure.layout.yaxis.range
+    assert (low, high) == (-high, pytest.approx(reach, rel=0.15))
+    assert high == pytest.approx(min(max(1.1 * np.abs(bars.y).max(), 3.0 * 0.098), 1.05))
+
+
+def intervals(**given: tuple[float, float]) -> Any:
+    coefficients, errors = ({name: pair[k] for name, pair in given.items()} for k in (0, 1))
+    fit: Any = SimpleNamespace(coefficients=coefficients, standard_errors=errors)
+    return coefficients_figure(fit)
+
+
+def test_what_may_be_zero_is_not_significant_and_long_intervals_are_cut() -> None:
+    """Per cent of the estimate, of one that is 0 of 1; from -150 to 350 is shown."""
+    figure = intervals(
+        sure=(2.0, 0.5), unsure=(-1.0, 1.0), none=(0.0, 0.3), unknown=(4.0, np.nan), wild=(1.0, 9.0)
+    )
+    significant, other = figure.data
+    assert [text.partition(":")[0] for text in significant.text] == ["sure", "unknown"]
+    assert [text.partition(":")[0] for text in other.text] == ["unsure", "none", "wild"]
+    assert significant.text[0] == "sure: ± 49 %"
+    assert list(significant.x) == [100.0, 100.0]
+    assert list(other.x) == [100.0, 0.0, 100.0]
+    assert list(significant.error_x.array) == pytest.approx([49.0, 0.0])
+    assert list(other.error_x.array) == pytest.approx([196.0, 58.8, 250.0])
+    assert list(other.error_x.arrayminus) == pytest.approx([196.0, 58.8, 250.0])
+    assert list(other.y) == [1.0, 2.0, 4.0]
+
+
+@pytest.mark.parametrize(("count", "columns", "height"), [(11, 1, 330), (12, 2, 230), (13, 2, 250)])
+def test_twelve_coefficients_stand_in_two_columns(count: int, columns: int, height: int) -> None:
+    figure = intervals(**{f"c{k}": (1.0, 0.1) for k in range(count)})
+    axes = list(figure.select_yaxes())
+    assert [name for axis in axes for name in axis.ticktext] == [f"c{k}" for k in range(count)]
+    assert (len(axes), figure.layout.height) == (columns, height)
+
+
+def test_an_l_curve_is_drawn_where_a_rank_was_chosen_or_given() -> None:
+    fit: Any = SimpleNamespace(
+        estimators={
+            "u": TruncatedLSSVM(selection="full"), "v": TruncatedLSSVM(selection="full", rank=2),
+            "r": TruncatedLSSVM(), "p": SimpleNamespace(selection="gcv", rank=2),
+        }
+    )  # fmt: skip
+    assert list(with_a_rank(fit)) == ["v", "r"]
+    curve = SimpleNamespace(residual_norm=np.array([3.0, 2.0, 1.0]), solution_norm=np.array([1.0, 40.0, 5e3]))
+    for name in ("v", "r"):
+        vars(fit.estimators[name]).update(l_curve_=curve, rank_=2)
+    figure = l_curve_figure(fit)
+    assert [note.text for note in figure.layout.annotations] == ["sway: rank 2 of 3", "yaw: rank 2 of 3"]
+    line, chosen = figure.data[:2]
+    assert (list(chosen.x), list(chosen.y)) == ([2.0], [40.0])
+    assert list(line.text) == ["1", "2", "3"]
+
+
+@pytest.mark.parametrize(("largest", "step"), [(99.0, "D2"), (101.0, 1)])
+def test_less_than_two_decades_are_drawn_in_steps_of_1_2_and_5(largest: float, step: object) -> None:
+    found = _logarithmic("norm", np.array([1.0, 7.0, largest], dtype=np.float32))
+    assert (found["dtick"], found["type"]) == (step, "log")
+    assert _logarithmic("norm", np.array([0.0, 1.0], dtype=np.float32))["dtick"] == 1
+
+
+def test_a_search_that_leaves_nothing_is_drawn_as_it_is() -> None:
+    """And a band between 0 and 1; objectives relative to the final one, weights as powers of ten."""
+
+    def search(value: float, history: list[float], variable: str, course: list[float]) -> SearchResult:
+        rounds = np.array(course)[:, None]
+        return SearchResult(rounds[-1], value, np.array(history), rounds, 9, variable)
+
+    both = {"v": search(0.0, [2.0, 0.0], BAND, [0.5, 0.2]), "r": search(2.0, [8.0, 2.0], BAND, [0.9, 0.1])}
+    figure = search_figure(SimpleNamespace(searches=both))  # type: ignore[arg-type]
+    for trace, values in zip(figure.data, ([2.0, 0.0], [4.0, 1.0], [0.5, 0.2], [0.9, 0.1]), strict=True):
+        assert list(trace.y) == pytest.approx(values)
+    assert figure.layout.yaxis2.range == (0.0, 1.0)
+    one = {"v": search(2.0, [8.0, 2.0], LOG_C, [1.0, 3.0])}
+    figure = search_figure(SimpleNamespace(searches=one))  # type: ignore[arg-type]
+    for trace, values in zip(figure.data, ([4.0, 1.0], [10.0, 1000.0]), strict=True):
+        assert list(trace.y) == pytest.approx(values)
+    assert figure.layout.yaxis2.type == "log"
+
+
+def test_settings_are_told_in_words() -> None:
+    given = (True, False, ["a.csv", 3], [], 2.5, "gcv")
+    assert [_shown(value) for value in given] == ["yes", "no", "a.csv, 3", None, 2.5, "gcv"]
+
+
+def test_what_a_trial_did_not_record_is_left_out() -> None:
+    t = np.arange(5.0)
+    speed = 0.514444 * np.array([6.0, 8.0, 7.0, 6.5, 7.5])
+    heading = Trial(2.0 * t, {"psi": t, "u": speed}, kind="turning-circle", use="validate", derived=["u"])
+    row = _trial(heading, "short")
+    assert (row["rudder"], row["speeds"], row["kind"], row["derived"]) == (None, None, "turning circle", "u")
+    assert (row["samples"], row["duration"], row["interval"]) == (5, 8.0, 2.0)
+    whole = _trial(Trial(t, {"u": 0.6 * speed, "v": -0.8 * speed, "delta": -0.1 * t}), "whole")
+    assert whole["speeds"] == pytest.approx((6.0, 8.0), rel=1e-5)
+    assert (whole["kind"], whole["derived"], whole["use"]) == (None, "none", "fit")
+    assert whole["rudder"] == pytest.approx(np.degrees(0.4))
+
+
+def test_headings_of_trials_that_were_fitted_are_told_where_none_is_held_out() -> None:
+    def heading(**uses: tuple[str, float | None]) -> Any:
+        trials = {
+            f"runs/{name}.csv": {
+                "use": use,
+                "rmse": {"psi": None if degrees is None else np.radians(degrees)},
+            }
+            for name, (use, degrees) in uses.items()
+        }
+        return _heading(SimpleNamespace(metrics={"trials": trials}))  # type: ignore[arg-type]
+
+    found = heading(a=("fit", 1.0), b=("fit", 4.0), c=("fit", 2.0), d=("fit", None))
+    assert (found["unseen"], found["trial"]) == (False, "b.csv")
+    assert (found["median"], found["largest"]) == pytest.approx((2.0, 4.0))
+    found = heading(a=("fit", 9.0), b=("validate", 3.0))
+    assert (found["unseen"], found["trial"], found["largest"]) == (True, "b.csv", pytest.approx(3.0))
+    assert heading(a=("fit", 9.0), b=("validate", None)) is None
+
+
+def test_an_index_is_told_where_the_trial_has_it() -> None:
+    pair = {"measured": 8.0, "predicted": 7.0, "closed_loop": 7.5}
+    told = _errors({"overshoot_1_deg": pair, "advance_lengths": None, "transfer_lengths": pair})["indices"]
+    assert told == [("1st overshoot", 8.0, 7.0, 7.5, "deg"), ("transfer", 8.0, 7.0, 7.5, "L")]
+
+
+def test_coefficients_without_errors_are_significant_unless_they_are_zero() -> None:
+    """Accelerations in their own units; with an error it is two of these that make them so."""
+    dynamics = SimpleNamespace(normalisation="si", quantity="acceleration")
+    given = {"b_v": (3.0, 0.0), "b_r": (0.0, 0.0), "c_v": (-1.99, 1.0), "c_r": (-2.0, 1.0)}
+    fit: Any = SimpleNamespace(
+        model=SimpleNamespace(dynamics=dynamics),
+        coefficients={name: pair[0] for name, pair in given.items()},
+        standard_errors={name: pair[1] for name, pair in given.items()},
+    )  # fmt: skip
+    ((title, rows),) = _coefficients(fit).items()
+    assert title == "coefficient"
+    assert [(row["value"], row["t"], row["significant"]) for row in rows] == [
+        (3.0, None, True), (0.0, None, False), (-1.99, -1.99, False), (-2.0, -2.0, True)
+    ]  # fmt: skip
+    table = coefficients_table(fit)
+    assert table.title == "Coefficients of accelerations, si units"
+    assert list(table.columns[1].cells) == ["3", "0", "-1.99", "-2"]
+    assert list(table.columns[3].cells) == ["-", "-", "-2.0", "-2.0"]

@@ -14,7 +14,7 @@ from identification import identify
 from identification.regression import current, still_water
 from identification.regression.still_water import in_still_water, through_water
 from identification.regression.wind import measured_wind
-from identification.report.sea import sea_sentences, track_figure
+from identification.report.sea import _current, sea_sentences, track_figure
 from shipgym import ShipModel, Trial
 from shipgym.errors import InputError
 from shipgym.manoeuvres import turning_circle, zigzag
@@ -404,3 +404,46 @@ def test_what_a_ship_of_the_prior_does_is_the_same_to_both_sides() -> None:
     # at her speed ahead on a straight course only the propeller and the wind act
     steady = current._accelerations(1.1, 0.0, np.array([0.0, 0.0, 1.1, 0.02, 0.05]), c)
     assert steady == (pytest.approx(c[0] + 0.02 * c[17]), pytest.approx(0.05 * c[17]))
+
+
+@pytest.mark.parametrize(
+    ("row", "said"),
+    [
+        (
+            {"source": "trial", "standard_errors": (0.01, 0.02), "probability": 0.009, "taken_out": True},
+            "its own, north 0.300 ± 0.020, east -0.400 ± 0.039 m/s (95 %), which differs from zero; removed",
+        ),
+        (
+            {
+                "source": "all trials",
+                "standard_errors": (0.1, 0.2),
+                "probability": 0.0101,
+                "taken_out": False,
+            },
+            "one for all, north 0.300 ± 0.196, east -0.400 ± 0.392 m/s (95 %), which does not differ from "
+            "zero; left in",
+        ),
+        (
+            {"source": "all trials", "taken_out": False},
+            "one for all, a guess without an interval, as the trials keep to one heading; left in",
+        ),
+        ({"source": "given", "taken_out": True}, "as given; removed"),
+        ({"source": "columns", "taken_out": True}, "from columns; removed"),
+    ],
+)
+def test_a_current_is_told_with_set_and_drift_and_what_became_of_it(row, said):
+    """A knot is 0.514444 m/s; the water sets to the north-west, 53 degrees from north."""
+    told = _current({"north": NORTH, "east": EAST, **row})
+    assert told == f"current of 0.50 m/s (0.97 knots) towards 307 deg, {said}"
+
+
+def test_winds_are_told_by_their_range_and_by_what_was_removed_of_each_trial():
+    wind = {
+        "mean_speeds": {"a": 4.24, "b": 12.3},
+        "accelerations": {"runs/a.csv": {"wind_vdot": 0.0123, "wind_rdot": -2.5e-5}},
+    }
+    assert sea_sentences({"wind": wind}) == [
+        "wind of 4.2 to 12 m/s on average: its forces are removed",
+        "a.csv: constant acceleration removed, vdot 0.012 m/s², rdot -2.5e-05 rad/s²",
+    ]
+    assert sea_sentences({}) == []

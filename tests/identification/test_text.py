@@ -16,3 +16,9 @@ def test_columns_are_aligned_as_their_headings_ask():
 
 def test_lines_of_text_are_not_broken():
     assert as_text("x" * (2 * WIDTH)) == "x" * (2 * WIDTH) + "\n"
+
+
+def test_tables_are_at_most_a_hundred_characters_wide():
+    table = lined_table("Words", "one", "other")
+    table.add_row("x" * 70, "y" * 70)
+    assert max(map(len, as_text(table).splitlines())) == WIDTH == 100
