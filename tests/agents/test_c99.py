@@ -1,6 +1,7 @@
 """The exported C does what the library does, and what cannot be written as C is refused by name."""
 
 import ctypes
+import json
 import math
 import subprocess
 from dataclasses import replace
@@ -315,6 +316,11 @@ def test_the_command_writes_c_and_says_what_it_cannot(tmp_path):
     found = run(app, ["export", str(tmp_path / "pid.json"), "--c", str(tmp_path / "out")])
     assert found.exit_code == 0, found.output
     assert sorted(one.name for one in (tmp_path / "out").iterdir()) == ["pid.c", "pid.h"]
+    for what, name in ((tmp_path / "pid.json", "helm"), ("mariner", "hull")):
+        found = run(app, ["export", str(what), "--c", str(tmp_path / name), "--name", name, "--json"])
+        written = sorted(one.name for one in (tmp_path / name).iterdir())
+        assert (found.exit_code, written) == (0, [f"{name}.c", f"{name}.h"])
+        assert json.loads(found.stdout) == {"written": [str(tmp_path / name)]}
     found = run(app, ["export", "mariner", "--c", str(tmp_path)])
     assert (found.exit_code, (tmp_path / "mariner.c").exists()) == (2, False)  # a folder with other files
     for said, *arguments in (

@@ -7,6 +7,10 @@ import resource
 import shlex
 import subprocess
 import sys
+import tempfile
+import warnings
+from contextlib import nullcontext
+from io import BytesIO, TextIOWrapper
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -14,12 +18,15 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
-from agents.cli import app, doctor, training
-from agents.cli.command import LONGEST_NAME, told_failure
+from agents import cli
+from agents.cli import app, doctor, identification, reproduction, training, warm
+from agents.cli.command import answered, told_failure
 from agents.cli.warm import _jobs, _names
+from agents.controllers.designs import CLASSICAL
+from agents.engines.jobs import JobEngine, WorkerDiedError
 from agents.training.plan import Given
 from agents.training.run_folder import CHECKPOINT
-from shipgym import InputError, load_model
+from shipgym import InputError, ManoeuvreError, UnstableModelError, load_model
 from tests.golden.texts import same_page, same_text
 
 ROOT = Path(__file__).parents[2]
@@ -370,7 +377,7 @@ def test_warm_says_what_cannot_be_and_goes_on_only_where_all_was_asked_for(monke
     ("error", "code", "said"),
     [
         (OSError(errno.ENOENT, "No such file", "a.toml"), 2, "a.toml: No such file"),
-        (OSError(errno.ENOENT, "No such file", "a" * 5000), 2, "a" * LONGEST_NAME + ": No such file"),
+        (OSError(errno.ENOENT, "No such file", "a" * 5000), 2, "a" * 200 + ": No such file"),
         (OSError(errno.EIO, "Input/output error"), 2, "Input/output error"),
         (OSError("odd"), 2, "odd"),
         (OSError(errno.ENOSPC, "No space left"), 1, "the output cannot be written (No space left)"),
@@ -486,14 +493,389 @@ def test_what_a_training_found_is_told(capsys):
 
 def test_a_training_that_is_interrupted_says_whether_it_can_go_on(tmp_path, monkeypatch, capsys):
     def interrupted(plan, out, **settings):
+        assert settings["command"] == "shipgym train ppo --out 'my run'"  # as the run's file tells
         if out.name == "kept":
             out.mkdir()
             (out / CHECKPOINT).touch()
         raise KeyboardInterrupt
 
     monkeypatch.setattr("agents.training.training.train", interrupted)
+    monkeypatch.setattr(sys, "argv", ["/usr/bin/shipgym", "train", "ppo", "--out", "my run"])
     told = {"none": "interrupted", "kept": f"interrupted; continue with --resume --out {tmp_path / 'kept'}"}
     for name, said in told.items():
         with pytest.raises(typer.Exit) as left:
             training._train(Given("ppo"), tmp_path / name, False, None)
         assert (left.value.exit_code, capsys.readouterr().err) == (130, f"error: {said}\n")
+
+
+@pytest.mark.parametrize(
+    ("error", "code", "said"),
+    [
+        (InputError("length: -1 found"), 2, "length: -1 found"),
+        (ManoeuvreError("never turned", None), 1, "never turned"),
+        (UnstableModelError("lost", 1.0, {}), 1, "lost"),
+        (WorkerDiedError("a worker died"), 1, "a worker died"),
+        (KeyboardInterrupt(), 130, "interrupted, nothing was written"),
+        (OSError(errno.ENOENT, "No such file", "a.toml"), 2, "a.toml: No such file"),
+    ],
+)
+def test_whatever_goes_wrong_is_one_message_and_an_exit_code(error, code, said, capsys):
+    def command():
+        raise error
+
+    with pytest.raises(typer.Exit) as left:
+        answered(command)()
+    assert (left.value.exit_code, capsys.readouterr().err) == (code, f"error: {said}\n")
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["", "--json"], "argument: '' found"), (["identify", ""], "argument: '' found"),
+        (["identify", "x", "--out", ""], "--out: '' found"), (["identify", "--out="], "--out: '' found"),
+        (["look", "a\0b"], "argument: 'a\\x00b' found"), (["look", "--out=\0"], "--out: '\\x00' found"),
+    ],
+)  # fmt: skip
+def test_an_argument_without_text_is_refused_by_the_name_of_its_option(words, said):
+    answer = shipgym(*words)
+    assert answer.exit_code == 2
+    assert f"{said}, expected a text that is not empty" in " ".join(answer.stderr.split())
+
+
+def run_main(monkeypatch, command):
+    """The command line with another command in place of all."""
+    monkeypatch.setattr(warnings, "showwarning", warnings.showwarning)  # is put back afterwards
+    monkeypatch.setattr(cli, "app", lambda prog_name: command())
+    cli.main()
+
+
+def test_a_warning_is_one_line_on_standard_error(monkeypatch, capsys):
+    def command():
+        with warnings.catch_warnings():
+            warnings.simplefilter("always")
+            warnings.warn("the cache is full", stacklevel=1)
+
+    run_main(monkeypatch, command)
+    assert capsys.readouterr() == ("", "warning: the cache is full\n")
+
+
+def test_names_that_the_terminal_has_no_letters_for_are_written_all_the_same(monkeypatch):
+    monkeypatch.setattr(sys, "stdout", TextIOWrapper(BytesIO(), "ascii"))
+    run_main(monkeypatch, lambda: print("\u2192 Elbe", flush=True))
+    assert sys.stdout.buffer.getvalue().strip() == b"\\u2192 Elbe"
+
+
+def test_without_standard_output_nothing_is_begun_and_without_standard_error_nothing_is_said(monkeypatch):
+    monkeypatch.setattr(sys, "stderr", None)
+    run_main(monkeypatch, lambda: print("odd", file=sys.stderr))
+    assert sys.stderr.name == os.devnull
+    sys.stderr.close()
+    monkeypatch.setattr(sys, "stdout", None)
+    with pytest.raises(SystemExit, match="error: standard output is closed"):
+        run_main(monkeypatch, lambda: None)
+
+
+def test_standard_trials_are_asked_for_as_told_and_say_how_far_they_are(monkeypatch, tmp_path):
+    asked, shown = [], []
+    found = SimpleNamespace(
+        indices={}, water="water of 25 m", criteria={}, refused={"direct spiral": "runs away"}, to_dict=dict
+    )
+
+    def stand_in(ship, draws, seed, tell, depth):
+        asked.append((ship.name, draws, seed, depth))
+        shown.append(tell)
+        return found
+
+    monkeypatch.setattr("agents.cli.standard_trials.standard_trials", stand_in)
+    monkeypatch.setattr("agents.cli.trials_page.write_page", lambda ship, found, out: out.touch())
+    answer = shipgym(
+        "trials", "tanker", "--depth", 25, "--draws", 7, "--seed", 3, "--out", tmp_path / "a.html"
+    )
+    assert answer.exit_code == 0, answer.stderr
+    assert "Manoeuvres from service speed in water of 25 m" in " ".join(answer.stdout.split())
+    assert [line for line in answer.stdout.splitlines() if line][-2:] == [
+        "The IMO criteria are made for deep water: leave --depth out to assess them.",
+        f"written: {tmp_path / 'a.html'}",
+    ]
+    assert answer.stderr == "warning: no direct spiral: runs away\n"
+    told = shipgym("trials", "tanker", "--json")
+    assert json.loads(told.stdout) == {"model": "tanker", "seed": 0}
+    assert asked == [("tanker", 7, 3, 25.0), ("tanker", 100, 0, float("inf"))]
+    assert shown == [None, None]  # standard error is no terminal
+    bars = []
+    monkeypatch.setattr(
+        "agents.cli.terminal.progress_bars", lambda: nullcontext(lambda *now: bars.append(now))
+    )
+    assert shipgym("trials", "tanker", "--draws", 7).exit_code == 0
+    shown[-1](2)
+    assert bars == [("models drawn", 2, 7)]
+
+
+def test_autopilots_are_asked_for_as_told(demo, tmp_path, monkeypatch):
+    asked = []
+    monkeypatch.setattr(
+        "agents.verification.chain.build_autopilot", lambda *given, **more: asked.append((given, more))
+    )
+    monkeypatch.setattr(cli, "_print_result", lambda *given: asked.append(given))
+    words = ["autopilot", demo, "--out", tmp_path]
+    more = ["--draws", "3", "--seed", "4", "--autopilots", "pid, lqg", "--agent", "a.json", "--standards"]
+    assert (
+        shipgym(*words).exit_code == shipgym(*words, *more, "--workers", "2", "--method", "ls").exit_code == 0
+    )
+    usual, told, given, other = asked
+    assert usual[0] == given[0] == (demo, tmp_path)
+    assert told == (None, tmp_path / "report.html", 200)
+    assert other[2] == 3
+    expected = {
+        "draws": 200, "seed": 0, "options": {}, "agents": (), "standards": False, "progress": None,
+        "designs": ("pid", "lq", "lq-scheduled", "turn-rate", "wheel-over"), "where": JobEngine(),
+    }  # fmt: skip
+    assert usual[1] == expected
+    assert given[1] == {
+        "draws": 3, "seed": 4, "options": {"method": "ls"}, "agents": ["a.json"], "standards": True,
+        "progress": None, "designs": ["pid", "lqg"], "where": JobEngine("local", 2),
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("instability", "refusal", "said"),
+    [
+        ("it runs away", None, "the identified model is unstable: it runs away; see out.html"),
+        (
+            None,
+            "every design loses control",
+            "no autopilot is given: every design loses control; see out.html",
+        ),
+    ],
+)
+def test_an_autopilot_that_cannot_be_trusted_fails_with_the_reason(instability, refusal, said, capsys):
+    result = SimpleNamespace(
+        metrics={}, verification=None, stable=instability is None, instability=instability, refusal=refusal
+    )
+    with pytest.raises(typer.Exit) as left:
+        cli._print_result(result, Path("out.html"), 9)
+    assert (left.value.exit_code, capsys.readouterr().err) == (1, f"error: {said}\n")
+
+
+@pytest.fixture
+def benchmarked(monkeypatch):
+    """What the command asks for of benchmarks that are not run, and their result."""
+    summary = {"contestants": dict.fromkeys(("pid", "lq", "mine")), "seeds": {"count": 100}}
+    found = SimpleNamespace(summary=summary, failures=[], asked=[], submitted=[], ends=None)
+
+    def benchmark(*given, **more):
+        found.asked.append((*given[:5], more["episodes"], more["resume"]))
+        if found.ends is not None:
+            raise found.ends
+        given[3].mkdir(exist_ok=True)
+        return found
+
+    def write_page(result, path, **_):
+        raise InputError("plotly is not installed")
+
+    monkeypatch.setattr("agents.benchmarking.run.benchmark", benchmark)
+    monkeypatch.setattr("agents.benchmarking.page.write_page", write_page)
+    monkeypatch.setattr(
+        "agents.benchmarking.submission.submit", lambda _, *what: found.submitted.append(what)
+    )
+    for table in ("ranking_table", "costs_table"):
+        monkeypatch.setattr(f"agents.cli.benchmark_tables.{table}", lambda result: "a table")
+    return found
+
+
+def test_a_benchmark_is_run_as_told_and_the_last_contestant_submitted(benchmarked, tmp_path):
+    out, mine = tmp_path / "out", tmp_path / "mine.json"
+    answer = shipgym("benchmark", "--out", out, "--submit", mine)
+    assert answer.exit_code == 0, answer.stderr
+    assert answer.stderr == "warning: there is no index.html: plotly is not installed\n"
+    assert answer.stdout.splitlines() == ["a table", "", "a table", "", f"written: {out}"]
+    assert benchmarked.submitted == [("mine", mine)]
+    benchmarked.failures.append("lq lost control")
+    benchmarked.summary["seeds"]["count"] = 99
+    words = ["--controllers", "pid,mine", "--tasks", "a,b", "--workers", 3, "--episodes", 99, "--resume"]
+    answer = shipgym("benchmark", "--out", out, *words, "--no-page")
+    assert answer.stderr.splitlines() == [
+        "warning: lq lost control", "warning: 99 of 100 episodes: for a quick look, not for a ranking"
+    ]  # fmt: skip
+    assert len(benchmarked.submitted) == 1
+    assert benchmarked.asked == [
+        (CLASSICAL, "shipgym-v1", None, out, None, 100, False),
+        ("pid,mine", "shipgym-v1", ["a", "b"], out, 3, 99, True),
+    ]
+    benchmarked.ends = KeyboardInterrupt()
+    answer = shipgym("benchmark", "--out", out)
+    assert answer.exit_code == 130
+    assert answer.stderr == f"error: interrupted; what was done is kept in {out}: continue with --resume\n"
+
+
+def test_results_are_verified_as_told(monkeypatch, tmp_path):
+    asked = []
+
+    def verify(path, **given):
+        asked.append((path, given))
+        return []
+
+    monkeypatch.setattr("agents.benchmarking.verification.verify", verify)
+    assert shipgym("benchmark", "--verify", tmp_path, "--json").stdout.split() == [
+        "{",
+        '"checks":',
+        "[]",
+        "}",
+    ]
+    given = ("--sample", 3, "--tolerance", 0.1, "--workers", 2, "--allow-code", "mine:make")
+    assert shipgym("benchmark", "--verify", tmp_path, *given).exit_code == 0
+    assert asked == [
+        (tmp_path, {"sample": 8, "tolerance": None, "workers": None, "allow_code": []}),
+        (tmp_path, {"sample": 3, "tolerance": 0.1, "workers": 2, "allow_code": ["mine:make"]}),
+    ]
+
+
+@pytest.mark.parametrize(("stable", "error", "code"), [(True, 0.1, 0), (False, 0.1, 1), (True, None, 1)])
+def test_a_comparison_in_which_no_method_stays_stable_fails(stable, error, code, demo, tmp_path, monkeypatch):
+    found = SimpleNamespace(
+        save=lambda folder: (folder / "comparison.json").write_text("{}"),
+        to_dict=lambda: {"held_out": "trials marked validate", "ranking": []}, refused={"svr": "too few"},
+        left_out={"ls": ("C", "rank")}, standings=[SimpleNamespace(stable=stable, error=error)],
+    )  # fmt: skip
+    monkeypatch.setattr("agents.identifying.compare_ship", lambda *_: found)
+    answer = shipgym("identify", demo, "--out", tmp_path / "out", "--compare")
+    assert answer.exit_code == code
+    assert answer.stderr.splitlines() == [
+        "warning: svr was not fitted: too few",
+        "warning: ls has no setting of these names and was fitted without them: C, rank",
+        *(["error: no method gives a model that stays stable on every held-out trial"] if code else []),
+    ]
+
+
+def test_notes_on_the_trials_are_told_before_what_speaks_against_the_model(monkeypatch, capsys):
+    trials = [SimpleNamespace(name="a.csv", notes=["two clocks"]), SimpleNamespace(name="b.csv", notes=[])]
+    monkeypatch.setattr("identification.validation.warnings.model_warnings", lambda _: ["sway was derived"])
+    monkeypatch.setattr("identification.validation.warnings.why_unstable", lambda _: None)
+    identification._check_stable(SimpleNamespace(trials=trials))
+    assert capsys.readouterr().err == "warning: a.csv: two clocks\nwarning: sway was derived\n"
+    monkeypatch.setattr("identification.validation.warnings.why_unstable", lambda _: "it turns")
+    with pytest.raises(typer.Exit) as left:
+        identification._check_stable(SimpleNamespace(trials=trials))
+    told = "error: the identified model is unstable: it turns; it must not be used\n"
+    assert (left.value.exit_code, capsys.readouterr().err) == (1, told)
+
+
+def test_a_cache_that_can_only_be_read_is_of_use_where_there_is_something_in_it(tmp_path, monkeypatch):
+    def refused(**_):
+        raise OSError(errno.EROFS, "Read-only file system")
+
+    readable = {"yes": True}
+    monkeypatch.setattr(doctor, "cache_folder", lambda: tmp_path)
+    monkeypatch.setattr(doctor, "open_folder", lambda: tmp_path)
+    monkeypatch.setattr(tempfile, "NamedTemporaryFile", refused)
+    monkeypatch.setattr(os, "access", lambda *_: readable["yes"])
+    state, told = doctor._cache()
+    assert state == "wrong"
+    assert "cannot be written (Read-only file system): every process compiles its ships again" in told
+    (tmp_path / "notes.txt").write_text("2" * 150_000)
+    assert doctor._cache() == (
+        "fine", f"{tmp_path}, 1 files, 0.1 MB, to be read only: what is missing is compiled in memory"
+    )  # fmt: skip
+    readable["yes"] = False
+    assert doctor._cache()[0] == "wrong"
+
+
+def test_doctor_looks_here_one_level_below_and_into_the_cache(tmp_path, monkeypatch):
+    (tmp_path / "b").mkdir()
+    (tmp_path / "a").mkdir()
+    (tmp_path / "file").touch()
+    seen = []
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(doctor, "cache_folder", lambda: Path("cache"))
+    monkeypatch.setattr(doctor, "locks_and_drafts", lambda folder: seen.append(folder) or [("a lock", False)])
+    found = doctor.left_findings()
+    assert seen == [tmp_path, tmp_path / "a", tmp_path / "b", Path("cache")]
+    assert {(one.what, one.state, one.detail) for one in found} == {("in use", "fine", "a lock")}
+
+
+def test_doctor_knows_what_is_needed_and_what_is_an_extra_but_not_what_developers_need(monkeypatch):
+    declared = ["numpy>=2", "tomli; python_version < '3.11'", 'plotly>=6; extra == "report"']
+    declared += ['shipgym[report]; extra == "dev"', 'ruff; extra == "dev"', 'mkdocs; extra == "docs"']
+    monkeypatch.setattr(importlib.metadata, "requires", lambda name: declared)
+    assert doctor._declared() == {
+        "": ["numpy", "tomli"], "report": ["plotly"], "dev": ["ruff"], "docs": ["mkdocs"]
+    }  # fmt: skip
+    monkeypatch.setattr(doctor, "_cache", lambda: ("fine", "here"))
+    monkeypatch.setattr(doctor, "left_findings", list)
+    monkeypatch.setattr(doctor, "name_finding", lambda name: doctor.Finding(f"import {name}", "fine", ""))
+    found = {one.what: (one.state, one.detail) for one in doctor.examine_installation()}
+    assert list(found) == [
+        "shipgym", "numpy", "tomli", "extra report", "cache",
+        "import shipgym", "import identification", "import agents",
+    ]  # fmt: skip
+    assert found["extra report"][0] == "fine"
+    monkeypatch.setattr(importlib.metadata, "requires", lambda name: None)
+    assert doctor._declared() == {}
+
+
+def test_papers_are_reproduced_by_the_program_of_the_checkout(monkeypatch, tmp_path):
+    asked = []
+
+    def run(command, **more):
+        asked.append((command, more["stdout"]))
+        return SimpleNamespace(returncode=3)
+
+    monkeypatch.setattr(reproduction.subprocess, "run", run)
+    page = str(tmp_path / "page.md")
+    for words in ([], ["--markdown", page, "--json", "--quiet"], ["--quiet"]):
+        assert shipgym("reproduce", "xu2020", *words).exit_code == 3
+    program = [sys.executable, str(ROOT / "scripts" / "reproduce.py"), "xu2020"]
+    assert asked == [
+        (program, None), ([*program, "--markdown", page, "--json"], None), (program, subprocess.DEVNULL)
+    ]  # fmt: skip
+
+
+def test_warming_is_told_to_a_hundredth_of_a_second(monkeypatch):
+    clock = iter([10.0, 11.23456])
+    monkeypatch.setattr(warm, "time", SimpleNamespace(perf_counter=lambda: next(clock)))
+    monkeypatch.setattr(warm, "_names", lambda wanted, everything: ["one"])
+    monkeypatch.setattr(warm, "_jobs", lambda name: iter([("first", int)]))
+    assert [one["seconds"] for one in json.loads(shipgym("warm", "--json").stdout)["ready"]] == [1.23]
+
+
+def test_an_environment_is_made_closed_and_not_warned_of(monkeypatch):
+    made = []
+
+    def make(env_id, **options):
+        warnings.warn("there is a newer version", DeprecationWarning, stacklevel=1)
+        made.append((env_id, options))
+        return SimpleNamespace(close=lambda: made.append("closed"))
+
+    monkeypatch.setattr("gymnasium.make", make)
+    for _, job in _jobs("shipgym/CourseKeeping-v0"):
+        job()
+    assert made == [
+        ("shipgym/CourseKeeping-v0", {}), "closed", ("shipgym/CourseKeeping-v0", {"sea": "rough"}), "closed"
+    ]  # fmt: skip
+
+
+def test_a_training_is_asked_for_as_told(tmp_path, monkeypatch):
+    asked = []
+    monkeypatch.setattr(training, "_train", lambda *given: asked.append(given))
+    monkeypatch.setattr(training, "_print_result", lambda result, out: asked.append(out))
+    words = ["train", "sac", "--out", tmp_path, "--env", "path-following-v1", "--model", "tanker"]
+    words += ["--sea", "rough", "--option", "current=0.5", "--total-steps", "5000", "--set", "gamma=0.9"]
+    words += [
+        "--from-nothing",
+        "--seed",
+        "7",
+        "--randomise",
+        "--threads",
+        "2",
+        "--max-seconds",
+        "9",
+        "--resume",
+    ]
+    for given in (words, words[:4]):
+        answer = shipgym(*given)
+        assert answer.exit_code == 0, answer.output
+    own = {"gamma": 0.9, "total_steps": 5000, "base": "none"}
+    given = Given(
+        "sac", "path-following-v1", "tanker", "rough", None, {"current": 0.5}, None, own, 7, True, 2
+    )  # fmt: skip
+    assert asked == [(given, tmp_path, True, 9.0), tmp_path, (Given("sac"), tmp_path, False, None), tmp_path]

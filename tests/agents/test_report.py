@@ -5,6 +5,7 @@ from dataclasses import replace
 from html.parser import HTMLParser
 from importlib.resources import files
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -124,6 +125,23 @@ def test_the_chain_prints_its_golden_tables(chain, capsys):
     _print_result(chain[1], Path("report.html"), DRAWS)
     shown = capsys.readouterr()
     assert same_text("autopilot", shown.out + shown.err)
+
+
+def test_limits_that_are_not_kept_and_designs_that_are_refused_are_warned_of(chain, capsys):
+    """Of what a standard's topics ask for, the one that failed."""
+    about = {"standard": "ISO 11674", "topic": "Course change", "unit": "deg", "limit": 2.5}
+    rows = [
+        SimpleNamespace(passed=passed, value=value, **about) for passed, value in ((True, 2.1), (False, 3.2))
+    ]
+    found = chain[1].verification.manoeuvres
+    result = SimpleNamespace(
+        metrics=chain[1].metrics, stable=True, refusal=None, identification=chain[1].identification,
+        verification=SimpleNamespace(manoeuvres=found, standards=rows, refused={"lqg": "no such sensor"}),
+    )  # fmt: skip
+    _print_result(result, Path("report.html"), DRAWS)
+    first, *_, last = capsys.readouterr().err.splitlines()
+    assert first == "warning: ISO 11674, course change: 3.2 deg, limit 2.5"
+    assert last == "warning: no LQG autopilot: no such sensor"
 
 
 def test_every_figure_has_a_caption_and_a_place(source):
