@@ -39,7 +39,7 @@ STRENGTHS = tuple(float(strength) for strength in np.geomspace(1e-3, 1.0, 19))
 
 
 def hard_turn_features(
-    structure: Structure, particulars: Particulars, shaft_speed: float = 1.0
+    structure: Structure, particulars: Particulars, shaft_speed: float
 ) -> dict[str, Floats]:
     """Size of each term in a hard turn, by equation, arrays of shape (n_terms,), SI units."""
     speed = HARD_TURN["speed"] * particulars["speed"]
@@ -49,7 +49,7 @@ def hard_turn_features(
         "p": HARD_TURN["heel"] * HARD_TURN["speed"] * particulars["speed"] / particulars["length"],
         "phi": HARD_TURN["heel"], "delta": HARD_TURN["rudder"], "n": HARD_TURN["shaft"] * shaft_speed,
     }  # fmt: skip
-    channels = {name: np.array([state.get(name, 0.0)]) for name in structure.required_channels}
+    channels = {name: np.array([state[name]]) for name in structure.required_channels}
     sizes = {
         q: np.abs(structure.features(q, channels, particulars, shaft_speed)[0]) for q in structure.equations
     }

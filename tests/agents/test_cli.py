@@ -1,5 +1,6 @@
 import errno
 import importlib.metadata
+import importlib.util
 import json
 import os
 import re
@@ -416,6 +417,8 @@ def test_doctor_names_what_is_missing_and_packages_of_one_name(monkeypatch):
     assert doctor.name_finding("identification").state == "fine"
     assert doctor.name_finding("json").detail.startswith("leads to ")
     assert doctor.name_finding("nowhere_1").detail.startswith("leads to None, expected ")
+    monkeypatch.setattr(importlib.util, "find_spec", lambda name: SimpleNamespace(origin=None))
+    assert doctor.name_finding("identification").detail.startswith("leads to None, expected ")
 
 
 @pytest.mark.skipif(os.name == "nt", reason="Windows has other permissions")
@@ -598,6 +601,8 @@ def test_standard_trials_are_asked_for_as_told_and_say_how_far_they_are(monkeypa
         f"written: {tmp_path / 'a.html'}",
     ]
     assert answer.stderr == "warning: no direct spiral: runs away\n"
+    shallow = shipgym("trials", "tanker", "--depth", 18)  # before anything is simulated
+    assert (shallow.exit_code, len(asked)) == (2, 1)
     told = shipgym("trials", "tanker", "--json")
     assert json.loads(told.stdout) == {"model": "tanker", "seed": 0}
     assert asked == [("tanker", 7, 3, 25.0), ("tanker", 100, 0, float("inf"))]
@@ -702,6 +707,8 @@ def test_a_benchmark_is_run_as_told_and_the_last_contestant_submitted(benchmarke
         (CLASSICAL, "shipgym-v1", None, out, None, 100, False),
         ("pid,mine", "shipgym-v1", ["a", "b"], out, 3, 99, True),
     ]
+    absent = shipgym("benchmark", "--out", out, "--submit", tmp_path / "absent" / "mine.json")
+    assert (absent.exit_code, len(benchmarked.asked)) == (2, 2)  # before anything is run
     benchmarked.ends = KeyboardInterrupt()
     answer = shipgym("benchmark", "--out", out)
     assert answer.exit_code == 130
@@ -772,9 +779,9 @@ def test_a_cache_that_can_only_be_read_is_of_use_where_there_is_something_in_it(
     state, told = doctor._cache()
     assert state == "wrong"
     assert "cannot be written (Read-only file system): every process compiles its ships again" in told
-    (tmp_path / "notes.txt").write_text("2" * 150_000)
+    (tmp_path / "notes.txt").write_text("2" * 260_000)
     assert doctor._cache() == (
-        "fine", f"{tmp_path}, 1 files, 0.1 MB, to be read only: what is missing is compiled in memory"
+        "fine", f"{tmp_path}, 1 files, 0.3 MB, to be read only: what is missing is compiled in memory"
     )  # fmt: skip
     readable["yes"] = False
     assert doctor._cache()[0] == "wrong"

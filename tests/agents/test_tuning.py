@@ -342,6 +342,7 @@ def test_the_command_asks_for_what_it_was_told_and_shows_trials_best_first(tmp_p
     def stand_in(plan, out, trials_asked, fixed, where, progress):
         asked.append((plan.settings.gamma, plan.settings.evaluate_every, plan.configuration()["seed"]))
         asked.append((out, trials_asked, fixed, where.workers, progress))
+        assert plan.threads == 1  # of each of the trials that are done beside one another
         return Tuning(trials, trials[2])
 
     assert inspect.signature(tune).parameters["trials"].default == 20  # as the command has it

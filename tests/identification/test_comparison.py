@@ -12,7 +12,7 @@ import pytest
 
 from identification import Comparison, compare_methods, cross_validate
 from identification.regression.samples import build_samples
-from identification.report.comparison import comparison_page, headings_figure
+from identification.report.comparison import _smoothed, comparison_page, headings_figure
 from identification.validation.comparison import COMPARISON_FILES, _pairs
 from identification.validation.folds import held_out_rows
 from shipgym import InputError, ShipModel, Trial
@@ -65,6 +65,10 @@ def test_it_is_written_with_every_model(comparison: Comparison, tmp_path: Path) 
     told = json.loads((tmp_path / "comparison.json").read_text())
     assert [row["method"] for row in told["ranking"]] == [s.method for s in comparison.standings]
     assert ShipModel.load(tmp_path / "model-ls.json").coefficients == comparison.results["ls"].coefficients
+    (first, result), *_ = comparison.results.items()
+    alone = replace(comparison, standings=comparison.standings[:1], results={first: result})
+    alone.save(tmp_path / "alone")
+    assert (tmp_path / "alone" / f"model-{first}.json").exists()
 
 
 def test_the_page_is_the_golden_one(comparison: Comparison) -> None:
@@ -104,8 +108,8 @@ def test_two_trials_are_enough_to_hold_each_out(noisy_trials: list[Trial], marin
 
 
 def test_the_four_best_are_drawn_with_the_error_of_their_headings() -> None:
-    """Running means over a hundredth of 250 samples, which are two; three panels in two rows."""
-    t = np.arange(250.0)
+    """Running means over a hundredth of 210 samples, which are two; three panels in two rows."""
+    t = np.arange(210.0)
     held = [Trial(t, {"psi": 0.1 * t}, name=f"runs/{k}.csv", use="validate") for k in range(3)]
     others = [Trial(t, {"psi": t}, use="fit"), Trial(t, {"r": t}, use="validate")]
     results = {
@@ -123,6 +127,7 @@ def test_the_four_best_are_drawn_with_the_error_of_their_headings() -> None:
     assert [line.name for line in drawn["x"]] == [f"method {k}" for k in range(4)]
     np.testing.assert_allclose(drawn["x"][2].x, t[1:] - 0.5)
     np.testing.assert_allclose(drawn["x"][2].y, 0.02 * (t[1:] - 0.5), rtol=1e-4)
+    np.testing.assert_array_equal(_smoothed(t[:199] ** 2), t[:199] ** 2)
 
 
 def test_what_cannot_be_compared_is_named(noisy_trials: list[Trial], mariner: ShipModel) -> None:
@@ -160,6 +165,10 @@ def test_a_single_trial_is_held_out_in_pieces_that_cover_it(
     held = list(held_out_rows([trial], samples, "trials"))
     np.testing.assert_array_equal(np.concatenate([piece.t for _, piece in held]), trial.t)
     assert [piece.name for _, piece in held] == [f"{trial.name}, part {n}" for n in (1, 2, 3)]
+    both = build_samples(noisy_trials[:2], get_structure("abkowitz"), mariner.particulars)
+    for k, (rows, other) in enumerate(held_out_rows(noisy_trials[:2], both, "trials")):
+        assert other is noisy_trials[k]
+        assert set(both.trial[rows]) == {1 - k}
     for rows, piece in held:
         begins, ends = samples.start[rows], (samples.start + samples.duration)[rows]
         assert not np.any((begins < piece.t[-1]) & (ends > piece.t[0]))

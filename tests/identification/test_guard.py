@@ -71,7 +71,7 @@ def test_penalties_grow_by_sixths_of_a_decade_from_a_thousandth_to_all_that_term
 
 def test_size_of_a_term_in_the_hard_turn(mariner: ShipModel) -> None:
     p = mariner.particulars
-    sizes = hard_turn_features(mariner.table, p)
+    sizes = hard_turn_features(mariner.table, p, 1.0)
     names = [term.name for term in mariner.table.terms("r")]
     speed = 0.47 * p["speed"]
     assert sizes["r"][names.index("d")] == pytest.approx(np.radians(35.0) * speed**2)
@@ -83,13 +83,13 @@ def test_sizes_of_shaft_heel_and_memory_in_the_hard_turn(mariner: ShipModel) -> 
     p, speed = mariner.particulars, 0.47 * 7.7175
     u, v = speed * np.cos(np.radians(20.5)), speed * np.sin(np.radians(20.5))
     r, d, heel = 0.8 * speed / 160.93, np.radians(35.0), np.radians(5.0)
-    memory = hard_turn_features(get_structure("nomoto2"), p)["r"]
+    memory = hard_turn_features(get_structure("nomoto2"), p, 1.0)["r"]
     assert memory == pytest.approx([r, d, r * 160.93 / speed, d * 160.93 / speed])
     assert hard_turn_features(get_structure("cubic"), p, 2.0)["u"][:5] == pytest.approx(
         [1.8**2, 1.8 * u, u**2, v**2, v * r]
     )
     rolling = shipgym.register_structure("heeling", {"v": "v", "r": "r, delta", "p": "p, phi"})
-    p_term, phi_term = hard_turn_features(rolling, p)["p"]
+    p_term, phi_term = hard_turn_features(rolling, p, 1.0)["p"]
     assert p_term / phi_term == pytest.approx(speed / 160.93)
     assert phi_term == pytest.approx(heel)
 

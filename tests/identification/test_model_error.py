@@ -26,7 +26,7 @@ from identification.validation.warnings import (
     _why_lost,
     held_out_error,
 )
-from shipgym import InputError, ShipModel, Trial
+from shipgym import InputError, ShipModel, Trial, load_model
 from shipgym.manoeuvres import zigzag, zigzag_indices
 from tests.ships.mmg import mmg_ship
 
@@ -82,6 +82,10 @@ def test_the_factor_is_that_at_which_errors_with_their_noise_are_of_size_one() -
     variance, noise = rng.uniform(0.5, 2.0, 4000), rng.uniform(0.0, 4.0, 4000)
     errors = rng.standard_normal(4000) * np.sqrt(9.0 * variance + noise)
     assert scale_of(list(zip(errors**2, variance, noise, strict=True))) == pytest.approx(3.0, rel=0.05)
+    assert scale_of([(1.05, 1.0, 1.0)]) == pytest.approx(np.sqrt(0.05))
+    assert scale_of([(0.99, 1.0, 1.0)]) == 1e-3  # the noise explains it
+    assert scale_of([(0.95e6, 1.0, 0.0)]) == pytest.approx(1e3 * np.sqrt(0.95))
+    assert scale_of([(1.05e6, 1.0, 0.0)]) == 1e3
 
 
 def test_the_factor_is_the_mean_of_motion_and_indices_never_below_one_and_larger_for_few_trials(
@@ -278,6 +282,11 @@ def test_shaft_speeds_that_a_structure_ignores_are_said(mariner: ShipModel) -> N
     assert "the shaft speed varies by" in said
     assert "acceleration.csv starts from rest" in said
     assert "such as cubic" in said
+    for knows in ("kvlcc2", "mariner-nomoto"):  # the shaft, and no surge that it would change
+        assert not _shaft_ignored(Found(load_model(knows), trials=[trial]))
+    unknown = Trial(t, {"u": 0.0 * t, "v": 0.0 * t}, use="fit")
+    held = trial.with_(use="validate")
+    assert not _shaft_ignored(Found(mariner, trials=[unknown, held]))
     steady = Trial(t, {"u": 0.0 * t + 7.7, "v": 0.0 * t, "n": 0.0 * t + 1.0}, name="z.csv", use="fit")
     assert not _shaft_ignored(Found(mariner, trials=[steady]))
 

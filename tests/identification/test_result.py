@@ -25,6 +25,7 @@ from identification.report.figures import (
 )
 from identification.report.figures import truncated as with_a_rank
 from identification.report.page import _shown, report_page
+from identification.report.predictions import overview_figure, prediction_figure
 from identification.report.summary import _coefficients as coefficients_table
 from identification.report.view import _coefficients, _errors, _heading, _trial, fit_view, short_names
 from identification.result import FILES
@@ -350,6 +351,55 @@ def test_a_search_that_leaves_nothing_is_drawn_as_it_is() -> None:
     for trace, values in zip(figure.data, ([4.0, 1.0], [10.0, 1000.0]), strict=True):
         assert list(trace.y) == pytest.approx(values)
     assert figure.layout.yaxis2.type == "log"
+
+
+def test_a_turn_is_drawn_to_scale_and_seen_from_its_first_course() -> None:
+    """First to the east: what is ahead is east, what is to starboard is south."""
+    t = np.arange(4.0)
+    channels = {
+        "x": 5.0 - t,
+        "y": 3.0 + t**2,
+        "psi": np.pi / 2.0 + 0.1 * t,
+        "r": 0.1 + 0.0 * t,
+        "delta": 0.2 * t,
+    }
+    turn = Trial(t, channels, kind="turning-circle")
+    predicted = turn.with_channels({"x": 5.0 - 2.0 * t})
+    *lines, measured, ours = prediction_figure(turn, predicted).data
+    assert [line.name for line in lines] == ["measured", "predicted"] * 2 + ["measured"]  # u, v are not known
+    np.testing.assert_allclose(lines[-1].y, np.degrees(0.2 * t), rtol=1e-6)
+    np.testing.assert_allclose([measured.x, measured.y], [t, t**2], atol=1e-5)
+    np.testing.assert_allclose([ours.x, ours.y], [2.0 * t, t**2], atol=1e-5)
+    layout = prediction_figure(turn, predicted).layout
+    assert (layout.xaxis6.title.text, layout.yaxis6.title.text) == (
+        "to starboard, m",
+        "along the first course, m",
+    )
+    assert (layout.yaxis6.scaleanchor, layout.yaxis6.scaleratio) == ("x6", 1)
+    straight = prediction_figure(Trial(t, channels, kind="zigzag"), None)
+    np.testing.assert_allclose([straight.data[-1].x, straight.data[-1].y], [t**2, t], atol=1e-5)
+    assert straight.layout.yaxis6.autorange == "reversed"
+    assert {line.name for line in straight.data} == {"measured"}
+    assert [straight.layout[f"xaxis{k}"].title.text for k in (1, 2, 3, 4, 5)] == [
+        "",
+        "",
+        "",
+        "time, s",
+        "time, s",
+    ]
+
+
+def test_trials_are_shown_together_where_all_have_heading_and_rudder() -> None:
+    t = np.arange(4.0)
+    whole = Trial(t, {"psi": 1.0 + 0.1 * t, "delta": 0.2 * t}, name="runs/a.csv")
+    figure = overview_figure([whole] * 3, {"runs/a.csv": Trial(t, {"psi": 1.0 + 0.3 * t})})
+    assert figure is not None
+    assert figure.layout.height == 540
+    assert [note.text for note in figure.layout.annotations] == ["a.csv"] * 3
+    for line, values in zip(figure.data, (0.2 * t, 0.1 * t, 0.3 * t), strict=False):
+        np.testing.assert_allclose(line.y, np.degrees(values), atol=1e-5)
+    for name in ("psi", "delta"):
+        assert overview_figure([whole, Trial(t, {name: t})], {}) is None
 
 
 def test_settings_are_told_in_words() -> None:

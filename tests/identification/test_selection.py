@@ -90,7 +90,7 @@ def test_a_method_or_setting_that_is_named_is_kept(auto: Auto, trials: list[Tria
         auto(trials[:2], epsilon=0.1)
 
 
-@pytest.mark.parametrize(("count", "sizes"), [(7, [2, 1, 2, 1, 1]), (3, [1, 1, 1]), (10, [2] * 5)])
+@pytest.mark.parametrize(("count", "sizes"), [(7, [2, 1, 2, 1, 1]), (2, [1, 1]), (10, [2] * 5)])
 def test_trials_are_held_out_in_no_more_than_five_groups(
     count: int, sizes: list[int], monkeypatch: pytest.MonkeyPatch
 ) -> None:

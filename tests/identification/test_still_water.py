@@ -79,6 +79,10 @@ def test_a_current_is_found_and_taken_out(mariner: ShipModel, logs: list[Trial])
         "the water meanwhile",
     ]
     assert figure.layout.annotations[0].text.startswith("turn: 0.5")
+    away = np.array([[row["east"]], [row["north"]]]) * found[0].duration * [0.0, 1.0]
+    ends = np.array([[found[0]["y"][-1]], [found[0]["x"][-1]]]) + away
+    np.testing.assert_allclose([figure.data[2].x, figure.data[2].y], ends, rtol=1e-6)
+    assert track_figure(SimpleNamespace(model=mariner, trials=found)) is None
     drawn = list(flat(json.loads(figure.to_json()), "figure"))
     assert same_text("current taken out", "\n".join([*sea_sentences(report), *drawn]))
     told = sea_sentences(report)[0]
