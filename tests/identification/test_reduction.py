@@ -217,6 +217,15 @@ def test_by_default_a_term_is_uncertain_beyond_a_tenth_of_its_size(
     assert found.terms == terms
 
 
+@pytest.mark.parametrize("unit", [1e-6, 1.0, 1e6])
+def test_terms_are_selected_whatever_the_unit_of_the_targets(unit: float) -> None:
+    """Also beside one that says the same as another, which adds nothing and is left out."""
+    X, y = orthogonal()
+    found = forward_selection(np.column_stack([X, 2.0 * X[:, 2]]), unit * y, (*NAMES, "copy"))
+    assert [step.changed for step in found.path][:3] in (["a", "c", "f"], ["a", "copy", "f"])
+    assert len({step.changed for step in found.path}) == len(found.path) == 8
+
+
 def test_one_term_stays_and_is_enough_for_ten_samples() -> None:
     X, y = orthogonal()
     assert len(backward_elimination(X, y, NAMES, tolerance=9.0, threshold=0.0).terms) == 1
