@@ -84,8 +84,9 @@ def test_a_single_trial_is_cut_into_thirds(auto: Auto, trials: list[Trial]) -> N
 
 
 def test_a_method_or_setting_that_is_named_is_kept(auto: Auto, trials: list[Trial]) -> None:
-    told = auto(trials[:2], method="ls-svm", C=1e6).metrics["selection"]
-    assert {row["method"] for row in told["ranking"]} == {"ls-svm"}
+    result = auto(trials[:2], method="ls-svm", C=1e6)
+    assert {row["method"] for row in result.metrics["selection"]["ranking"]} == {"ls-svm"}
+    assert result.model.provenance["method"] == "ls-svm"
     with pytest.raises(InputError, match="settings: epsilon found, which method 'tls-svm' does not know"):
         auto(trials[:2], epsilon=0.1)
 

@@ -115,6 +115,17 @@ def test_a_clock_is_ahead_of_utc_by_what_its_text_says():
         read_angles(["57.5", "57 north"])
 
 
+@pytest.mark.parametrize("offset", [0.0, 40.0])
+def test_only_what_goes_there_and_back_three_times_tells_a_delay(offset):
+    t = np.linspace(0.0, 1.0, 400)
+    assert _reverses(offset + np.sin(4.5 * np.pi * t))
+    assert not _reverses(offset + np.sin(2.5 * np.pi * t))
+    assert not _reverses(offset + t)
+    assert not _reverses(offset + np.sin(4.5 * np.pi * t), least=2.1)
+    nearly = np.where(t < 0.5, 1.0, 0.2 * np.sin(40.0 * np.pi * t))  # noise about the middle is no reversal
+    assert not _reverses(offset + np.where(t > 0.9, -1.0, nearly))
+
+
 def test_too_short_a_record_says_nothing_of_a_clock():
     t = np.arange(0.0, 20.0)
     assert clock_offset(t, np.sin(t), np.cos(t), {}) is None
