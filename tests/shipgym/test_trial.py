@@ -104,6 +104,10 @@ def test_a_trial_gives_its_channels_read_only():
         trial.channels["r"] = np.zeros(3)
 
 
+def test_a_trial_lasts_from_its_first_to_its_last_sample():
+    assert Trial(np.array([30.0, 31.0, 40.0]), {"psi": np.zeros(3)}).duration == 10.0
+
+
 def test_a_missing_channel_is_named_with_those_present():
     trial = Trial([0.0, 1.0, 2.0], {"delta": np.zeros(3)})
     with pytest.raises(
