@@ -182,6 +182,6 @@ def riccati(A: Floats, G: Floats, H: Floats) -> Floats:
             more = at @ h @ wa
             A[going], G[going], H[going] = a @ wa, g + a @ wg @ at, h + 0.5 * (more + more.transpose(0, 2, 1))
             size = np.abs(H[going]).max(axis=(1, 2))
-            converged[going] = np.abs(more).max(axis=(1, 2)) <= ACCURACY * size
+            converged[going] = np.abs(more).max(axis=(1, 2)) < ACCURACY * size
     H[~converged] = np.nan
     return H

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from agents import LQ, AdaptiveLQ, check_controller, load_agent, sail
+from agents.controllers.adaptive_lq import SIZES, _stable
 from agents.controllers.linear_loop import SIGNALS, length_time, rate_weight, sample_ship, sampled_ships
 from agents.controllers.lq import lq_rows
 from agents.controllers.memory import records
@@ -159,3 +160,60 @@ def test_waves_teach_it_little_that_is_wrong():
 def test_numbers_beyond_their_bounds_are_refused(name, value):
     with pytest.raises(InputError, match=rf"{name}: .* found, expected"):
         AdaptiveLQ.from_model(MARINER, **{name: value})
+
+
+def test_a_rudder_five_times_as_strong_or_weak_is_believed_and_no_stronger_or_weaker_one():
+    adaptive = AdaptiveLQ.from_model(MARINER)
+    for share, believed in ((4.9, True), (5.2, False), (0.205, True), (0.195, False), (-1.0, False)):
+        kept = adaptive._fresh()
+        kept["theta"][0, 1, 2] *= share
+        changed_gains = not np.array_equal(adaptive._redesigned(kept)["gains"], kept["gains"])
+        assert changed_gains == believed, share
+
+
+def test_gains_hold_a_ship_whose_sampled_poles_are_within_the_unit_circle():
+    A = np.array([np.diag([size, 0.5]) for size in (0.98, 1.02, -1.02)])
+    assert _stable(A, np.zeros((3, 2)), np.zeros((3, 2))).tolist() == [True, False, False]
+
+
+def test_a_coefficient_may_be_as_wrong_as_it_is_large_and_a_hundredth_at_least():
+    adaptive = AdaptiveLQ.from_model(MARINER)
+    scaled = np.array([[3.0, -2.0, 0.02, 0.0], [0.005, 1.0, 4.0, -0.5]])
+    own = replace(adaptive, prior=scaled * adaptive.error_size[:, None] / SIZES)
+    expected = [[9.0, 4.0, 0.0004, 0.0001], [0.0001, 1.0, 16.0, 0.25]]
+    np.testing.assert_allclose(own._doubt(), expected, rtol=1e-9)
+    covariance = own._fresh()["covariance"][0]
+    np.testing.assert_allclose(covariance, [np.diag(row) for row in expected], rtol=1e-9)
+
+
+def seen_of(**values):
+    """What one ship observes that is at rest on her course but for the values given."""
+    rest = dict.fromkeys(("sway", "yaw_rate", "rudder", "surge", "heading_error_sin"), 0.0)
+    known = {**rest, "heading_error_cos": 1.0, "heading_error_integral": 0.0, **values}
+    return {name: np.array([value]) for name, value in known.items()}
+
+
+def test_a_ship_without_way_counts_as_one_with_a_tenth_of_hers():
+    adaptive = AdaptiveLQ.from_model(MARINER)
+    memory, begins = np.zeros((1, adaptive.memory_size)), np.array([True])
+    for surge, sway, speed in ((0.0, 0.0, 0.1 * adaptive.design["speed"]), (3.0, -4.0, 5.0)):
+        _, after = adaptive.steer(seen_of(surge=surge, sway=sway), memory, begins)
+        assert records(after, adaptive.record)["last"][0, 3] == pytest.approx(speed)
+
+
+def test_nothing_is_learned_before_the_yaw_rate_was_calm_for_a_while():
+    """What is remembered of its unrest begins ten times above the limit, and decays within a ship length."""
+    adaptive = AdaptiveLQ.from_model(MARINER, redesign_lengths=2.0)
+    steps, memory = adaptive.design["redesign_steps"], np.zeros((1, adaptive.memory_size))
+    begins, learned = np.array([True]), []
+    for step in range(int(4.0 * steps)):
+        seen = seen_of(surge=7.7, rudder=0.02 * np.sin(0.05 * step), yaw_rate=1e-4 * np.cos(0.05 * step))
+        _, memory = adaptive.steer(seen, memory, begins)
+        begins = np.array([False])
+        learned.append(bool(np.any(records(memory, adaptive.record)["terms"])))
+    first = np.log(0.1) / np.log(1.0 - 1.0 / steps)
+    assert learned.index(True) + 1 == pytest.approx(first, abs=1.0)
+
+
+def test_it_is_designed_anew_once_in_a_control_interval_at_most():
+    assert AdaptiveLQ.from_model(MARINER, redesign_lengths=1e-3).design["redesign_steps"] == 1.0

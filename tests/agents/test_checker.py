@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 
 from agents import LQ, LQG, PID, check_controller
+from agents.controllers.checker import _check_same
 from shipgym.errors import InputError
 from shipgym.ships import load_model
-from shipgym.tasks.task import OBSERVATION_NAMES, path_following_task
+from shipgym.tasks.task import OBSERVATION_NAMES, observation_scales, path_following_task
 
 MARINER = load_model("mariner")
 
@@ -83,6 +84,26 @@ class Curt(Helmsman):
         return seen[..., :1]
 
 
+class Triple(Helmsman):
+    def answer(self, seen, state):
+        return seen[..., :1], state, "and more"
+
+
+class Listed(Helmsman):
+    def answer(self, seen, state):
+        return [seen[..., :1], state]
+
+
+class ByKeyword(Helmsman):
+    def predict(self, observation, *, state=None, episode_start=None, deterministic=True):
+        return observation[..., :1], state
+
+
+class Unnamed(Helmsman):
+    def predict(self, observation, memory=None, starts=None, sure=True):
+        return observation[..., :1], memory
+
+
 class Short:
     def predict(self, observation):
         return observation[..., :1], None
@@ -117,6 +138,10 @@ def test_a_user_s_own_passes():
         (Wordy(), "action .*'port'.* found, expected numbers"),
         (Flat(), r"action of shape \(3,\) found, expected \(3, 1\)"),
         (Curt(), "ndarray found, expected a pair: action and state"),
+        (Triple(), "tuple found, expected a pair: action and state"),
+        (Listed(), "list found, expected a pair: action and state"),
+        (ByKeyword(), r"too many positional arguments; expected predict\(observation, state=None"),
+        (Unnamed(), "unexpected keyword argument 'state'; expected predict"),
         (Short(), "unexpected keyword argument 'state'; expected predict"),
         (object(), "no method 'predict' found"),
         (Misnamed(), "observation 0 is 'heading_error_sin', expected 'heading_error'"),
@@ -127,3 +152,40 @@ def test_a_user_s_own_passes():
 def test_a_broken_promise_is_named(controller, message):
     with pytest.raises(InputError, match=message):
         check_controller(controller, MARINER)
+
+
+def test_a_scale_of_one_s_own_may_differ_by_a_millionth_of_it():
+    """Also where it is far from 1, as that of the yaw rate, 0.048 rad/s, is."""
+    scales = observation_scales(MARINER)
+    for factor, fits in ((1.0 + 0.9e-6, True), (1.0 + 1.2e-6, False)):
+        own = Helmsman()
+        own.observation_names = OBSERVATION_NAMES
+        own.observation_scales = tuple(scales * np.where(np.arange(8) == 2, factor, 1.0))
+        if fits:
+            check_controller(own, MARINER, n_steps=2)
+        else:
+            with pytest.raises(InputError, match="of 'yaw_rate', which is"):
+                check_controller(own, MARINER, n_steps=2)
+
+
+def test_orders_are_the_same_to_a_hundred_thousandth_of_the_rudder_limit():
+    _check_same([0.9 + 0.95e-5], [0.9], "it")
+    for found in (0.9 + 1.05e-5, 0.9 - 1.05e-5):
+        with pytest.raises(InputError, match=r"it: \[0\.\d+\] found, expected \[0\.9\] as otherwise"):
+            _check_same([found], [0.9], "it")
+
+
+def test_by_default_a_minute_of_intervals_is_steered():
+    """What it remembers is how many it has seen; the first of another episode comes after them."""
+
+    class Counter(Helmsman):
+        most = 0
+
+        def answer(self, seen, state):
+            counted = (0 if state is None else state) + 1
+            self.most = max(self.most, counted)
+            return 0.0 * seen[..., :1], counted
+
+    counter = Counter()
+    check_controller(counter, MARINER)
+    assert counter.most == 61

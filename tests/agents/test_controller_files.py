@@ -10,7 +10,7 @@ import pytest
 
 from agents import LQ, PID, load_agent
 from agents.agent_file import PRETRAINED, find_agent, list_pretrained
-from agents.controllers.controller import check_scales
+from agents.controllers.controller import check_scales, model_hash
 from agents.controllers.registry import BUILT_IN, controller_class
 from shipgym.errors import InputError
 from shipgym.ships import load_model
@@ -75,6 +75,7 @@ SCALES = list(DESIGNS["pid"].observation_scales)
     ("changes", "message"),
     [
         ({"format": 2}, "format 2 found, this version of shipgym reads format 1"),
+        ({"kind": None}, "field 'kind' is missing"),
         ({"kind": "pdi"}, "kind: 'pdi' found, expected one of 'pid', .*Did you mean 'pid'"),
         ({"gains": None}, "field 'gains' is missing"),
         ({"gain": {}}, "unknown key 'gain'. Did you mean 'gains'"),
@@ -173,6 +174,10 @@ def test_scales_of_observations_agree_within_a_millionth():
     check_scales(["rudder"], [1.0 - 0.95e-6], [1.0], "agent", "hers is {}")
     with pytest.raises(InputError, match=r"agent: the scale of 'rudder' is 0\.999999, but hers is 1"):
         check_scales(["rudder"], [1.0 - 1.05e-6], [1.0], "agent", "hers is {}")
+    for own in (0.01, 300.0):  # of it, whatever it is
+        check_scales(["it"], [own * (1.0 + 0.95e-6)], [own], "agent", "{}")
+        with pytest.raises(InputError, match="agent: the scale of 'it' is"):
+            check_scales(["it"], [own * (1.0 + 1.05e-6)], [own], "agent", "{}")
 
 
 def test_there_is_a_file_of_every_kind():
@@ -228,6 +233,19 @@ def test_what_a_kind_needs_of_its_design_is_checked_when_it_is_read(path, tmp_pa
         ("mpc", lambda arrays: arrays["transition"][3].__setitem__(3, 1.01), "stays: 1.01 found, .* <= 1$"),
         ("mpc", lambda arrays: arrays["effect"].__setitem__(3, 1.01), "followed: 1.01 found"),
         ("mpc", lambda arrays: arrays["transition"][0].__setitem__(0, 9.0), "a sampled pole of size"),
+        ("lqg", lambda arrays: arrays["transition"].clear(), r"transition: .* of shape \(states, states\)"),
+        (
+            "lqg",
+            lambda arrays: arrays.update(
+                transition=np.zeros((4, 4)).tolist(),
+                input=[0.0] * 4,
+                kalman=[[0.0] * 2] * 4,
+                output=[[0.0] * 4] * 2,
+            ),
+            r"arrays.input: 4 states found, expected one of \(3, 5\)",
+        ),
+        ("lq-scheduled", lambda arrays: arrays["speeds"].clear(), r"speeds: .* of shape \(speeds\)"),
+        ("turn-rate", lambda arrays: arrays["rates"].sort(reverse=True), "rates: .* in rising order"),
         ("lq-scheduled", lambda arrays: arrays["speeds"].sort(reverse=True), "speeds: .* in rising order"),
         ("lq-scheduled", lambda arrays: arrays["neutral"][0].pop(), "expected a list of 2 numbers"),
         (
@@ -253,3 +271,26 @@ def test_guidance_leads_what_keeps_a_heading(tmp_path):
     nested = changed(path, tmp_path, lambda content: content.update(autopilot=json.loads(path.read_text())))
     with pytest.raises(InputError, match="autopilot: 'los' found, expected one that keeps a heading"):
         load_agent(nested)
+
+
+def test_a_model_is_told_by_its_structure_coefficients_particulars_and_gear():
+    own = model_hash(MARINER)
+    assert len(own) == 64
+    assert model_hash(replace(MARINER, name="other", covariance=None)) == own
+    others = [
+        replace(MARINER, coefficients={**MARINER.coefficients, "N_r": 1.001 * MARINER.coefficients["N_r"]}),
+        replace(MARINER, particulars=replace(MARINER.particulars, draught=7.5)),
+        replace(MARINER, steering=replace(MARINER.steering, time_constant=0.3)),
+    ]
+    assert len({own, *map(model_hash, others)}) == 4
+
+
+def test_gains_of_many_ships_make_as_many_rows_and_none_where_a_gain_is_none():
+    gains = {
+        "proportional": np.array([0.0, 2.0]),
+        "integral": np.zeros(2),
+        "derivative": np.array([3.0, 0.0]),
+    }
+    row = replace(DESIGNS["pid"], gains=gains).row
+    assert row.tolist() == [[0.0, 0.0], [-3.0, 0.0], [0.0, 2.0], [0.0, 0.0], [0.0, 0.0]]
+    assert replace(DESIGNS["pid"], gains=dict.fromkeys(gains, 0.0)).row.tolist() == [0.0] * 5

@@ -9,8 +9,15 @@ from stable_baselines3.common.evaluation import evaluate_policy
 from stable_baselines3.common.monitor import Monitor
 
 from agents import LQ, sail, step_response
-from agents.controllers.linear_loop import SIGNALS, _crossing, rate_weight, sample_ship
-from agents.controllers.lq import lq_gain
+from agents.controllers.linear_loop import (
+    SIGNALS,
+    Compensator,
+    _crossing,
+    rate_weight,
+    sample_ship,
+    sampled_ships,
+)
+from agents.controllers.lq import lq_gain, lq_rows, riccati
 from shipgym.errors import InputError
 from shipgym.ships import load_model
 from shipgym.ships.conversions import nomoto, nomoto2_ship
@@ -180,3 +187,41 @@ def test_an_impossible_design_is_refused():
 def test_numbers_beyond_their_bounds_are_refused(name, value):
     with pytest.raises(InputError, match=rf"{name}: .* found, expected"):
         LQ.from_model(MARINER, **{name: value})
+
+
+def test_the_integral_is_a_state_of_the_loop_only_where_it_is_fed_back():
+    """By a gain on it, or into what a controller remembers."""
+    ship = sample_ship(MARINER, 1.0)
+    proportional, integral = np.eye(5)[[2]], np.eye(5)[[4]]
+
+    def size(gathers, row):
+        memory = np.zeros((1, 1)), gathers, np.ones((1, 1)), row
+        return len(Compensator(*memory).closed_loop(ship))
+
+    assert len(Compensator.static(proportional).closed_loop(ship)) == 4
+    assert Compensator.static(integral).closed_loop(ship) == pytest.approx(ship.A + ship.B @ integral)
+    assert size(proportional, proportional) == 5
+    assert size(integral, proportional) == size(proportional, integral) == 6
+
+
+def test_a_gear_without_lag_is_where_it_was_ordered_an_interval_later():
+    linear = np.array([[[-0.02, -3.1, 0.9], [-0.001, -0.05, 0.003]]])
+    (A,), (B,) = sampled_ships(linear, 0.0, 1.3)
+    assert (A[3].tolist(), B[3]) == ([0.0] * 5, 1.0)
+    quick, order = sampled_ships(linear, 1e-4, 1.3)
+    others = [0, 1, 2, 4]
+    np.testing.assert_allclose(A[np.ix_(others, others)], quick[0][np.ix_(others, others)], atol=1e-9)
+    np.testing.assert_allclose(B, order[0], rtol=2e-3)
+
+
+def test_the_riccati_equation_has_the_golden_ratio_for_ones_and_no_solution_without_a_rudder():
+    """X = X / (1 + X) + 1; a state that stays or doubles, and that no command moves, has none."""
+    stays, doubles = np.array([[1.0]]), np.array([[2.0]])
+    found = riccati(
+        np.array([stays, stays, doubles]), np.array([[[1.0]], [[0.0]], [[0.0]]]), np.ones((3, 1, 1))
+    )
+    assert found[0, 0, 0] == pytest.approx((1.0 + np.sqrt(5.0)) / 2.0, rel=1e-12)
+    assert np.isnan(found[1:]).all()
+    unsteady = np.array([[[-0.02, -3.1, 0.0], [-0.001, 0.05, 0.0]]])
+    rows = lq_rows(*sampled_ships(unsteady, 2.0, 1.0), 1.0, rate_weight(UNSTABLE), 400.0)
+    assert np.isnan(rows).all()

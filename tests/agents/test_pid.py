@@ -186,3 +186,31 @@ def test_impossible_designs_are_refused(arguments, message):
 def test_numbers_beyond_their_bounds_are_refused(name, value):
     with pytest.raises(InputError, match=rf"{name}: .* found, expected"):
         PID.from_model(MARINER, **{name: value})
+
+
+def test_what_is_left_of_the_gain_margin_is_told_to_the_last_twentieth():
+    """Beyond it the loop is unstable, and what is lost of it below 1 is found too."""
+    model = changed(UNSTABLE, gear=SteeringGear(35.0, 2.5, 2.0))
+    pid = PID.from_model(model)
+    most, least = pid.margins.gain_margin, pid.margins.lowest_gain
+
+    def with_gains(factor):
+        return replace(pid, gains={name: factor * gain for name, gain in pid.gains.items()})
+
+    high = with_gains(most / 1.05).margins_on(model)
+    assert high.gain_margin == pytest.approx(1.05, rel=1e-6)
+    assert high.lowest_gain == pytest.approx(1.05 * least / most, rel=1e-6)
+    assert with_gains(least / 0.95).margins_on(model).lowest_gain == pytest.approx(0.95, rel=1e-6)
+    for factor in (1.02 * most, 0.98 * least):
+        with pytest.raises(InputError, match=r"unstable with these gains \(largest sampled pole 1\.0"):
+            with_gains(factor).margins_on(model)
+
+
+def test_poles_that_do_not_oscillate_are_the_two_slowest_of_the_three():
+    """1 / T two thousand times the rudder's effect: s1 s2 = (K / T) 10^(1/2), s1^2 + s2^2 = 1 / T^2."""
+    effect = 0.01
+    found = optimal_poles(Nomoto(K=effect, T1=1.0, T2=0.0, T3=0.0, T=1.0), rate_weight=1e-9)
+    product = effect * np.sqrt(10.0)
+    frequency, damping = np.sqrt(product), np.sqrt(1.0 + 2.0 * product) / (2.0 * np.sqrt(product))
+    assert found == pytest.approx((frequency, damping), rel=1e-3)
+    assert damping > 1.0
