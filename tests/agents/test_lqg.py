@@ -163,3 +163,25 @@ def test_impossible_designs_are_refused():
 def test_numbers_beyond_their_bounds_are_refused(name, value):
     with pytest.raises(InputError, match=rf"{name}: .* found, expected"):
         LQG.from_model(MARINER, wave_period=9.0, **{name: value})
+
+
+def test_a_heading_opposite_to_the_course_is_estimated_as_any_other():
+    """Through 180 degrees of error, where the measured one changes its sign."""
+    lqg, kept = LQG.from_model(MARINER), []
+    noise = 1e-3 * np.random.default_rng(0).normal(size=12)
+    for course in (0.0, np.pi - 0.012):
+        memory, rows = np.zeros((1, lqg.memory_size)), []
+        for k in range(12):
+            error = course + 0.002 * k + noise[k]
+            seen = {"heading_error_sin": np.sin([error]), "heading_error_cos": np.cos([error])}
+            seen |= {"yaw_rate": np.array([-0.002]), "rudder": np.array([0.01])}
+            seen["heading_error_integral"] = np.zeros(1)
+            _, memory = lqg.steer(seen, memory, np.array([k == 0]))
+            rows.append(memory[0])
+        kept.append(np.array(rows))
+    others = [0, 1, 3]  # sway, yaw rate, rudder
+    np.testing.assert_allclose(kept[1][:, others], kept[0][:, others], rtol=1e-9, atol=1e-12)
+    turned = kept[1][:, 2] - kept[0][:, 2]
+    np.testing.assert_allclose(np.exp(1j * turned), np.exp(1j * (np.pi - 0.012)), atol=1e-12)
+    assert np.abs(kept[1][:, 2]).max() <= np.pi
+    assert kept[1][0, 2] > 0.0 > kept[1][-1, 2]

@@ -93,3 +93,18 @@ def test_it_simulates_lq_and_no_other_autopilot():
     with pytest.raises(InputError, match="autopilot: PID found, expected LQ"):
         PreviewMPC.from_model(MARINER, autopilot=PID.from_model(MARINER))
     assert isinstance(PreviewMPC.from_model(MARINER).autopilot, LQ)
+
+
+def test_it_looks_one_step_of_two_intervals_ahead_at_least():
+    design = PreviewMPC.from_model(MARINER, horizon_lengths=0.01).design
+    assert design["horizon_steps"] == 1.0
+    longer = PreviewMPC.from_model(MARINER, horizon_lengths=3.0).design
+    time = 3.0 * LENGTH / MARINER.particulars["speed"]
+    assert longer["horizon_steps"] == round(time / (2.0 * longer["dt"]))
+
+
+def test_far_inside_of_an_arc_the_way_stays_finite_and_forward():
+    """A ship beyond the middle of the circle, from where every direction would be the arc's."""
+    ahead = Ahead([np.array([100.0]), np.array([1.0]), np.array([9e3]), np.array([0.5])], 300.0, 0.0)
+    ways = [ahead.fix(np.array([x]), np.array([320.0])).way[0] for x in (90.0, 102.0, 110.0)]
+    assert ways == pytest.approx([90.0, 100.0 + 300.0 * np.arctan(2 / 30), 100.0 + 300.0 * np.arctan(1 / 3)])

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from agents import TurnRate, check_controller, load_agent, step_response
+from agents.controllers import turn_rate
 from agents.controllers.turn_rate import steady_turns
 from shipgym.errors import InputError
 from shipgym.manoeuvres import turning_circle
@@ -106,3 +107,23 @@ def test_it_is_a_controller_with_margins_and_a_file(tmp_path):
     assert np.array_equal(again.rudders, agent.rudders)
     with pytest.raises(InputError, match=r"rate_deg_min: 1000 found, expected"):
         TurnRate.from_model(MARINER, rate_deg_min=1000.0)
+
+
+def test_a_ship_that_three_tenths_of_the_rudder_do_not_turn_changes_courses_at_the_least_rate(monkeypatch):
+    """A fiftieth of speed over length."""
+    table = np.array([-0.01, 0.0, 0.01]), np.radians([-15.0, 0.0, 15.0])
+    monkeypatch.setattr(turn_rate, "steady_turns", lambda *_: table)
+    time = MARINER.particulars["length"] / MARINER.particulars["speed"]
+    assert TurnRate.from_model(MARINER).gains["rate"] == pytest.approx(0.02 / time)
+
+
+def test_the_integral_waits_while_the_rudder_is_at_its_limit():
+    agent, memory = TurnRate.from_model(MARINER), np.array([[0.02, 0.0]])
+    seen = {"heading_error_sin": np.zeros(1), "heading_error_cos": np.ones(1)}
+    for rate, waits in ((-0.003, False), (-0.5, True), (0.5, True)):
+        seen |= {"yaw_rate": np.array([rate]), "rate_of_turn": np.array([0.001])}
+        order, after = agent.steer(seen, memory, np.array([False]))
+        assert (abs(order[0]) >= MARINER.steering.limit) == waits
+        off = agent.smoothing * 0.001 - rate
+        more = 0.0 if waits else agent.gains["integral"] * agent.design["dt"] * off
+        assert after[0] == pytest.approx([0.02 + more, agent.smoothing * 0.001])

@@ -1,9 +1,12 @@
 """Wheel-over: turns begun by the ship's own turning circle, a current countered, guards at sharp turns."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from agents import LQ, LineOfSight, WheelOver, check_controller, load_agent
+from agents.controllers import wheel_over
 from agents.controllers.wheel_over import STEEPEST, bend, own_lead, own_turn
 from agents.rollouts.metrics import evaluate
 from agents.suites.suite import BenchmarkTask, load_suite
@@ -101,3 +104,39 @@ def test_a_length_that_is_no_length_is_refused_by_the_name_that_it_was_given_by(
     for name in ("lookahead_lengths", "turn_lookahead_lengths", "radius_lengths", "reach_lengths"):
         with pytest.raises(InputError, match=f"^{name}: 0 found, expected a number > 0"):
             WheelOver.from_model(MARINER, **{"radius_lengths": 3.0, "reach_lengths": 1.0} | {name: 0.0})
+
+
+@pytest.mark.parametrize(
+    ("diameter", "advance", "radius", "reach"), [(4.0, 3.5, 2.0, 1.5), (4.0, 1.9, 2.0, 0.01)]
+)
+def test_a_ship_that_turns_at_once_runs_on_for_a_hundredth_of_a_length(
+    diameter, advance, radius, reach, monkeypatch
+):
+    """Diameters to port are negative; of both sides the mean is taken."""
+    sides = iter([1.0, -1.0])
+
+    def indices(*_):
+        side = next(sides)
+        return SimpleNamespace(
+            tactical_diameter_lengths=side * diameter + 0.2, advance_lengths=advance + 0.3 * side
+        )
+
+    monkeypatch.setattr(wheel_over, "turning_circle", lambda *_: None)
+    monkeypatch.setattr(wheel_over, "turning_indices", indices)
+    assert own_turn.__wrapped__(MARINER) == pytest.approx((radius, reach))
+
+
+@pytest.mark.parametrize("missing", ["tactical_diameter_lengths", "advance_lengths"])
+def test_a_ship_that_does_not_turn_round_to_one_side_has_no_turn(missing, monkeypatch):
+    whole = {"tactical_diameter_lengths": 4.0, "advance_lengths": 3.0}
+    sides = iter([whole, whole | {missing: None}])
+    monkeypatch.setattr(wheel_over, "turning_circle", lambda *_: None)
+    monkeypatch.setattr(wheel_over, "turning_indices", lambda *_: SimpleNamespace(**next(sides)))
+    with pytest.raises(InputError, match=r"does not turn round within 60 lengths with 12\.0 degrees"):
+        own_turn.__wrapped__(MARINER)
+
+
+def test_an_arc_is_seen_a_tenth_of_a_length_ahead_at_least_and_ten_at_most(monkeypatch):
+    for late, lead in ((-100.0, 0.1), (100.0, 10.0)):
+        monkeypatch.setattr(wheel_over, "LATE", late)
+        assert own_lead(MARINER, None) == lead
