@@ -28,7 +28,14 @@ from agents.cli import app
 from agents.controllers.adaptive_lq import AdaptiveLQ
 from agents.controllers.los_autopilot import AdaptiveLineOfSight
 from agents.deployment.autopilot import Autopilot
-from agents.deployment.c99 import ShipInput, advance, autopilot_source, ship_source
+from agents.deployment.c99 import (
+    ShipInput,
+    _environment,
+    advance,
+    autopilot_source,
+    checked_name,
+    ship_source,
+)
 from agents.deployment.translator import Translator, c_name, literal
 from shipgym.engine import mathematics
 from shipgym.engine.motion import Motion
@@ -332,3 +339,31 @@ def test_the_command_writes_c_and_says_what_it_cannot(tmp_path):
         found = run(app, ["export", *map(str, arguments)])
         assert found.exit_code == 2
         assert said in " ".join(found.output.split())
+
+
+def test_texts_have_angles_speeds_and_headings_in_four_digits():
+    """A heading is below 360 degrees, also where it is rounded."""
+    made = _environment().filters
+    assert made["deg"](np.radians(-12.34567)) == -12.3457
+    assert made["knots"](1852.0 / 3600.0 * 7.12345) == 7.1235
+    headings = [made["heading"](np.radians(one)) for one in (-90.0, 12.34567, 359.99997, -1e-9, 720.5)]
+    assert headings == [270.0, 12.3457, 0.0, 0.0, 0.5]
+    assert made["float32"](0.1) == "1.000000000e-01f"
+
+
+def test_a_long_name_is_shown_by_its_beginning():
+    with pytest.raises(InputError) as refused:
+        checked_name("x" * 100)
+    assert f"name: '{'x' * 60}' found" in str(refused.value)
+    title = ship_source(replace(MARINER, name="m" * 300), "ship").header.partition("*/")[0]
+    assert "Ship model _" + "m" * 108 in title  # 120 characters
+    assert "m" * 109 not in title
+
+
+def test_a_ship_without_particulars_for_wind_is_written_without_it_and_says_so():
+    unknown = replace(MARINER.particulars, beam=None, draught=None)
+    source = ship_source(replace(MARINER, particulars=unknown), "ship")
+    assert set(source.inputs) == {"rudder", "current_north", "current_east"}
+    (note,) = source.notes
+    assert note.startswith("wind is left out: ")
+    assert "wind_speed" in ship_source(MARINER, "ship").inputs

@@ -1,11 +1,14 @@
 """FMUs are valid for FMPy and simulate as the library does."""
 
+from zipfile import ZipFile
+
 import fmpy
 import numpy as np
 import pytest
 from fmpy import validation
 
 from agents import LQ, TurnRate, WheelOver
+from agents.deployment import fmu
 from agents.deployment.autopilot import Autopilot
 from agents.deployment.c99 import autopilot_source, ship_source
 from agents.deployment.fmu import write_fmu
@@ -82,3 +85,38 @@ def test_what_is_in_the_way_and_what_is_missing_is_said(tmp_path, monkeypatch):
     with pytest.raises(InputError, match="no C compiler for Linux found"):
         write_fmu(source, tmp_path / "other.fmu")
     assert not (tmp_path / "other.fmu").exists()
+    with pytest.raises(InputError, match=r"lq\.zip: found, expected a name that ends in \.fmu"):
+        write_fmu(source, tmp_path / "lq.zip")
+    monkeypatch.setenv("CC", "false")  # a program that fails
+    with pytest.raises(InputError, match="false: cannot compile the FMU: "):
+        write_fmu(source, tmp_path / "other.fmu")
+    monkeypatch.setattr(fmu, "find_spec", lambda name: None)
+    with pytest.raises(InputError, match=r"fmpy is not installed, .*pip install 'shipgym\[fmu\]'"):
+        write_fmu(source, tmp_path / "other.fmu")
+    assert [one.name for one in tmp_path.iterdir()] == ["lq.fmu"]
+
+
+@pytest.mark.parametrize(
+    ("version", "machine", "folder"),
+    [
+        ("2.0", "x86_64", "linux64"), ("2.0", "aarch64", "aarch64-linux"),
+        ("3.0", "x86_64", "x86_64-linux"), ("3.0", "aarch64", "aarch64-linux"),
+    ],
+)  # fmt: skip
+def test_a_binary_stands_where_the_standard_has_it_beside_its_sources(
+    version, machine, folder, tmp_path, monkeypatch
+):
+    """Written twice it is the same to the byte; of FMI 3.0 it says how it was built."""
+    monkeypatch.setattr(fmu.platform, "machine", lambda: machine)
+    monkeypatch.setattr(fmu, "_compiled", lambda files, name: b"binary")
+    source = autopilot_source(PILOTS["lq"], "lq")
+    for name in ("one.fmu", "two.fmu"):
+        write_fmu(source, tmp_path / name, version)
+    assert (tmp_path / "one.fmu").read_bytes() == (tmp_path / "two.fmu").read_bytes()
+    with ZipFile(tmp_path / "one.fmu") as archive:
+        assert archive.read(f"binaries/{folder}/lq.so") == b"binary"
+        names = set(archive.namelist())
+        assert archive.read("sources/lq.c").decode() == source.source
+    assert ("sources/buildDescription.xml" in names) == (version == "3.0")
+    assert {"modelDescription.xml", "sources/fmu.c", "sources/lq.h"} < names
+    assert any(name.endswith("FunctionTypes.h") for name in names)

@@ -1,12 +1,14 @@
 """An autopilot on NMEA 0183: what it understands, when it hands over, and a ship that it steers over TCP."""
 
 import asyncio
+import gc
 import json
 import math
 import os
 import re
 import selectors
 import socket
+import struct
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -16,11 +18,11 @@ from typer.testing import CliRunner
 
 from agents import LQ, PID, IntegralLineOfSight, TurnRate, WheelOver, load_agent
 from agents.cli import app
-from agents.deployment import scheduling
+from agents.deployment import nmea, scheduling, steering
 from agents.deployment.nmea import Line, Link, Reading, readings, sentences
 from agents.deployment.route import Route
 from agents.deployment.simulated import SimulatedShip, simulate_ship
-from agents.deployment.steering import MANUAL, STANDBY, STEERING, Helm, Limits, Sensors, steer
+from agents.deployment.steering import MANUAL, STANDBY, STEERING, Helm, Limits, Sensors, _missing, steer
 from shipgym.engine.trajectories import SEA_CHANNELS
 from shipgym.errors import InputError
 from shipgym.ships import load_model
@@ -99,6 +101,111 @@ def test_lines_come_in_any_portions_and_an_endless_one_is_forgotten():
     for portion in (b"$HE", b"HDT", b",1\r\n \n$B", b"\n", b"x" * 512, b"\n", b"y" * 513, b"rest\n"):
         line.data_received(portion)
     assert heard == ["$HEHDT,1", "$B", "x" * 512, "rest"]
+    line.data_received(b"z" * 600 + b"\n")  # whole, but too long
+    assert heard[4:] == ["z" * 512]
+
+
+class Wire:
+    """A transport that keeps what is sent, of datagrams if it may be sent to someone."""
+
+    def __init__(self, connected=None, datagrams=True, broken=False):
+        self.sent, self.connected, self.broken, self.closed = [], connected, broken, False
+        if datagrams:
+            self.sendto = lambda data, peer: self.sent.append((data, peer))
+
+    def get_extra_info(self, name):
+        return self.connected if name == "peername" else None
+
+    def write(self, data):
+        if self.broken:
+            raise OSError("broken")
+        self.sent.append(data)
+
+    def close(self):
+        self.closed = True
+
+
+def test_datagrams_go_to_whoever_was_heard_last_or_where_the_socket_is_connected():
+    open_, connected = Wire(), Wire(connected=("host", 1))
+    lines = [Line(lambda line: None, set()) for _ in range(2)]
+    for line, wire in zip(lines, (open_, connected), strict=True):
+        line.connection_made(wire)
+        line.send(b"1")
+    assert (open_.sent, connected.sent) == ([], [(b"1", None)])
+    lines[0].datagram_received(b"$HEHDT,1", ("a", 2))
+    lines[0].send(b"2")
+    lines[0].datagram_received(b"$HEHDT,1", ("b", 3))
+    lines[0].send(b"3")
+    assert open_.sent == [(b"2", ("a", 2)), (b"3", ("b", 3))]
+
+
+def test_a_datagram_holds_whole_lines():
+    heard = []
+    line = Line(heard.append, set())
+    for data in (b"$A,1\r\n$B,2", b"$C,3\r\n"):
+        line.datagram_received(data, ("a", 2))
+    assert heard == ["$A,1", "$B,2", "$C,3"]
+
+
+def test_all_that_are_connected_are_told_though_one_line_is_broken_and_closed_at_the_end():
+    link = Link(lambda line: None)
+    wires = [Wire(datagrams=False, broken=k == 0) for k in range(3)]
+    lines = [link.line() for _ in wires]
+    for line, wire in zip(lines, wires, strict=True):
+        line.connection_made(wire)
+    link.send("order")
+    assert [wire.sent for wire in wires] == [[], [b"order"], [b"order"]]
+    lines[2].connection_lost(None)
+    assert link.ends == {lines[0], lines[1]}
+    link.others.append(server := Wire())
+    link.close()
+    assert [one.closed for one in (*wires, server)] == [True, True, False, True]
+
+
+@pytest.mark.parametrize(("address", "baud"), [("serial:/dev/x", 4800), ("serial:/dev/x@38400", 38400)])
+def test_a_serial_line_has_the_speed_of_the_standard_unless_another_is_named(address, baud, monkeypatch):
+    """It is written to itself; what reads it is closed with it."""
+    port, reader, asked = Wire(datagrams=False), Wire(), []
+    serial = SimpleNamespace(Serial=lambda *given, **more: asked.append((given, more)) or port)
+    monkeypatch.setattr(nmea, "library", lambda name: serial)
+
+    async def talk():
+        async def connected(made, pipe):
+            line = made()
+            line.connection_made(reader)
+            return reader, line
+
+        asyncio.get_running_loop().connect_read_pipe = connected
+        link = Link(lambda line: None)
+        await link.open(address)
+        link.send("order")
+        link.close()
+
+    asyncio.run(talk())
+    ((given, more),) = asked
+    assert given == ("/dev/x", baud)
+    assert (more["timeout"], more["write_timeout"], more["exclusive"]) == (0, 0, True)
+    assert (port.sent, port.closed, reader.closed) == ([b"order"], True, True)
+
+
+def test_the_kernel_is_asked_for_the_slice_as_its_interface_has_it(monkeypatch):
+    """sched_setattr(pid, attr, flags): struct sched_attr of 48 bytes, its fields by include/uapi/linux."""
+    asked = []
+    library = SimpleNamespace(syscall=lambda *given: asked.append(given))
+    monkeypatch.setattr(scheduling.ctypes, "CDLL", lambda name: library)
+    for machine, number in (("x86_64", 314), ("aarch64", 274)):
+        monkeypatch.setattr(scheduling.platform, "machine", lambda machine=machine: machine)
+        scheduling._ask(123_456)
+        call, thread, attributes, flags = asked.pop()
+        assert (call, thread, flags) == (number, 0, 0)
+        assert len(attributes) == 48
+        fields = struct.unpack("=IIQiIQQQ", attributes)
+        nice = os.getpriority(os.PRIO_PROCESS, 0)
+        assert fields == (48, 0, 0, nice, 0, 123_456, 0, 0)  # 0: ordinary policy, no flags, priority
+    monkeypatch.setattr(scheduling.platform, "machine", lambda: "riscv64")
+    scheduling._ask(1)
+    assert asked == []
+    assert scheduling.SLICE_NS == 100_000  # the least that Linux takes
 
 
 def helm(agent=PID_MARINER, **limits):
@@ -585,3 +692,87 @@ def test_instruments_disagree_when_it_lasts_and_while_both_speak():
     assert sensors.fault(0.0, 1.0, 12.1) is None  # the second one is silent
     assert sensors.value("heading", 15.1) == pytest.approx(math.radians(179.0))
     assert sensors.value("heading", 15.2) is None
+
+
+def test_a_simulated_ship_keeps_time_and_runs_so_many_times_as_fast():
+    """A minute of hers in six seconds, a step of a tenth of a second at a time."""
+    ship, steps = SimulatedShip(MARINER), []
+
+    async def sails():
+        begin = asyncio.get_running_loop().time()
+        await simulate_ship(ship, f"udp:127.0.0.1:{free_port()}", duration=60.0, speed_up=10.0)
+        steps.append(asyncio.get_running_loop().time() - begin)
+
+    with asyncio.Runner(loop_factory=no_waiting) as runner:
+        runner.run(sails())
+        with pytest.raises(InputError, match="speed_up: 0 found, expected a number > 0"):
+            runner.run(simulate_ship(ship, "udp:127.0.0.1:9", speed_up=0.0))
+    assert ship.steps == 600
+    assert steps[0] == pytest.approx(59.9 / 10.0)
+
+
+def test_a_ship_that_runs_away_says_when():
+    ship = SimulatedShip(MARINER, step=0.5)
+    ship.steps, ship.states[0, 3] = 7, np.nan
+    with pytest.raises(InputError, match=r"model 'mariner' ran away after 3\.5 s"):
+        ship.advance()
+
+
+@pytest.mark.parametrize(("delay_s", "alarm"), [(1.4, ""), (1.6, "a step came 2.2 s late")])
+def test_it_hands_over_when_a_step_comes_a_second_late_and_not_sooner(delay_s, alarm):
+    """Twice as fast as time goes; half a second of the delay is that to the step. Garbage is left alone."""
+    ship, address, told = SimulatedShip(MARINER), f"tcp:127.0.0.1:{free_port()}", []
+    gc.unfreeze()
+
+    async def both():
+        loop = asyncio.get_running_loop()
+
+        def tell(line):
+            told.append(line)
+            if line.endswith("s: steering") and len(told) == 2:
+                loop._selector.now += delay_s
+
+        other = asyncio.create_task(simulate_ship(ship, address, duration=90.0, speed_up=2.0))
+        await asyncio.sleep(0.05)
+        more = {"heading": 0.0, "duration": 20.0, "speed_up": 2.0, "limits": Limits(silence_s=20.0)}
+        found = await steer(PID_MARINER, address, told=tell, **more)
+        other.cancel()
+        return found, loop.time()
+
+    with asyncio.Runner(loop_factory=no_waiting) as runner:
+        found, ended = runner.run(both())
+    frozen = gc.get_freeze_count()
+    gc.unfreeze()
+    assert told[1].endswith("s: steering")
+    assert found.alarm == alarm
+    assert ended < 20.0
+    assert frozen > 0
+
+
+@pytest.mark.parametrize("name", ["speed_up", "heading", "rate"])
+def test_what_is_no_number_is_refused_before_anything_is_opened(name):
+    given = {"heading": 0.1, "rate": 0.001} | {name: math.nan}
+    with pytest.raises(InputError, match=f"{name}: nan found"):
+        asyncio.run(steer(PID_MARINER, "usb:1", **given))
+
+
+def test_who_does_not_answer_within_five_seconds_is_waited_for(monkeypatch):
+    link = Link(lambda line: None)
+
+    async def silent(address):
+        await asyncio.sleep(100.0)
+
+    async def refused(address):
+        raise InputError(f"{address}: cannot be opened") from ConnectionRefusedError()
+
+    async def waits():
+        loop = asyncio.get_running_loop()
+        begin, said = loop.time(), await _missing(link, "tcp:ship:1", first=True)
+        return said, loop.time() - begin
+
+    with asyncio.Runner(loop_factory=no_waiting) as runner:
+        monkeypatch.setattr(link, "open", silent)
+        assert runner.run(waits()) == ("; tcp:ship:1: no answer", pytest.approx(5.0))
+        monkeypatch.setattr(link, "open", refused)
+        assert runner.run(waits())[0] == "; tcp:ship:1: cannot be opened"
+    assert steering.RETRY_S == 1.0
