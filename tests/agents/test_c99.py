@@ -5,6 +5,7 @@ import json
 import math
 import subprocess
 from dataclasses import replace
+from typing import NamedTuple
 
 import gymnasium as gym
 import numpy as np
@@ -134,6 +135,89 @@ def test_functions_of_the_engine_are_the_same_in_c_bit_by_bit(tmp_path):
         in_c.restype, in_c.argtypes = ctypes.c_double, [ctypes.c_double]
         for x in np.linspace(-9.0, 0.0 if k == 1 else 9.0, 37).tolist():
             assert in_c(x) == function(x)
+
+
+LIMIT, EXACT = 3, True
+
+
+class Pair(NamedTuple):
+    """Two numbers."""
+
+    left: float
+    right: float
+
+
+def within(x):
+    return 1 if -1.0 < x <= 2.0 else 0.25
+
+
+def either(x):
+    outside = x > 1.0 or (x < -1.0 and x != -3.0)
+    return 0.5 if not outside else -x
+
+
+def summed(x):
+    total = 0.0
+    for k in range(LIMIT):
+        total = total + x * (k + 1) / 2 - k / 2
+    return total
+
+
+def swapped(x):
+    a, b = x, 2.0
+    a, b = b, a
+    return a - b * 3.0 - (a - 1)
+
+
+def powers(x):
+    return (1.0 + x * x) ** 0.5 + x**3 + (1.0 + x * x) ** -1 + (2.0 + x) ** 0
+
+
+def branches(x):
+    y = (x - 1.0) if EXACT else unwritable(x)
+    unread = unwritable(y)
+    if not EXACT:
+        y = unread
+    if y > 0.0:
+        y = y / 4
+        z = y - 1.0
+    else:
+        z = -(y + 1)
+    return y + 2.0 * z
+
+
+def limited(x):
+    return abs(min(x, 0.5)) + max(-x, math.floor(x)) + float(int(x)) / 2 + np.arctan2(x, 1.5)
+
+
+def paired(x):
+    pair = Pair(x, right=2.0)
+    left, right = turned(pair)
+    return left / right
+
+
+def turned(pair):
+    return pair.right, pair.left + 9.0
+
+
+def test_each_construct_of_python_is_the_same_in_c(tmp_path):
+    c, plain = Translator({}, "it"), (within, either, summed, swapped, powers, branches, limited, paired)
+    names = [c.function(one, float)[0] for one in plain]
+    prelude = ship_source(MARINER, "ship").source.partition("typedef")[0].replace('"ship.h"', '"it.h"')
+    public = [
+        f"double f{k}(double x);\ndouble f{k}(double x) {{ return {one}(x); }}" for k, one in enumerate(names)
+    ]
+    text = "\n".join([prelude, *c.structures, *c.functions, *public])
+    (tmp_path / "it.h").write_text("")
+    (tmp_path / "it.c").write_text(text)
+    command = ["gcc", "-std=c99", "-shared", "-fPIC", "it.c", "-o", "it.so", "-lm"]
+    subprocess.run(command, cwd=tmp_path, check=True)
+    library = ctypes.CDLL(str(tmp_path / "it.so"))
+    for k, function in enumerate(plain):
+        in_c = getattr(library, f"f{k}")
+        in_c.restype, in_c.argtypes = ctypes.c_double, [ctypes.c_double]
+        for x in (-3.0, -1.3, -1.0, -0.4, 0.0, 0.3, 0.7, 1.0, 1.9, 2.0, 2.6):
+            assert in_c(x) == pytest.approx(function(x), rel=1e-15, abs=1e-15), (function.__name__, x)
 
 
 def over_wheel_over():

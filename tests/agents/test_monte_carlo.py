@@ -1,6 +1,6 @@
 """Monte Carlo over the covariance gives the same in this process, in others, resumed, and draw by draw."""
 
-from dataclasses import fields
+from dataclasses import fields, replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -8,8 +8,9 @@ import pytest
 
 from agents import LQ, PID, sail
 from agents.engines.jobs import JobEngine
+from agents.verification import index_uncertainty
 from agents.verification.index_uncertainty import nominal_runs, sail_draws, uncertainty_of
-from agents.verification.monte_carlo import monte_carlo
+from agents.verification.monte_carlo import draw_jobs, monte_carlo
 from shipgym import InputError, load_model
 
 DRAWS, SEED = 28, 3  # two jobs
@@ -48,6 +49,7 @@ def test_two_workers_give_the_same_and_what_they_did_is_resumed(found, ship, pil
     assert_same(monte_carlo(pilots, ship, DRAWS, SEED, where=engine, progress=told.append), found)
     assert told == sorted(told)
     assert (told[0], told[-1]) == (0, DRAWS)
+    assert set(told) <= {0, 25, DRAWS}  # 25 in a job
     told.clear()
     assert_same(
         monte_carlo(pilots, ship, DRAWS, SEED, where=JobEngine(keep=tmp_path), progress=told.append), found
@@ -95,3 +97,34 @@ def test_draws_that_run_away_in_any_manoeuvre_count_once_and_have_no_paths(ship,
     assert found.unstable.tolist() == [False, True, False, False, True, False, False]
     assert found.zigzag_headings.tolist() == list(found.circle_paths) == [0, 2, 3, 5, 6]
     assert (found.zigzag, found.circle) == ("zigzag", "circle")
+
+
+def test_draws_are_shared_out_in_jobs_of_25_that_go_on_with_the_seeds(ship):
+    drawn = ship.sample(51, 0)
+    jobs = draw_jobs([], ship, drawn, 7)
+    assert [len(job["names"]) for job in jobs] == [25, 25, 1]
+    assert [job["first_seed"] for job in jobs] == [7, 32, 57]
+    assert [name for job in jobs for name in job["names"]] == [draw.name for draw in drawn]
+    rows = [row for job in jobs for row in job["coefficients"]]
+    assert rows == [list(draw.coefficients.values()) for draw in drawn]
+
+
+def test_forty_circles_are_kept_for_the_report_and_all_headings(ship, monkeypatch):
+    none = SimpleNamespace(drawn=SimpleNamespace(ran_away=np.zeros(45, dtype=bool)))
+    monkeypatch.setattr(index_uncertainty, "imo_manoeuvres", lambda model: {})
+    monkeypatch.setattr(index_uncertainty, "imo_criteria", lambda model, found: {"advance": none})
+    part = {"values": {}, "ran_away": {}, "lost": np.zeros(45, dtype=bool)}
+    found = uncertainty_of(ship, ("", ""), [part | {"headings": np.arange(45), "paths": np.arange(45)}])
+    assert list(found.circle_paths) == list(range(40))
+    assert len(found.zigzag_headings) == 45
+
+
+def test_runs_are_kept_for_25_and_30_lengths_and_the_circle_within_the_rudder_s_limit(ship):
+    narrow = replace(ship, steering=replace(ship.steering, rudder_limit_deg=25.0))
+    time = ship.particulars["length"] / ship.particulars["speed"]
+    for model, rudder in ((ship, 35.0), (narrow, 25.0)):
+        zigzag, circle = nominal_runs(model)
+        assert np.degrees(np.abs(circle["delta"]).max()) == pytest.approx(rudder, abs=1e-6)
+        assert np.degrees(np.abs(zigzag["delta"]).max()) == pytest.approx(20.0, abs=1e-6)
+        assert (zigzag.t[-1] / time, circle.t[-1] / time) == pytest.approx((25.0, 30.0), abs=0.11)
+        assert np.diff(circle.t) == pytest.approx(0.1 * time)

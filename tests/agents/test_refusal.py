@@ -19,7 +19,7 @@ from agents.verification.page import verification_view
 from agents.verification.refusal import lost_control, rudder_effect, simpler_structures, why_refused
 from agents.verification.result import verification_metrics
 from identification.design.experiment import advise
-from shipgym import InputError, ShipFile, UnstableModelError, load_model
+from shipgym import InputError, ShipFile, Trial, UnstableModelError, load_model
 from shipgym.manoeuvres.standard import families_of
 from shipgym.ships.conversions import nomoto1_ship
 
@@ -199,3 +199,43 @@ def test_an_autopilot_may_lose_one_model_in_twenty():
     assert refusal.lost_control(lost) is None
     lost[50:53] = True
     assert refusal.lost_control(lost) == "it loses control of 53 of 1000 models drawn"
+
+
+@pytest.mark.parametrize(("windows", "known"), [(4.5, False), (5.5, True)])
+def test_a_trial_of_less_than_four_changes_says_nothing_of_the_rudder(windows, known):
+    """Changes over half a ship length; three numbers are found from them."""
+    ship = load_model("mariner")
+    window = 0.5 * ship.particulars["length"] / ship.particulars["speed"]
+    t = np.linspace(0.0, windows * window, 400)
+    rate = 0.004 * np.sin(0.11 * t) + 1e-4 * np.sin(1.7 * t)
+    trial = Trial(t, {"r": rate, "delta": 0.1 * np.cos(0.07 * t)})
+    found = rudder_effect([trial], ship)
+    assert (found != 0.0) == known
+    assert np.isfinite(found)
+
+
+def test_where_nothing_can_be_advised_a_zigzag_to_both_sides_helps(monkeypatch):
+    def nothing(*_, **__):
+        raise InputError("no table")
+
+    fit = SimpleNamespace(model=None, trials=())
+    monkeypatch.setattr(refusal, "advise", nothing)
+    assert refusal.helpful_trial(fit) == "a 20/20 zigzag to both sides"
+    advice = SimpleNamespace(chosen=["turning circle 35", "zigzag 10/10"])
+    monkeypatch.setattr(refusal, "advise", lambda *_, criterion: advice if criterion == "D" else None)
+    assert refusal.helpful_trial(fit) == "a turning circle 35 to both sides"
+
+
+def test_a_model_without_a_straight_course_is_left_to_the_designs(monkeypatch):
+    def none(_):
+        raise InputError("no straight course")
+
+    monkeypatch.setattr(refusal, "steering_state_space", none)
+    model = SimpleNamespace(sample=lambda count, seed: [None] * count)
+    assert why_refused(SimpleNamespace(model=model, trials=())) is None
+
+
+def test_two_simpler_structures_are_named_at_most():
+    ranking = [stood("a", 9), stood("b", 7), stood("c", 6), stood("b", 5), stood("d", 4)]
+    assert simpler_structures(ranking, "a") == ["b", "c"]
+    assert simpler_structures(ranking, "unknown") == []

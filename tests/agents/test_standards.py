@@ -6,9 +6,12 @@ import numpy as np
 import pytest
 
 from agents import LQ, PID, WheelOver
+from agents.controllers.linear_loop import length_time
 from agents.deployment.steering import Limits
+from agents.verification import standards as module
 from agents.verification.standards import REQUIREMENTS, Row, heading_control, kept, standards, track_control
 from agents.verification.tracks import keep_track, track_task
+from shipgym.errors import InputError
 from tests.agents.policies import MARINER
 
 
@@ -45,3 +48,31 @@ def test_a_heading_that_falls_silent_is_handed_over_and_the_rest_is_steered():
     assert found.alarm == "no heading for 5 s"
     assert 65.0 <= found.alarm_at <= 67.0
     assert np.abs(found.error).max() < 1.0
+
+
+def test_a_course_is_kept_for_forty_ship_lengths_of_which_the_first_ten_do_not_count():
+    found = kept(MARINER, PID.from_model(MARINER))
+    assert (found.alarm, found.alarm_at) == ("", np.inf)
+    assert found.t[-1] == pytest.approx(40.0 * length_time(MARINER), abs=1.0)
+    assert module._settled(found.t)[0] == pytest.approx(10.0 * length_time(MARINER), abs=1.0)
+
+
+def test_what_no_simulation_shows_of_a_ship_has_no_value(monkeypatch):
+    """Neither waves, of which her particulars do not tell, nor a rate of turn."""
+
+    def unknown(*_, **__):
+        raise InputError("not known")
+
+    monkeypatch.setattr(module, "kept", unknown)
+    monkeypatch.setattr(module.TurnRate, "from_model", unknown)
+    assert module._sea(MARINER, PID.from_model(MARINER)) == {}
+    assert module._rate_of_turn(MARINER) == {}
+
+
+def test_what_is_largest_without_a_warning_is_that_of_the_quiet_intervals():
+    run = module.Run(*[np.zeros(4)] * 5, [], [[], ["off track"], ["off heading"], []], "", np.inf)
+    size = np.array([1.0, 9.0, 7.0, 3.0])
+    assert module._unwarned(run, size, "off track") == 7.0
+    assert module._unwarned(run, size, "off heading") == 9.0
+    always = run._replace(warnings=[["off track"]] * 4)
+    assert module._unwarned(always, size, "off track") == 0.0

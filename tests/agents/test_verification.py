@@ -7,10 +7,13 @@ import numpy as np
 import pytest
 
 from agents import PID
+from agents.engines.jobs import JobEngine
 from agents.verification import chain
-from agents.verification.page import headline
+from agents.verification.page import headline, verification_view
 from agents.verification.result import pilot_metrics, track_metrics
-from shipgym import load_model
+from agents.verification.tracks import track_task
+from identification.progress import PROGRESS
+from shipgym import InputError, load_model
 
 
 def track(largest, rms, arrived):
@@ -107,3 +110,82 @@ def test_the_verdict_says_what_is_met_missed_and_not_decided(criteria, runaway, 
     told = headline(SimpleNamespace(draws=9, pilots=[best], manoeuvres=manoeuvres))
     assert told.startswith("The model ")
     assert said in told
+
+
+@pytest.mark.parametrize(
+    ("passed", "runaway", "lost", "certain"),
+    [
+        ((True, True), 0, 0, True), ((True, None), 0, 0, False), ((False, True), 0, 0, False),
+        ((True, True), 1, 0, False), ((True, True), 0, 1, False), ((False, None), 2, 3, False),
+    ],
+)  # fmt: skip
+def test_a_verdict_is_certain_where_nothing_is_missed_or_open_and_no_model_drawn_is_lost(
+    passed, runaway, lost, certain
+):
+    def pilot(name, costs):
+        numbers = episodes(9)
+        numbers.cost, numbers.terminated = np.array(costs), np.arange(9) < lost
+        return SimpleNamespace(name=name, design=None, episodes=numbers)
+
+    pilots = [pilot("LQ", [1.0] * 9), pilot("PID", [0.5] * 3 + [2.0] * 6)]
+    criteria = dict(zip(("advance", "tactical_diameter"), map(criterion, passed), strict=True))
+    manoeuvres = SimpleNamespace(criteria=criteria, unstable=np.arange(9) < runaway)
+    found = SimpleNamespace(
+        draws=9, pilots=pilots, by_name=pilots, manoeuvres=manoeuvres, tracks=(),
+        course_unstable=np.arange(9) < 4,
+    )  # fmt: skip
+    view = verification_view(found)
+    assert view["certain"] == certain
+    assert (view["met"], view["missed"]) == (passed.count(True), passed.count(False))
+    assert (view["unstable"], view["course_unstable"], view["best"]) == (runaway, 4, "LQ")
+    assert view["cheaper"] == pytest.approx({"PID": 6.0 / 9.0})
+    assert (view["learned"], view["designs"]) == (["LQ", "PID"], {})
+
+
+def test_a_stage_is_told_at_its_beginning_and_end_and_its_parts_in_between():
+    told, outside = [], PROGRESS.get(None)
+    with chain._stage(lambda *one: told.append(one), "reading"):
+        assert told == [("reading", 0, 1)]
+        PROGRESS.get()("part", 1, 3)
+    assert told[1:] == [("part", 1, 3), ("reading", 1, 1)]
+    assert PROGRESS.get(None) is outside
+    told.clear()
+    with pytest.raises(ValueError, match="lost"), chain._stage(lambda *one: told.append(one), "it"):
+        raise ValueError("lost")
+    assert told == [("it", 0, 1)]
+    assert PROGRESS.get(None) is outside
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({"seed": -1}, "seed: -1 found, expected"),
+        ({"seed": 2**32 + 1}, "seed: 4.*found, expected"),
+        ({"where": "lokal"}, "Did you mean 'local'"),
+        ({"plotly": False}, "plotly is missing"),
+    ],
+)
+def test_what_is_wrong_is_said_before_a_file_is_read(given, message, tmp_path, monkeypatch):
+    if "where" in given:
+        given = {"where": JobEngine(given["where"])}
+    if given.pop("plotly", True) is False:
+
+        def missing():
+            raise InputError("plotly is missing")
+
+        monkeypatch.setattr(chain, "graph_objects", missing)
+    monkeypatch.setattr(chain.ShipFile, "load", lambda path: pytest.fail("a file is read"))
+    with pytest.raises(InputError, match=message):
+        chain.build_autopilot("ship.toml", tmp_path / "out", **given)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_twice_the_time_that_the_track_takes_is_sailed_at_most():
+    """Six legs of twelve ship lengths, at service speed."""
+    model = load_model("mariner")
+    task = track_task(model)
+    waypoints = np.array(task.settings.waypoints[1:]).reshape(-1, 2)
+    length = np.hypot(*np.diff(waypoints, axis=0).T).sum()
+    assert length == pytest.approx(6 * 12 * model.particulars["length"])
+    most = task.episode_steps * task.interval(model) * model.particulars["speed"]
+    assert most / length == pytest.approx(2.0, abs=0.05)
