@@ -103,6 +103,8 @@ class Learned:
 def test_a_learned_autopilot_is_led_but_has_no_file(tmp_path):
     guided = IntegralLineOfSight.from_model(MARINER, autopilot=Learned())
     check_controller(guided, MARINER, path_following_task(), n_steps=5)
+    margins = guided.margins
+    assert (margins.gain_margin, margins.phase_margin_deg, margins.lowest_gain) == (np.inf, np.inf, 0.0)
     with pytest.raises(InputError, match="autopilot: Learned found, expected a controller of shipgym"):
         guided.save(tmp_path / "guided.json")
 

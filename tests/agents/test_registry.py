@@ -130,3 +130,23 @@ def test_our_own_keep_their_kind_and_are_documented(kind):
     assert register_controller(controller) is controller
     page = (Path(__file__).parents[2] / "docs" / "controllers.md").read_text()
     assert f"`{controller.__name__}`" in page
+
+
+def test_a_kind_is_a_name_and_no_other_controller_s(monkeypatch):
+    monkeypatch.setattr(registry, "_REGISTERED", {})
+
+    def of_kind(kind):
+        return type("Mine", (LQ,), {"kind": kind, "__module__": "mine"})
+
+    for kind in ("", "my lq", "my,lq", "my/lq"):
+        with pytest.raises(InputError, match=f"Mine.kind is '{kind}', expected a name such as 'my-lq'"):
+            register_controller(of_kind(kind))
+    first = of_kind("my-lq")
+    assert register_controller(first) is register_controller(first) is first
+    assert registry.controller_kinds()[-1] == "my-lq"
+    assert registry.registered_modules() == ("mine",)
+    other = of_kind("my-lq")
+    other.__qualname__ = "Other"
+    with pytest.raises(InputError, match="kind 'my-lq' is that of mine:Mine already, expected another one"):
+        register_controller(other)
+    assert registry.controller_class("my-lq") is first

@@ -776,3 +776,51 @@ def test_who_does_not_answer_within_five_seconds_is_waited_for(monkeypatch):
         monkeypatch.setattr(link, "open", refused)
         assert runner.run(waits())[0] == "; tcp:ship:1: cannot be opened"
     assert steering.RETRY_S == 1.0
+
+
+@pytest.mark.parametrize(("dt", "looks"), [(3.0, 30), (2.1, 42)])
+def test_sensors_are_looked_at_once_a_second_at_least_and_steered_by_in_each_interval(dt, looks, monkeypatch):
+    """In 30 s of intervals of 3 s three times in each, and as often of 2.1 s."""
+    counts = dict.fromkeys(("watch", "sentences", "steer"), 0)
+
+    def counted(name, method):
+        def call(self, *given):
+            counts[name] += 1
+            return method(self, *given)
+
+        return call
+
+    for name in counts:
+        monkeypatch.setattr(Helm, name, counted(name, getattr(Helm, name)))
+    found, _, _ = sailed(PID.from_model(MARINER, dt=dt), seconds=looks * dt / 3.0, heading=0.3)
+    assert found.state == STEERING
+    assert counts == {"watch": looks, "sentences": looks, "steer": looks // 3}
+
+
+def test_what_is_not_installed_is_named_with_its_extra():
+    with pytest.raises(InputError, match=r"no_such_nmea is not installed: pip install 'shipgym\[nmea\]'"):
+        nmea.library.__wrapped__("no_such_nmea")
+
+
+@pytest.mark.parametrize(
+    ("error", "said"),
+    [(OSError(111, "refused"), r"\(refused\)"), (OSError("several of them"), r"\(several of them\)")],
+)
+def test_why_an_address_cannot_be_opened_is_said(error, said):
+    async def fails(*_):
+        raise error
+
+    async def opens():
+        asyncio.get_running_loop().create_connection = fails
+        await Link(lambda line: None).open("tcp:ship:1")
+
+    with pytest.raises(InputError, match=f"^tcp:ship:1: cannot be opened {said}$") as refused:
+        asyncio.run(opens())
+    assert refused.value.__cause__ is error
+
+
+def test_an_address_that_is_none_is_shown_by_its_beginning():
+    for address in ("serial:", "usb:" + "x" * 200, "tcp:ship"):
+        with pytest.raises(InputError) as refused:
+            asyncio.run(Link(lambda line: None).open(address))
+        assert f"address: '{address[:80]}' found, expected tcp:HOST:PORT" in str(refused.value)

@@ -1,14 +1,15 @@
 """What is said of a verified autopilot, from numbers made up."""
 
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+import shipgym
 from agents import PID
 from agents.engines.jobs import JobEngine
-from agents.verification import chain
+from agents.verification import chain, page
 from agents.verification.page import headline, verification_view
 from agents.verification.result import pilot_metrics, track_metrics
 from agents.verification.tracks import track_task
@@ -189,3 +190,106 @@ def test_twice_the_time_that_the_track_takes_is_sailed_at_most():
     assert length == pytest.approx(6 * 12 * model.particulars["length"])
     most = task.episode_steps * task.interval(model) * model.particulars["speed"]
     assert most / length == pytest.approx(2.0, abs=0.05)
+
+
+def to_be_built(monkeypatch, verification="found", refusal=None):
+    """Stands in for the work of the chain; returns what is asked of it."""
+    asked = {"standards": 0}
+    fit = SimpleNamespace(model="model")
+
+    @dataclass(frozen=True)
+    class Result:
+        verification: object
+        refusal: str | None
+
+    def examined(ship, fit, guests, verified):
+        asked["verify"] = verified.args
+        return Result(verification, refusal)
+
+    def to_standards(found, model):
+        asked["standards"] += 1
+        return f"{found} of {model}"
+
+    stand_ins = {
+        "trials_of": lambda ship, settings: ("trials", "arguments"), "examined": examined,
+        "identification_settings": lambda ship, options: {}, "_to_standards": to_standards,
+        "identify_trials": lambda *_: fit, "_write": lambda result, folder: (folder / "report.html").touch(),
+        "load_agent": lambda agent: f"made of {agent}",
+    }  # fmt: skip
+    for name, one in stand_ins.items():
+        monkeypatch.setattr(chain, name, one)
+    monkeypatch.setattr(chain.ShipFile, "load", lambda path: "ship")
+    return asked
+
+
+def test_by_default_two_hundred_models_are_drawn_from_the_first_seed_on(monkeypatch, tmp_path):
+    asked = to_be_built(monkeypatch)
+    result = chain.build_autopilot("ship.toml", tmp_path / "out", agents=["guest"])
+    model, draws, seed, _, where, guests, designs = asked["verify"]
+    assert (model, draws, seed, guests) == ("model", 200, 0, ["made of guest"])
+    assert designs == ("pid", "lq", "lq-scheduled", "turn-rate", "wheel-over")
+    assert where is chain.HERE
+    assert (result.verification, asked["standards"]) == ("found", 0)
+    assert (tmp_path / "out" / "report.html").exists()
+
+
+@pytest.mark.parametrize(
+    ("wanted", "verification", "refusal", "simulated"),
+    [
+        (True, "found", None, 1), (False, "found", None, 0), (True, None, None, 0),
+        (True, "found", "it loses control", 0), (True, None, "it is wrong", 0),
+    ],
+)  # fmt: skip
+def test_standards_are_simulated_where_they_are_asked_for_and_an_autopilot_is_given(
+    wanted, verification, refusal, simulated, monkeypatch, tmp_path
+):
+    asked = to_be_built(monkeypatch, verification, refusal)
+    told = []
+    result = chain.build_autopilot(
+        "ship.toml", tmp_path / "out", standards=wanted, progress=lambda *one: told.append(one)
+    )
+    assert asked["standards"] == simulated
+    assert result.verification == ("found of model" if simulated else verification)
+    stages = ["reading trials", "identifying", *["standards"] * simulated, "writing the report"]
+    assert told == [(name, done, 1) for name in stages for done in (0, 1)]
+
+
+def test_standards_are_those_of_the_best_design_and_the_tracks_that_are_given(monkeypatch):
+    def pilot(key, design):
+        return SimpleNamespace(key=key, design=design)
+
+    @dataclass(frozen=True)
+    class Found:
+        pilots: tuple
+        tracks: tuple
+        refused: dict
+        standards: tuple = ()
+
+    pilots = pilot("guest", None), pilot("pid", "PID"), pilot("lq", "LQ"), pilot("lqg", "LQG")
+    tracks = SimpleNamespace(key="los"), SimpleNamespace(key="wheel-over")
+    found = Found(pilots, tracks, {"pid": "it loses control", "los": "it is late"})
+    monkeypatch.setattr("agents.verification.standards.standards", lambda *given: given)
+    assert chain._to_standards(found, "model").standards == ("model", "LQ", [tracks[1]])
+
+
+@pytest.mark.parametrize("known", [True, False])
+def test_a_report_tells_how_the_model_was_made_where_that_is_known(known, monkeypatch, tmp_path):
+    drawn = {}
+    monkeypatch.setattr(page, "render", lambda name, **data: drawn.update(data) or "page")
+    monkeypatch.setattr(page, "fit_view", lambda result: "fit")
+    monkeypatch.setattr(page, "held_out_error", lambda result: 0.5)
+    provenance = {"software": "shipgym 0.0.9", "structure": "abkowitz", "method": "ls", "samples": 900}
+    model = SimpleNamespace(provenance=provenance if known else None, particulars={"length": 161.0})
+    ship = SimpleNamespace(particulars=SimpleNamespace(name="Mariner"), path=tmp_path / "ship.toml")
+    result = SimpleNamespace(
+        verification=None, model=model, ship=ship, identification=None, instability="it runs away",
+        refusal=None, trials=(),
+    )  # fmt: skip
+    page.write_report(result, tmp_path / "report.html")
+    assert (tmp_path / "report.html").read_text() == "page"
+    if known:
+        assert (drawn["software"], drawn["settings"]) == ("shipgym 0.0.9", ["abkowitz", "ls", "900"])
+    else:
+        assert (drawn["software"], drawn["settings"]) == (f"shipgym {shipgym.__version__}", [page.NONE] * 3)
+    assert (drawn["found"], drawn["figures"], drawn["step_deg"]) == (None, {}, 20.0)
+    assert drawn["infinity"] == np.inf
