@@ -1,11 +1,14 @@
 """Files are read within limits, and each refusal is one message."""
 
+import json
+import math
 import os
 from pathlib import Path
 
 import pytest
 
-from shipgym.errors import InputError
+from shipgym import files
+from shipgym.errors import InputError, ManoeuvreError, UnstableModelError
 from shipgym.files import (
     named_values,
     parse_json,
@@ -129,3 +132,113 @@ def test_values_given_by_name_are_read_as_toml_has_them():
     }  # fmt: skip
     for wrong in ("a", "=1", " = "):
         assert said(named_values, [wrong], "--set", "a=1").endswith("name=value, such as --set a=1")
+
+
+LIMITS = (Path(__file__).parents[2] / "docs" / "ship_file.md").read_text(encoding="utf-8")
+
+
+@pytest.mark.parametrize(
+    ("row", "most"),
+    [
+        ("ship file and other TOML | 256 KiB", files.LARGEST_TOML),
+        ("trial (CSV, NMEA 0183) | 64 MiB", files.LARGEST_CSV),
+        ("model, episode, controller, results and other JSON | 32 MiB", files.LARGEST_JSON),
+        ("weights (safetensors) | 256 MiB", files.LARGEST_TENSORS),
+    ],
+)
+def test_files_are_as_large_as_their_page_says(row, most):
+    assert f"| {row}" in LIMITS
+    number, unit = row.split(" | ")[1].split()
+    assert most == int(number) * {"KiB": 1024, "MiB": 1024**2}[unit]
+
+
+def test_limits_of_values_are_those_of_their_page():
+    assert f"32 MiB, {files.MOST_VALUES:,} values |" in LIMITS
+    assert f"| tables and lists within each other | {files.DEEPEST} levels |" in LIMITS
+    assert f"| other numbers | magnitude 1e{math.log10(files.LARGEST_NUMBER):.0f}, finite" in LIMITS
+    assert f"| texts, such as names and paths | {files.LONGEST_KEY:,} characters" in LIMITS
+
+
+@pytest.mark.parametrize(
+    ("fine", "beyond", "expected"),
+    [
+        (f'{{"{"k" * 4096}": 1}}', f'{{"{"k" * 4097}": 1}}', "expected a text of at most 4096 characters"),
+        (f'{{"a": {2**64 - 1}}}', f'{{"a": {2**64}}}', "expected a whole number of at most 64 bits"),
+        (f'{{"a": {1 - 2**64}}}', f'{{"a": {-(2**64)}}}', "expected a whole number of at most 64 bits"),
+        (f'{{"seed": {2**128 - 1}}}', f'{{"seed": {2**128}}}', "expected a whole number of at most 128 bits"),
+        ('{"a": 1e100}', '{"a": 1.01e100}', "expected a number of magnitude 1e+100 at most"),
+        ("-1e100", "-1.01e100", "expected a number of magnitude 1e+100 at most"),
+        ('{"a": [null, true, "text"]}', '{"a": "\\u0000"}', "expected a text without null bytes"),
+    ],
+)
+def test_values_are_read_up_to_their_limits(fine, beyond, expected):
+    assert parse_json(fine, "a.json:", "x") == json.loads(fine)
+    assert expected in said(parse_json, beyond, "a.json:", "x")
+
+
+def test_an_infinite_number_of_toml_is_no_large_one():
+    assert parse_toml("a = [inf, -inf]", "a.toml:") == {"a": [math.inf, -math.inf]}
+    assert said(parse_toml, "a = 1.01e100", "a.toml:") == (
+        "a.toml: a: 1.01e+100 found, expected a number of magnitude 1e+100 at most"
+    )
+    assert said(parse_toml, "[a.b]\nc = [[nan]]", "a.toml:").startswith("a.toml: a.b.c[0][0]: nan found")
+
+
+def test_a_json_file_holds_one_object(tmp_path):
+    path = tmp_path / "model.json"
+    path.write_text('{"a": [1, 2]}')
+    assert read_json(path, "model file", "x") == {"a": [1, 2]}
+    path.write_text("[1, 2]")
+    assert said(read_json, path, "model file", "x") == (
+        f"{path}: [1, 2] found, expected a table of keys and values"
+    )
+
+
+def test_a_file_in_utf_16_is_told_so(tmp_path):
+    for encoding in ("utf-16-le", "utf-16-be"):
+        (tmp_path / "a.toml").write_bytes("\ufeff[ship]\n".encode(encoding))
+        for latin in (False, True):
+            message = said(read_text, tmp_path / "a.toml", "ship file", 100, latin)
+            assert message.endswith(
+                "a.toml: the file is in UTF-16, expected a ship file; save it as text in UTF-8"
+            )
+
+
+def test_the_line_of_a_byte_that_is_no_text_is_counted_from_one(tmp_path):
+    (tmp_path / "a.toml").write_bytes(b"\xb0")
+    assert "a.toml: line 1 holds byte 0xb0, which" in said(read_text, tmp_path / "a.toml", "x", 100)
+
+
+def test_of_a_missing_file_the_nearest_name_beside_is_asked_for(tmp_path):
+    (tmp_path / "mariner.json").write_text("{}")
+    assert said(read_bytes, tmp_path / "marinr.json", "model file", 9).endswith(
+        "marinr.json: there is no such model file. Did you mean 'mariner.json'?"
+    )
+    assert said(read_bytes, tmp_path / "x", "model file", 9).endswith("x: there is no such model file.")
+
+
+def test_whether_a_file_can_be_read_is_seen_without_reading_it(tmp_path):
+    (tmp_path / "large.csv").write_bytes(b"0" * 1000)
+    files.check_readable(tmp_path / "large.csv", "CSV file")
+    assert read_bytes(tmp_path / "large.csv", "CSV file", 0) == b""
+    assert "this is a folder, expected a CSV file" in said(files.check_readable, tmp_path, "CSV file")
+
+
+def test_the_reason_of_the_system_is_given_in_words(tmp_path):
+    long = tmp_path / ("x" * 300)
+    assert said(read_bytes, long, "file", 9) == (
+        f"{long}: cannot be read (File name too long), expected a file"
+    )
+
+
+def test_the_middle_of_a_message_is_left_out_beyond_two_thousand_characters():
+    text = "a" * 1000 + "b" * 1000
+    assert str(InputError(text)) == text
+    assert str(InputError("a" * 1000 + "middle" + "b" * 1000)) == "a" * 1000 + " ... " + "b" * 1000
+
+
+def test_errors_of_a_simulation_carry_what_was_there():
+    error = UnstableModelError("runs away", 12.5, {"u": 9.0})
+    assert (str(error), error.time_s, error.state) == ("runs away", 12.5, {"u": 9.0})
+    error = ManoeuvreError("never turned", "the trial so far")
+    assert (str(error), error.trial) == ("never turned", "the trial so far")

@@ -4,12 +4,22 @@ import errno
 import os
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
 
+from shipgym import files
 from shipgym.errors import InputError
-from shipgym.files import abandoned_drafts, draft_name, make_folder, remove_drafts, write_text
+from shipgym.files import (
+    abandoned_drafts,
+    draft_folder,
+    draft_name,
+    make_folder,
+    remove_drafts,
+    write_json,
+    write_text,
+)
 
 WEEK = 7 * 86400
 
@@ -69,3 +79,65 @@ def test_a_folder_is_made_with_those_above_it_and_may_be_there(tmp_path):
     write_text("a file", tmp_path / "file")
     with pytest.raises(InputError, match="file/first: no folder can be made there"):
         make_folder(tmp_path / "file" / "first")
+
+
+def test_a_refusal_gives_the_reason_of_the_system_in_words(tmp_path):
+    with pytest.raises(InputError) as caught:
+        write_text("text", tmp_path / "none" / "a")
+    assert str(caught.value) == (
+        f"{tmp_path}/none/a: cannot be written (No such file or directory); choose a folder that exists"
+    )
+    with pytest.raises(InputError) as caught:
+        write_text("text", tmp_path / ("x" * 250))  # its draft's name is longer than names may be
+    assert str(caught.value).endswith("x: cannot be written (File name too long)")
+    write_text("a file", tmp_path / "file")
+    with pytest.raises(InputError, match=r"no folder can be made there \(Not a directory\)$"):
+        make_folder(tmp_path / "file" / "first")
+
+
+def test_json_is_written_with_a_space_a_level_and_an_end_of_line(tmp_path):
+    write_json({"a": {"b": 1}}, tmp_path / "a.json")
+    assert (tmp_path / "a.json").read_text() == '{\n "a": {\n  "b": 1\n }\n}\n'
+    write_json({"a": [1, 2]}, tmp_path / "a.json", indent=None)
+    assert (tmp_path / "a.json").read_text() == '{"a": [1, 2]}\n'
+
+
+def test_a_folder_is_removed_unless_it_was_renamed(tmp_path, dead):
+    left = draft(tmp_path / "result", dead)
+    own = draft_name(tmp_path / "result")
+    own.mkdir()
+    (own / "old").write_text("of a killed process of the same number")
+    with draft_folder(tmp_path / "result") as folder:
+        assert not left.exists()
+        assert list(folder.iterdir()) == []
+        (folder / "new").write_text("whole")
+        folder.rename(tmp_path / "result")
+    assert [path.name for path in tmp_path.rglob("*")] == ["result", "new"]
+    with pytest.raises(ZeroDivisionError), draft_folder(tmp_path / "other") as folder:
+        (folder / "half").write_text(str(1 / 0))
+    assert [path.name for path in tmp_path.iterdir()] == ["result"]
+
+
+def test_a_process_is_dead_where_the_system_knows_none_of_its_number(monkeypatch, dead):
+    host = files._host()
+    assert [files._is_dead(host, str(number)) for number in (dead, os.getpid(), 10**30)] == [
+        True,
+        False,
+        True,
+    ]
+    assert not files._is_dead("00000000", str(dead))
+
+    def refused(*_):
+        raise PermissionError  # of another user's, which is alive
+
+    monkeypatch.setattr(os, "kill", refused)
+    assert files._is_dead(host, "1") is False
+
+
+def test_drafts_of_this_computer_and_of_others_count_as_abandoned_after_a_week(tmp_path):
+    living, elsewhere = draft(tmp_path / "a", os.getppid()), draft(tmp_path / "b", 1, "00000000")
+    for age, expected in ((WEEK - 60, []), (WEEK + 60, [living, elsewhere])):
+        for path in (living, elsewhere):
+            os.utime(path, (time.time() - age,) * 2)
+        assert sorted(abandoned_drafts(tmp_path)) == expected
+    assert abandoned_drafts(tmp_path / "none") == []
