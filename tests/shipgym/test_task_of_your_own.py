@@ -1,6 +1,7 @@
 """A task, a reward and a sensor set from files outside the package: those of their documentation page."""
 
 import re
+import sys
 from pathlib import Path
 from typing import Annotated, NamedTuple
 
@@ -14,6 +15,7 @@ from stable_baselines3 import PPO
 import shipgym
 from shipgym import InputError, ShipVecEnv, check_task, check_vector_env, register_task
 from shipgym.envs.engine import Engine
+from shipgym.python_files import load_file
 from shipgym.tasks.contract import Setting
 from shipgym.tasks.definition import read_definition
 from shipgym.tasks.source import annotated, check_namespace, keywords, make_settings, read_source
@@ -338,3 +340,21 @@ def test_lanes_of_a_task_are_equal_bit_for_bit(tmp_path):
         many, earned, *_ = large.step(np.tile(order, (130, 1)))
         np.testing.assert_array_equal(seen, many[127:])
         np.testing.assert_array_equal(rewards, earned[127:])
+
+
+def test_an_error_of_a_file_is_told_with_its_last_line_in_it_and_the_file_may_be_mended(tmp_path):
+    def refused(text):
+        with pytest.raises(InputError) as caught:
+            load_file(written(tmp_path, "own.py", text))
+        return str(caught.value).removeprefix(str(tmp_path / "own.py"))
+
+    calls = "import json\n\n\ndef read():\n    json.loads('{')\n\n\nread()\n"
+    for _ in range(2):  # what failed is not taken for read
+        assert refused(calls).startswith(", line 5: cannot be executed: JSONDecodeError: ")
+    assert refused("x = (\n").startswith(", line 1: cannot be executed: SyntaxError: ")
+    assert refused("from shipgym import InputError\nraise InputError('no such tide')\n") == ": no such tide"
+    assert refused("\0").startswith(": cannot be executed: ")
+    own = load_file(written(tmp_path, "own.py", "x = 3\n"))
+    assert (own.x, own.__file__) == (3, str((tmp_path / "own.py").resolve()))
+    assert load_file(tmp_path / "own.py") is own is sys.modules[own.__name__]
+    assert load_file(written(tmp_path, "other.py", "x = 3\n")) is not own
