@@ -14,11 +14,14 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
+from filelock import FileLock, Timeout
+from platformdirs import user_cache_path
 
 import shipgym
 from shipgym.engine import cache_folder, compiling
 from shipgym.engine.disk_cache import DiskCache
 from shipgym.engine.voyages import Voyages
+from shipgym.errors import InputError
 from shipgym.files import draft_name
 from shipgym.instruments.sensor_set import shipped_sensors
 from shipgym.tasks.definition import read_definition
@@ -321,3 +324,97 @@ def test_loops_over_ships_are_vectorised(monkeypatch):
     assert sailing > 300  # the Runge-Kutta step with the ship's 40 terms; on any processor, however wide
     assert concluding > 60  # reward and observations
     assert alone == alone_too == 0
+
+
+def test_a_user_without_a_home_has_no_folder_of_that_name_made(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("SHIPGYM_CACHE", "~/.cache/shipgym")
+    with pytest.raises(OSError, match="the user has no home"):
+        cache_folder.open_folder()
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_the_cache_is_where_the_user_says_or_where_caches_are(monkeypatch, tmp_path):
+    monkeypatch.setenv("SHIPGYM_CACHE", str(tmp_path))
+    assert cache_folder.cache_folder() == tmp_path
+    monkeypatch.setenv("SHIPGYM_CACHE", "")
+    assert cache_folder.cache_folder() == user_cache_path("shipgym")
+
+
+def test_what_is_wrong_with_a_loop_s_file_is_told_and_other_files_are_none(folder):
+    whole, damaged, other = folder / "whole.loop", folder / "damaged.loop", folder / "other.txt"
+    cache_folder.write_loop(b"content", whole)
+    damaged.write_bytes(whole.read_bytes()[:-1])
+    other.write_bytes(b"anything")
+    assert [cache_folder.loop_fault(path) for path in (whole, damaged, other)] == ["", "is damaged", ""]
+    assert "No such file" in cache_folder.loop_fault(folder / "none.loop")
+
+
+@posix
+def test_loops_may_be_read_by_others_whatever_the_user_s_habit(folder):
+    before = os.umask(0o077)
+    try:
+        cache_folder.write_loop(b"content", folder / "a.loop")
+    finally:
+        os.umask(before)
+    assert stat.S_IMODE((folder / "a.loop").stat().st_mode) == 0o644
+
+
+def test_a_lock_is_held_while_a_loop_is_compiled_and_free_afterwards(folder):
+    other = FileLock(folder / "hash.lock")
+    with cache_folder.locked(folder / "hash-signature.loop"), pytest.raises(Timeout):
+        other.acquire(timeout=0)
+    other.acquire(timeout=0)
+    other.release()
+    assert [path.name for path in folder.iterdir() if path.suffix != ".lock"] == []
+
+
+def test_a_loop_is_given_once_and_only_while_its_file_is_there(folder):
+    cache = DiskCache(folder, "tag", "void()")
+    assert cache.load_overload(None, None) is None
+    assert not cache.ready()
+    cache_folder.write_loop(b"content", cache.path)
+    assert cache.ready()
+    cache.path.unlink()
+    assert not cache.ready()
+    assert cache.load_overload(None, None) is None
+
+
+def test_arguments_of_another_kind_have_a_file_of_their_own(folder):
+    paths = {DiskCache(folder, tag, of).path for tag in ("one", "two") for of in ("void()", "void(int64)")}
+    assert len(paths) == 4
+    assert all(path.parent == folder for path in paths)
+    assert all(re.fullmatch(r"(one|two)-[0-9a-f]{8}\.loop", path.name) for path in paths)
+
+
+def test_code_that_names_places_of_this_process_is_not_kept(folder):
+    cache = DiskCache(folder, "tag", "void()")
+    library = SimpleNamespace(has_dynamic_globals=True)
+    cache.save_overload(None, SimpleNamespace(library=library, _reduce=lambda: ("code",)))
+    assert not cache.path.exists()
+    library.has_dynamic_globals = False
+    cache.save_overload(None, SimpleNamespace(library=library, _reduce=lambda: ("code",)))
+    assert pickle.loads(cache_folder.read_loop(cache.path)) == ("code",)
+
+
+def test_a_warning_of_the_cache_names_folder_reason_and_remedy(tmp_path):
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        cache_folder.warn_of(tmp_path / "a", OSError(28, "No space left on device"))
+        cache_folder.warn_of(tmp_path / "b", InputError("no place"))
+        cache_folder.warn_of(tmp_path / "a", OSError(28, "No space left on device"))
+    assert [str(one.message) for one in said] == [
+        f"{tmp_path}/{name}: cannot be written ({reason}), so ships are compiled again in each process. "
+        "Set SHIPGYM_CACHE to a folder that can."
+        for name, reason in (("a", "No space left on device"), ("b", "no place"))
+    ]
+
+
+@pytest.mark.parametrize(
+    ("folder", "kept"), [(Path("/c"), "kept in /c (beforehand: shipgym warm)"), (None, "kept in memory only")]
+)
+def test_who_waits_in_a_notebook_sees_where_loops_are_kept(monkeypatch, capsys, folder, kept):
+    monkeypatch.setattr("sys.stderr.isatty", lambda: False)
+    monkeypatch.setitem(sys.modules, "ipykernel", None)
+    compiling._announce("a ship", folder)
+    assert capsys.readouterr().err == f"shipgym: compiling a ship, once, about 4 s; {kept}\n"

@@ -1,12 +1,15 @@
 """Compiled loops: the same numbers as plain Python, one file a loop and ship, any number of processes."""
 
+import gc
 import inspect
 import os
 import re
 import subprocess
 import sys
 import warnings
-from dataclasses import replace
+from contextlib import suppress
+from dataclasses import dataclass, field, replace
+from types import FunctionType
 from typing import NamedTuple
 
 import numpy as np
@@ -14,7 +17,7 @@ import pytest
 from llvmlite.binding import get_host_cpu_features
 
 import shipgym
-from shipgym.engine import compiling, mathematics, specialise
+from shipgym.engine import addresses, compiling, lean_numba, mathematics, places, specialise
 from shipgym.engine.compiling import explanation
 from shipgym.engine.loops import LOOPS, ship_loop
 from shipgym.engine.record_code import (
@@ -29,6 +32,7 @@ from shipgym.engine.record_code import (
 )
 from shipgym.engine.records import Layout, table_of
 from shipgym.engine.specialise import Part, fingerprint
+from shipgym.errors import InputError
 from shipgym.sea.open_sea import sea_parts
 from shipgym.ships.catalogue import kvlcc2, kvlcc2_l7
 from shipgym.ships.term_functions import Sum, accelerations_source
@@ -238,3 +242,191 @@ def test_records_are_read_and_stored_where_their_rows_are(jit, monkeypatch):
     expected |= {2 * 64 + 11: 0.0, 3 * 64 + 11: 15.0, 4 * 64 + 11: -6.0}  # products within their bounds
     expected |= {3 * 64 + 13: 1.0, 2 * 64 + 15: 0.0, 3 * 64 + 15: 0.0, 4 * 64 + 15: 0.0}
     assert found == expected | {3 * 64 + 17: 2.0}  # of a table in rows 1 to 3 the second
+
+
+NO_MATCH = """Failed in step (step: nopython frontend)
+No implementation of function Function(<built-in function sub>) found for signature:
+
+ >>> sub(float64, none)
+
+There are 18 candidate implementations:
+During: typing of intrinsic-call at own.py (7)
+
+File "own.py", line 7:
+def drift(u, v):
+    return u - None
+    ^
+"""
+
+
+@pytest.mark.parametrize(
+    ("text", "reason"),
+    [
+        (
+            NO_MATCH,
+            " in drift (own.py, line 7): No implementation of function Function(<built-in function sub>): "
+            "sub(float64, none)",
+        ),
+        ("Failed in step\nUntyped name 'w'\nat own.py (25)", " (own.py, line 25): Untyped name 'w'"),
+        (
+            f"Cannot unify\n<function drift_{'0a' * 12} at 0x7f>\nat own.py (25)",
+            " in drift: Cannot unify",  # the line is that of who calls
+        ),
+        ("Failed in step", ": no reason given"),
+        ("", ": no reason given"),
+    ],
+)
+def test_a_reason_of_numba_s_is_told_in_one_sentence(text, reason):
+    assert explanation(ValueError(text), "own") == f"own: cannot be compiled{reason}"
+
+
+@pytest.mark.parametrize("collected", [True, False])
+def test_garbage_is_collected_again_after_a_compilation_if_it_was_before(collected):
+    before = gc.isenabled()
+    try:
+        (gc.enable if collected else gc.disable)()
+        with suppress(ZeroDivisionError), compiling._uncollected():
+            assert not gc.isenabled()
+            raise ZeroDivisionError
+        assert gc.isenabled() == collected
+    finally:
+        (gc.enable if before else gc.disable)()
+
+
+def asked():
+    return GROUP, PART  # noqa: F821
+
+
+asked.__module__ = "shipgym.engine"
+
+
+def test_in_plain_python_no_lane_is_sailed_that_holds_no_ship():
+    assert compiling.plain(asked, {"GROUP": 16, "PART": 3})() == (1, 3)
+
+
+def test_a_function_within_another_is_refused_with_what_it_uses_of_it():
+    def around(inner):
+        def within():
+            return inner
+
+        return within
+
+    with pytest.raises(InputError) as caught:
+        fingerprint(around(3), {})
+    assert str(caught.value) == (
+        f"{__name__}.within: uses variables of the function around it (inner), expected a function at the "
+        "top of a file"
+    )
+
+
+def user_asks():
+    return GROUP  # noqa: F821
+
+
+def test_names_of_a_user_s_function_are_the_user_s():
+    assert list(specialise.named_globals(asked, {"GROUP": 16})) == [("GROUP", 16)]
+    assert list(specialise.named_globals(user_asks, {"GROUP": 16})) == []
+    assert [specialise.is_shipped(one) for one in (asked, user_asks, compiling.plain)] == [True, False, True]
+
+
+def measured(k):
+    """What is measured."""
+    return 2.0 * k + SHARE  # noqa: F821
+
+
+def test_all_that_machine_code_depends_on_is_in_its_name():
+    def named(change, **parts):
+        copy = FunctionType(measured.__code__, measured.__globals__, "measured", measured.__defaults__)
+        copy.__doc__, copy.__module__ = measured.__doc__, "shipgym"
+        change(copy)
+        return fingerprint(copy, {"SHARE": 0.5, **parts})
+
+    def set_code(**changes):
+        def change(function):
+            function.__code__ = function.__code__.replace(**changes)
+
+        return change
+
+    def as_it_is(function):
+        pass
+
+    own = named(as_it_is)
+    assert own == named(as_it_is)
+    assert len(own) == 24
+    other = {
+        "a global": named(as_it_is, SHARE=0.6),
+        "a constant": named(set_code(co_consts=(measured.__doc__, 2.1))),
+        "a default": named(lambda function: setattr(function, "__defaults__", (1.0,))),
+        "a function for a number": named(as_it_is, SHARE=Part(asked)),
+        "whether it is called": named(as_it_is, SHARE=Part(asked, inline=False)),
+        "a record": named(as_it_is, SHARE=Fix),
+        "another record": named(as_it_is, SHARE=Anchor),
+        "a library": named(as_it_is, SHARE=np),
+    }
+    assert len({own, *other.values()}) == 1 + len(other)
+    text = "Told otherwise."
+
+    def tell(function):
+        function.__doc__ = text
+        set_code(co_consts=(text, 2.0))(function)
+
+    assert named(tell) == own
+
+
+def test_places_that_nobody_filled_say_who_does():
+    with pytest.raises(RuntimeError, match=r"^push is a place that the sea fill when a loop is compiled$"):
+        places.push(1, 2, 3)
+    assert places.measure.__name__ == "measure"
+    with pytest.raises(AttributeError, match="has no attribute 'pull'"):
+        places.pull  # noqa: B018
+
+
+def test_arrays_are_found_again_by_address_and_shape():
+    words, table, flags = (
+        np.arange(24, dtype=np.uint64).reshape(2, 3, 4),
+        np.arange(6.0).reshape(3, 2),
+        np.array([True, False]),
+    )
+    empty = np.zeros((0, 5))
+    world = np.array([99, *addresses.addresses([words, table, empty, flags])], dtype=np.int64)
+    assert world[[2, 3, 4, 6, 7, 9, 10, 12]].tolist() == [2, 3, 4, 3, 2, 0, 5, 2]
+    found = [addresses.words_at.function(world, 1), addresses.table_at.function(world, 5)]
+    found += [addresses.table_at.function(world, 8), addresses.flags_at.function(world, 11)]
+    for one, other in zip(found, (words, table, empty, flags), strict=True):
+        assert one.dtype == other.dtype
+        np.testing.assert_array_equal(one, other, strict=True)
+    table[1, 1] = -7.0
+    assert found[1][1, 1] == -7.0
+
+
+def test_the_plan_of_a_lane_stands_behind_its_rows_and_is_written_in_place():
+    tile = np.arange(5 * 64.0)
+    plan = addresses.plan_at(3).function(tile, 7)
+    assert plan.tolist() == [3 * 64.0 + 7, 4 * 64.0 + 7]
+    plan[1] = -1.0
+    assert tile[4 * 64 + 7] == -1.0
+
+
+def test_what_is_replaced_in_numba_is_put_back_even_after_an_error():
+    owner = type("Owner", (), {"one": 1, "two": 2})
+    with suppress(ZeroDivisionError), lean_numba._replaced() as replace:
+        replace(owner, "one", 3)
+        replace(owner, "one", 5)
+        replace(owner, "two", 4)
+        assert (owner.one, owner.two) == (5, 4)
+        raise ZeroDivisionError
+    assert (owner.one, owner.two) == (1, 2)
+
+
+@dataclass(eq=False)
+class Library:
+    name: str
+    _linking_libraries: list["Library"] = field(default_factory=list)
+
+
+def test_libraries_beneath_a_loop_are_linked_once_each_after_what_it_calls():
+    leaf, other = Library("leaf_tag"), Library("other", [Library("far")])
+    first = Library("first_tag", [leaf, other])
+    loop = Library("loop_tag", [Library("second_tag", [first, leaf]), first, other])
+    found = lean_numba._beneath(loop, lambda name: name.endswith("_tag"), {})
+    assert [library.name for library in found] == ["leaf_tag", "other", "first_tag", "second_tag"]
