@@ -8,7 +8,18 @@ import pytest
 import shipgym
 from shipgym.engine.compiling import compiled
 from shipgym.engine.loops import ship_loop
-from shipgym.engine.mathematics import arctan, arctan2, exponential
+from shipgym.engine.mathematics import (
+    arctan,
+    arctan2,
+    clip,
+    exponential,
+    nearest,
+    pick,
+    power_of_two,
+    turn_sin_cos,
+    two_to,
+    wrap,
+)  # fmt: skip
 from shipgym.engine.records import LANES
 
 SHIPS = ("mariner", "container", "tanker", "kvlcc2")
@@ -76,3 +87,35 @@ def test_a_ship_in_a_batch_sails_as_it_does_alone(name, shared):
         alone = model.simulate(held, h)
         for channel, value in zip(model.state_names, lanes[lane], strict=True):
             assert value == pytest.approx(alone[channel][-1], rel=1e-10, abs=1e-12), channel
+
+
+def test_powers_of_two_are_exact_to_two_parts_in_a_hundred_million_million():
+    x = np.concatenate([np.linspace(-30.0, 0.0, 1201), [-999.75, -513.4, -1e-9]])
+    np.testing.assert_allclose([two_to(one) for one in x], np.exp2(x), rtol=2e-14)
+    assert two_to(-5000.0) == two_to(-1000.0) == pytest.approx(2.0**-1000, rel=2e-14)
+    whole = np.array([-1022.0, -60.0, -1.0, 0.0, 1.0, 40.0, 1023.0])
+    assert [power_of_two(one) for one in whole] == np.exp2(whole).tolist()
+
+
+def test_the_nearest_whole_number_is_even_at_a_half():
+    x = [-1.6, -1.5, -0.5, 0.4, 0.5, 1.5, 2.5, 1e15 + 0.5]
+    assert [nearest(one) for one in x] == np.round(x).tolist()
+
+
+@pytest.mark.parametrize(("largest", "error"), [(0.6, 2e-16), (np.pi / 4, 2e-14), (np.pi / 2, 1e-9)])
+def test_sine_and_cosine_of_a_turn_within_a_step_have_their_stated_error(largest, error):
+    x = np.linspace(-largest, largest, 1001)
+    found = np.array([turn_sin_cos(angle) for angle in x])
+    np.testing.assert_allclose(found, np.stack([np.sin(x), np.cos(x)], axis=1), rtol=0.0, atol=error)
+
+
+def test_a_number_is_clipped_to_its_bounds_and_one_of_two_is_picked():
+    assert [clip(one, -1.0, 2.0) for one in (-3.0, -1.0, 0.5, 2.0, 9.0)] == [-1.0, -1.0, 0.5, 2.0, 2.0]
+    assert (pick(True, 1.0, 2.0), pick(False, 1.0, 2.0)) == (1.0, 2.0)
+
+
+def test_angles_at_the_seam_are_wrapped_to_minus_half_a_turn():
+    for turns in (-7, -1, 0, 1, 4):
+        assert wrap(2 * turns * math.pi + 0.25) == pytest.approx(0.25, abs=1e-12)
+    assert wrap(math.pi) == -math.pi
+    assert wrap(-math.pi) == -math.pi

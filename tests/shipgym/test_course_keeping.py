@@ -239,6 +239,14 @@ def test_each_lane_may_have_a_ship_of_its_own(mariner):
     assert 0.0 < engine.physical_state()["r"][1] < 0.8 * engine.physical_state()["r"][0]
 
 
+def test_ships_of_a_fleet_are_seen_in_scales_of_their_own(mariner):
+    slow = replace(mariner, particulars=replace(mariner.particulars, speed=4.0))
+    engine = Engine([mariner, slow], 2)
+    surge = OBSERVATION_NAMES.index("surge")
+    assert engine.observations[:, surge].tolist() == [1.0, 1.0]
+    assert engine.read("u").tolist() == [7.7175, 4.0]
+
+
 def test_scales_follow_the_ship(mariner):
     assert dict(zip(OBSERVATION_NAMES, observation_scales(mariner), strict=True)) == {
         "heading_error_sin": 1.0,

@@ -2,6 +2,7 @@
 
 import copy
 import pickle
+from dataclasses import replace
 from functools import partial
 
 import gymnasium
@@ -9,7 +10,9 @@ import numpy as np
 import pytest
 from gymnasium.wrappers import TimeAwareObservation
 
-from shipgym import InputError
+from shipgym import InputError, load_model
+from shipgym.envs.engine import episode_keys
+from shipgym.envs.environment import rudder_orders
 
 PATH, FIRST, COURSE = "shipgym/PathFollowing-v1", "shipgym/PathFollowing-v0", "shipgym/CourseKeeping-v0"
 HOOK = [[0.0, 0.0], [1500.0, 0.0], [2900.0, 1400.0]]
@@ -174,3 +177,145 @@ def test_an_unknown_keyword_is_a_type_error_too():
     for make in (one, many):
         with pytest.raises(TypeError, match="unexpected keyword argument 'frameskip'"):
             make(frameskip=1)
+
+
+def test_a_refused_action_leaves_what_was_shown():
+    env = many(COURSE, model="mariner").unwrapped
+    env.reset(seed=3)
+    sailed(env, 4)
+    engine = env._engine
+    shown = [engine.observations, engine.info("heading_error").copy(), engine.shown.outcomes[0].copy()]
+    with pytest.raises(InputError, match=r"^actions: inf found in lane 1, expected numbers in \[-1, 1\]$"):
+        env.step(np.array([[0.0], [np.inf], [np.nan]], np.float32))
+    assert shown[2].all()  # costs
+    for before, now in zip(
+        shown, [engine.observations, engine.info("heading_error"), engine.shown.outcomes[0]], strict=True
+    ):
+        np.testing.assert_array_equal(now, before)
+    mask = np.array([True, False, True])
+    seen, _ = env.reset(options={"reset_mask": mask})
+    np.testing.assert_array_equal(seen[1], shown[0][1])
+
+
+def test_the_first_reward_that_is_no_number_is_named():
+    engine = many(COURSE, model="mariner").unwrapped._engine
+    engine.reset([1, 2, 3])
+    engine.step(np.zeros((3, 1)))
+    own = engine.task.definition.reward_source
+    engine.shown.outcomes[0, 1] = np.inf  # a sum beyond all numbers, of parts that are within
+    with pytest.raises(InputError) as caught:
+        engine.refuse_rewards()
+    value = engine.info("reward_heading")[1]
+    assert str(caught.value).startswith(
+        f"{own}: reward_heading is {value} in lane 1 at step 1, expected a finite number; look for"
+    )
+    engine.info("reward_rudder_rate")[2] = np.nan
+    with pytest.raises(InputError, match=r"reward_rudder_rate is nan in lane 2 at step 1, expected a finite"):
+        engine.refuse_rewards()
+
+
+def test_a_state_tells_which_number_of_which_ship_is_none():
+    env = many().unwrapped
+    env.reset(seed=0)
+    state = env.get_state()
+    first = state["engine"]["states"].reshape(-1, 64)
+    rows = len(state["engine"]["made_for"]["rows"])
+    for row, name in ((3, "motion.u"), (rows, "plan"), (rows + 9, "plan")):
+        wrong = copy.deepcopy(state)
+        wrong["engine"]["states"].reshape(-1, 64)[row, 2] = np.inf
+        with pytest.raises(InputError, match=f"^state: {name} in row 2 is not finite, expected a number$"):
+            env.set_state(wrong)
+    first[:, 3:] = np.nan  # lanes without a ship
+    env.set_state(state)
+
+
+def test_a_state_of_another_ship_by_the_same_name_is_refused():
+    mariner = load_model("mariner")
+    other = replace(mariner, coefficients={**mariner.coefficients, "N_d": 0.0011})
+    env, another = (one(COURSE, model=ship).unwrapped for ship in (mariner, other))
+    for each in (env, another):
+        each.reset(seed=0)
+    with pytest.raises(InputError, match=r"^state: of another ship than this 'mariner', expected the same$"):
+        env.set_state(another.get_state())
+    short = env.get_state()
+    short["engine"]["keys"] = short["engine"]["keys"][:, :2]
+    with pytest.raises(InputError, match=r"^state: keys of shape \(1, 2, 64\) found, expected \(1, 3, 64\)$"):
+        env.set_state(short)
+
+
+def test_numbers_of_the_state_are_read_and_written_by_name():
+    engine = many(COURSE, model="mariner").unwrapped._engine
+    engine.reset([1, 2, 3])
+    assert engine.read("u").tolist() == [engine.model.particulars["speed"]] * 3
+    assert not np.any([engine.read(name) for name in ("v", "r", "delta", "rudder_command", "steps", "ended")])
+    assert engine.read("shaft_command").tolist() == [1.0] * 3
+    engine.write("r", [1e-3, 2e-3, 3e-3])
+    assert engine.read("r").tolist() == [1e-3, 2e-3, 3e-3]
+    assert engine.read("u").tolist() == [engine.model.particulars["speed"]] * 3
+    with pytest.raises(KeyError, match="depth"):
+        engine.read("depth")
+
+
+def test_lengths_of_a_path_are_in_metres_where_there_is_one():
+    course, path = one(COURSE).unwrapped._engine, one().unwrapped._engine
+    assert path.path_metres("corridor") == pytest.approx(160.93)
+    assert path.path_metres("turn_radius") == pytest.approx(4.0 * 160.93)
+    assert course.path_metres("corridor") is None
+    assert course.waypoints() is None
+    plan = course._voyages.state.n_rows
+    course._states = np.zeros((1, (plan + 4) * 64))  # a plan that is none of waypoints
+    assert course.waypoints() is None
+
+
+def test_masks_and_orders_of_all_ships_cannot_be_written_by_accident():
+    env = many(COURSE, model="mariner").unwrapped
+    env.reset(seed=0)
+    *_, infos = env.step(np.zeros((3, 1), np.float32))
+    with pytest.raises(ValueError, match="read-only"):
+        infos["_heading_error"][0] = False
+
+
+def test_episodes_of_a_checkpoint_go_on_for_every_row():
+    env, other = many(COURSE, model="mariner").unwrapped, many(COURSE, model="mariner").unwrapped
+    env.reset(seed=4)
+    sailed(env, 10)
+    memory = env.memory()
+    ours = sailed(env, 10, swing=0.8)
+    other.remember(memory)
+    same(ours, sailed(other, 10, swing=0.8))
+    np.testing.assert_array_equal(env.reset()[0], other.reset()[0])
+
+
+@pytest.mark.parametrize(
+    ("given", "expected"), [(4, [[0.0]]), (np.int64(0), [[-1.0]]), (8, [[1.0]]), (np.uint8(5), [[0.1]])]
+)
+def test_an_order_is_one_of_nine(given, expected):
+    np.testing.assert_allclose(rudder_orders(given, (), "action"), expected)
+
+
+@pytest.mark.parametrize("wrong", [-1, 9, 4.0, [4], True])
+def test_what_is_no_order_is_refused(wrong):
+    with pytest.raises(InputError) as caught:
+        rudder_orders(wrong, (), "action")
+    assert str(caught.value) == (
+        f"action: {wrong!r} found, expected a whole number from 0 to 8: a rudder order"
+    )
+
+
+def test_orders_of_several_ships_are_a_column():
+    found = rudder_orders([0, 8, 2], (3,), "actions")
+    np.testing.assert_allclose(found, [[-1.0], [1.0], [-0.25]])
+    assert found.dtype == np.float32
+    for wrong in ([0, 8], [0, 8, 9], [-1, 0, 0], [0.0, 1.0, 2.0], 3):
+        with pytest.raises(InputError, match=r"expected int of shape \(3,\) from 0 to 8: rudder orders$"):
+            rudder_orders(wrong, (3,), "actions")
+
+
+def test_seeds_are_those_of_gymnasiums_generators():
+    keys = episode_keys([[0, 1], [2, 0]])
+    assert keys.dtype == np.uint64
+    assert keys.shape == (2, 2)
+    assert keys[0, 0] == keys[1, 1]
+    first = int(np.random.Generator(np.random.PCG64(1)).integers(2**63))
+    assert keys[0, 1] == first
+    assert len(np.unique(keys)) == 3
