@@ -150,3 +150,82 @@ def test_a_file_cut_in_half_is_told_so(tmp_path):
         Episode.load(path)
     with pytest.raises(InputError, match="there is no such episode file"):
         Episode.load(tmp_path / "absent.json")
+
+
+def test_a_trial_is_named_by_what_begins_its_episode_again():
+    trial = EPISODE.to_trial()
+    assert trial.name == f"shipgym/PathFollowing-v0 seed {2**100} episode 3"
+    assert (trial.use, EPISODE.to_trial(use="validate").use) == ("fit", "validate")
+    assert EPISODE.to_trial("first", "skip").name == "first"
+
+
+def test_the_path_of_an_episode_is_drawn_with_its_turns():
+    corner = [[0.0, 0.0], [1000.0, 0.0], [1000.0, 1000.0]]
+    episode = replace(EPISODE, waypoints=corner, turn_radius=300.0)
+    assert np.hypot(*(episode.path - [1000.0, 0.0]).T).min() == pytest.approx(
+        300.0 * (np.sqrt(2.0) - 1.0), abs=1.0
+    )
+    assert replace(EPISODE, waypoints=corner, turn_radius=None).path.tolist() == corner
+    assert replace(EPISODE, waypoints=None, turn_radius=None).path is None
+    with pytest.raises(InputError, match=r"rows 0 and 1 are 1000 m apart, expected at least 1200 m"):
+        replace(episode, turn_radius=1200.0)
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"environment": " "}, "environment: ' ' found, expected a text that is not empty"),
+        ({"length": None}, "length: None found, expected a number > 0"),
+        ({"dt": None}, "dt: None found, expected a number > 0"),
+        ({"rudder_limit": 1.58}, "rudder_limit: 1.58 found, expected a number > 0 and <= 1.5708"),
+        ({"beam": 160.94}, "beam: 160.94 found, expected a number > 0 and <= 160.93"),
+        ({"corridor": 0.0}, "corridor: 0 found, expected a number > 0"),
+        ({"turn_radius": -1.0}, "turn_radius: -1 found, expected a number > 0"),
+        ({"arguments": ["mariner"]}, "arguments: ['mariner'] found, expected a table of keys and values"),
+        ({"number": -1}, "number: -1 found, expected a whole number of at least 0"),
+        ({"seed": 1.0}, "seed: 1.0 found, expected a whole number of at least 0"),
+        ({"terminated": None}, "terminated: None found, expected true or false"),
+        ({"truncated": 1}, "truncated: 1 found, expected true or false"),
+        ({"success": 0}, "success: 0 found, expected true or false"),
+        ({"actions": np.zeros(STEPS)}, "actions: shape (4,) found, expected (4, n_actions), a row for each"),
+        ({"rewards": np.zeros((STEPS, 1))}, "rewards: shape (4, 1) found, expected (n_steps,)"),
+        ({"rewards": np.zeros(0)}, "rewards: no step found, expected at least one step"),
+        ({"commands": {"n": np.zeros(STEPS + 1)}}, "commands.n: shape (5,) found, expected (4,)"),
+        ({"reward_parts": {"end": np.zeros(STEPS + 1)}}, "reward_parts.end: shape (5,) found, expected (4,)"),
+        ({"info": [1.0]}, "info: [1.0] found, expected a table of keys and values"),
+    ],
+)  # fmt: skip
+def test_an_episode_that_cannot_be_is_refused(changes, said):
+    with pytest.raises(InputError) as caught:
+        replace(EPISODE, **changes)
+    assert str(caught.value).startswith(said)
+
+
+def test_what_need_not_be_known_may_be_left_out():
+    unknown = dict.fromkeys(("waypoints", "corridor", "turn_radius", "beam", "seed", "success"))
+    bare = replace(EPISODE, **unknown, commands={})
+    assert (bare.n_steps, bare.number, bare.rudder_limit) == (STEPS, 3, 0.7)
+    assert replace(bare, rudder_limit=np.pi / 2.0, beam=160.93, number=0).number == 0
+    assert "delta_command" not in bare.to_trial()
+
+
+@pytest.mark.parametrize("changes", [{}, {"turn_radius": None}, {"waypoints": None}])
+def test_a_path_is_told_as_far_as_there_is_one(tmp_path, changes):
+    episode = replace(EPISODE, **changes)
+    episode.save(tmp_path / "episode.json")
+    path = json.loads((tmp_path / "episode.json").read_text())["path"]
+    assert (path is None) == ("waypoints" in changes)
+    if path is not None:
+        assert path.keys() == {"waypoints", "corridor", "turn_radius"} - changes.keys()
+        assert Episode.load(tmp_path / "episode.json").turn_radius == episode.turn_radius
+    else:
+        assert Episode.load(tmp_path / "episode.json").waypoints is None
+    assert (tmp_path / "episode.json").read_text().count("\n") == 1  # all in one line
+
+
+def test_a_file_of_another_kind_is_told_so(tmp_path):
+    (tmp_path / "model.json").write_text('{"kind": "model", "format": 7}')
+    with pytest.raises(
+        InputError, match=r"kind: 'model' found, expected 'episode': a file that RecordEpisode"
+    ):
+        Episode.load(tmp_path / "model.json")

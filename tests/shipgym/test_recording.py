@@ -1,10 +1,12 @@
 from dataclasses import replace
+from pathlib import Path
 
 import gymnasium
 import numpy as np
 import pytest
 
 from shipgym import Current, Episode, InputError, RecordEpisode, Weather, Wind, load_model
+from shipgym.envs import recording
 from shipgym.envs.recording import plain
 
 COURSE_KEEPING = "shipgym/CourseKeeping-v0"
@@ -204,3 +206,43 @@ def test_a_recorded_environment_is_still_gymnasiums(tmp_path):
     from gymnasium.utils.env_checker import check_env
 
     check_env(RecordEpisode(course_keeping(), tmp_path, overwrite=True), skip_render_check=True)
+
+
+def test_of_what_is_reported_single_finite_numbers_are_kept():
+    info = {
+        "cross_track": np.float32(1.5), "in_corridor": np.True_, "steps": 3, "far": np.inf, "text": "a",
+        "waypoints": np.zeros(2), "reward_end": -1.0, "success": True, "is_success": False,
+    }  # fmt: skip
+    assert recording._numbers(info) == {"cross_track": 1.5, "in_corridor": 1.0, "steps": 3.0}
+
+
+def test_a_name_that_some_step_lacks_is_left_out():
+    found = recording._columns([{"a": 1.0, "b": 2.0}, {"b": 3.0, "c": 4.0}])
+    assert {name: values.tolist() for name, values in found.items()} == {"b": [2.0, 3.0]}
+
+
+def test_episodes_are_counted_from_the_last_seed(tmp_path):
+    env = RecordEpisode(course_keeping(episode_steps=1), tmp_path)
+    for seed in (None, 4, None, None, 5):
+        sail(env, seed)
+    recorded = [Episode.load(tmp_path / name) for name in files(tmp_path)]
+    assert [one.number for one in recorded] == [0, 0, 1, 2, 0]
+    assert [one.seed for one in recorded][1:] == [4, 4, 4, 5]
+    env.unwrapped.np_random = np.random.default_rng(0)  # a generator put in by hand has no seed
+    sail(env)
+    assert Episode.load(tmp_path / "episode-00005.json").seed is None
+
+
+def test_a_trigger_is_asked_with_the_number_of_the_episode(tmp_path):
+    asked = []
+    env = RecordEpisode(course_keeping(episode_steps=1), tmp_path, lambda number: asked.append(number))
+    for _ in range(3):
+        sail(env)
+    assert asked == [0, 1, 2]
+    assert files(tmp_path) == []
+    assert env.episode_number == 2
+
+
+def test_arguments_that_are_no_text_number_or_table_are_told_in_words():
+    given = [np.array([1.5, np.nan]), (), None, True, Path("own.py"), np.int64(3)]
+    assert plain(given) == [[1.5, "nan"], [], None, True, "own.py", 3]

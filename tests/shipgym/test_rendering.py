@@ -1,5 +1,6 @@
 import warnings
 from dataclasses import replace
+from types import SimpleNamespace
 
 import gymnasium
 import numpy as np
@@ -7,7 +8,8 @@ import pygame
 import pytest
 
 from shipgym import InputError
-from shipgym.envs.artist import scene
+from shipgym.envs import artist
+from shipgym.envs.artist import Artist, scene
 from shipgym.envs.rendering import (
     CORRIDOR,
     CURRENT,
@@ -16,6 +18,7 @@ from shipgym.envs.rendering import (
     HULL,
     INK,
     ORDER,
+    PANEL,
     PATH,
     RUDDER,
     SIZE,
@@ -23,6 +26,8 @@ from shipgym.envs.rendering import (
     WIND,
     Renderer,
     Scene,
+    _Brush,
+    _Chart,
 )
 from shipgym.sea import Current, Weather, Wind
 from shipgym.ships import load_model
@@ -307,3 +312,202 @@ def test_the_turns_of_a_planned_path_are_arcs_that_touch_both_legs(renderer):
         north, east = where(renderer.draw(replace(scene, turn_radius=radius)), PATH)
         near = {place: (np.hypot(north - place[0], east - place[1]) < 4 * METRES).any() for place in PLACES}
         assert near == {place: place == seen for place in PLACES}
+
+
+@pytest.mark.parametrize(
+    ("angle_deg", "shown"),
+    [(0.0, "000.0"), (7.26, "007.3"), (-90.0, "270.0"), (359.96, "000.0"), (725.0, "005.0")],
+)
+def test_a_bearing_is_shown_as_on_a_compass(angle_deg, shown):
+    assert artist._bearing(np.radians(angle_deg)) == f"{shown} deg"
+
+
+class Voyage:
+    """Stands for an engine of two lanes, the second of which is looked at."""
+
+    model, shown = load_model("mariner"), SimpleNamespace(outcomes=np.array([[-9.0, -0.1234]]))
+    task = SimpleNamespace(info_names=("cross_track",))
+    state = {"x": 10.0, "y": -20.0, "psi": 3.1, "u": 7.2, "v": -2.1, "delta": -0.1}  # noqa: RUF012
+
+    def physical_state(self):
+        return {name: np.array([99.0, value]) for name, value in self.state.items()}
+
+    def waypoints(self, lane):
+        return None
+
+    def path_metres(self, name):
+        return {"corridor": 160.0}.get(name)
+
+    def info(self, name):
+        return np.array([5.0, -34.6])
+
+
+def test_readouts_are_those_of_the_lane_in_usual_units():
+    voyage = Voyage()
+    shown = scene(voyage, 1, np.zeros((0, 2)))
+    assert shown.readouts == {
+        "speed": "7.5 m/s, 14.6 kn", "heading": "177.6 deg", "rudder": "-5.7 deg", "cross-track": "-35 m",
+        "reward": "-0.123",
+    }  # fmt: skip
+    assert (shown.x, shown.y, shown.heading, shown.rudder) == (10.0, -20.0, 3.1, -0.1)
+    assert shown.rudder_limit == pytest.approx(np.radians(40.0))
+    assert (shown.course_order, shown.corridor, shown.turn_radius) == (3.1, 160.0, None)
+    assert (shown.wind, shown.current) == (None, None)
+    voyage.state = {**voyage.state, "set_point": -3.1}  # 4.8 degrees on, through south
+    voyage.task = SimpleNamespace(info_names=())
+    shown = scene(voyage, 1, np.zeros((0, 2)))
+    assert list(shown.readouts) == ["speed", "heading", "to steer", "heading error", "rudder", "reward"]
+    assert (shown.readouts["to steer"], shown.readouts["heading error"]) == ("182.4 deg", "+4.8 deg")
+    assert shown.course_order == -3.1
+
+
+@pytest.mark.parametrize(
+    ("sea", "wind", "current"),
+    [
+        ({"wind_speed": 9.0, "wind_from": 0.5}, (9.0, 0.5), None),
+        ({"wind_speed": 0.0, "current_north": 0.0, "current_east": -2.0}, None, (2.0, -np.pi / 2)),
+        ({"current_north": -1.0, "current_east": 0.0}, None, (1.0, np.pi)),
+        ({"current_north": 3.0, "current_east": 4.0}, None, (5.0, np.arctan2(4.0, 3.0))),
+    ],
+)  # fmt: skip
+def test_wind_and_current_are_shown_where_there_is_any(sea, wind, current):
+    voyage = Voyage()
+    voyage.state = {**voyage.state, **sea}
+    shown = scene(voyage, 1, np.zeros((0, 2)))
+    assert (shown.wind, shown.current) == (wind, current)
+
+
+def test_the_wake_is_that_of_the_last_four_hundred_places():
+    voyage, drawn = Voyage(), Artist("rgb_array", 1)
+    voyage.state = {**voyage.state, "x": -1.0}
+    drawn.begin(voyage)
+    for x in range(500):
+        voyage.state = {**voyage.state, "x": float(x)}
+        drawn.note(voyage)
+    assert drawn._wake == [(float(x), -20.0) for x in range(100, 500)]
+    drawn.begin(voyage)
+    assert drawn._wake == [(499.0, -20.0)]
+
+
+def test_a_ship_is_drawn_with_her_bow_ahead_and_her_rudder_behind(sketch):
+    """Heading east: the line ahead ends 1.1 lengths from midship, the order's arrow 1.6 lengths."""
+    scene = replace(SHIP, heading=np.pi / 2, rudder=np.pi / 6, course_order=np.pi)
+    found = sketch(scene)
+    middle = np.array([SIZE / 2, SIZE / 2])
+    start, bow, *_ = found.of("line", HULL)[0]
+    np.testing.assert_allclose(
+        (np.array([start, bow]) - middle) * METRES, [[0, 0], [1.1 * LENGTH, 0]], atol=1e-6
+    )
+    stern, blade, width = next(one for one in found.of("line", RUDDER) if one[2] == 3)
+    np.testing.assert_allclose((stern - middle) * METRES, [-0.5 * LENGTH, 0.0], atol=1e-6)
+    aft = 0.22 * LENGTH * np.array([-np.cos(np.pi / 6), np.sin(np.pi / 6)])  # to starboard is down
+    np.testing.assert_allclose((blade - stern) * METRES, aft, atol=1e-6)
+    (tail, tip), *_ = found.of("arrow", ORDER)
+    np.testing.assert_allclose(
+        (np.array([tail, tip]) - middle) * METRES, [[0, 0], [0, 1.6 * LENGTH]], atol=1e-6
+    )
+    ((hull,),) = found.of("polygon", HULL)
+    along, across = ((np.array(hull) - middle) * METRES).T
+    assert (along.max(), along.min()) == pytest.approx((0.5 * LENGTH, -0.5 * LENGTH))
+    assert (across.max(), across.min()) == pytest.approx((0.5 * BEAM, -0.5 * BEAM))
+    assert along[0] == along.max()  # the stem, amidships
+    assert across[0] == pytest.approx(0.0, abs=1e-9)
+    mirrored = {(round(x, 6), round(-y, 6)) for x, y in zip(along, across, strict=True)}
+    assert mirrored == {(round(x, 6), round(y, 6)) for x, y in zip(along, across, strict=True)}
+    assert width == 3
+
+
+def test_what_a_scene_has_not_is_not_drawn(sketch):
+    found = sketch(SHIP)
+    assert found.of("arrow", ORDER) == found.of("polygon", ORDER) == found.of("lines", WAKE) == []
+    assert found.of("lines", PATH) == found.of("arrow", WIND) == found.of("arrow", CURRENT) == []
+    one = sketch(replace(SHIP, wake=np.zeros((1, 2))))
+    assert one.of("lines", WAKE) == []  # of one place there is no line
+    wake = np.array([[4900.0, -300.0], [5000.0, -200.0]])
+    ((points, width),) = sketch(replace(SHIP, wake=wake)).of("lines", WAKE)
+    np.testing.assert_allclose((points - SIZE / 2) * METRES, [[0.0, 100.0], [100.0, 0.0]], atol=1e-9)
+    assert width == 2
+
+
+def test_the_gauge_has_marks_at_its_ends_halves_and_middle_within_its_panel(sketch):
+    found = sketch(SHIP)
+    marks = [one for one in found.of("line", FAINT) if one[0][0] == one[1][0] and one[0][1] > 0.9 * SIZE]
+    assert [start[0] - SIZE / 2 for start, *_ in marks] == [-90.0, -45.0, 0.0, 45.0, 90.0]
+    assert {end[1] - start[1] for start, end in marks} == {10.0}
+    left, top, width, height = found.of("panel", PANEL)[-1][0]
+    assert left + width / 2 == SIZE / 2
+    for text, (x, y), anchor in found.texts:
+        if text.startswith(("port", "stbd", "rudder")):
+            assert anchor == "centre"
+            assert left < x < left + width
+            assert top < y < top + height
+    (scale,) = [start[0] for start, end in [found.of("line", FAINT)[-6]] if start[1] == end[1]]
+    assert scale == SIZE / 2 - 90.0
+
+
+def test_the_panel_of_readouts_holds_all_their_lines(sketch):
+    for count in (1, 4):
+        found = sketch(replace(SHIP, readouts={f"line {k}": "1" for k in range(count)}))
+        left, top, width, height = found.of("panel", PANEL)[-1][0]
+        lines = [at for text, at, anchor in found.texts if text.startswith("line")]
+        assert min(x for x, _ in lines) >= left + 8.0
+        assert all(top < y < top + height - 12.0 for _, y in lines)
+        assert max(y for _, y in lines) > top + height - 30.0  # no empty line
+        values = [at for text, at, anchor in found.texts if anchor == "right"]
+        assert all(left + 100.0 < x < left + width - 5.0 for x, _ in values)
+    assert len(sketch(SHIP).of("panel", PANEL)) == 1  # the gauge's alone
+
+
+class Canvas:
+    """What is drawn on a finer surface, by kind."""
+
+    def __init__(self):
+        self.calls = []
+
+    def __getattr__(self, kind):
+        return lambda surface, colour, *what, **how: self.calls.append((kind, *what, how))
+
+
+def brushed(draw):
+    """The calls of a brush, in pixels of the finer surface."""
+    brush = _Brush(pygame)
+    canvas = Canvas()
+    brush._pygame = SimpleNamespace(draw=canvas)
+    draw(brush)
+    return canvas.calls
+
+
+def test_a_pixel_is_two_of_the_finer_surface():
+    assert brushed(lambda brush: brush.line(INK, (1, 2), (3.5, 4))) == [
+        ("line", [2.0, 4.0], [7.0, 8.0], 2, {})
+    ]
+    assert brushed(lambda brush: brush.line(INK, (1, 2), (3, 4), 3))[0][3] == 6
+    assert brushed(lambda brush: brush.lines(INK, [(1, 2), (3, 4)], 2)) == [
+        ("lines", False, [[2.0, 4.0], [6.0, 8.0]], 4, {})
+    ]
+    assert brushed(lambda brush: brush.circle(INK, (1, 2), 5.0)) == [("circle", [2.0, 4.0], 10.0, 0, {})]
+    assert brushed(lambda brush: brush.circle(INK, (1, 2), 5.0, 2))[0][3] == 4
+    assert brushed(lambda brush: brush.panel(INK, (1, 2, 3, 4))) == [
+        ("rect", [2.0, 4.0, 6.0, 8.0], {"border_radius": 16})
+    ]
+
+
+def test_an_arrow_has_its_tip_where_it_points_and_is_alike_on_both_sides():
+    (_, tail, end, _, _), (_, head, _) = brushed(lambda brush: brush.arrow(INK, (10.0, 10.0), (10.0, 50.0)))
+    assert tail == [20.0, 20.0]
+    assert end == [20.0, 90.0]  # within the head
+    tip, left, right = np.array(head)
+    assert tip.tolist() == [20.0, 100.0]
+    assert sorted([left.tolist(), right.tolist()]) == [[12.0, 82.0], [28.0, 82.0]]
+    assert len(brushed(lambda brush: brush.arrow(INK, (1.0, 1.0), (1.0, 1.0)))) == 2  # of no length
+
+
+@pytest.mark.parametrize(
+    ("length", "spacing"),
+    [(0.5, 1.0), (43.0, 100.0), (85.5, 100.0), (86.0, 200.0), (214.0, 200.0), (215.0, 500.0)],
+)
+def test_lines_are_a_round_distance_apart_six_to_the_chart_or_more(length, spacing):
+    """1, 2 or 5 times a power of ten, at most a sixth of the 14 ship lengths across."""
+    chart = _Chart(replace(SHIP, length=length))
+    assert chart.spacing == pytest.approx(spacing)
+    assert chart.spacing <= 14.0 * length / 6.0 < 2.5 * chart.spacing
