@@ -3,6 +3,7 @@
 import re
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Annotated, NamedTuple
 
 import gymnasium
@@ -14,11 +15,12 @@ from stable_baselines3 import PPO
 
 import shipgym
 from shipgym import InputError, ShipVecEnv, check_task, check_vector_env, register_task
+from shipgym.envs import task_checker
 from shipgym.envs.engine import Engine
 from shipgym.python_files import load_file
-from shipgym.tasks.contract import Setting
-from shipgym.tasks.definition import read_definition
-from shipgym.tasks.source import annotated, check_namespace, keywords, make_settings, read_source
+from shipgym.tasks.contract import NO_NUMBERS, Numbers, Seen, Setting
+from shipgym.tasks.definition import no_worst_cost, read_definition
+from shipgym.tasks.source import annotated, check_namespace, kept_source, keywords, make_settings, read_source
 from shipgym.tasks.task import Task
 
 ROOT = Path(__file__).parents[2]
@@ -358,3 +360,259 @@ def test_an_error_of_a_file_is_told_with_its_last_line_in_it_and_the_file_may_be
     assert (own.x, own.__file__) == (3, str((tmp_path / "own.py").resolve()))
     assert load_file(tmp_path / "own.py") is own is sys.modules[own.__name__]
     assert load_file(written(tmp_path, "other.py", "x = 3\n")) is not own
+
+
+def test_what_a_ship_shows_alone_is_compared_to_the_last_digit(monkeypatch):
+    class Shifted(Engine):
+        def reset(self, seeds):
+            return super().reset(seeds) + (1e-6 if self.num_envs == 1 else 0.0)
+
+    monkeypatch.setattr(task_checker, "Engine", Shifted)
+    (problem,) = check_task("CourseKeeping", model="mariner").problems
+    assert re.match(
+        r"Observation.helm.heading_error_sin is \S+ among many ships and \S+ alone in lane 69 at step 0; ",
+        problem,
+    )
+
+
+def test_a_task_that_is_none_is_told_by_its_name():
+    found = check_task("CourseKeping")
+    assert found.name == "CourseKeping"
+    assert found.problems[0].startswith(
+        "task: 'CourseKeping' found, expected the path of a .py file or one of"
+    )
+    assert found.problems[0].endswith(" Did you mean 'CourseKeeping'?")
+    assert not found.ok
+
+
+def test_a_beginner_steers_each_lane_the_same_however_many_there_are():
+    three, seventy = (
+        np.stack(
+            [
+                task_checker._orders(SimpleNamespace(num_envs=n, task=SimpleNamespace(n_commands=2)), step)
+                for step in range(200)
+            ]
+        )
+        for n in (3, 70)
+    )
+    np.testing.assert_array_equal(three, seventy[:, :3])
+    np.testing.assert_array_equal(seventy[..., 0], seventy[..., 1])
+    rudder = seventy[..., 0]
+    assert (rudder.min(), rudder.max()) == (-1.0, 1.0)
+    assert set(np.unique(rudder[:, 1::4])) == {-1.0, 1.0}  # hard over to and fro
+    assert not rudder[:, 2::4].any()
+    assert (rudder[:, 3::4] == 1.0).all()
+    assert (np.abs(np.diff(rudder[:, ::4], axis=0)).max(axis=0) > 0.1).all()
+    assert np.abs(np.diff(rudder[:, ::4], axis=0)).max() < 0.35  # a swing
+    assert len({tuple(lane) for lane in rudder[:, ::4].T}) > 10  # each its own
+
+
+class Shown:
+    """Stands for an engine whose observations and rewards are given step by step."""
+
+    model = None
+
+    def __init__(self, seen, rewards=None, episode_steps=9):
+        self.seen = np.asarray(seen, dtype=float)
+        self.rewards = np.zeros(self.seen.shape[:2]) if rewards is None else np.asarray(rewards, dtype=float)
+        self.num_envs = self.seen.shape[1]
+        observed = [SimpleNamespace(path=path) for path in ("helm.sway", "extras.roll")[: self.seen.shape[2]]]
+        self.task = SimpleNamespace(
+            n_commands=1, episode_steps=episode_steps, observed=lambda model: observed
+        )
+
+    def reset(self, seeds):
+        self.seeds, self.step_number = seeds, 0
+        return self.seen[0]
+
+    def step(self, orders):
+        assert orders.shape == (self.num_envs, 1)
+        self.step_number += 1
+        return self.seen[self.step_number], self.rewards[self.step_number], None, None
+
+
+def differences(one, other, lanes=slice(None), steps=3, agreement=1e-5):
+    return list(task_checker._differ(one, other, lanes, steps, agreement, ("here", "there")))
+
+
+def test_the_first_difference_of_two_engines_is_told_with_lane_and_step():
+    seen = np.random.default_rng(0).uniform(0.5, 1.0, (5, 3, 2))
+    seen[2, 0, 0] = np.nan  # in both
+    assert differences(Shown(seen), Shown(seen), agreement=0.0) == []
+    close, other = seen.copy(), seen.copy()
+    close[1:] *= 1.0 + 9e-6
+    assert differences(Shown(close), Shown(seen)) == []
+    other[3, 2, 1] = 0.25
+    assert differences(Shown(other), Shown(seen)) == [
+        f"Observation.extras.roll is 0.25 here and {seen[3, 2, 1]} there in lane 2 at step 3; look for what "
+        "differs, such as a global that changes"
+    ]
+    assert differences(Shown(other), Shown(seen), steps=2) == []
+    assert differences(Shown(other, episode_steps=2), Shown(seen)) == []
+    rewards = np.zeros((5, 3))
+    rewards[1, 1] = -1.0
+    (found,) = differences(Shown(other, rewards), Shown(seen))
+    assert found.startswith("reward is -1.0 here and 0.0 there in lane 1 at step 1; ")
+    other[0, 0, 0] = 0.25
+    assert " in lane 0 at step 0; " in differences(Shown(other, rewards), Shown(seen))[0]
+
+
+def test_the_last_lane_of_many_is_compared_with_one_alone():
+    many = np.random.default_rng(1).uniform(0.5, 1.0, (5, 4, 1))
+    alone = Shown(many[:, -1:])
+    assert differences(Shown(many), alone, slice(-1, None), agreement=0.0) == []
+    assert alone.seeds.tolist() == [3]
+    alone.seen = alone.seen + np.array([0.0, 0.0, 1e-12, 0.0, 0.0])[:, None, None]
+    (found,) = differences(Shown(many), alone, slice(-1, None), agreement=0.0)
+    assert " in lane 3 at step 2; " in found
+
+
+def test_what_is_beyond_its_bounds_in_more_than_a_twentieth_of_the_steps_is_remarked():
+    seen = {"helm.sway": Seen(-2.0, 2.0), "extras.roll": Seen(-3.0, 3.0)}
+    task = SimpleNamespace(definition=SimpleNamespace(seen=seen))
+    inside = [2.0 + 5e-7, -2.0 - 5e-7] * 47 + [0.0]  # rounding makes no remark
+    often, seldom = [2.1, -4.0, 2.1, 2.1, 2.1, 2.1], [2.1] * 5
+    assert list(task_checker._often_clipped(task, {"helm.sway": inside + seldom})) == []
+    found = list(task_checker._often_clipped(task, {"helm.sway": inside[1:] + often, "extras.roll": inside}))
+    assert found == [
+        "Observation.helm.sway: -4 found in units of its scale, beyond its bounds -2 to 2 in 6 % of the "
+        "steps, and clipped; give it wider bounds or a larger scale if more is to be seen"
+    ]
+
+
+def test_options_of_a_task_are_kept_as_given_in_absolute_paths(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert kept_source("own.py") == kept_source(Path("own.py")) == str(tmp_path / "own.py")
+    assert [kept_source(one) for one in ("PathFollowing", None, shipgym)] == ["PathFollowing", None, shipgym]
+
+
+class Least(NamedTuple):
+    least: float
+    largest: float
+
+
+class Choices(NamedTuple):
+    count: Annotated[int, Setting("A count.", at_least=1, at_most=100, whole=True)] = 4
+    share: Annotated[float, Setting("A share.", above=0.0, at_most=1.0)] = 0.5
+    lengths: Annotated[Least, Setting("Lengths.", above=0.0)] = Least(1.0, 2.0)
+    free: float = 0.0
+    listed: Annotated[Numbers, Setting("Numbers.", at_least=-1.0)] = NO_NUMBERS
+
+
+def test_settings_are_given_by_keyword_the_others_are_their_defaults():
+    assert make_settings(Choices, {}, np.asarray) == Choices()
+    found = make_settings(Choices, {"count": 100, "lengths": [3, 4.5], "listed": [1, -1.0]}, np.asarray)
+    assert found[:4] == (100, 0.5, Least(3.0, 4.5), 0.0)
+    assert found.listed.tolist() == [1.0, -1.0]
+    assert make_settings(Choices, {"listed": None}, np.asarray).listed.tolist() == []
+    assert make_settings(Choices, {"free": -1e9, "share": 1.0}, np.asarray)[1:4:2] == (1.0, -1e9)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"count": 0}, "count: 0 found, expected a whole number of at least 1"),
+        ({"count": 2.0}, "count: 2.0 found, expected a whole number of at least 1"),
+        ({"count": 101}, "count: 101 found, expected a number >= 1 and <= 100"),
+        ({"share": 0.0}, "share: 0 found, expected a number > 0 and <= 1"),
+        ({"lengths": (3.0, 0.0)}, "lengths: the largest: 0 found, expected a number > 0"),
+        ({"lengths": (0.0, 3.0)}, "lengths: the least: 0 found, expected a number > 0"),
+        ({"lengths": (1.0,)}, r"lengths: \(1.0,\) found, expected the least and the largest"),
+        ({"lengths": "12"}, "lengths: '12' found, expected the least and the largest"),
+        ({"lengths": 3.0}, "lengths: 3.0 found, expected the least and the largest"),
+        ({"listed": [0.0, -1.5]}, "listed: number 1: -1.5 found, expected a number >= -1"),
+        ({"listed": 3.0}, "listed: 3.0 found, expected a list"),
+        ({"listed": [[1.0]]}, r"listed: \[\[1.0\]\] found, expected a list"),
+        ({"listed": []}, "listed: none found, expected one at least, or None"),
+    ],
+)
+def test_settings_beyond_their_bounds_are_refused(options, message):
+    with pytest.raises(InputError, match=f"^{message}$"):
+        make_settings(Choices, options, np.asarray)
+
+
+class Inner(NamedTuple):
+    listed: Numbers
+    weight: float
+
+
+class ListBefore(NamedTuple):
+    listed: Numbers = NO_NUMBERS
+    weight: float = 1.0
+
+
+class WithInner(NamedTuple):
+    inner: Inner
+
+
+def test_a_list_stands_last_and_in_settings_alone():
+    with pytest.raises(
+        InputError, match=r"^own: Settings.listed: .* expected a number, or a list as the last"
+    ):
+        check_namespace(SimpleNamespace(Settings=ListBefore), "own", ("Settings",), {})
+    with pytest.raises(InputError, match=r"^own: State.inner.listed: .* found, expected a float$"):
+        check_namespace(SimpleNamespace(State=WithInner), "own", ("State",), {})
+    assert check_namespace(SimpleNamespace(Settings=Choices), "own", ("Settings",), {}) == {
+        "Settings": Choices
+    }
+    assert check_namespace(SimpleNamespace(), "own", (), {"due": ()}, ("due",)) == {}
+
+
+def test_a_task_without_events_and_plan_is_complete():
+    task = read_definition(ROOT / "examples" / "fairway.py")
+    settings = task.Settings()
+    moment = (None, "state", None, None, settings)
+    assert task.due(*moment) is False
+    assert task.on_event(*moment, None, None) == "state"
+    assert task.plan_length(settings) == 0
+    assert task.check(settings, None) is None
+    assert no_worst_cost(settings) == 0.0
+    assert (task.name, task.episode_steps, task.flags) == ("fairway", 600, ("speeding",))
+    assert task.reported == ("speeding", "cross_track")
+    assert task.reward_names == ("cross_track", "delay", "over_speed")
+    assert not task.shipped
+    assert task.reward_source == task.source == str(ROOT / "examples" / "fairway.py")
+    own = read_definition("CourseKeeping")
+    assert own.shipped
+    assert own.reward_source.endswith("course_keeping.py")
+    assert read_definition(own) is own
+
+
+def test_bounds_of_an_observation_are_finite_and_in_order(tmp_path):
+    for bounds in ("1.0, -1.0", "1.0, 1.0", "-float('inf'), 1.0", "-1.0, float('nan')"):
+        text = FAIRWAY.replace(
+            "g_sin: Annotated[float, Seen(-1.0, 1.0)]", f"g_sin: Annotated[float, Seen({bounds})]"
+        )
+        path = written(tmp_path, "fairway.py", text)
+        with pytest.raises(
+            InputError, match=r"Observation.heading_sin: no bounds found, expected Annotated\[f"
+        ):
+            read_definition(path)
+
+
+def test_names_that_the_engine_has_in_info_are_not_reported(tmp_path):
+    text = FAIRWAY.replace("speeding: Flag", "truncated: Flag").replace('"speeding", ', '"truncated", ')
+    with pytest.raises(InputError, match=r"REPORTED: 'truncated' found, expected fields of State, none of"):
+        read_definition(written(tmp_path, "fairway.py", text))
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        (
+            "    delay: float",
+            "    end: float",
+            "two fields named 'end' found, .* the engine has one of that name$",
+        ),
+        (
+            "    to_zone: Annotated",
+            "    limit_: Inner\n    to_zone: Annotated",
+            "'limit' found, .* that differ$",
+        ),
+    ],
+)
+def test_two_fields_of_one_name_are_refused(tmp_path, old, new, message):
+    inner = "class Inner(NamedTuple):\n    limit: Annotated[float, Seen(0.0, 1.0)]\n\n\nclass Observation("
+    text = FAIRWAY.replace("class Observation(", inner).replace(old, new, 1)
+    with pytest.raises(InputError, match=message):
+        read_definition(written(tmp_path, "fairway.py", text))
