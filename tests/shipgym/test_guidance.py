@@ -10,6 +10,7 @@ from shipgym.tasks.guidance import (
     integral_line_of_sight,
     line_of_sight,
     random_path,
+    track,
     wrapped,
 )
 
@@ -122,3 +123,92 @@ def test_wrapped_is_the_same_direction(angle):
 def test_a_path_that_is_none_is_refused(waypoints, message):
     with pytest.raises(InputError, match=message):
         Path(waypoints)
+
+
+def test_a_turn_is_as_sharp_as_a_hundred_and_fifty_degrees():
+    def back(angle_deg):
+        angle = np.radians(angle_deg)
+        return Path([[0.0, 0.0], [100.0, 0.0], [100.0 + 100.0 * np.cos(angle), 100.0 * np.sin(angle)]])
+
+    back(149.9).check_turns(1.0)
+    back(-149.9).check_turns(1.0)
+    with pytest.raises(InputError) as caught:
+        back(-151.0).check_turns(1.0)
+    assert str(caught.value) == (
+        "waypoints: the path doubles back at row 1, by 151 deg, expected turns of 150 deg at most"
+    )
+
+
+def test_turns_leave_room_for_each_other_on_a_leg():
+    """Right angles of 100 m radius take 100 m of a leg at each end; a point that only divides takes none."""
+    for middle in (200.0, 201.0):
+        Path([[0, 0], [100, 0], [100, middle], [200, middle]]).check_turns(100.0)
+    divided = Path([[0, 0], [60, 0], [100, 0], [100, 90], [100, 200], [200, 200]])
+    divided.check_turns(100.0)
+    with pytest.raises(InputError) as caught:
+        Path([[0, 0], [60, 0], [100, 0], [100, 90], [100, 199], [200, 199]]).check_turns(100.0)
+    assert str(caught.value) == (
+        "waypoints: rows 2 and 4 are 199 m apart, expected at least 200 m, which turns with a radius of "
+        "100 m take; set them further apart, or set a smaller turn_radius"
+    )
+    with pytest.raises(InputError, match="rows 0 and 1 are 99 m apart, expected at least 100 m"):
+        Path([[0, 0], [99, 0], [99, 300]]).check_turns(100.0)
+    with pytest.raises(InputError, match="rows 1 and 2 are 99 m apart, expected at least 100 m"):
+        Path([[0, 0], [300, 0], [300, 99]]).check_turns(100.0)
+
+
+def test_the_distance_from_a_path_goes_round_its_ends():
+    assert EAST_THEN_SOUTH.distance([3.0, 0.0, -503.0], [-4.0, 500.0, 1004.0]).tolist() == pytest.approx(
+        [5.0, 0.0, 5.0]
+    )
+    assert EAST_THEN_SOUTH.distance(0.0, 1000.0).shape == ()
+
+
+def test_points_of_a_turn_are_at_most_five_degrees_apart():
+    corner = np.array([[0.0, 0.0], [1000.0, 0.0], [1000.0, 1000.0]])
+    for sign in (1.0, -1.0):
+        points = track(corner * [1.0, sign], 300.0)
+        centre = np.array([700.0, sign * 300.0])
+        arc = points[1:-1] - centre
+        np.testing.assert_allclose(np.hypot(*arc.T), 300.0)
+        angles = np.degrees(np.unwrap(np.arctan2(*arc.T[::-1])))
+        assert np.abs(np.diff(angles)).max() <= 5.0
+        assert angles[-1] - angles[0] == pytest.approx(sign * 90.0)
+        assert len(points) < 2 + 25
+        np.testing.assert_array_equal(points[[0, -1]], (corner * [1.0, sign])[[0, -1]])
+    assert track(None, 300.0) is None
+    line = np.array([[0.0, 0.0], [500.0, 0.0], [1000.0, 0.0]])
+    np.testing.assert_allclose(track(line, 300.0)[:, 1], 0.0)
+
+
+@pytest.mark.parametrize(
+    ("waypoints", "message"),
+    [
+        ([[0, 0], [1, 0], [1, 0], [2, 0]], r"waypoints: row 2 repeats \[1.0, 0.0\] of the row before"),
+        ([[1e8, -1e8], [0, np.inf]], r"waypoints: row 1 is \[0.0, inf\], expected finite numbers in m"),
+        ([[0, 0, 0], [1, 1, 1]], r"waypoints: shape \(2, 3\) found, expected at least 2 rows"),
+        ([[[0, 0], [1, 1]]], r"waypoints: shape \(1, 2, 2\) found, expected at least 2 rows"),
+        ({"a": 1}, r"waypoints: shape \(0,\) found, expected at least 2 rows"),
+    ],
+)
+def test_the_row_of_a_wrong_waypoint_is_named(waypoints, message):
+    with pytest.raises(InputError, match=message):
+        Path(waypoints)
+
+
+def test_waypoints_cannot_be_changed_and_may_lie_a_hundred_thousand_kilometres_off():
+    given = np.array([[1e8, 0.0], [-1e8, -1e8]])
+    path = Path(given)
+    given[0] = 0.0
+    assert path.waypoints[0].tolist() == [1e8, 0.0]
+    with pytest.raises(ValueError, match="read-only"):
+        path.waypoints[0] = 1.0
+
+
+def test_the_integral_of_a_line_of_sight_gathers_less_far_from_the_path():
+    """Borhaug 2008: sigma L^2 e / ((e + i)^2 + L^2) per second, and the course towards e + i."""
+    where = PathPosition(np.array(0.0), np.array([3.0, 300.0]), np.array(0.2), np.array(1.0))
+    course, integral = integral_line_of_sight(where, 10.0, np.array([1.0, 0.0]), 0.5, 2.0)
+    expected = [1.0 + 2.0 * 0.5 * 100.0 * 3.0 / 116.0, 2.0 * 0.5 * 100.0 * 300.0 / 90_100.0]
+    np.testing.assert_allclose(integral, expected)
+    np.testing.assert_allclose(course, 0.2 - np.arctan([0.4, 30.0]))
