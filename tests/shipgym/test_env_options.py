@@ -1,6 +1,8 @@
 """Options of the environments: instruments, observations, commands, seas, depth, and ships that differ."""
 
+import re
 from dataclasses import replace
+from pathlib import Path
 
 import document_settings
 import gymnasium
@@ -10,10 +12,12 @@ import pytest
 import shipgym
 from shipgym import InputError
 from shipgym.envs.randomisation import N_SPEEDS, POOL_SIZE, Randomisation
+from shipgym.envs.registration import env_id, environments, register_environments
 from shipgym.sea import Waves, Weather, Wind
 from shipgym.ships import Envelope
+from shipgym.tasks.definition import read_definition
 from shipgym.tasks.steering import ROLL_SCALE
-from shipgym.tasks.task import RUDDER_ORDERS
+from shipgym.tasks.task import RUDDER_ORDERS, Task, course_keeping_task, rounded_interval
 from shipgym.trials.sensors import SEA_TRIAL
 
 pytestmark = pytest.mark.interpreted
@@ -381,3 +385,157 @@ def test_an_approach_speed_turns_the_shaft_in_proportion_and_load_divides_what_f
     assert 1.23 < loads.max() <= 1.25
     for ship, load in zip(loaded[:3], loads, strict=False):
         assert ship.coefficients == pytest.approx({k: v / load for k, v in mariner.coefficients.items()})
+
+
+PAGES = Path(__file__).parents[2] / "docs" / "environments"
+
+
+def documented(page):
+    """Bounds of observations by name, as a page has them."""
+    found = {}
+    for line in (PAGES / f"{page}.md").read_text(encoding="utf-8").splitlines():
+        cells = [cell.strip() for cell in line.strip("|").split("|")]
+        names, bounds = (
+            re.findall(r"`(\w+)`", " ".join(cells[:2])),
+            re.findall(r"(\S+) to (-?[0-9.]+)", cells[-1]),
+        )
+        if bounds and len(cells) == 5:
+            found |= {
+                name: (float(low), float(high)) for name, (low, high) in zip(names, bounds, strict=False)
+            }
+    return found
+
+
+@pytest.mark.parametrize(
+    ("name", "page", "count"),
+    [
+        ("CourseKeeping", "course_keeping", 12),
+        ("PathFollowing-v1", "path_following", 7),
+        ("PathFollowing", "path_following_v0", 5),
+    ],
+)
+def test_observations_have_the_bounds_of_their_page(name, page, count):
+    own = {
+        path.rpartition(".")[2]: (seen.low, seen.high) for path, seen in read_definition(name).seen.items()
+    }
+    found = documented(page)
+    assert len(found) == count
+    assert {key: own[key] for key in found} == found
+    assert own.keys() == found.keys() | documented("course_keeping").keys()
+
+
+def test_scales_of_roll_and_shaft_are_those_of_their_page():
+    tanker, container = shipgym.load_model("tanker"), shipgym.load_model("container")
+    seen = {one.name: one for one in Task.of("CourseKeeping", action="rudder-shaft").observed(tanker)}
+    assert seen["shaft_speed"].scale == seen["last_shaft_command"].scale == tanker.service_shaft_speed
+    assert "roll" not in seen
+    rolls = {one.name: one.scale for one in Task.of("CourseKeeping", roll=True).observed(container)}
+    assert (rolls["roll"], rolls["roll_rate"]) == (pytest.approx(np.pi / 6), 0.1)
+    assert "last_shaft_command" not in rolls
+
+
+def test_scales_of_a_path_are_those_of_its_page():
+    mariner = shipgym.load_model("mariner")
+    length = mariner.particulars["length"]
+    for name, far, turns in (
+        ("PathFollowing-v1", 20.0, ("next_turn", "second_turn")), ("PathFollowing", 10.0, ("turn",)),
+    ):  # fmt: skip
+        scales = {one.name: one.scale for one in Task.of(name, corridor=0.5).observed(mariner)}
+        assert scales["cross_track"] == pytest.approx(0.5 * length)
+        for turn in turns:
+            assert scales[f"{turn}_distance"] == pytest.approx(far * length)
+            assert scales[f"{turn}_angle"] == pytest.approx(np.pi)
+
+
+@pytest.mark.parametrize(
+    ("travel_s", "interval"),
+    [
+        (20.0, 1.0), (28.2, 1.0), (28.4, 2.0), (63.0, 2.0), (63.5, 5.0), (141.0, 5.0), (142.0, 10.0),
+        (400.0, 20.0), (3.0, 0.2), (0.5, 0.02),
+    ],
+)  # fmt: skip
+def test_a_control_interval_is_about_a_twentieth_of_the_time_a_length_takes(travel_s, interval):
+    """As 1, 2 or 5 times a power of ten, by the nearest ratio."""
+    assert rounded_interval(travel_s) == pytest.approx(interval)
+
+
+def test_an_interval_is_integrated_in_steps_of_at_most_one_and_a_half_usual_ones():
+    mariner = shipgym.load_model("mariner")
+    for dt, steps in ((None, 1), (0.25, 1), (1.0, 1), (1.5, 1), (1.51, 2), (3.0, 2), (3.01, 3), (30.0, 20)):
+        task = course_keeping_task(dt=dt)
+        assert task.interval(mariner) == (dt or 1.0)
+        assert task.substeps(mariner) == steps
+        assert task.substep(mariner) == pytest.approx((dt or 1.0) / steps)
+
+
+def test_an_interval_is_at_most_five_ship_lengths():
+    mariner = shipgym.load_model("mariner")
+    longest = 5.0 * 160.93 / 7.7175
+    course_keeping_task(dt=longest - 0.01).check_fits(mariner)
+    with pytest.raises(
+        InputError, match=r"^dt: 104.3 found, expected a number <= 104.263; s: 5 ship lengths$"
+    ):
+        course_keeping_task(dt=104.3).check_fits(mariner)
+
+
+def test_settings_of_a_task_are_its_attributes_weights_too():
+    task = Task.of("PathFollowing-v1", corridor=0.7, heading_scale_deg=20.0)
+    assert (task.corridor, task.heading_scale_deg, task.turn_radius, task.name) == (
+        0.7, 20.0, 4.0, "PathFollowing-v1",
+    )  # fmt: skip
+    with pytest.raises(AttributeError, match="task 'PathFollowing-v1' has no setting 'acceptance'"):
+        _ = task.acceptance
+    assert task.follows_path
+    assert not course_keeping_task().follows_path
+    assert task.changed(corridor=0.9).corridor == 0.9
+    assert task.changed(ground=5.0).corridor == 0.7
+    assert (task.n_commands, Task.of("PathFollowing", action="rudder-shaft").n_commands) == (1, 2)
+
+
+def test_info_has_what_the_task_reports_and_the_parts_of_its_reward():
+    task = course_keeping_task()
+    parts = ("heading", "rudder", "rudder_rate", "roll", "envelope", "end")
+    assert task.reward_parts == tuple(f"reward_{part}" for part in parts)
+    assert task.info_names == ("heading_error", "envelope_distance", "extrapolating", *task.reward_parts)
+    assert task.flags == {"extrapolating"}
+    assert Task.of("PathFollowing").flags == {"extrapolating", "success", "in_corridor", "grounded"}
+
+
+def test_ships_and_seas_of_a_pool_go_together_in_all_pairs():
+    mariner = shipgym.load_model("mariner")
+    others = [replace(mariner, name=name) for name in ("second", "third")]
+    seas = [Weather(), Weather(wind=Wind(9.0))]
+    plain = Randomisation(ensemble=others).ships(mariner, seas)
+    assert [(ship.name, seas.index(sea)) for ship, sea in plain] == [
+        (name, k) for name in ("mariner", "second", "third") for k in (0, 1)
+    ]
+    drawn = Randomisation(ensemble=others, speed_range=(0.5, 1.0)).ships(mariner, seas)
+    assert len(drawn) == POOL_SIZE == 256
+    pairs = [(ship.name, seas.index(sea)) for ship, sea in drawn]
+    assert pairs[:6] == [(name, k) for k in (0, 1) for name in ("mariner", "second", "third")]
+    assert pairs == (pairs[:6] * 43)[:256]
+    again = Randomisation(ensemble=others, speed_range=(0.5, 1.0)).ships(mariner, seas)
+    assert [ship.particulars["speed"] for ship, _ in again] == [
+        ship.particulars["speed"] for ship, _ in drawn
+    ]
+    assert all(ship.coefficients == mariner.coefficients for ship, _ in drawn)
+
+
+def test_options_are_parted_into_what_is_randomised_and_the_rest():
+    randomised, rest = Randomisation.take_from({"speed_range": (0.5, 1.0), "noise": 1.0})
+    assert (randomised.speed_range, randomised.loading_range, rest) == ((0.5, 1.0), None, {"noise": 1.0})
+    assert Randomisation.names() == ("model_uncertainty", "ensemble", "speed_range", "loading_range")
+
+
+def test_ids_have_a_version_the_first_is_none():
+    assert env_id("CourseKeeping") == "shipgym/CourseKeeping-v0"
+    assert env_id("PathFollowing-v1", "Roll") == "shipgym/PathFollowingRoll-v1"
+    found = environments()
+    assert len(found) == 14
+    assert found["shipgym/CourseKeepingRoll-v1"] == {
+        **found["shipgym/CourseKeepingRoll-v0"], "model": "container-4dof-output-error",
+    }  # fmt: skip
+    assert found["shipgym/PathFollowingShaft-v1"]["task"] == "PathFollowing-v1"
+    before = dict(gymnasium.registry)
+    register_environments()  # a second time changes nothing
+    assert gymnasium.registry == before

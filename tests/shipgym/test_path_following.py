@@ -15,6 +15,7 @@ from shipgym.engine.motion import Motion, Ship
 from shipgym.engine.records import leaves
 from shipgym.envs.engine import Engine
 from shipgym.tasks import path_following
+from shipgym.tasks.contract import Interval
 from shipgym.tasks.guidance import Path, wrapped
 from shipgym.tasks.path_following import Settings, State, fix, leg_from
 from shipgym.tasks.steering import RudderWork, worked
@@ -302,3 +303,148 @@ def test_the_next_leg_is_one_of_the_plan_whatever_a_checkpoint_holds(leg):
     found = path_following.on_event(motion, state, None, SHIP, asked, None, plan)
     assert found.leg.number in (1.0, 3.0)
     assert np.isfinite(found.leg).all()
+
+
+@given(st.floats(-0.9, 0.9), st.floats(0.0, 0.099), st.sampled_from([1.0, -1.0]))
+def test_near_the_centre_of_a_turn_places_on_it_are_those_of_a_tenth_of_its_radius(angle, near, side):
+    """Seen from the centre the arc passes below the ship as slowly as a tenth of the radius off."""
+    plan, radius = np.array([0.0, 0.0, 3000.0, 0.0, 3000.0, side * 3000.0]), 1000.0
+    leg, asked = leg_from(0, 0.0, radius, plan), Settings(turn_radius=radius / LENGTH)
+    towards = np.array([1.0, -side]) / np.sqrt(2.0)  # from the centre to the arc's middle
+    across = np.array([1.0, side]) / np.sqrt(2.0)
+    x, y = np.array([2000.0, side * 1000.0]) + radius * (near * towards + 0.1 * angle * across)
+    found = fix(x, y, leg, SHIP, asked)
+    if x > 2000.0:
+        turned = np.pi / 4.0 + np.arctan(angle)
+        assert found.turned == pytest.approx(turned)
+        assert found.way == pytest.approx(2000.0 + radius * turned)
+        off = radius - 0.1 * radius * np.hypot(1.0, angle) + 0.1 * radius - near * radius
+        assert found.cross == pytest.approx(side * off)
+    else:
+        assert (found.way, found.turned) == (pytest.approx(x), 0.0)
+
+
+def test_a_course_leads_to_the_path_a_lookahead_distance_ahead():
+    """On the arc it is the direction of the chord to the point that far ahead on the path."""
+    plan, radius, lookahead = np.array([0.0, 0.0, 3000.0, 0.0, 3000.0, 3000.0]), 1000.0, 400.0
+    leg = leg_from(0, 0.0, radius, plan)
+    asked = Settings(turn_radius=radius / LENGTH, lookahead=lookahead / LENGTH)
+    for turned in (0.1, 0.6, 1.1):
+        x, y = 2000.0 + radius * np.sin(turned), radius * (1.0 - np.cos(turned))
+        found = fix(x, y, leg, SHIP, asked)
+        ahead = turned + lookahead / radius
+        chord = np.arctan2(np.cos(turned) - np.cos(ahead), np.sin(ahead) - np.sin(turned))
+        assert found.cross == pytest.approx(0.0, abs=1e-9)
+        assert found.course == pytest.approx(chord)
+    aside = fix(500.0, 30.0, leg, SHIP, asked)
+    assert aside == pytest.approx((500.0, 30.0, -np.arctan(30.0 / lookahead), 0.0))
+
+
+@pytest.mark.parametrize(("legs", "least"), [(1, 0.0), (2, 4.0), (3, 8.0), (9, 8.0)])
+def test_legs_of_a_drawn_path_leave_room_for_the_turns_at_their_ends(legs, least):
+    """Right angles with a radius of 4 lengths: none for a single leg, one for two, two for others."""
+    asked = Settings(n_legs=legs, max_turn_deg=90.0, leg_lengths=path_following.Range(max(least, 0.1), 9.0))
+    path_following.check(asked, None)
+    if least:
+        tight = asked._replace(leg_lengths=path_following.Range(least - 0.01, 9.0))
+        with pytest.raises(
+            InputError, match=f"the least: {least - 0.01:g} found, .* >= {least:g}; ship lengths"
+        ):
+            path_following.check(tight, None)
+
+
+def test_paths_of_a_list_are_filled_up_to_the_longest_on_their_last_leg():
+    found = path_following.listed([[[0, 0], [30, 0]], [[0, 0], [0, 9], [9, 9], [9, 0]]])
+    assert found[0] == 4.0
+    first, second = found[1:].reshape(2, 4, 2)
+    np.testing.assert_allclose(first, [[0, 0], [10, 0], [20, 0], [30, 0]])
+    np.testing.assert_allclose(second, [[0, 0], [0, 9], [9, 9], [9, 0]])
+    one = path_following.listed(np.array([[0.0, 0.0], [30.0, 0.0]]))
+    assert one.tolist() == [2.0, 0.0, 0.0, 30.0, 0.0]
+    assert path_following.plan_length(Settings(waypoints=found)) == 8
+    assert path_following.plan_length(Settings(n_legs=5)) == 12
+    with pytest.raises(InputError, match="waypoints: row 1 repeats"):
+        path_following.listed([[[0, 0], [30, 0]], [[1, 1], [1, 1]]])
+
+
+def test_each_listed_path_has_to_leave_room_for_its_turns():
+    mariner = shipgym.load_model("mariner")
+    paths = path_following.listed([LINE, [[0, 0], [900, 0], [900, 500]]])
+    path_following.check(Settings(waypoints=paths), None)  # lengths of an unknown ship are not known
+    with pytest.raises(InputError, match=r"rows 1 and 2 are 500 m apart, expected at least 643.7"):
+        path_following.check(Settings(waypoints=paths), mariner)
+    path_following.check(Settings(waypoints=paths, turn_radius=3.0), mariner)
+
+
+def test_a_corridor_is_wider_than_the_ship_whose_beam_is_known():
+    mariner = shipgym.load_model("mariner")
+    least = 0.5 * 23.17 / 160.93
+    path_following.check_path(Settings(corridor=1.01 * least), mariner)
+    with pytest.raises(InputError) as caught:
+        path_following.check_path(Settings(corridor=0.07), mariner)
+    assert str(caught.value) == (
+        "corridor: 0.07 ship lengths to each side is 22.5 m wide, expected more than the beam of 'mariner', "
+        "23.2 m"
+    )
+    path_following.check_path(Settings(corridor=0.07), None)
+    bare = replace(mariner, particulars=replace(mariner.particulars, beam=None))
+    path_following.check_path(Settings(corridor=0.07), bare)
+    with pytest.raises(
+        InputError, match="ground: 1 found, expected a number > 1; in ship lengths, beyond the c"
+    ):
+        path_following.check_path(Settings(ground=1.0), None)
+
+
+def test_turns_and_distances_of_a_plan():
+    plan = np.array([0.0, 0.0, 300.0, 0.0, 300.0, 400.0, 300.0, 900.0, 0.0, 900.0])
+    assert path_following.between(1, 2, plan) == pytest.approx((400.0, np.pi / 2))
+    assert path_following.between(0, 2, plan) == pytest.approx((500.0, np.arctan2(400.0, 300.0)))
+    turns = [path_following.change_of_course(number, plan) for number in range(5)]
+    assert turns == pytest.approx([0.0, np.pi / 2, 0.0, np.pi / 2, 0.0])
+    assert [path_following.next_turn(number, plan) for number in range(5)] == [1, 3, 3, 4, 4]
+    assert [path_following.part_of(turn, way, 100.0) for turn, way in ((0.5, 20.0), (-0.5, 20.0))] == [
+        0.2,
+        -0.2,
+    ]
+    assert [path_following.part_of(-0.5, way, 100.0) for way in (-9.0, 60.0)] == [0.0, -0.5]
+
+
+def test_a_step_on_the_last_leg_earns_way_up_to_its_end_only():
+    """Two ship lengths a step of service speed; the path ends at 40 lengths."""
+    asked, plan = Settings(), LINE.ravel()
+    state = on_path(RADIUS, plan)._replace(distance_made_good=39.0 * LENGTH)
+    interval = Interval(2.0 * LENGTH / SPEED, 7.0, 0.02, 0.0, 1.0, 0.0, 0.0)
+    motion = Motion(40.5 * LENGTH, 0.5 * LENGTH, *[0.0] * 7, 0.12, 0.0)
+    after, reward, aground, arrived = path_following.step(motion, state, interval, SHIP, asked)
+    assert after.distance_made_good == pytest.approx(40.0 * LENGTH)
+    assert reward.progress == pytest.approx(-0.5)
+    assert reward.cross_track == pytest.approx(-0.25)
+    assert (bool(aground), bool(arrived), after.success, after.in_corridor) == (False, True, 1.0, 1.0)
+    assert after.rudder_travel == pytest.approx(0.1)
+    assert reward.rudder_travel == pytest.approx(-0.1 * 0.1 / np.radians(30.0))
+    for aside, within, ashore in ((1.01, 0.0, 0.0), (4.01, 0.0, 1.0)):
+        off = motion._replace(y=aside * LENGTH)
+        after, reward, aground, arrived = path_following.step(off, state, interval, SHIP, asked)
+        assert (after.success, after.in_corridor, after.grounded) == (0.0, within, ashore)
+        assert not arrived
+        assert bool(aground) == bool(ashore)
+    back = motion._replace(x=30.0 * LENGTH)
+    after, reward, _, arrived = path_following.step(back, state, interval, SHIP, asked)
+    assert reward.progress == -2.0  # no less, however far back
+    assert not arrived
+    assert path_following.worst_cost(asked) == pytest.approx(18.0)
+
+
+def test_reversals_are_counted_by_the_minute():
+    asked, plan = Settings(reversal_deg=2.0, reversal_weight=0.3), LINE.ravel()
+    work = RudderWork(1.0, np.radians(5.0), 4.0)
+    state = on_path(RADIUS, plan)._replace(work=work)
+    interval = Interval(0.5, 100.0, 0.0, 0.0, 1.0, 0.0, 0.0)
+    for back, count in ((1.9, 4.0), (2.1, 5.0)):
+        motion = Motion(*[0.0] * 9, np.radians(5.0 - back), 0.0)
+        after, reward, *_ = path_following.step(motion, state, interval, SHIP, asked)
+        assert after.work.reversals == count
+        assert after.reversals_per_minute == pytest.approx(count * 60.0 / 50.0)
+        assert reward.reversals == pytest.approx(-0.3 * (count - 4.0))
+    first, *_ = path_following.step(motion, state, interval._replace(steps=0.0), SHIP, asked)
+    assert first.reversals_per_minute == pytest.approx(5.0 * 60.0 / 0.5)
