@@ -188,3 +188,74 @@ def test_pictures_of_all_rows_in_one():
     np.testing.assert_array_equal(picture[:600], env.env_method("render", indices=0)[0])
     env.close()
     assert list(ours(COURSE, 2).get_images()) == [None, None]
+
+
+def steps(env, count, command=0.4):
+    """What some steps show, and their infos."""
+    found = []
+    for _ in range(count):
+        seen, rewards, dones, infos = env.step(np.full((3, 1), command, np.float32))
+        found.append((seen.tolist(), rewards.tolist(), dones.tolist(), [dict(info) for info in infos]))
+    for *_, infos in found:
+        for info in infos:
+            if "episode" in info:
+                info["episode"] = {"r": info["episode"]["r"], "l": info["episode"]["l"]}
+                info["terminal_observation"] = info["terminal_observation"].tolist()
+    return found
+
+
+def test_an_environment_goes_on_from_its_memory_returns_and_lengths_too():
+    env, other = (ours(COURSE, episode_steps=9, seed=k) for k in (3, 8))
+    env.reset()
+    steps(env, 12)  # three steps into the second episodes
+    memory = env.memory()
+    assert memory["lengths"].tolist() == [3, 3, 3]
+    assert (memory["returns"] < 0.0).all()
+    expected = steps(env, 8)
+    other.reset()
+    other.remember(memory)
+    assert other.reset_infos == [{}] * 3
+    assert steps(other, 8) == expected
+    ended = [info for *_, infos in expected for info in infos if "episode" in info]
+    assert [info["episode"]["l"] for info in ended] == [9, 9, 9]
+    assert memory["lengths"].tolist() == [3, 3, 3]  # a copy
+
+
+def test_infos_are_emptied_by_what_is_remembered_and_by_a_reset():
+    env = ours(COURSE, episode_steps=2, seed=0)
+    env.reset()
+    memory = env.memory()
+    assert "episode" in steps(env, 2)[-1][-1][0]
+    env.remember(memory)
+    assert steps(env, 1)[0][-1] == [{}] * 3
+    steps(env, 1)
+    env.reset()
+    assert steps(env, 1)[0][-1] == [{}] * 3
+    assert "episode" in steps(env, 1)[0][-1][0]
+
+
+def test_a_row_shows_what_is_fixed_and_its_own_place():
+    env = ours(PATH, 2, seed=0)
+    env.reset()
+    first, second = env.get_attr("unwrapped")
+    assert first.dt == env.get_attr("dt")[1]
+    assert first.observation_space == env.observation_space == second.observation_space
+    assert first.action_space == env.action_space
+    assert first.render() is None
+    with pytest.raises(AttributeError, match="a row of ShipVecEnv has no attribute 'cargo'"):
+        _ = first.cargo
+    assert not np.array_equal(first.waypoints, second.waypoints)
+    assert first.physical_state().keys() == second.physical_state().keys()
+    for fixed in ("observation_space", "dt", "waypoints", "render", "physical_state"):
+        with pytest.raises(InputError, match=f"set_attr: '{fixed}' is fixed when the ships are made"):
+            env.set_attr(fixed, None)
+
+
+def test_what_an_episode_returned_is_told_to_six_digits():
+    env = ours(COURSE, episode_steps=3, seed=1)
+    env.reset()
+    shown = [env.step(np.full((3, 1), 0.9, np.float32)) for _ in range(3)]
+    total = sum(rewards[1] for _, rewards, *_ in shown)
+    told = shown[-1][3][1]["episode"]["r"]
+    assert told == pytest.approx(float(total), abs=1e-5)
+    assert told == round(told, 6)

@@ -194,3 +194,73 @@ def test_an_unknown_mode_is_refused():
     for name, value in (("autoreset_mode", "Never"), ("render_mode", "human")):
         with pytest.raises(InputError, match=f"{name}: '{value}' found, expected"):
             gymnasium.make_vec("shipgym/CourseKeeping-v0", num_envs=2, model="mariner", **{name: value})
+
+
+@pytest.mark.parametrize("given", ["SameStep", "SAME_STEP", AutoresetMode.SAME_STEP])
+def test_a_mode_is_named_as_gymnasium_has_it(given):
+    assert vector(COURSE, 2, autoreset_mode=given).metadata["autoreset_mode"] is AutoresetMode.SAME_STEP
+
+
+def test_without_a_mode_the_next_step_begins_the_next_episode():
+    env = vector(COURSE, 2, episode_steps=3)
+    assert env.metadata["autoreset_mode"] is env.unwrapped.autoreset_mode is AutoresetMode.NEXT_STEP
+    assert env.metadata["render_modes"] == ["rgb_array"]
+    env.reset(seed=0)
+    steps = [env.step(np.zeros((2, 1), np.float32)) for _ in range(5)]
+    assert [truncated.tolist() for *_, truncated, _ in steps] == [[k == 2] * 2 for k in range(5)]
+    assert [rewards.tolist() == [0.0, 0.0] for _, rewards, *_ in steps] == [k == 3 for k in range(5)]
+
+
+def test_rows_may_have_seeds_of_their_own_or_go_on_without():
+    env = vector(COURSE, 3)
+    first, _ = env.reset(seed=5)
+    np.testing.assert_array_equal(env.reset(seed=[5, 6, 7])[0], first)
+    np.testing.assert_array_equal(env.reset(seed=np.int64(5))[0], first)
+    second, _ = env.reset()
+    assert not np.any(np.all(second == first, axis=1))
+    mixed, _ = env.reset(seed=[None, 6, None])
+    np.testing.assert_array_equal(mixed[1], first[1])
+    env.reset(seed=5)
+    np.testing.assert_array_equal(env.reset()[0], second)
+    again, _ = env.reset(options={"reset_mask": np.array([False, True, False])}, seed=[1, 6, 1])
+    np.testing.assert_array_equal(again, [second[0], first[1], second[2]])
+
+
+def test_rows_outside_of_a_mask_keep_all_that_they_show():
+    env = vector(COURSE, 3)
+    env.reset(seed=5)
+    *_, infos = env.step(np.full((3, 1), 0.5, np.float32))
+    before = {name: infos[name].copy() for name in infos if not name.startswith("_")}
+    mask = np.array([True, False, False])
+    _, infos = env.reset(options={"reset_mask": mask})
+    for name, values in before.items():
+        np.testing.assert_array_equal(infos[name][1:], values[1:])
+        np.testing.assert_array_equal(infos[f"_{name}"], mask)
+    assert infos["reward_heading"][0] == 0.0
+    infos["_reward_heading"][:] = True
+    assert mask.tolist() == [True, False, False]
+    with pytest.raises(
+        InputError, match=r"options with a reset_mask of some rows: unknown key 'model_index'"
+    ):
+        env.reset(options={"reset_mask": mask, "model_index": 0})
+
+
+def test_the_last_infos_of_rows_that_go_on_are_zeros():
+    env = vector(COURSE, 3, autoreset_mode="SameStep", episode_steps=9)
+    env.reset(seed=5)
+    for step in range(12):
+        if step == 3:
+            env.reset(options={"reset_mask": np.array([False, True, False])})
+        seen, *_, infos = env.step(np.full((3, 1), 0.5, np.float32))
+        if "final_info" in infos:
+            ended = [step != 11, step == 11, step != 11]
+            assert infos["_final_obs"].tolist() == infos["_final_info"].tolist() == ended
+            final = infos["final_info"]
+            assert (final["heading_error"] != 0.0).tolist() == ended
+            assert final["_heading_error"].tolist() == ended
+            assert final["extrapolating"].dtype == np.bool_
+            assert [one is not None for one in infos["final_obs"]] == ended
+            row = ended.index(True)
+            assert not np.array_equal(infos["final_obs"][row], seen[row])
+        else:
+            assert step not in (8, 11)
