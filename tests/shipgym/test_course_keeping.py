@@ -13,8 +13,11 @@ from stable_baselines3.common.env_checker import check_env as sb3_check_env
 
 import shipgym
 from shipgym import InputError
+from shipgym.engine.episodes import are_finite
 from shipgym.engine.motion import Motion, Ship
+from shipgym.engine.random import DRAW, GOLDEN, mix, uniform
 from shipgym.envs.engine import Engine
+from shipgym.envs.lanes import envelope_numbers, ship_tiles
 from shipgym.envs.randomisation import Randomisation
 from shipgym.ships import Envelope
 from shipgym.tasks import course_keeping
@@ -394,3 +397,96 @@ def test_a_step_is_charged_for_its_error_and_control_is_lost_beyond_the_largest(
         assert reward.heading == pytest.approx(-((error / (np.pi / 6)) ** 2))
         assert (failed, arrived) == (lost, False)
     assert course_keeping.worst_cost(settings) == pytest.approx(9.0)
+
+
+def test_an_episode_begins_on_a_first_set_point_with_nothing_gathered():
+    settings = course_keeping.Settings(course_changes_deg=np.array([170.0, 30.0]), change_interval_steps=7)
+    headings = []
+    for key in range(60):
+        with np.errstate(over="ignore"):
+            motion, state = course_keeping.begin(SHIP, settings, Random(np.uint64(key), np.uint64(3)), None)
+        assert motion == Motion(0.0, 0.0, motion.psi, 8.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.5)
+        assert state.course == pytest.approx(motion.psi + np.radians(170.0))
+        assert (state.next_change, state.changes, state.integral) == (7.0, 1.0, 0.0)
+        assert state.heading_error == pytest.approx(np.radians(170.0))
+        headings.append(motion.psi)
+    assert -np.pi <= min(headings) < -0.8 * np.pi
+    assert 0.8 * np.pi < max(headings) < np.pi
+
+
+def test_set_points_change_at_most_every_step_and_begin_with_the_first_listed():
+    random = Random(np.uint64(1), np.uint64(0))
+    state = course_keeping.State(1.0, 0.0, -5.0, 0.0, 0.0)
+    listed = course_keeping.Settings(course_changes_deg=np.array([5.0, -7.0]))
+    often = course_keeping.Settings(change_interval_steps=1)
+    with np.errstate(over="ignore"):
+        found = course_keeping.changed(state, 50.0, listed, random)  # whatever a checkpoint holds
+        waits = {
+            course_keeping.changed(state._replace(changes=k), 50.0, often, random).next_change
+            for k in range(30)
+        }
+    assert found.course == pytest.approx(1.0 + np.radians(5.0))
+    assert waits == {51.0}
+
+
+def test_random_numbers_are_those_of_splitmix64():
+    """The first three of the seed 0, as the authors' program gives them."""
+    with np.errstate(over="ignore"):
+        found = [int(mix(np.uint64(k) * GOLDEN)) for k in (1, 2, 3)]
+        words = [int(DRAW[k]) for k in (0, 1, 3)]
+    assert found == [0xE220A8397B1DCDAF, 0x6E789E6AA1B965F4, 0x06C45D188009454F]
+    assert words == [0, int(GOLDEN), 3 * int(GOLDEN) % 2**64]
+
+
+def test_uniform_numbers_fill_their_range_and_differ_by_each_word():
+    with np.errstate(over="ignore"):
+        numbers = np.array(
+            [
+                uniform(np.uint64(key), np.uint64(episode), np.uint64(draw), -3.0, 5.0)
+                for key in range(10) for episode in range(10) for draw in range(10)
+            ]
+        )  # fmt: skip
+    assert len(np.unique(numbers)) == 1000
+    assert -3.0 <= numbers.min() < -2.95
+    assert 4.95 < numbers.max() < 5.0
+    assert numbers.mean() == pytest.approx(1.0, abs=4.0 * 8.0 / np.sqrt(12.0 * 1000))
+    assert numbers.std() == pytest.approx(8.0 / np.sqrt(12.0), rel=0.05)
+
+
+@pytest.mark.parametrize(
+    ("actions", "finite"),
+    [
+        ([[0.0, -1e30]], True),
+        ([[0.0, np.nan]], False),
+        ([[np.inf, 0.0]], False),
+        ([[0.0], [-np.inf]], False),
+        ([[np.nan, np.nan], [0.0, 0.0]], False),
+    ],
+)
+def test_orders_of_all_ships_are_looked_at(actions, finite):
+    assert are_finite(np.array(actions)) is finite
+
+
+def test_the_envelope_of_a_model_is_given_row_by_row(mariner):
+    rng = np.random.default_rng(0)
+    envelope = Envelope.from_samples(*(rng.normal(m, s, 300) for m, s in ((8, 1), (0, 2), (0, 3), (0, 4))))
+    found = envelope_numbers(replace(mariner, envelope=envelope))
+    low, high, centre, upper = found[:4], found[4:8], found[8:12], found[12:]
+    assert (low < centre).all()
+    assert (centre < high).all()
+    matrix = np.zeros((4, 4))
+    matrix[np.triu_indices(4)] = upper
+    np.testing.assert_array_equal(matrix, envelope.shape)
+    none = envelope_numbers(mariner)
+    assert none.tolist() == [-np.inf] * 4 + [np.inf] * 4 + [0.0] * 14
+
+
+def test_columns_of_ships_lie_in_tiles_of_64_filled_up_with_the_first():
+    columns = np.arange(70.0)[:, None] + np.array([0.0, 1000.0])
+    tiles = ship_tiles(columns, 2, True).reshape(2, 2, 64)
+    assert tiles[0, 0].tolist() == list(range(64))
+    assert tiles[1, 1].tolist() == [1064.0 + k for k in range(6)] + [1000.0] * 58
+    assert ship_tiles(columns, 1, True).shape == (1, 128)
+    assert ship_tiles(columns[:1], 2, False).tolist() == [[0.0, 1000.0]]
+    alone = ship_tiles(columns[:1], 1, True).reshape(2, 64)
+    assert (alone == [[0.0], [1000.0]]).all()

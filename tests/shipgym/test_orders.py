@@ -7,6 +7,8 @@ import pytest
 
 import shipgym
 from shipgym import InputError, UnstableModelError, load_model, manoeuvres
+from shipgym.engine import trajectories
+from shipgym.engine.motion import Motion, Ship
 from shipgym.ships.simulate import open_loop
 
 pytestmark = pytest.mark.interpreted
@@ -97,3 +99,37 @@ def test_the_shaft_is_part_of_the_record_of_a_ship_without_shaft_lag():
     steps = manoeuvres.shaft_speed_steps(ship, duration=600)
     np.testing.assert_array_equal(steps["n"], steps["n_command"])
     assert "n" not in manoeuvres.zigzag(load_model("mariner"), duration=50).channels
+
+
+SHIP = Ship(*np.arange(1.0, 9.0))
+MOTION = Motion(*np.arange(11.0))
+
+
+def test_a_ship_is_changed_in_what_is_asked_for_alone():
+    gear = trajectories.with_gear(SHIP, 0.5, 0.25)
+    assert gear == SHIP._replace(rudder_limit=0.5, rudder_rate=0.25, gear_frequency=0.0)
+    assert trajectories.in_depth(SHIP, 20.0) == SHIP._replace(water_depth=20.0)
+    assert trajectories.replaced(MOTION, 1.0, 2.0, 3.0) == MOTION._replace(psi=1.0, delta=2.0, n=3.0)
+
+
+@pytest.mark.parametrize("command", [0.3, -0.3])
+def test_a_rudder_reverses_within_a_step_at_the_very_heading(monkeypatch, command):
+    """Heading 0.3 t + 0.1 t^3 to the side of the order: it passes 0.07 at 0.2293 s of 2 s."""
+    asked = []
+
+    def advanced(motion, command, n, h, *more):
+        asked.append((command, h))
+        return motion._replace(psi=motion.psi + command * h * (1.0 + h * h / 3.0), x=motion.x + h)
+
+    monkeypatch.setattr(trajectories, "advanced", advanced)
+    start = Motion(*[0.0] * 11)
+    after = trajectories.switched(start, command, 0.07, 1.0, 2.0, None, None, None)
+    time = np.roots([0.1, 0.0, 0.3, -0.07])
+    time = float(time[np.isreal(time)][0].real)
+    side = np.sign(command)
+    rest = 2.0 - time
+    assert asked[-2] == (command, pytest.approx(time, abs=1e-4))
+    assert asked[-1] == (-command, pytest.approx(rest, abs=1e-4))
+    assert after.psi == pytest.approx(side * (0.07 - 0.3 * rest * (1.0 + rest * rest / 3.0)), abs=2e-4)
+    assert after.x == pytest.approx(2.0)
+    assert len(asked) <= 15
