@@ -11,10 +11,15 @@ import pytest
 
 import shipgym
 from shipgym import InputError
+from shipgym.engine.motion import Motion
 from shipgym.envs.randomisation import N_SPEEDS, POOL_SIZE, Randomisation
 from shipgym.envs.registration import env_id, environments, register_environments
+from shipgym.instruments import bridge, perfect
+from shipgym.instruments.sensor_set import read_sensors, shipped_sensors
 from shipgym.sea import Waves, Weather, Wind
+from shipgym.sea.open_sea import Sea
 from shipgym.ships import Envelope
+from shipgym.tasks.contract import Interval, Random
 from shipgym.tasks.definition import read_definition
 from shipgym.tasks.steering import ROLL_SCALE
 from shipgym.tasks.task import RUDDER_ORDERS, Task, course_keeping_task, rounded_interval
@@ -539,3 +544,101 @@ def test_ids_have_a_version_the_first_is_none():
     before = dict(gymnasium.registry)
     register_environments()  # a second time changes nothing
     assert gymnasium.registry == before
+
+
+@pytest.mark.parametrize(
+    ("windy", "noise", "filtered", "name"),
+    [
+        (False, False, False, "perfect"), (True, False, False, "bridge"), (False, True, False, "bridge"),
+        (False, False, True, "bridge"), (True, True, True, "bridge"),
+    ],
+)  # fmt: skip
+def test_instruments_are_without_error_only_in_calm_water_without_noise_and_filter(
+    windy, noise, filtered, name
+):
+    found = shipped_sensors(windy, noise, filtered)
+    assert Path(found.source).stem == name
+    if name == "bridge":
+        assert (found.noise, found.filter) == (noise, filtered)
+    assert read_sensors(found) is found
+
+
+INTERVAL = Interval(0.5, 7.0, 0.0, 0.0, 1.0, 0.0, 0.0)
+WAVES = {"psi_wave": 0.02, "r_wave": 0.003, "phi_wave": 0.04, "p_wave": 0.005}
+SEA = Sea(**dict.fromkeys(Sea._fields, 0.0) | WAVES | {"current_north": 0.6, "current_east": 0.8})
+NO_NOTCH = bridge.Notch(0.0, 0.0, 0.0, 0.0)
+NO_MEMORY = bridge.Memory(*[0.0] * 6, NO_NOTCH, NO_NOTCH)
+SAILING = Motion(10.0, 20.0, 0.5 * np.pi, 5.0, 0.3, 0.01, 0.02, 0.1, 0.0, 0.2, 1.5)
+
+
+def test_perfect_instruments_show_what_is_so_and_the_way_over_ground():
+    assert perfect.measure(SAILING, SEA, "memory", 0.5, INTERVAL, None, None) == "memory"
+    shown = perfect.readings(SAILING, SEA, None)
+    over_ground = (5.0 + 0.8, 0.3 * np.cos(0.1) - 0.6)  # heading east
+    assert (shown.ahead, shown.aside) == pytest.approx(over_ground, abs=1e-12)
+    for name in ("x", "y", "psi", "u", "v", "r", "p", "phi", "delta", "n"):
+        assert getattr(shown, name) == getattr(SAILING, name)
+    assert shown.track_psi == SAILING.psi
+
+
+def test_a_bridge_shows_waves_and_noise_beside_the_slow_motion():
+    memory = bridge.Memory(1.0, 2.0, 3.0, 4.0, 5.0, 6.0, NO_NOTCH, NO_NOTCH)
+    shown, plain = bridge.readings(SAILING, SEA, memory), perfect.readings(SAILING, SEA, None)
+    added = {name: getattr(shown, name) - getattr(plain, name) for name in plain._fields}
+    expected = {"x": 1.0, "y": 2.0, "psi": 3.0, "u": 4.0, "v": 5.0, "r": 6.0, "p": 0.005, "phi": 0.04}
+    assert added == pytest.approx(dict.fromkeys(plain._fields, 0.0) | expected)
+
+
+def test_without_noise_and_filter_a_bridge_adds_the_waves_alone(monkeypatch):
+    monkeypatch.setattr(bridge, "HAS_NOISE", False)
+    monkeypatch.setattr(bridge, "HAS_FILTER", False)
+    found = bridge.measure(SAILING, SEA, NO_MEMORY, 0.6, INTERVAL, bridge.Settings(9.0, 9.0, 9.0, 9.0), None)
+    assert found == NO_MEMORY._replace(psi=0.02, r=0.003)
+
+
+def measured(settings, steps=7.0, key=1):
+    random = Random(np.uint64(key), np.uint64(2))
+    with np.errstate(over="ignore"):
+        return bridge.measure(
+            SAILING, SEA, NO_MEMORY, 0.6, INTERVAL._replace(steps=steps), bridge.Settings(**settings), random
+        )
+
+
+def test_noise_of_each_instrument_is_its_own_and_grows_with_its_deviation(monkeypatch):
+    monkeypatch.setattr(bridge, "HAS_FILTER", False)
+    plain = measured({})
+    assert plain[:6] == (0.0, 0.0, 0.02, 0.0, 0.0, 0.003)
+    shows = {"heading": ("psi",), "yaw_rate": ("r",), "speed": ("u", "v"), "position": ("x", "y")}
+    drawn = []
+    for setting, channels in shows.items():
+        one, twice = measured({setting: 0.1}), measured({setting: 0.2})
+        for name in plain._fields[:6]:
+            noise = getattr(one, name) - getattr(plain, name)
+            assert getattr(twice, name) - getattr(plain, name) == pytest.approx(2.0 * noise)
+            assert (noise != 0.0) == (name in channels)
+            drawn += [noise] if noise else []
+    assert len(set(drawn)) == 6
+    assert measured({"speed": 0.1}) == measured({"speed": 0.1})
+    assert len({measured({"speed": 0.1}, steps, key).u for steps in (0.0, 1.0, 2.0) for key in (1, 2)}) == 6
+
+
+def test_a_filter_takes_nothing_away_in_the_first_sample(monkeypatch):
+    monkeypatch.setattr(bridge, "HAS_NOISE", False)
+    first = bridge.measure(
+        SAILING, SEA, NO_MEMORY, 0.6, INTERVAL._replace(steps=0.0), bridge.Settings(), None
+    )
+    assert (first.psi, first.r) == (0.02, 0.003)
+    assert first.heading == bridge.Notch(SAILING.psi + 0.02, SAILING.psi + 0.02, 0.0, 0.0)
+    assert first.rate == pytest.approx(bridge.Notch(0.013, 0.013, 0.0, 0.0))
+    later = bridge.measure(SAILING, SEA, first, 0.6, INTERVAL, bridge.Settings(), None)
+    assert later.heading == bridge.notched(SAILING.psi + 0.02, 0.3, False, first.heading)
+    assert later.psi == pytest.approx(0.02 - later.heading.taken_1)
+    changed = SEA._replace(psi_wave=0.05, r_wave=-0.01)
+    later = bridge.measure(SAILING, changed, first, 0.6, INTERVAL, bridge.Settings(), None)
+    assert later.rate == pytest.approx(bridge.notched(0.0, 0.3, False, first.rate))
+    assert later.r == pytest.approx(-0.01 - later.rate.taken_1)
+    assert later.heading.taken_1 != 0.0 != later.rate.taken_1
+    fast = bridge.measure(SAILING, changed, first, 99.0, INTERVAL, bridge.Settings(), None)
+    assert fast.rate == pytest.approx(
+        bridge.notched(0.0, 2.8, False, first.rate)
+    )  # not beyond what is sampled
