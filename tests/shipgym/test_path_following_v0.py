@@ -381,3 +381,80 @@ def test_the_next_leg_is_one_of_the_plan_whatever_a_checkpoint_holds(leg):
     motion = Motion(490.0, 0.0, *[0.0] * 9)
     found = path_following.on_event(motion, state, None, ship, path_following.Settings(), None, plan)
     assert (found.leg, found.north, found.east) == (1.0, 500.0, 0.0)
+
+
+PLAN = np.array([0.0, 0.0, 3000.0, 0.0, 3000.0, 4000.0, 0.0, 0.0])
+
+
+def test_a_leg_knows_its_length_its_course_and_the_turn_at_its_end():
+    legs = [leg_from(number, 100.0, PLAN) for number in range(3)]
+    assert [leg.leg for leg in legs] == [0.0, 1.0, 2.0]
+    assert [leg.length for leg in legs] == [leg.to_go for leg in legs] == [3000.0, 4000.0, 5000.0]
+    back = np.arctan2(-4000.0, -3000.0)
+    assert [leg.leg_course for leg in legs] == pytest.approx([0.0, np.pi / 2, back])
+    assert [leg.turn for leg in legs] == pytest.approx([np.pi / 2, wrapped(back - np.pi / 2), 0.0])
+    assert {(leg.before, leg.sailed, leg.distance_made_good, leg.in_corridor) for leg in legs} == {
+        (100.0, 0.0, 0.0, 1.0)
+    }
+    assert (legs[2].cosine, legs[2].sine) == pytest.approx((-0.6, -0.8))
+
+
+def test_the_next_leg_is_due_near_the_end_of_each_but_the_last():
+    asked = Settings(n_legs=3, acceptance=1.5)
+    near, far = 1.49 * LENGTH, 1.51 * LENGTH
+    for number, to_go, due in (
+        (0, near, True),
+        (0, far, False),
+        (1, near, True),
+        (2, near, False),
+        (2, -9.0, False),
+    ):
+        state = leg_from(number, 0.0, PLAN)._replace(to_go=to_go)
+        assert bool(path_following.due(None, state, None, SHIP, asked)) is due
+    assert path_following.last_leg(asked) == 2.0
+    assert (
+        path_following.last_leg(Settings(n_legs=9, waypoints=path_following.listed(PLAN.reshape(-1, 2))))
+        == 2.0
+    )
+
+
+def test_the_way_round_a_corner_that_is_cut_counts_as_sailed():
+    state = leg_from(0, 0.0, PLAN)._replace(heading_error=0.7, distance_made_good=2500.0, integral=0.3)
+    motion = Motion(2900.0, 150.0, 0.2, *[0.0] * 8)
+    found = path_following.on_event(motion, state, None, SHIP, Settings(), None, PLAN)
+    assert (found.leg, found.before, found.sailed, found.to_go) == (1.0, 3000.0, 3150.0, 3850.0)
+    assert found.cross_track == pytest.approx(100.0)  # south of a leg due east
+    assert found.course == pytest.approx(np.pi / 2 - np.arctan(100.0 / (2.5 * LENGTH)))
+    assert (found.heading_error, found.distance_made_good, found.integral) == (
+        0.7,
+        2500.0,
+        0.3,
+    )  # as reported
+    behind = path_following.on_event(motion._replace(y=-80.0), state, None, SHIP, Settings(), None, PLAN)
+    assert (behind.sailed, behind.to_go) == (3000.0, 4080.0)
+
+
+def test_a_step_on_a_leg_is_charged_for_its_distance_and_for_way_not_made():
+    asked = Settings(n_legs=3, corridor=0.5, ground=2.0)
+    state = leg_from(2, 7000.0, PLAN)._replace(sailed=11_000.0)
+    interval = Interval(100.0, 7.0, 0.02, 0.0, 1.0, 0.0, 0.0)
+    along, aside = np.array([-0.6, -0.8]), np.array([0.8, -0.6])
+
+    def step(way, off):
+        x, y = PLAN[4:6] + way * along + off * LENGTH * aside
+        return path_following.step(Motion(x, y, *[0.0] * 9), state, interval, SHIP, asked)
+
+    after, reward, aground, arrived = step(4000.0 + 50.0 * SPEED, 0.25)
+    assert after.sailed == after.distance_made_good == pytest.approx(11_000.0 + 50.0 * SPEED)
+    assert after.to_go == pytest.approx(1000.0 - 50.0 * SPEED)
+    assert (reward.progress, reward.cross_track) == pytest.approx((-0.5, -0.25))
+    assert (bool(aground), bool(arrived), after.in_corridor, after.grounded) == (False, False, 1.0, 0.0)
+    assert step(4000.0 - 300.0 * SPEED, 0.0)[1].progress == -2.0
+    assert step(4000.0 + 300.0 * SPEED, 0.0)[1].progress == 0.0
+    for way, off, end in ((5001.0, 0.49, True), (5001.0, 0.51, False), (4999.0, 0.0, False)):
+        after, *_, arrived = step(way, off)
+        assert bool(arrived) is bool(after.success) is end
+    assert step(5001.0, 0.0)[0].sailed == pytest.approx(12_000.0)  # the path's end
+    assert [bool(step(4500.0, off)[2]) for off in (1.99, -2.01)] == [False, True]
+    first = path_following.step(Motion(0.0, 0.0, *[0.0] * 9), state._replace(leg=1.0), interval, SHIP, asked)
+    assert not first[3]
