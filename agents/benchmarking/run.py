@@ -12,7 +12,7 @@ import numpy as np
 
 from agents.benchmarking.contestants import BEST_KNOWN, Contestant, check_agents, contestants, policy_hash
 from agents.benchmarking.results import PARTS, BenchmarkResult, check_new, gathered
-from agents.engines.jobs import run_jobs
+from agents.engines.jobs import check_engine, run_jobs
 from agents.output import in_use
 from agents.rollouts.metrics import evaluate
 from agents.suites.reference import best_costs
@@ -66,6 +66,7 @@ def benchmark(
     """
     chosen, who = _chosen(suite, tasks), contestants(controllers)
     check_number(check_whole(episodes, "episodes", at_least=1), "episodes", at_most=N_EPISODES)
+    check_engine(engine, workers, address)
     for one in who:
         check_agents(one, chosen)
     folder = None if out is None else check_new(Path(out), resume, suite)
