@@ -135,7 +135,7 @@ def test_a_process_is_dead_where_the_system_knows_none_of_its_number(monkeypatch
 
 
 def test_drafts_of_this_computer_and_of_others_count_as_abandoned_after_a_week(tmp_path):
-    living, elsewhere = draft(tmp_path / "a", os.getppid()), draft(tmp_path / "b", 1, "00000000")
+    living, elsewhere = draft(tmp_path / "a", os.getpid()), draft(tmp_path / "b", 1, "00000000")
     for age, expected in ((WEEK - 60, []), (WEEK + 60, [living, elsewhere])):
         for path in (living, elsewhere):
             os.utime(path, (time.time() - age,) * 2)
