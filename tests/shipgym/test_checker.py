@@ -136,6 +136,23 @@ def test_a_ship_is_sailed_straight_for_30_lengths_and_in_hard_turns_for_40(marin
     assert sailed == [(0.0, 30.0), (pytest.approx(limit), 40.0), (pytest.approx(-limit), 40.0)]
 
 
+def test_states_are_those_of_hard_manoeuvres(mariner):
+    """By service speed and ship length: slow and a little too fast, drifting, turning, rolling and heeled."""
+    states = checker._states(mariner)
+    length, speed = mariner.particulars["length"], mariner.particulars["speed"]
+    u = states["u"]
+    assert (u.min() / speed, u.max() / speed) == (pytest.approx(0.2, abs=0.01), pytest.approx(1.1, abs=0.01))
+    sizes = {
+        "v": states["v"] / u, "r": states["r"] * length / u, "p": states["p"] * length / u,
+        "phi": np.degrees(states["phi"]), "q": states["q"] * (length / speed) ** 2,
+        "delta": np.degrees(states["delta"]),
+    }  # fmt: skip
+    ranges = {"v": 0.3, "r": 0.8, "p": 0.5, "phi": 15.0, "q": 0.5, "delta": 40.0}
+    for name, most in ranges.items():
+        assert 0.98 * most < sizes[name].max() <= most
+        assert -most <= sizes[name].min() < -0.98 * most
+
+
 @pytest.mark.parametrize(("off", "problems"), [(0.95e-9, 0), (1.05e-9, 1)])
 def test_compiled_accelerations_are_those_of_the_table_to_nine_digits(mariner, off, problems, monkeypatch):
     """By the largest of each."""

@@ -456,6 +456,17 @@ def test_velocities_contradict_positions_where_they_follow_them_in_another_way(
         check_consistency(log, "body", here)
 
 
+@pytest.mark.parametrize(("error_deg", "told"), [(0.74, True), (0.76, False)])
+def test_an_offset_of_the_compass_is_told_where_it_is_four_standard_errors(error_deg, told, monkeypatch):
+    """Here of 3 deg."""
+    monkeypatch.setattr(plausibility, "heading_offset", lambda *_: (3.0 * DEGREE, error_deg * DEGREE))
+    t = np.arange(100.0)
+    values = {"psi": 0.0 * t, "delta": t, "ground_north": 5.0 + 0.0 * t, "ground_east": 0.0 * t}
+    here = source(range(100), t="time", psi="gyro")
+    notes = check_log(Log(t, values, "", []), Instruments(), here, gnss=True)
+    assert ["heading_offset_deg = 3.0 in [sensors]" in note for note in notes] == [True] * told
+
+
 @pytest.mark.parametrize(("swing_deg", "refused"), [(44.0, True), (47.0, False)])
 def test_a_heading_that_swings_about_the_course_is_not_compared(swing_deg, refused):
     """The mean of cos(45 deg) is 0.71."""

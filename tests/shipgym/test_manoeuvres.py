@@ -294,3 +294,27 @@ def test_a_turn_is_steady_after_three_quarters_of_a_circle(turned, steady):
     assert found.steady_diameter_lengths == pytest.approx(2.0 * 5.0 / 0.02 / 100.0)
     assert found.steady_speed_ratio == pytest.approx(5.0 / 8.0)
     assert found.steady_drift_deg == pytest.approx(np.degrees(np.arctan2(3.0, 4.0)))
+
+
+@pytest.mark.parametrize(
+    ("reached_deg", "switch_deg"),
+    [
+        (9.4, 9.4),
+        (9.6, 10.0),
+        (12.9, 10.0),
+        (13.1, 13.1),
+        (14.3, 15.0),
+        (0.94, 0.94),
+        (0.96, 1.0),
+        (3.9, 1.0),
+    ],
+)
+def test_a_measured_zigzag_was_switched_at_the_last_usual_heading_three_degrees_back_at_most(
+    reached_deg, switch_deg
+):
+    """Usual are 1 and multiples of 5 deg, which a helmsman may take for reached 5 per cent before."""
+    t = np.arange(101.0)
+    psi = np.radians(np.interp(t, [0.0, 5.0, 50.0, 100.0], [0.0, 0.0, reached_deg, 0.0]))
+    rudder = np.interp(t, [0.0, 4.0, 5.0, 50.0, 51.0, 52.0, 100.0], [0.0, 0.0, 10.0, 10.0, 0.0, -10.0, -10.0])
+    trial = Trial(t, {"psi": psi, "delta": np.radians(rudder)})
+    assert manoeuvres.switch_heading_deg(trial) == pytest.approx(switch_deg)

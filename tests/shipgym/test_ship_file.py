@@ -214,6 +214,11 @@ def test_repair_may_be_asked_for_the_whole_file_or_one_trial(folder):
         ),
         ('structure = "abkowitz"', "structure = 3", ": [identify] structure: 3 found"),
         ("structure =", "structur =", ": [identify]: unknown key 'structur'"),
+        (
+            'structure = "abkowitz"',
+            'reference_model = "ship.py"',
+            ": [identify].reference_model: 'ship.py' found, which is code: no file makes shipgym run another",
+        ),
         ('kind = "zigzag"', 'kind = "zig zag"', ": [[trials]] 1 kind: 'zig zag' found"),
         ('use = "validate"', 'use = "valid"', ": [[trials]] 2 use: 'valid' found"),
         ('use = "validate"', 'used = "validate"', ": [[trials]] 2: unknown key 'used'. Did you mean 'use'?"),
