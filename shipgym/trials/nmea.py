@@ -26,7 +26,7 @@ MOST_DAMAGED = 0.1
 SENTENCES: dict[str, dict[str, list[str]]] = shipped_toml("shipgym.trials", "sentences.toml")
 _SPEEDS = {"N": "knots", "K": "km/h", "M": "m/s"}
 #: The better sources: of heading true ones, of the speed through the water the log with two axes.
-_BETTER = {"HDT": 3, "THS": 2, "VHW": 1, "VBW": 1}
+_BETTER = {"HDT": 3, "THS": 2, "VHW": 1, "VBW": 2}
 _SENTENCE = re.compile(rf"\$[A-Z]{{2}}(?:{'|'.join(SENTENCES)}),.*")
 _ANY = re.compile(r"^[^\n]{0,60}[$!][A-Z]{4,5},", re.MULTILINE)
 

@@ -765,10 +765,11 @@ def readings(count, begin=34_200.0):
         ("psi", {"HEHDT": 3, "GPHDT": 9}, "GPHDT"),
         ("psi", {"IIHDT": 9, "HEHDT": 3}, "HEHDT"),  # a display that passes others' sentences on
         ("sog", {"GPRMC": 3, "GPVTG": 9}, "GPVTG"),
+        ("stw", {"VDVBW": 3, "VDVHW": 9}, "VDVBW"),  # the log with two axes
     ],
 )
 def test_of_several_sources_the_better_one_is_read(channel, sources, best):
-    """True headings before those of compasses, then sources of their own, then those that say the most."""
+    """True headings and logs of two axes first, then sources of their own, then those that say the most."""
     told = {name: readings(count) for name, count in sources.items()}
     table = nmea._assembled(Path("log"), {"t": {"GPGGA": readings(12)}, channel: told}, [])
     (other,) = sources.keys() - {best}
