@@ -217,3 +217,26 @@ def test_nothing_is_learned_before_the_yaw_rate_was_calm_for_a_while():
 
 def test_it_is_designed_anew_once_in_a_control_interval_at_most():
     assert AdaptiveLQ.from_model(MARINER, redesign_lengths=1e-3).design["redesign_steps"] == 1.0
+
+
+@pytest.mark.parametrize(
+    ("sway", "turn", "learned"),
+    [(0.095, 0.0, True), (-0.105, 0.0, False), (0.0, -0.24, True), (0.0, 0.26, False), (0.105, 0.24, False)],
+)
+def test_drift_of_a_tenth_and_turns_of_a_quarter_are_too_hard_to_learn_from(sway, turn, learned):
+    """Over speed, and times length over speed; the mean of an interval counts, and none where it begins."""
+    adaptive = AdaptiveLQ.from_model(MARINER)
+    speed, length = 6.0, adaptive.design["length"]
+    ends = np.array([[sway * speed, turn * speed / length, 0.05, speed]])
+    spread = np.array([[0.3, 0.002, 0.0, 0.0]])
+    for begins in (False, True):
+        kept = adaptive._fresh()
+        kept["last"] = ends - spread
+        adaptive._learn(kept, ends + spread, np.array([begins]), np.array([True]))
+        assert bool(np.any(kept["terms"])) == (learned and not begins)
+        if learned and not begins:
+            terms = np.array([sway, turn, 0.05, 1.0]) / SIZES
+            np.testing.assert_allclose(kept["terms"][0, -1], terms, rtol=1e-12)
+            units = np.array([length / speed**2, (length / speed) ** 2])
+            targets = 2.0 * spread[0, :2] / adaptive.design["dt"] * units / adaptive.error_size
+            np.testing.assert_allclose(kept["targets"][0, -1], targets, rtol=1e-12)

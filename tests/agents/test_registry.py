@@ -17,6 +17,7 @@ from agents.controllers.memory import records
 from agents.suites.suite import load_suite
 from shipgym import load_model
 from shipgym.errors import InputError
+from tests.agents.policies import random_policy
 
 MINE = """
 from dataclasses import dataclass
@@ -150,3 +151,15 @@ def test_a_kind_is_a_name_and_no_other_controller_s(monkeypatch):
     with pytest.raises(InputError, match="kind 'my-lq' is that of mine:Mine already, expected another one"):
         register_controller(other)
     assert registry.controller_class("my-lq") is first
+
+
+def test_a_base_is_a_classical_controller_of_a_file_or_none(tmp_path):
+    task = load_suite("shipgym-v1").task("mariner-calm")
+    made = LQ.from_model(task.ship, integral_lengths=33.0)
+    made.save(tmp_path / "mine.json")
+    base = design_base(str(tmp_path / "mine.json"), task)
+    assert base.gains == made.gains
+    assert design_base("none", task) is None
+    random_policy(task.ship).save(tmp_path / "learned.json")
+    with pytest.raises(InputError, match=r"learned\.json holds a learned policy, expected a classical"):
+        design_base(str(tmp_path / "learned.json"), task)

@@ -76,3 +76,69 @@ def test_what_is_largest_without_a_warning_is_that_of_the_quiet_intervals():
     assert module._unwarned(run, size, "off heading") == 9.0
     always = run._replace(warnings=[["off track"]] * 4)
     assert module._unwarned(always, size, "off track") == 0.0
+
+
+def made_up(errors, warnings=None, **more):
+    """A run of a second an interval with these heading errors, deg."""
+    n = len(errors)
+    given, order = more.pop("given", [{}] * n), np.full(n, more.pop("order", 5.0))
+    zeros, rest = np.zeros(n), {"alarm": "", "alarm_at": np.inf} | more
+    told = warnings or [[]] * n
+    return module.Run(np.arange(float(n)), np.array(errors), zeros, zeros, order, given, told, **rest)
+
+
+@pytest.mark.parametrize(
+    ("last", "overshoot", "rudder"), [(0.95, 0.0, 7.0), (-0.95, 0.95, 7.0), (1.05, 0.0, np.inf)]
+)
+def test_a_turn_counts_where_it_ends_within_a_degree_of_the_course(last, overshoot, rudder, monkeypatch):
+    turn = made_up([30.0, 12.0, 11.0, last], [["off heading"], ["off heading"], [], []], order=-7.0)
+    straight = made_up([9.0, 0.3, -0.4, 0.2])  # the first quarter does not count
+    asked = []
+
+    def run_of(model, pilot, sea="calm", heading=0.0, **more):
+        asked.append((heading, {**more}))
+        lost = made_up([0.0] * 4, alarm="no heading", alarm_at=63.5)
+        return lost if "lost" in more else turn if heading else straight
+
+    monkeypatch.setattr(module, "kept", run_of)
+    found = heading_control(MARINER, None)
+    assert found == pytest.approx({
+        "heading_calm": 0.4, "overshoot": overshoot, "rudder_limit": rudder, "off_heading": 11.0 - 10.0,
+        "heading_lost": 3.5,
+    })  # fmt: skip
+    narrow = {"limits": Limits(order_deg=10.0)}
+    assert asked == [(30.0, {}), (30.0, narrow), (0.0, {}), (0.0, {"lost": ["heading"]})]
+
+
+@pytest.mark.parametrize(
+    ("warned", "lead"), [([], 1.0), ([3, 4, 5], 2.0), ([1, 2, 3], 4.0), ([0, 1, 2, 3], 0.0)]
+)
+def test_a_turn_is_announced_from_the_last_quiet_interval_on(warned, lead, track, monkeypatch):
+    """Begun where the reach is passed, in the fifth interval; one that was never quiet tells no lead.
+
+    The route ends four intervals after the last, of 10 m each.
+    """
+    reach = track.controller.gains["turn_reach"]
+    to_go = reach + 10.0 * np.array([4.0, 3.0, 2.0, 1.0, 0.0, -1.0])
+    given = [{"next_turn_distance": one, "next_turn_angle": 0.5} for one in to_go]
+    given += [{"next_turn_distance": one, "next_turn_angle": 0.0} for one in (60.0, 50.0, 40.0)]
+    told = [["course change ahead"] if k in warned else [] for k in range(9)]
+    along = made_up([0.0] * 9, told, given=given, alarm="the end of the route is reached", alarm_at=13.0)
+    off = [{"cross_track": one} for one in (150.0, -53.0, 9.0)]
+    aside = made_up([0.0] * 3, [["off track"], [], []], given=off)
+    lost = made_up([0.0] * 3, alarm="no latitude", alarm_at=63.0)
+
+    def run_of(model, one, limits, **more):
+        assert limits == Limits(off_track_m=50.0)
+        return lost if "lost" in more else aside if more.get("aside") else along
+
+    monkeypatch.setattr(module, "_on_track", run_of)
+    found = track_control(MARINER, track)
+    length, dt = MARINER.particulars["length"], track.controller.design["dt"]
+    assert found["early_indication"] == lead
+    assert found["off_track"] == pytest.approx(53.0 - 50.0)
+    assert found["position_lost"] == 3.0
+    assert found["route_ended"] == pytest.approx(13.0 - (8.0 + 4.0 * dt))
+    assert found["cross_track"] == pytest.approx(track.largest[0] / length)
+    along = along._replace(alarm="no heading")
+    assert track_control(MARINER, track)["route_ended"] == np.inf
