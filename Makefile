@@ -26,9 +26,12 @@ demo: $(VENV)/demo-installed
 # are marked as `compiled` in files so marked take many steps, or state facts about compiled code.
 INTERPRETED = $(shell grep -lr "pytest.mark.interpreted" tests --include="test_*.py")
 
+# The one long test of the fuzz begins first: at the end one of two processors would wait for it.
+COMPILED = -m "compiled or not interpreted" --ignore=tests/test_site.py tests/test_fuzz.py tests
+
 test: lint type
 	NUMBA_DISABLE_JIT=1 OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n 2 -m "interpreted and not compiled" $(INTERPRETED)
-	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n 2 --dist loadfile -m "compiled or not interpreted" --ignore=tests/test_site.py
+	OMP_NUM_THREADS=1 $(BIN)/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder $(COMPILED)
 
 lint: $(VENV)/dev-installed
 	$(BIN)/ruff format --check .
