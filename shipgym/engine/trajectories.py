@@ -148,7 +148,8 @@ def switched(
 ) -> Motion:  # fmt: skip
     """State after a step within which the heading crosses the threshold and the rudder reverses.
 
-    The instant is found by the Illinois variant of regula falsi on the heading after part of the step.
+    The instant is found by regula falsi on the heading after part of the step; the miss of the end that stays
+    is halved each time, as the Illinois variant does where an end stays twice.
     """
     side = 1.0 if command > 0.0 else -1.0
     low, high = 0.0, 1.0
