@@ -39,6 +39,7 @@ RUNNING = ("task", "model", "num_envs", "threads", "autoreset_mode", "vectorizat
 REFUSED = ("VecFrameStack", "VecTransposeImage", "VecExtractDictObs")
 #: What the wrapper has that adds to a controller.
 RESIDUAL = {"authority": float, "frame_stack": int, "action_repeat": int, "rate_limit": float}
+N_COMPARED = 16
 AGREEMENT = 1e-4  # of the commands found with torch and without, far above rounding
 
 
@@ -165,8 +166,8 @@ def _array(parameter: Any) -> NDArray[np.float32]:
 
 
 def _check_extraction(network: Network, agent: Any, action: str) -> None:
-    """The network must command what the agent does, where each observation alone is 1."""
-    inputs = np.eye(network.sizes[0], dtype=np.float32)
+    """The network must command what the agent does, on observations at random."""
+    inputs = np.random.default_rng(0).uniform(-1.0, 1.0, (N_COMPARED, network.sizes[0])).astype(np.float32)
     if agent.observation_space.shape != inputs.shape[1:]:
         raise InputError(
             f"agent: observations of shape {agent.observation_space.shape} found, expected "
@@ -175,7 +176,7 @@ def _check_extraction(network: Network, agent: Any, action: str) -> None:
     theirs, _ = agent.predict(inputs, deterministic=True)
     output = network(inputs)
     if action == "rudder-discrete":
-        agrees = bool((output.argmax(axis=1) == theirs).all())
+        agrees = bool((output.argmax(axis=-1) == theirs).all())
     else:
         agrees = bool(np.abs(np.clip(output, -1.0, 1.0) - theirs).max() < AGREEMENT)
     if not agrees:
