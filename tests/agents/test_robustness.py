@@ -36,6 +36,8 @@ def test_quantiles_are_over_the_stable_loops():
     values = {"gain_margin": np.array([2.0, np.inf, np.nan, 3.0])}
     found = MarginUncertainty(LQ.from_model(MARINER).margins, values, np.array([True, True, False, True]))
     assert found.quantiles((0.0, 0.5, 1.0))["gain_margin"].tolist() == [2.0, 3.0, np.inf]
+    many = replace(found, by_name={"gain_margin": np.arange(101.0)}, stable=np.ones(101, dtype=np.bool_))
+    assert many.quantiles()["gain_margin"].tolist() == [5.0, 50.0, 95.0]
 
 
 def test_no_models_are_refused():

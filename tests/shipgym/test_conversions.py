@@ -40,12 +40,13 @@ def same(found: Nomoto, expected: Nomoto, rel: float = 1e-9) -> None:
         assert getattr(found, name) == pytest.approx(getattr(expected, name), rel=rel), name
 
 
-def test_state_space_has_the_ship_s_states_by_name_and_nomoto_s_response():
-    plant = state_space(MARINER, heading=True, gear=True)
+@pytest.mark.parametrize("lag", [1.0, 2.5])
+def test_state_space_has_the_ship_s_states_by_name_and_nomoto_s_response(lag):
+    ship = replace(MARINER, steering=replace(MARINER.steering, time_constant=lag))
+    plant = state_space(ship, heading=True, gear=True)
     assert plant.state_labels == ["v", "r", "psi", "delta"]
     assert plant.input_labels == ["delta_command"]
     form = nomoto(MARINER)
-    lag = MARINER.steering.time_constant
     s = 1j * np.geomspace(1e-3, 1.0, 7)
     yaw = form.K * (1 + form.T3 * s) / ((1 + form.T1 * s) * (1 + form.T2 * s)) / (1 + lag * s)
     np.testing.assert_allclose(plant(s)[1, 0], yaw, rtol=1e-9)

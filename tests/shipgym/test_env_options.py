@@ -471,6 +471,8 @@ def test_an_interval_is_integrated_in_steps_of_at_most_one_and_a_half_usual_ones
         assert task.interval(mariner) == (dt or 1.0)
         assert task.substeps(mariner) == steps
         assert task.substep(mariner) == pytest.approx((dt or 1.0) / steps)
+    tanker = shipgym.load_model("kvlcc2")  # whose usual interval is 2 s
+    assert [course_keeping_task(dt=dt).substeps(tanker) for dt in (None, 3.0, 3.01, 6.0)] == [1, 1, 2, 2]
 
 
 def test_an_interval_is_at_most_five_ship_lengths():
