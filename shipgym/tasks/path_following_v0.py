@@ -70,6 +70,7 @@ class State(NamedTuple):
     success: Flag  # whether the end of the path is reached
     in_corridor: Flag
     grounded: Flag
+    last: float  # number of the last leg
 
 
 class Reward(NamedTuple):
@@ -114,7 +115,7 @@ def leg_from(number: int, before: float, plan: Numbers) -> State:
     cosine, sine = (to_north - north) / length, (to_east - east) / length
     return State(
         float(number), north, east, cosine, sine, length, course, turn, before, 0.0, length, course,
-        0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0,
+        0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, float(len(plan) // 2 - 2),
     )  # fmt: skip
 
 
@@ -142,18 +143,14 @@ def on_leg(motion: Motion, leg: State, so_far: State, sailed: float, ship: Ship,
         sailed, leg.length - at.along, at.course, so_far.integral,
         wrap(at.course - motion.psi) if first else so_far.heading_error,
         at.cross, so_far.distance_made_good, so_far.success, so_far.in_corridor, so_far.grounded,
+        leg.last,
     )  # fmt: skip
 
 
 def due(motion: Motion, state: State, interval: Interval, ship: Ship, settings: Settings) -> bool:
     """Whether the next leg begins."""
     near = state.to_go <= settings.acceptance * ship.length
-    return near & (state.leg < last_leg(settings))
-
-
-def last_leg(settings: Settings) -> float:
-    """Number of the last leg."""
-    return settings.waypoints[0] - 2.0 if len(settings.waypoints) > 0 else settings.n_legs - 1.0
+    return near & (state.leg < state.last)
 
 
 def on_event(
@@ -179,7 +176,7 @@ def step(
     off = fabs(at.cross) / ship.length
     to_go = state.length - at.along
     within, aground = off <= settings.corridor, off > settings.ground
-    arrived = (state.leg == last_leg(settings)) & (to_go <= 0.0) & within
+    arrived = (state.leg == state.last) & (to_go <= 0.0) & within
 
     per_corridor = 1.0 / settings.corridor
     reward = Reward(
@@ -190,7 +187,7 @@ def step(
     after = State(
         state.leg, state.north, state.east, state.cosine, state.sine, state.length, state.leg_course,
         state.turn, state.before, sailed, to_go, at.course, integral, error, at.cross, sailed,
-        pick(arrived, 1.0, 0.0), pick(within, 1.0, 0.0), pick(aground, 1.0, 0.0),
+        pick(arrived, 1.0, 0.0), pick(within, 1.0, 0.0), pick(aground, 1.0, 0.0), state.last,
     )  # fmt: skip
     return after, reward, aground, arrived
 

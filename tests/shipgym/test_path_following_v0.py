@@ -411,11 +411,7 @@ def test_the_next_leg_is_due_near_the_end_of_each_but_the_last():
     ):
         state = leg_from(number, 0.0, PLAN)._replace(to_go=to_go)
         assert bool(path_following.due(None, state, None, SHIP, asked)) is due
-    assert path_following.last_leg(asked) == 2.0
-    assert (
-        path_following.last_leg(Settings(n_legs=9, waypoints=path_following.listed(PLAN.reshape(-1, 2))))
-        == 2.0
-    )
+    assert leg_from(0, 0.0, PLAN).last == 2.0
 
 
 def test_the_way_round_a_corner_that_is_cut_counts_as_sailed():
