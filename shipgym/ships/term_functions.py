@@ -28,7 +28,7 @@ MADE = {
     **{name: f"motion.{name}" for name in ("u", "v", "r", "p", "phi", "delta", "n")},
     "s": "u * u + v * v",
     "U": "sqrt(s)",
-    "per_U": "1.0 / U",
+    "per_U": "U * (1.0 / s)",
     "du": "u - ship.speed",
     "dn": "n - ship.shaft",
     **{VARIABLE[symbol]: f"fabs({CHANNEL[symbol]})" for symbol in SYMBOLS if symbol[0] == "|"},
