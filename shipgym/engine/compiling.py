@@ -11,14 +11,14 @@ import re
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from shipgym.engine.cache_folder import locked, usable_folder
-from shipgym.engine.specialise import SEMANTICS, Parts, Specialisation, fingerprint, is_shipped
+from shipgym.engine.specialise import CALLED, SEMANTICS, Parts, Specialisation, fingerprint, is_shipped
 from shipgym.errors import InputError
 
 SECONDS = 4  # about what a loop takes to compile on a laptop; what is told to who waits
@@ -36,13 +36,9 @@ def compiled(loop: Any, signature: str, parts: Parts, what: str) -> Any:
     if plain_python():
         wraps = np.errstate(over="ignore")  # words of random numbers overflow, as they do when compiled
         return wraps(Specialisation(parts, tag, None).copy(loop))
-    import numba
-
     from shipgym.engine.disk_cache import DiskCache
-    from shipgym.engine.lean_numba import LeanCompiler, without_scipy
 
-    without_scipy()
-    jit = partial(numba.njit, pipeline_class=LeanCompiler)
+    jit = _lean_jit()
     options = {"nogil": True, "_nrt": not is_shipped(loop), **SEMANTICS}
     dispatcher = jit(**options)(Specialisation(parts, tag, jit).copy(loop))
     folder = usable_folder()
@@ -72,6 +68,17 @@ def plain_python() -> bool:
     return bool(numba.config.DISABLE_JIT)
 
 
+@cache
+def _lean_jit() -> Any:
+    """Numba's decorator, with our compiler."""
+    import numba
+
+    from shipgym.engine.lean_numba import LeanCompiler, without_scipy
+
+    without_scipy()
+    return partial(numba.njit, pipeline_class=LeanCompiler)
+
+
 def _compile(dispatcher: Any, signature: str, what: str) -> None:
     """Compile, or take from the cache."""
     from numba.core.compiler_lock import global_compiler_lock
@@ -81,7 +88,7 @@ def _compile(dispatcher: Any, signature: str, what: str) -> None:
 
     name = dispatcher.py_func.__qualname__
     try:
-        with global_compiler_lock, _uncollected(), lean(name.rpartition("_")[2], name):
+        with global_compiler_lock, _uncollected(), lean(name):
             dispatcher.compile(signature)
     except (NumbaError, TypeError) as error:  # TypeError: a record made of other fields
         raise InputError(explanation(error, what)) from None
@@ -109,7 +116,7 @@ def explanation(error: Exception, what: str) -> str:
             (f": {line[4:]}" for line in lines if line.startswith(">>> ")), ""
         )
     place = re.search(r"at (\S+) \((\d+)\)", text)
-    function = re.search(r"^def (\w+)\(|<function (\w+)_[0-9a-f]{24} at", text, re.MULTILINE)
+    function = re.search(rf"^def (\w+)\(|<function (\w+)_[0-9a-f]{{24}}(?:{CALLED})? at", text, re.MULTILINE)
     where = f" in {function[1] or function[2]}" if function else ""
     if place and (function is None or function[1]):
         where += f" ({place[1]}, line {place[2]})"

@@ -151,22 +151,22 @@ def sail_lanes(tile: Tile, h: float, lanes: int) -> None:
         before, course, sea = load_motion(state, lane), load_course(state, lane), load_sea(state, lane)
         rudder, shaft = course.rudder_command * ship.rudder_limit, course.shaft_command * ship.shaft
         after = sail(before, rudder, shaft, h, push(before, sea, p), coefficients, ship)
-        conclude_step(tile, lane, after, h, ship, p)
+        store_motion(state, lane, end_of_step(tile, lane, after, h, ship, p))
 
 
-def conclude_step(tile: Tile, lane: int, after: Any, h: float, ship: Any, p: Any) -> None:
-    """Put a ship where her step of h seconds leads, and let the sea of parameters p go on."""
+def end_of_step(tile: Tile, lane: int, after: Any, h: float, ship: Any, p: Any) -> Any:
+    """Where a ship is after her step of h seconds; the sea of parameters p goes on."""
     state, words = tile.state, tile.keys[2]
     before, course, sea = load_motion(state, lane), load_course(state, lane), load_sea(state, lane)
     away = lost(after, ship)
     over = course.ended != 0.0
     motion = choose_motion(away | over, before, after)
-    store_motion(state, lane, motion)
-    store_ran_away(state, lane, pick(away, 1.0, course.ran_away))
+    store_ran_away(state, lane, max(course.ran_away, pick(away, 1.0, 0.0)))
     if HAS_SEA:
         word = words[lane]
         words[lane] = word + EVOLVE_WORDS
         store_sea(state, lane, choose_sea(over, sea, evolve(motion, h, sea, word, p)))
+    return motion
 
 
 def conclude_lanes(tile: Tile, lanes: int) -> tuple[int, int]:

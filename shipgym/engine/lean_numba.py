@@ -1,9 +1,9 @@
 """Compiling a loop once: Numba optimises and emits each function on its own, though the loop holds them all.
 
 Numba makes machine code of every function that a loop calls, nested ones again in each that calls them, and
-then of the loop, into which their code is inlined. Here the functions with the loop's tag are translated only
-as far as LLVM's intermediate code and linked once, into the loop; and passes over them that find nothing in
-functions on numbers and records are left out. The loop's code is the same, but for the length of its vectors.
+then of the loop, into which their code is inlined. Here what loops call is translated once in a process, only
+as far as LLVM's intermediate code, and linked into each loop; and passes that find nothing in functions on
+numbers and records are left out. The loop's code is the same, but for the length of its vectors.
 """
 
 import sys
@@ -13,10 +13,13 @@ from types import CodeType
 from typing import Any
 
 import numba.np.linalg
+from llvmlite import ir
 from llvmlite.binding.newpassmanagers import create_new_function_pass_manager
 from numba.core import codegen
 from numba.core.compiler import Compiler
 from numba.core.compiler_machinery import PassManager
+
+from shipgym.engine.specialise import CALLED
 
 Replace = Callable[[Any, str, Any], None]
 
@@ -33,19 +36,18 @@ INSIDE = {
 }
 # LLVM halves the vectors of processors that slow down when a few long ones are used; loops use nothing else
 LONG_VECTORS = '"prefer-vector-width"="512"'
+# Loops of numbers that wait for one another; of two vectors of 256 bits at once, neither waits for the other
+CHAINS, TWO_VECTORS = ("sail_lanes", "conclude_lanes", "advance_tile"), 8
 CLOSURES = ("inline_closure_likes", "make_function_op_code_to_jit_function")
 
 
 @contextmanager
-def lean(tag: str, loop: str) -> Iterator[None]:
-    """Compile functions whose name ends with `tag`, but for the one called `loop`, no further than needed.
-
-    The tag ends the names of all functions that are compiled together.
-    """
+def lean(loop: str) -> Iterator[None]:
+    """Compile the functions that the one called `loop` calls no further than needed."""
     with _replaced() as replace:
         if all(hasattr(owner, name) for owner, names in INSIDE.items() for name in names):
-            _link_once(replace, tag, loop)
-            _use_long_vectors(replace, tag)
+            _link_once(replace, loop)
+            _use_long_vectors(replace, loop)
         yield
 
 
@@ -79,18 +81,19 @@ def _replaced() -> Iterator[Replace]:
             setattr(owner, name, value)
 
 
-def _link_once(replace: Replace, tag: str, loop: str) -> None:
+def _is_called(name: str) -> bool:
+    return name.endswith(CALLED)
+
+
+def _link_once(replace: Replace, loop: str) -> None:
     library, machine = codegen.JITCodeLibrary, codegen.JITCPUCodegen
     optimise, finish, set_env = library._optimize_functions, library.finalize, machine.set_env
     passes = create_new_function_pass_manager()  # without these, branches keep loops from being vectorised
     passes.add_sroa_pass()
     passes.add_simplify_cfg_pass()
 
-    def is_inner(name: str) -> bool:
-        return name.endswith(tag) and name != loop
-
     def optimise_functions(self: Any, module: Any) -> None:
-        if not self.name.endswith(tag):
+        if not (self.name == loop or _is_called(self.name)):
             optimise(self, module)
             return
         module.data_layout = self._codegen._data_layout
@@ -100,7 +103,7 @@ def _link_once(replace: Replace, tag: str, loop: str) -> None:
                 passes.run(function, builder)
 
     def finalize(self: Any) -> None:
-        if is_inner(self.name):
+        if _is_called(self.name):
             self._finalize_dynamic_globals()
             self._finalized, self._shared_module = True, self._final_module
             for function in self._final_module.functions:
@@ -109,7 +112,7 @@ def _link_once(replace: Replace, tag: str, loop: str) -> None:
             return
         if self.name == loop:
             # callers first, since what nobody calls yet is not linked
-            self._linking_libraries = list(reversed(_beneath(self, is_inner, {})))
+            self._linking_libraries = list(reversed(_beneath(self, {})))
         finish(self)
 
     def set_environment(self: Any, name: str, environment: Any) -> None:
@@ -122,25 +125,50 @@ def _link_once(replace: Replace, tag: str, loop: str) -> None:
     replace(machine, "set_env", set_environment)
 
 
-def _use_long_vectors(replace: Replace, tag: str) -> None:
+def _use_long_vectors(replace: Replace, loop: str) -> None:
     add_module = codegen.CPUCodeLibrary.add_ir_module
 
     def add_with_long_vectors(self: Any, module: Any) -> None:
-        if self.name.endswith(tag):
+        if self.name == loop or _is_called(self.name):
+            features = self._codegen._tm_features
+            twice = self.name.startswith(CHAINS) and "+avx2" in features and "+avx512f" not in features
             for function in module.functions:
                 if not function.is_declaration:
                     set.add(function.attributes, LONG_VECTORS)  # its own `add` knows no attributes of targets
+                    if twice:
+                        _lengthen(function, TWO_VECTORS)
         add_module(self, module)
 
     replace(codegen.CPUCodeLibrary, "add_ir_module", add_with_long_vectors)
 
 
-def _beneath(library: Any, is_inner: Callable[[str], bool], found: dict[Any, None]) -> dict[Any, None]:
+def _lengthen(function: Any, lanes: int) -> None:
+    """Ask LLVM to take so many lanes of the function's loops at once."""
+    number = ir.Constant(ir.IntType(32), lanes)
+    width = function.module.add_metadata(["llvm.loop.vectorize.width", number])
+    for block in _turning_back(function.entry_basic_block, (), set()):
+        loop = function.module.add_metadata([width, block.name])
+        loop.operands = loop, width  # its first entry tells it from other loops
+        block.terminator.set_metadata("llvm.loop", loop)
+
+
+def _turning_back(block: Any, path: tuple[Any, ...], seen: set[Any]) -> Iterator[Any]:
+    """Blocks that end with a branch back to where a path has come from."""
+    seen.add(block)
+    path = (*path, block)
+    for target in block.terminator.operands:
+        if target in path:
+            yield block
+        elif hasattr(target, "terminator") and target not in seen:
+            yield from _turning_back(target, path, seen)
+
+
+def _beneath(library: Any, found: dict[Any, None]) -> dict[Any, None]:
     """Libraries that one calls and those beneath them that were not linked, each after what it calls."""
     for other in library._linking_libraries:
         if other not in found:
-            if is_inner(other.name):
-                _beneath(other, is_inner, found)
+            if _is_called(other.name):
+                _beneath(other, found)
             found[other] = None
     return found
 

@@ -115,8 +115,12 @@ def number_storer(row: int) -> Part:
     return Part(store, code=partial(intrinsic, generate, 3), key=("number", row))
 
 
-def chooser(record: Record) -> Part:
-    """`choose(condition, yes, no)`: one of two records, number by number, without a branch."""
+def chooser(record: Record, stored: bool = False) -> Part:
+    """`choose(condition, yes, no)`: one of two records, number by number, without a branch.
+
+    `stored`: whether `yes` comes from where the choice is stored. LLVM would store `no` under a mask, which
+    without AVX-512 takes longer than to store both; a zero added prevents that.
+    """
 
     def choose(condition: bool, yes: Any, no: Any) -> Any:
         return yes if condition else no
@@ -126,13 +130,12 @@ def chooser(record: Record) -> Part:
         flag = context.cast(builder, values[0], kinds[0], _types().boolean)
 
         def number(path: str, kind: Any) -> Any:
-            return builder.select(
-                flag, *(_taken(context, builder, kinds[k], values[k], places[path]) for k in (1, 2))
-            )
+            one, other = (_taken(context, builder, kinds[k], values[k], places[path]) for k in (1, 2))
+            return builder.select(flag, builder.fadd(one, _constant(context, 0.0)) if stored else one, other)
 
         return _coded(context, builder, record, number)
 
-    return _part("choose", record, None, choose, generate, lambda: _type(record))
+    return _part("choose", record, stored, choose, generate, lambda: _type(record))
 
 
 def zero(record: Record) -> Part:

@@ -27,6 +27,9 @@ INNER = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 # error_model "numpy" keeps loops free of branches; contraction is the only fast-math liberty taken, because
 # the others would optimise NaN checks away and make results depend on the batch size.
 SEMANTICS = {"error_model": "numpy", "fastmath": {"contract"}}
+CALLED = "_called"  # ends the names of functions that others call
+#: These by all that they depend on: loops share them, so that a function is translated once in a process.
+SHARED: dict[Any, Any] = {}
 #: Modules that write machine code, or say how it is written.
 GENERATORS = ("addresses", "compiling", "lean_numba", "record_code", "specialise")
 
@@ -55,18 +58,25 @@ class Specialisation:
     def inner(self, part: Part) -> Any:
         """A function that others call, with all that it calls."""
         key = (part.function, part.inline)
-        if key not in self.made and part.code is not None:
-            self.made[key] = part.function if self.jit is None else part.code()
-        elif key not in self.made:
-            copy = self.copy(part.function)
-            if self.jit is not None:
-                # the package's functions make no arrays: Numba's counting of references, taken out again by
-                # its passes, takes a tenth of the time
-                counted = not is_shipped(part.function)
-                inline = {"forceinline": True} if part.inline else {}
-                copy = self.jit(**inline, _nrt=counted, **INNER, **SEMANTICS)(copy)
-            self.made[key] = copy
+        if key not in self.made:
+            self.made[key] = self._inner(part)
         return self.made[key]
+
+    def _inner(self, part: Part) -> Any:
+        if self.jit is None:
+            return part.function if part.code is not None else self.copy(part.function)
+        if part.code is not None:
+            return part.code()
+        tag, records = traced(part.function, self.parts)
+        # the package's functions make no arrays: Numba's counting of references, taken out again by its
+        # passes, takes a tenth of the time
+        counted = not is_shipped(part.function)
+        key = (self.jit, tag, records, part.inline, counted)
+        if key not in SHARED:
+            copy = Specialisation(self.parts, tag + CALLED, self.jit, self.made).copy(part.function)
+            inline = {"forceinline": True} if part.inline else {}
+            SHARED[key] = self.jit(**inline, _nrt=counted, **INNER, **SEMANTICS)(copy)
+        return SHARED[key]
 
     def copy(self, function: Any) -> FunctionType:
         """A function with its globals replaced: parts by their place, plain functions by their copies."""
@@ -116,8 +126,14 @@ def _loaded_names(code: CodeType) -> tuple[str, ...]:
 
 def fingerprint(function: Any, parts: Parts) -> str:
     """Hash of all that the machine code of a specialised function depends on."""
+    return traced(function, parts)[0]
+
+
+def traced(function: Any, parts: Parts) -> tuple[str, tuple[Any, ...]]:
+    """Hash of all that a specialised function depends on, and the records that it names itself."""
     digest = hashlib.sha256(_machine().encode())
     seen: set[Any] = set()
+    records: list[Any] = []
 
     def add(text: object) -> None:
         digest.update(repr(text).encode() + b"\0")
@@ -137,6 +153,7 @@ def fingerprint(function: Any, parts: Parts) -> str:
                     visit(other)
         elif is_record(value):
             add((value.__name__, value._fields))
+            records.append(value)
         elif isinstance(value, ModuleType):
             add(value.__name__)
         elif isinstance(value, type) or callable(value):
@@ -154,7 +171,7 @@ def fingerprint(function: Any, parts: Parts) -> str:
                 add(constant)
 
     visit(function)
-    return digest.hexdigest()[:24]
+    return digest.hexdigest()[:24], tuple(records)
 
 
 @cache

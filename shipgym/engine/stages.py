@@ -7,13 +7,13 @@ has that over lanes inside. What stands between the loops lies in the room for r
 
 from typing import Any, NamedTuple
 
-from shipgym.engine.episodes import Tile, conclude_step
+from shipgym.engine.episodes import Tile, end_of_step
 from shipgym.engine.mathematics import clip
 from shipgym.engine.motion import HAS_SHAFT, Motion, Rates, arrival, rates, stage, way
 from shipgym.engine.places import (
     common_sea, common_ship, load_course, load_motion, load_passed, load_point, load_sea, load_slope,
-    load_sums, point_of, push, row_sums, sea_at, ship_at, store_passed, store_point, store_slope, store_sums,
-    sum_accelerations,
+    load_sums, point_of, push, row_sums, sea_at, ship_at, store_motion, store_passed, store_point,
+    store_slope, store_sums, sum_accelerations,
 )  # fmt: skip
 
 N_ROWS = 0  # part: of the table that is summed over, a multiple of
@@ -124,7 +124,7 @@ def arrive(tile: Tile, h: float, lanes: int) -> None:
         p = sea_at(sea_common, tile.ships, lane)
         pushed = push(before, load_sea(tile.state, lane), p)
         after = arrival(before, start, passed.total, passed.ahead, passed.aside, order, h, pushed, ship)
-        conclude_step(tile, lane, after, h, ship, p)
+        store_motion(tile.state, lane, end_of_step(tile, lane, after, h, ship, p))
 
 
 #: What stands between the loops, by the names of `shipgym.engine.places`.

@@ -90,7 +90,8 @@ class Voyages:
         for name, place in (rows.rows | result.rows).items():
             made[f"load_{name}"], made[f"store_{name}"] = loader(place), storer(place)
         for name in ("motion", "sea", "state", "memory"):
-            made[f"choose_{name}"] = chooser(rows[name].record)
+            # most of a task's state stays as it is
+            made[f"choose_{name}"] = chooser(rows[name].record, stored=name != "state")
         made["choose_reward"] = chooser(self.task.Reward)
         bounds = {path: (seen.low, seen.high) for path, seen in self.task.seen.items()}
         settings = self.settings

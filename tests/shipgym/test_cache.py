@@ -309,13 +309,12 @@ def test_who_waits_at_a_terminal_sees_one_line(tmp_path, monkeypatch, capsys):
     assert capsys.readouterr().err == ""
 
 
-def test_loops_over_ships_are_vectorised(monkeypatch):
+@pytest.mark.parametrize("task", ["CourseKeeping", "PathFollowing", "PathFollowing-v1"])
+def test_loops_over_ships_are_vectorised(task, monkeypatch):
     monkeypatch.setattr(compiling, "usable_folder", lambda: None)  # what comes from the cache tells no code
     vessel = shipgym.load_model("mariner-tls-svm").vessel
     sensors = shipped_sensors(False, False, False)
-    (code,) = (
-        Voyages(vessel, read_definition("CourseKeeping"), sensors, False, True).run.inspect_llvm().values()
-    )
+    (code,) = Voyages(vessel, read_definition(task), sensors, False, True).run.inspect_llvm().values()
     counts = [
         [len(re.findall(rf" = f(?:mul|add|sub) (?:contract )?{kind}", block)) for kind in (VECTOR, "double")]
         for block in re.split(r"\n\n|\n}\n", code)
