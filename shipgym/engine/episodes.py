@@ -141,11 +141,11 @@ def take_commands(tile: Tile, actions: Any) -> None:
             store_course(state, lane, course)
 
 
-def sail_lanes(tile: Tile, h: float, lanes: int) -> None:
-    """Move ships by h seconds; one whose episode is over, or that would run away, stays where it is."""
+def sail_lanes(tile: Tile, h: float, groups: int) -> None:
+    """Move so many groups of ships by h seconds; one whose episode is over, or that would run away, stays where it is."""
     state = tile.state
     common, sea_common = common_ship(tile.ships), common_sea(tile.ships)
-    for lane in range(lanes):
+    for lane in range(groups * GROUP):
         ship, coefficients = ship_at(common, tile.ships, lane)
         p = sea_at(sea_common, tile.ships, lane)
         before, course, sea = load_motion(state, lane), load_course(state, lane), load_sea(state, lane)
@@ -169,18 +169,18 @@ def end_of_step(tile: Tile, lane: int, after: Any, h: float, ship: Any, p: Any) 
     return motion
 
 
-def conclude_lanes(tile: Tile, lanes: int) -> tuple[int, int]:
+def conclude_lanes(tile: Tile, groups: int) -> tuple[int, int]:
     """Reward, readings and observations of an interval that is over.
 
     Returns in how many lanes of the tile something is due, and how many episodes have just ended; lanes
-    beyond them, up to `lanes`, fill vectors.
+    beyond them, up to so many groups, fill vectors.
     """
     state, result, keys, settings = tile.state, tile.result, tile.keys, tile.settings
     rules, sensor, asked = read_rules(settings, 0), read_sensor(settings, 0), read_settings(settings, 0)
     common, view, sea_common = common_ship(tile.ships), common_view(tile.ships), common_sea(tile.ships)
     worst = worst_cost(asked)
     n_due, n_ended = 0, 0
-    for lane in range(lanes):
+    for lane in range(groups * GROUP):
         ship, _ = ship_at(common, tile.ships, lane)
         data, scale = view_at(view, tile.ships, lane)
         motion, course, sea = load_motion(state, lane), load_course(state, lane), load_sea(state, lane)
@@ -351,11 +351,11 @@ def step(fleet: Fleet, shown: Shown, actions: Any, first_tile: int, end_tile: in
     h = rules.dt / rules.substeps
     for number in range(first_tile, end_tile):
         tile = tile_of(fleet, number)
-        lanes = (tile.lanes + GROUP - 1) // GROUP * GROUP
+        groups = (tile.lanes + GROUP - 1) // GROUP
         take_commands(tile, actions)
         for _ in range(int(rules.substeps)):
-            sail_lanes(tile, h, lanes)
-        n_due, n_ended = conclude_lanes(tile, lanes)
+            sail_lanes(tile, h, groups)
+        n_due, n_ended = conclude_lanes(tile, groups)
         ended += n_ended
         if n_due > 0:
             let_events_come(tile)

@@ -74,8 +74,8 @@ class Specialisation:
         key = (self.jit, tag, records, part.inline, counted)
         if key not in SHARED:
             copy = Specialisation(self.parts, tag + CALLED, self.jit, self.made).copy(part.function)
-            inline = {"forceinline": True} if part.inline else {}
-            SHARED[key] = self.jit(**inline, _nrt=counted, **INNER, **SEMANTICS)(copy)
+            # said of each: one of which nothing is said would take after the first that calls it
+            SHARED[key] = self.jit(forceinline=part.inline, _nrt=counted, **INNER, **SEMANTICS)(copy)
         return SHARED[key]
 
     def copy(self, function: Any) -> FunctionType:

@@ -7,7 +7,7 @@ has that over lanes inside. What stands between the loops lies in the room for r
 
 from typing import Any, NamedTuple
 
-from shipgym.engine.episodes import Tile, end_of_step
+from shipgym.engine.episodes import GROUP, Tile, end_of_step
 from shipgym.engine.mathematics import clip
 from shipgym.engine.motion import HAS_SHAFT, Motion, Rates, arrival, rates, stage, way
 from shipgym.engine.places import (
@@ -46,25 +46,25 @@ class Passed(NamedTuple):
     aside: float
 
 
-def sail_lanes(tile: Tile, h: float, lanes: int) -> None:
+def sail_lanes(tile: Tile, h: float, groups: int) -> None:
     """Move ships by h seconds, as `shipgym.engine.episodes.sail_lanes`."""
     result, none = tile.result, Rates(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-    for lane in range(lanes):
+    for lane in range(groups * GROUP):
         store_slope(result, lane, none)
         store_passed(result, lane, Passed(none, 0.0, 0.0))
     for number in range(4):
         part = 0.0 if number == 0 else (1.0 if number == 3 else 0.5)
-        prepare(tile, part * h, lanes)
+        prepare(tile, part * h, groups)
         common = common_ship(tile.ships)
         for row in range(0, N_ROWS, ROWS_AT_ONCE):
-            for lane in range(lanes):
+            for lane in range(groups * GROUP):
                 _, coefficients = ship_at(common, tile.ships, lane)
                 at, sums, terms = load_point(result, lane), load_sums(result, lane), coefficients.terms
                 sums = row_sums(at, row_sums(at, sums, terms, row), terms, row + 1)
                 sums = row_sums(at, row_sums(at, sums, terms, row + 2), terms, row + 3)
                 store_sums(result, lane, sums)
-        conclude(tile, part * h, 2.0 if number == 1 or number == 2 else 1.0, lanes)
-    arrive(tile, h, lanes)
+        conclude(tile, part * h, 2.0 if number == 1 or number == 2 else 1.0, groups)
+    arrive(tile, h, groups)
 
 
 def start_of(tile: Tile, common: Any, lane: int) -> tuple[Motion, float, float, Any, Any]:
@@ -77,20 +77,20 @@ def start_of(tile: Tile, common: Any, lane: int) -> tuple[Motion, float, float, 
     return Motion(0.0, 0.0, 0.0, m.u, m.v, m.r, m.p, m.phi, m.q, m.delta, n), order, shaft, ship, coefficients
 
 
-def prepare(tile: Tile, h: float, lanes: int) -> None:
+def prepare(tile: Tile, h: float, groups: int) -> None:
     """Where the ships are at a stage, h seconds along the slope of the one before."""
     result, common = tile.result, common_ship(tile.ships)
-    for lane in range(lanes):
+    for lane in range(groups * GROUP):
         start, order, _, ship, coefficients = start_of(tile, common, lane)
         at = stage(start, load_slope(result, lane), h, order, ship)
         store_point(result, lane, point_of(at, coefficients.terms, ship))
         store_sums(result, lane, Sums(0.0, 0.0, 0.0))
 
 
-def conclude(tile: Tile, h: float, weight: float, lanes: int) -> None:
+def conclude(tile: Tile, h: float, weight: float, groups: int) -> None:
     """The slope at a stage, and what it adds to the step."""
     result, common, sea_common = tile.result, common_ship(tile.ships), common_sea(tile.ships)
-    for lane in range(lanes):
+    for lane in range(groups * GROUP):
         start, order, shaft, ship, coefficients = start_of(tile, common, lane)
         at = stage(start, load_slope(result, lane), h, order, ship)
         pushed = push(
@@ -115,10 +115,10 @@ def added(total: Rates, w: float, k: Rates) -> Rates:
     )  # fmt: skip
 
 
-def arrive(tile: Tile, h: float, lanes: int) -> None:
+def arrive(tile: Tile, h: float, groups: int) -> None:
     """Ships at the end of the step."""
     common, sea_common = common_ship(tile.ships), common_sea(tile.ships)
-    for lane in range(lanes):
+    for lane in range(groups * GROUP):
         start, order, _, ship, _ = start_of(tile, common, lane)
         passed, before = load_passed(tile.result, lane), load_motion(tile.state, lane)
         p = sea_at(sea_common, tile.ships, lane)
