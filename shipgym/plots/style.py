@@ -69,21 +69,23 @@ def panels(
     columns = min(columns, len(shown)) or 1
     rows = -(-len(shown) // columns) or 1
     titles = [panel.title for panel in shown] if any(panel.title for panel in shown) else []
-    figure = subplots(rows, columns, titles, **({"vertical_spacing": 0.36 / max(rows, 2)} | dict(grid or {})))
-    names: set[str] = set()
+    spacing = {"vertical_spacing": 0.36 / max(rows, 2)} | dict(grid or {})
+    # as plain dicts, since plotly checks a whole figure faster than one change after the other
+    drawn = subplots(rows, columns, titles, **spacing).layout.to_plotly_json()
+    traces, names = [], set[str]()
     for k, panel in enumerate(shown):
-        row, column = k // columns + 1, k % columns + 1
+        number = str(k + 1) if k else ""
         for trace in panel.traces:
             if trace.legendgroup is not None and trace.showlegend is not False:
                 trace.showlegend = trace.legendgroup not in names
                 names.add(trace.legendgroup)
-        figure.add_traces(panel.traces, rows=row, cols=column)
+            trace.xaxis, trace.yaxis = f"x{number}", f"y{number}"
+            traces.append(trace)
         x, y = (axis(told) if isinstance(told, str) else told for told in (panel.x, panel.y))
-        x = x | UNTITLED if outer and row < rows else x
-        y = y | UNTITLED if outer and column > 1 else y
-        label(figure, x, y, row, column)
-    figure.update_layout(layout(height, titled=bool(titles), **changes))
-    return figure
+        drawn[f"xaxis{number}"] |= x | UNTITLED if outer and k // columns < rows - 1 else x
+        drawn[f"yaxis{number}"] |= y | UNTITLED if outer and k % columns else y
+    drawn |= layout(height, titled=bool(titles), **changes)
+    return graph_objects().Figure(traces, drawn)
 
 
 def layout(height: int, *, titled: bool = False, left: int = 62, **changes: Any) -> dict[str, Any]:

@@ -112,8 +112,11 @@ class ManoeuvringModel:
         Raises InputError for water that is too shallow, and for particulars that the structure cannot use.
         """
         self.check_depth(water_depth)
-        own = self.dynamics.numbers(self.coefficients, self.particulars, self.service_shaft_speed)
-        return np.concatenate([ship_of(self, water_depth, step), own])
+        return np.concatenate([ship_of(self, water_depth, step), self._own_numbers])
+
+    @cached_property
+    def _own_numbers(self) -> Floats:
+        return self.dynamics.numbers(self.coefficients, self.particulars, self.service_shaft_speed)
 
     @property
     def state_names(self) -> tuple[str, ...]:
