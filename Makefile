@@ -17,6 +17,9 @@ PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check -c const
 # measured runs of real ships, which are not part of the project
 DATA ?= ../shared/data
 
+# what one process has read, the others need not compile again
+export PYTHONDONTWRITEBYTECODE =
+
 .PHONY: demo test lint format type bench soak fuzz release-check ecosystem mutate evidence docs site-test clean
 
 demo: $(VENV)/demo-installed

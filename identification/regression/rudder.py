@@ -133,11 +133,12 @@ def _orders(t: Floats, delta: Floats, rate: float, lag: float) -> Floats:
     steps, move = np.diff(t), np.diff(delta)
     size, side = np.abs(move), np.sign(move)
     distance = size / -np.expm1(-steps / lag) if lag > 0.0 else size
-    if lag > 0.0 and np.any(distance > rate * lag):
+    far = distance > rate * lag
+    if lag > 0.0 and np.any(far):
         # the ramp lasts x seconds, of x - lag exp((x - step) / lag) = size / rate - lag
-        short = size / rate - lag
-        ramping = short - lag * lambertw(-np.exp(np.minimum((short - steps) / lag, -1.0)), 0).real
-        distance = np.where(distance > rate * lag, rate * (ramping + lag), distance)
+        short = size[far] / rate - lag
+        ramping = short - lag * lambertw(-np.exp(np.minimum((short - steps[far]) / lag, -1.0)), 0).real
+        distance[far] = rate * (ramping + lag)
     ramps = size >= (1.0 - RAMP) * rate * steps
     return np.where(ramps, np.copysign(np.inf, move), delta[:-1] + side * distance)
 

@@ -309,7 +309,7 @@ def test_who_waits_at_a_terminal_sees_one_line(tmp_path, monkeypatch, capsys):
     assert capsys.readouterr().err == ""
 
 
-@pytest.mark.parametrize("task", ["CourseKeeping", "PathFollowing", "PathFollowing-v1"])
+@pytest.mark.parametrize("task", ["PathFollowing", "PathFollowing-v1"])
 def test_loops_over_ships_are_vectorised(task, monkeypatch):
     monkeypatch.setattr(compiling, "usable_folder", lambda: None)  # what comes from the cache tells no code
     vessel = shipgym.load_model("mariner-tls-svm").vessel

@@ -69,9 +69,11 @@ def smooth(t: ArrayLike, values: ArrayLike) -> Floats:
     spline = Reinsch(t / np.median(np.diff(t)))
     signs = np.random.default_rng(0).choice([-1.0, 1.0], len(t))
 
+    both = np.stack([values, signs])
+
     def criterion(stiffness: float) -> float:
-        left_out = values - spline.smoothed(values, 10.0**stiffness)
-        freedom = float(signs @ (signs - spline.smoothed(signs, 10.0**stiffness)))
+        left_out, rest = both - spline.smoothed(both, 10.0**stiffness)
+        freedom = float(signs @ rest)
         return float(left_out @ left_out) / max(freedom, 1.0) ** 2
 
     best = min(STIFFNESSES, key=criterion)
@@ -94,11 +96,11 @@ class Reinsch:
         self.roughness[0, 2:] = self.right[:-2] * self.left[2:]
 
     def smoothed(self, values: Floats, stiffness: float) -> Floats:
-        """Values of the spline at the knots."""
-        bends = self.left * values[:-2] + self.middle * values[1:-1] + self.right * values[2:]
-        forces = solveh_banded(self.curvature + stiffness * self.roughness, bends)
+        """Values of the spline at the knots, or of several, arrays of shape (..., n_knots)."""
+        bends = self.left * values[..., :-2] + self.middle * values[..., 1:-1] + self.right * values[..., 2:]
+        forces = solveh_banded(self.curvature + stiffness * self.roughness, bends.T).T
         pull = np.zeros_like(values)
-        pull[:-2] += self.left * forces
-        pull[1:-1] += self.middle * forces
-        pull[2:] += self.right * forces
+        pull[..., :-2] += self.left * forces
+        pull[..., 1:-1] += self.middle * forces
+        pull[..., 2:] += self.right * forces
         return values - stiffness * pull
