@@ -10,17 +10,9 @@ from agents.controllers.controller import FORMAT, NUMBERS, SCALES, Controller, R
 from agents.controllers.linear_loop import Margins
 from agents.controllers.registry import controller_class, controller_kinds
 from shipgym.checks import (
-    check_array,
-    check_choice,
-    check_format,
-    check_keys,
-    check_number,
-    check_table,
-    check_text,
-    placed,
-    quoted,
-    shown,
-)
+    check_array, check_choice, check_format, check_keys, check_number, check_table, check_text, placed,
+    quoted, shown,
+)  # fmt: skip
 from shipgym.errors import InputError
 from shipgym.ships import ShipModel
 

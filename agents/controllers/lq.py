@@ -15,15 +15,8 @@ import numpy as np
 
 from agents.controllers.controller import Controller
 from agents.controllers.linear_loop import (
-    ERROR,
-    INTEGRAL,
-    RUDDER,
-    SIGNALS,
-    SampledShip,
-    length_time,
-    rate_weight,
-    sample_ship,
-)
+    ERROR, INTEGRAL, RUDDER, SIGNALS, SampledShip, length_time, rate_weight, sample_ship,
+)  # fmt: skip
 from shipgym.arrays import Floats
 from shipgym.checks import check_number
 from shipgym.ships import ShipModel

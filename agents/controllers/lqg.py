@@ -12,16 +12,8 @@ import numpy as np
 
 from agents.controllers.controller import Controller, Range
 from agents.controllers.linear_loop import (
-    ERROR,
-    RUDDER,
-    SIGNALS,
-    YAW_RATE,
-    Compensator,
-    check_stable,
-    length_time,
-    sample_ship,
-    sampled_ships,
-)
+    ERROR, RUDDER, SIGNALS, YAW_RATE, Compensator, check_stable, length_time, sample_ship, sampled_ships,
+)  # fmt: skip
 from agents.controllers.lq import LQ, Weights
 from agents.controllers.memory import Flags, Floats, heading_error
 from shipgym.checks import check_number

@@ -17,16 +17,9 @@ from agents.policies.policy import NO_LIMIT, LearnedPolicy
 from agents.policies.shield import Limits, Shielded
 from agents.policies.weights_file import REMEDY, Tensors, present_names, read_weights, weights_path
 from shipgym.checks import (
-    check_array,
-    check_format,
-    check_keys,
-    check_number,
-    check_table,
-    check_text,
-    check_whole,
-    placed,
+    check_array, check_format, check_keys, check_number, check_table, check_text, check_whole, placed,
     quoted,
-)
+)  # fmt: skip
 from shipgym.errors import InputError
 from shipgym.ships.model_file import read_envelope
 from shipgym.tasks.task import OBSERVATION_NAMES

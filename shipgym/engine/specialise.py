@@ -21,8 +21,7 @@ from shipgym.errors import InputError
 
 Parts = Mapping[str, Any]
 
-# Of functions that loops call: without entries for Python and C, which take longer to compile than many a
-# function.
+# Of functions that loops call: no entries for Python and C, which take longer to compile than many a function
 INNER = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 # error_model "numpy" keeps loops free of branches; contraction is the only fast-math liberty taken, because
 # the others would optimise NaN checks away and make results depend on the batch size.

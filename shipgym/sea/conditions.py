@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from typing import Any, Literal
 
 from shipgym.checks import (
@@ -220,25 +220,6 @@ class Weather:
     def calm(self) -> bool:
         """Whether nothing is on."""
         return all(part is None or part.calm for part in (self.current, self.wind, self.waves))
-
-    @property
-    def random_directions(self) -> tuple[str, ...]:
-        """Those of "current", "wind", "waves" that are on and whose direction is not given."""
-        given = (
-            ("current", self.current, self.current and self.current.towards_deg),
-            ("wind", self.wind, self.wind and self.wind.from_deg),
-            ("waves", self.waves, self.waves and self.waves.from_deg),
-        )
-        return tuple(name for name, part, deg in given if part and not part.calm and deg is None)
-
-    def with_direction(self, from_deg: float) -> Weather:
-        """The same weather with `from_deg` for wind and waves that have no direction."""
-        wind, waves = self.wind, self.waves
-        if wind is not None and wind.from_deg is None:
-            wind = replace(wind, from_deg=from_deg)
-        if waves is not None and waves.from_deg is None:
-            waves = replace(waves, from_deg=from_deg)
-        return replace(self, wind=wind, waves=waves)
 
     def to_dict(self) -> dict[str, Any]:
         """Return the parts by name, ready for JSON; :meth:`from_dict` reads it."""

@@ -54,9 +54,9 @@ def test_calm_is_calm_unless_there_is_a_current():
 
 def test_directions_may_be_left_to_the_episode():
     weather = Weather.from_sea_state("rough", from_deg=None, current=Current(1.0))
-    assert weather.random_directions == ("current", "wind", "waves")
-    assert weather.with_direction(10.0).random_directions == ("current",)
-    assert Weather.from_sea_state("rough", current=Current(0.0)).random_directions == ()
+    assert (weather.current.towards_deg, weather.wind.from_deg, weather.waves.from_deg) == (None, None, None)
+    given = Weather.from_sea_state("rough", current=Current(0.0))
+    assert (given.wind.from_deg, given.waves.from_deg) == (45.0, 45.0)
 
 
 @pytest.mark.parametrize(
@@ -148,10 +148,6 @@ def test_what_is_not_said_of_the_weather():
 def test_parts_of_the_weather_begin_to_be_on_above_zero():
     for part in (Current(1e-9), Current(0.0, variation=1e-9), Wind(1e-9), Waves(1e-9, 8.0)):
         assert not part.calm
-    assert Weather(waves=Waves(0.0, 8.0), wind=Wind(3.0, 20.0)).random_directions == ()
-    assert Weather(waves=Waves(1.0, 8.0), wind=Wind(3.0, 20.0)).random_directions == ("waves",)
-    both = Weather(Current(1.0), Wind(3.0, 20.0), Waves(1.0, 8.0)).with_direction(70.0)
-    assert (both.current.towards_deg, both.wind.from_deg, both.waves.from_deg) == (None, 20.0, 70.0)
 
 
 @pytest.mark.parametrize(
@@ -183,7 +179,7 @@ def test_tables_that_no_wind_has_are_refused(rows, message):
 def test_a_sea_state_by_name_comes_from_north_east():
     weather = as_weather("rough", "weather")
     assert (weather.name, weather.wind.from_deg, weather.waves.from_deg) == ("rough", 45.0, 45.0)
-    assert as_weather("rough", "weather", None).random_directions == ("wind", "waves")
+    assert as_weather("rough", "weather", None).wind.from_deg is None
     assert as_weather(None, "weather").calm
     assert as_weather(weather, "weather") is weather
     with pytest.raises(
