@@ -36,7 +36,7 @@ GROUPS: dict[str, list[Callable[[], Row | list[Row]]]] = {
         partial(environments.kernel_ship, centres=100),
         environments.two_threads,
         *(partial(environments.native_against_python, task) for task in TASKS),
-        *(partial(environments.native_against_cart_pole, task) for task in TASKS[:2]),
+        *(partial(environments.native_against_cart_pole, task) for task in TASKS),
     ],
     "learning": [partial(environments.learning, task) for task in TASKS],
     "physics": [
