@@ -17,7 +17,7 @@ PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check -c const
 # measured runs of real ships, which are not part of the project
 DATA ?= ../shared/data
 
-# what one process has read, the others need not compile again
+# Bytecode is kept (an empty value means unset): the many processes of the tests compile the same files but once.
 export PYTHONDONTWRITEBYTECODE =
 
 .PHONY: demo test lint format type bench soak fuzz release-check ecosystem mutate evidence docs site-test clean

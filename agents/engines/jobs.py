@@ -14,15 +14,8 @@ from joblib import cpu_count
 
 from agents.controllers.registry import registered_modules
 from agents.engines.job import (
-    Job,
-    JobError,
-    JobFunction,
-    Outcome,
-    WorkerDiedError,
-    check_outcome,
-    do_job,
-    with_modules,
-)
+    Job, JobError, JobFunction, Outcome, WorkerDiedError, check_outcome, do_job, with_modules,
+)  # fmt: skip
 from agents.engines.local import in_processes
 from agents.engines.ray_engine import on_ray
 from agents.engines.serialisation import KeptResults, serialised, shortened, unpack

@@ -16,14 +16,8 @@ from agents.policies.policy import NO_LIMIT
 from agents.training.plan import Plan, training_options
 from agents.training.residual import ResidualVecEnv
 from agents.training.settings import (
-    LEARNED,
-    RUNNING,
-    OffPolicySettings,
-    PPOSettings,
-    Settings,
-    TD3Settings,
-    TQCSettings,
-)
+    LEARNED, RUNNING, OffPolicySettings, PPOSettings, Settings, TD3Settings, TQCSettings,
+)  # fmt: skip
 from shipgym.envs.sb3 import ShipVecEnv
 from shipgym.errors import InputError
 

@@ -18,14 +18,8 @@ from identification.estimators.estimator import FitTask
 from identification.regression.samples import Samples
 from identification.simulation_error.prior import reference_turns
 from identification.simulation_error.segments import (
-    BLOCK,
-    Segment,
-    Shooter,
-    Shooting,
-    about_mean,
-    compared_channels,
-    cut,
-)
+    BLOCK, Segment, Shooter, Shooting, about_mean, compared_channels, cut,
+)  # fmt: skip
 from identification.uncertainty.covariance import newey_west
 from identification.validation.guard import GuardedFit, reasons_unstable
 from shipgym import InputError, ShipModel, Trial

@@ -72,16 +72,15 @@ def cold_start(sea: str, aim: str) -> Row:
 def cold_workers() -> list[Row]:
     """Workers of stable-baselines3 that start at once on an empty cache, by the clock; and CartPole's."""
 
-    def used(env_id: str, n: int) -> tuple[float, float]:
+    def taken(env_id: str, n: int) -> tuple[float, float]:
         with tempfile.TemporaryDirectory() as cache:
             wall, processor = run_python(WORKERS, env_id, str(n), SHIPGYM_CACHE=cache)
         return wall, processor
 
     rows = []
     for env, aim in (("shipgym:shipgym/CourseKeeping-v0", "1.3 times"), ("CartPole-v1", "")):
-        one, four = used(env, 1), used(env, 4)
-        told = (f"{wall:.1f} s, {processor:.1f} s of processor" for wall, processor in (four, one))
-        ours, single = told
+        one, four = taken(env, 1), taken(env, 4)
+        ours, single = (f"{wall:.1f} s, {processor:.1f} s of processor" for wall, processor in (four, one))
         what = f"SubprocVecEnv of {env.rpartition('/')[2]}, 4 spawned workers, empty cache"
         rows.append(Row(what, ours, f"one worker {single}", four[0] / one[0], aim))
     return rows

@@ -142,7 +142,7 @@ def take_commands(tile: Tile, actions: Any) -> None:
 
 
 def sail_lanes(tile: Tile, h: float, groups: int) -> None:
-    """Move groups of ships by h seconds; who would run away, or whose episode is over, stays where she is."""
+    """Move groups of ships by h seconds; one that would run away, or whose episode is over, stays."""
     state = tile.state
     common, sea_common = common_ship(tile.ships), common_sea(tile.ships)
     for lane in range(groups * GROUP):

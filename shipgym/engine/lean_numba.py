@@ -30,13 +30,19 @@ IDLE = (
 )  # fmt: skip
 # What is replaced of Numba's inside; of a version without it loops are compiled in Numba's own way
 INSIDE = {
-    codegen.JITCodeLibrary: ("_optimize_functions", "finalize", "_finalize_dynamic_globals"),
+    codegen.JITCodeLibrary: (
+        "_optimize_functions",
+        "_optimize_final_module",
+        "finalize",
+        "_finalize_dynamic_globals",
+    ),
     codegen.JITCPUCodegen: ("set_env",),
     codegen.CPUCodeLibrary: ("add_ir_module",),
 }
 # LLVM halves the vectors of processors that slow down when a few long ones are used; loops use nothing else
 LONG_VECTORS = '"prefer-vector-width"="512"'
-# Loops of numbers that wait for one another; of two vectors of 256 bits at once, neither waits for the other
+# Loops that are a long chain of dependent operations: of two vectors of 256 bits neither waits for the other.
+# Such a loop must not sum over lanes, since the hint lets LLVM take sums in another order.
 CHAINS, TWO_VECTORS = ("sail_lanes", "conclude_lanes", "advance_tile"), 8
 CLOSURES = ("inline_closure_likes", "make_function_op_code_to_jit_function")
 
@@ -88,6 +94,7 @@ def _is_called(name: str) -> bool:
 def _link_once(replace: Replace, loop: str) -> None:
     library, machine = codegen.JITCodeLibrary, codegen.JITCPUCodegen
     optimise, finish, set_env = library._optimize_functions, library.finalize, machine.set_env
+    optimise_final = library._optimize_final_module
     passes = create_new_function_pass_manager()  # without these, branches keep loops from being vectorised
     passes.add_sroa_pass()
     passes.add_simplify_cfg_pass()
@@ -115,12 +122,22 @@ def _link_once(replace: Replace, loop: str) -> None:
             self._linking_libraries = list(reversed(_beneath(self, {})))
         finish(self)
 
+    def optimise_module(self: Any) -> None:
+        if self.name == loop:
+            for function in self._final_module.functions:
+                if CALLED in function.name and not function.is_declaration:
+                    function.name += (
+                        f".{loop}"  # no symbol is defined by two loops, which may come from files
+                    )
+        optimise_final(self)
+
     def set_environment(self: Any, name: str, environment: Any) -> None:
         # what has not been emitted has no environment; functions on numbers use none
         if self._engine.is_symbol_defined(name) or self._engine.get_global_value_address(name):
             set_env(self, name, environment)
 
     replace(library, "_optimize_functions", optimise_functions)
+    replace(library, "_optimize_final_module", optimise_module)
     replace(library, "finalize", finalize)
     replace(machine, "set_env", set_environment)
 
@@ -143,7 +160,7 @@ def _use_long_vectors(replace: Replace, loop: str) -> None:
 
 
 def _lengthen(function: Any, lanes: int) -> None:
-    """Ask LLVM to take so many lanes of the function's loops at once."""
+    """Ask LLVM to take this many lanes of the function's loops at once."""
     number = ir.Constant(ir.IntType(32), lanes)
     width = function.module.add_metadata(["llvm.loop.vectorize.width", number])
     for block in _turning_back(function.entry_basic_block, (), set()):

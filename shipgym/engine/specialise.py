@@ -26,8 +26,8 @@ INNER = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 # error_model "numpy" keeps loops free of branches; contraction is the only fast-math liberty taken, because
 # the others would optimise NaN checks away and make results depend on the batch size.
 SEMANTICS = {"error_model": "numpy", "fastmath": {"contract"}}
-CALLED = "_called"  # ends the names of functions that others call
-#: These by all that they depend on: loops share them, so that a function is translated once in a process.
+CALLED = "__called_by_loops"  # ends the names of functions that others call
+#: Compiled ones, by all that they depend on: loops share them, and each is translated once in a process.
 SHARED: dict[Any, Any] = {}
 #: Modules that write machine code, or say how it is written.
 GENERATORS = ("addresses", "compiling", "lean_numba", "record_code", "specialise")
@@ -70,10 +70,11 @@ class Specialisation:
         # the package's functions make no arrays: Numba's counting of references, taken out again by its
         # passes, takes a tenth of the time
         counted = not is_shipped(part.function)
-        key = (self.jit, tag, records, part.inline, counted)
+        code = part.function.__code__  # errors name the place of a user's function
+        key = (self.jit, tag, records, part.inline, counted and (code.co_filename, code.co_firstlineno))
         if key not in SHARED:
             copy = Specialisation(self.parts, tag + CALLED, self.jit, self.made).copy(part.function)
-            # said of each: one of which nothing is said would take after the first that calls it
+            # stated for each: Numba lets a function without these options inherit those of its first caller
             SHARED[key] = self.jit(forceinline=part.inline, _nrt=counted, **INNER, **SEMANTICS)(copy)
         return SHARED[key]
 
@@ -129,7 +130,7 @@ def fingerprint(function: Any, parts: Parts) -> str:
 
 
 def traced(function: Any, parts: Parts) -> tuple[str, tuple[Any, ...]]:
-    """Hash of all that a specialised function depends on, and the records that it names itself."""
+    """Hash of all that a specialised function depends on, and the records that it and what it calls name."""
     digest = hashlib.sha256(_machine().encode())
     seen: set[Any] = set()
     records: list[Any] = []

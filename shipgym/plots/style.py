@@ -71,7 +71,8 @@ def panels(
     titles = [panel.title for panel in shown] if any(panel.title for panel in shown) else []
     spacing = {"vertical_spacing": 0.36 / max(rows, 2)} | dict(grid or {})
     # as plain dicts, since plotly checks a whole figure faster than one change after the other
-    drawn = subplots(rows, columns, titles, **spacing).layout.to_plotly_json()
+    figure = subplots(rows, columns, titles, **spacing)
+    drawn = figure.layout.to_plotly_json()
     traces, names = [], set[str]()
     for k, panel in enumerate(shown):
         number = str(k + 1) if k else ""
@@ -79,13 +80,13 @@ def panels(
             if trace.legendgroup is not None and trace.showlegend is not False:
                 trace.showlegend = trace.legendgroup not in names
                 names.add(trace.legendgroup)
-            trace.xaxis, trace.yaxis = f"x{number}", f"y{number}"
-            traces.append(trace)
+            traces.append(trace.to_plotly_json() | {"xaxis": f"x{number}", "yaxis": f"y{number}"})
         x, y = (axis(told) if isinstance(told, str) else told for told in (panel.x, panel.y))
         drawn[f"xaxis{number}"] |= x | UNTITLED if outer and k // columns < rows - 1 else x
         drawn[f"yaxis{number}"] |= y | UNTITLED if outer and k % columns else y
-    drawn |= layout(height, titled=bool(titles), **changes)
-    return graph_objects().Figure(traces, drawn)
+    figure.layout = drawn | layout(height, titled=bool(titles), **changes)
+    figure.add_traces(traces)
+    return figure
 
 
 def layout(height: int, *, titled: bool = False, left: int = 62, **changes: Any) -> dict[str, Any]:

@@ -8,14 +8,8 @@ from dataclasses import asdict, dataclass
 from typing import Any, Literal
 
 from shipgym.checks import (
-    check_choice,
-    check_flag,
-    check_number,
-    check_table,
-    check_text,
-    did_you_mean,
-    quoted,
-)
+    check_choice, check_flag, check_number, check_table, check_text, did_you_mean, quoted,
+)  # fmt: skip
 from shipgym.errors import InputError
 from shipgym.sea.wind import WindTable, check_coefficients
 

@@ -112,11 +112,16 @@ class ManoeuvringModel:
         Raises InputError for water that is too shallow, and for particulars that the structure cannot use.
         """
         self.check_depth(water_depth)
-        return np.concatenate([ship_of(self, water_depth, step), self._own_numbers])
+        of, kept = tuple(self.coefficients.values()), self._numbers
+        if of not in kept:
+            own = self.dynamics.numbers(self.coefficients, self.particulars, self.service_shaft_speed)
+            kept.clear()
+            kept[of] = own
+        return np.concatenate([ship_of(self, water_depth, step), kept[of]])
 
     @cached_property
-    def _own_numbers(self) -> Floats:
-        return self.dynamics.numbers(self.coefficients, self.particulars, self.service_shaft_speed)
+    def _numbers(self) -> dict[tuple[float, ...], Floats]:
+        return {}  # by the coefficients that they were made of
 
     @property
     def state_names(self) -> tuple[str, ...]:

@@ -158,7 +158,8 @@ def on_event(
     plan: Numbers,
 ) -> State:  # fmt: skip
     """Go on to the next leg; the way round the corner that is cut counts as sailed."""
-    number = int(max(0.0, state.leg)) + 1  # within the plan, whatever a checkpoint holds
+    # within the plan, whatever a checkpoint holds
+    number = min(int(max(0.0, state.leg)) + 1, len(plan) // 2 - 2)
     leg = leg_from(number, state.before + state.length, plan)
     along = fix(motion.x, motion.y, leg, ship, settings).along
     return on_leg(motion, leg, state, leg.before + clip(along, 0.0, leg.length), ship, settings)

@@ -428,11 +428,47 @@ class Library:
 
 
 def test_libraries_beneath_a_loop_are_linked_once_each_after_what_it_calls():
-    leaf, other = Library("leaf_called"), Library("other", [Library("far")])
-    first = Library("first_called", [leaf, other])
-    loop = Library("loop", [Library("second_called", [first, leaf]), first, other])
-    found = lean_numba._beneath(loop, {})
-    assert [library.name for library in found] == ["leaf_called", "other", "first_called", "second_called"]
+    leaf, other = Library(f"leaf{specialise.CALLED}"), Library("was_called", [Library("far")])
+    first = Library(f"first{specialise.CALLED}", [leaf, other])
+    loop = Library("loop", [Library(f"second{specialise.CALLED}", [first, leaf]), first, other])
+    found = list(lean_numba._beneath(loop, {}))
+    assert found == [leaf, other, first, loop._linking_libraries[0]]
+
+
+ALIKE = """
+import sys
+from pathlib import Path
+from typing import Any, NamedTuple
+from shipgym.engine.compiling import compiled
+from shipgym.engine.specialise import Part
+
+def asked(one, other):
+    Settings = NamedTuple("Settings", [(one, float), (other, float)])
+    space = {"Settings": Settings, "__name__": "own"}
+    long = "    x = x * 0.5 + x * x * 0.25 - x / (x * x + 3.0)\\n" * 60  # too much to be inlined
+    exec(f"def near_of(settings, x):\\n{long}    return settings.near + x\\n"
+         "def loop(x): return begin(Settings(1.0, 2.0), x) + begin(Settings(0.0, 0.0), x)\\n", space)
+    begin = Part(space["near_of"], inline=False)
+    space["loop"].__module__ = "shipgym.tests"
+    return compiled(space["loop"], "float64(float64)", {"begin": begin}, "a loop")
+
+print(*(asked(*names.split("-"))(0.0) for names in sys.argv[1:]))
+"""
+
+
+def test_loops_from_files_call_their_own_functions_whose_names_and_types_are_alike(tmp_path):
+    """Records of one name that differ in the order of fields only, compiled in processes of their own."""
+
+    def answers(*orders):
+        environment = {**os.environ, "SHIPGYM_CACHE": str(tmp_path)}
+        command = [sys.executable, "-c", ALIKE, *orders]
+        done = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
+        return done.stdout.split()
+
+    assert answers("near-far") == ["1.0"]
+    assert answers("far-near") == ["2.0"]
+    assert answers("near-far", "far-near") == ["1.0", "2.0"]
+    assert answers("far-near", "near-far") == ["2.0", "1.0"]
 
 
 def test_loops_of_two_tasks_share_the_step_of_a_ship_but_not_that_of_another_ship():

@@ -96,7 +96,7 @@ class Reinsch:
         self.roughness[0, 2:] = self.right[:-2] * self.left[2:]
 
     def smoothed(self, values: Floats, stiffness: float) -> Floats:
-        """Values of the spline at the knots, or of several, arrays of shape (..., n_knots)."""
+        """Values of the spline at the knots, shape (n_knots,) or (n_splines, n_knots)."""
         bends = self.left * values[..., :-2] + self.middle * values[..., 1:-1] + self.right * values[..., 2:]
         forces = solveh_banded(self.curvature + stiffness * self.roughness, bends.T).T
         pull = np.zeros_like(values)
