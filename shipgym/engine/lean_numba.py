@@ -123,12 +123,10 @@ def _link_once(replace: Replace, loop: str) -> None:
         finish(self)
 
     def optimise_module(self: Any) -> None:
-        if self.name == loop:
+        if self.name == loop:  # no symbol is defined by two loops, which may both come from files
             for function in self._final_module.functions:
                 if CALLED in function.name and not function.is_declaration:
-                    function.name += (
-                        f".{loop}"  # no symbol is defined by two loops, which may come from files
-                    )
+                    function.name += f".{loop}"
         optimise_final(self)
 
     def set_environment(self: Any, name: str, environment: Any) -> None:
