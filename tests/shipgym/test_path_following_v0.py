@@ -414,6 +414,12 @@ def test_the_next_leg_is_due_near_the_end_of_each_but_the_last():
     assert leg_from(0, 0.0, PLAN).last == 2.0
 
 
+def test_a_leg_beyond_the_plan_that_a_state_may_claim_is_the_last():
+    state = leg_from(0, 0.0, PLAN)._replace(leg=1e5, last=1e6)
+    motion = Motion(2900.0, 150.0, 0.2, *[0.0] * 8)
+    assert path_following.on_event(motion, state, None, SHIP, Settings(), None, PLAN).leg == 2.0
+
+
 def test_the_way_round_a_corner_that_is_cut_counts_as_sailed():
     state = leg_from(0, 0.0, PLAN)._replace(heading_error=0.7, distance_made_good=2500.0, integral=0.3)
     motion = Motion(2900.0, 150.0, 0.2, *[0.0] * 8)
