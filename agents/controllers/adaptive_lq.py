@@ -16,7 +16,7 @@ from agents.controllers.controller import Controller, Range
 from agents.controllers.linear_loop import SIGNALS, length_time, sampled_ships
 from agents.controllers.lq import LQ, lq_rows
 from agents.controllers.memory import Flags, Floats, Records, deviations, records
-from identification.estimators.recursive_kernels import scalar_updates
+from identification.estimators.recursive_kernels import least_squares
 from shipgym.checks import check_number
 from shipgym.errors import InputError
 from shipgym.ships import ShipModel
@@ -202,9 +202,9 @@ class AdaptiveLQ(Controller):
         targets = np.ascontiguousarray(y.transpose(1, 0, 2).reshape(INNOVATIONS, signals))
         ceiling = np.ascontiguousarray(np.tile(self._doubt(), (len(chosen), 1)))
         forgetting, history = float(self.design["forgetting"]), np.empty((1, signals, N_TERMS))
-        scalar_updates(
+        least_squares()(
             features, targets, INNOVATIONS - 1, theta, covariance, ceiling, forgetting, INNOVATIONS, 0.0,
-            history,
+            history, np.empty(N_TERMS),
         )  # fmt: skip
         chosen["theta"] = theta.reshape(chosen["theta"].shape)
         chosen["covariance"] = covariance.reshape(chosen["covariance"].shape)

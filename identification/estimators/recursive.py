@@ -20,6 +20,7 @@ from sklearn.utils.validation import check_is_fitted
 from identification.estimators.decomposition import scales_of
 from identification.estimators.linear import LinearRegressor, settings, validated
 from identification.estimators.lssvm import LSSVM
+from identification.estimators.recursive_kernels import least_squares, stochastic_gradient
 from shipgym import InputError
 from shipgym.arrays import Floats
 from shipgym.checks import check_number, check_whole
@@ -212,14 +213,11 @@ class RecursiveLeastSquares(Recursion):
         self._ceiling = np.full((signals, m), float(self.C))
 
     def _advance(self, phi: Floats, y: Floats, history: Floats) -> None:
-        from identification.estimators.recursive_kernels import matrix_updates, scalar_updates
-
         first = len(self._past[1])
         phi, y = np.concatenate([self._past[0], phi]), np.concatenate([self._past[1], y])
-        kernel = scalar_updates if self.inverse_free else matrix_updates
-        kernel(
+        least_squares(self.inverse_free)(
             phi, y, first, self._theta, self._P, self._ceiling, float(self.forgetting), self.innovations,
-            float(self.omega), history,
+            float(self.omega), history, np.empty(phi.shape[-1]),
         )  # fmt: skip
         kept = min(self.innovations - 1, len(y))
         self._past = (phi[len(y) - kept :].copy(), y[len(y) - kept :].copy())
@@ -269,9 +267,8 @@ class StochasticGradient(Recursion):
         self._r = np.zeros(len(self._theta))
 
     def _advance(self, phi: Floats, y: Floats, history: Floats) -> None:
-        from identification.estimators.recursive_kernels import gradient_updates
-
-        gradient_updates(phi, y, self._theta, self._r, float(self.forgetting), float(self.omega), history)
+        advance = stochastic_gradient()
+        advance(phi, y, self._theta, self._r, float(self.forgetting), float(self.omega), history)
 
 
 def _shaped(phi: ArrayLike, y: ArrayLike) -> tuple[Floats, Floats]:

@@ -1,33 +1,26 @@
-"""Compiled recursions: one pass over samples in time order, for any number of signals side by side."""
+"""Recursions: one pass over samples in time order, for any number of signals side by side."""
 
-from collections.abc import Callable
+from functools import cache
 from math import tanh
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
-from numba import njit
+from scipy.linalg.lapack import dposv
 
-_Function = TypeVar("_Function", bound=Callable[..., Any])
-_SEMANTICS = {"error_model": "numpy", "cache": True, "nogil": True, "fastmath": {"contract"}}
+from shipgym.engine.compiling import compiled
 
-
-def compiled(function: _Function) -> _Function:
-    """Compile when first called, or read from the on-disk cache."""
-    result: _Function = njit(**_SEMANTICS)(function)
-    return result
+VECTOR, TABLE, CUBE = "float64[::1]", "float64[:, ::1]", "float64[:, :, ::1]"
 
 
-@compiled
 def innovation(error: float, omega: float) -> float:
     """The error, or its bounded odd function of slope 1 at 0 (Song 2020, equation 3-7, over omega)."""
     return tanh(omega * error) / omega if omega > 0.0 else error
 
 
-@compiled
-def forget(P: Any, forgetting: float, ceiling: Any) -> None:
+def forget(P: Any, forgetting: float, ceiling: Any, stretch: Any) -> None:
     """Divide a covariance by the forgetting factor, but let no coefficient forget beyond where it began.
 
-    Rows and columns are stretched alike, so that the matrix stays positive.
+    Rows and columns are stretched alike, so that the matrix stays positive; `stretch` is scratch.
     """
     m = P.shape[0]
     free = True
@@ -40,7 +33,6 @@ def forget(P: Any, forgetting: float, ceiling: Any) -> None:
                 P[i, j] *= grown
         return
     full = 1.0 / np.sqrt(forgetting)
-    stretch = np.empty(m)
     for i in range(m):
         room = ceiling[i] / P[i, i] if P[i, i] > 0.0 else 1.0
         stretch[i] = min(full, max(np.sqrt(room), 1.0))
@@ -49,11 +41,11 @@ def forget(P: Any, forgetting: float, ceiling: Any) -> None:
             P[i, j] *= stretch[i] * stretch[j]  # in this order the matrix stays symmetric to the last bit
 
 
-@compiled
 def rank_one(phi: Any, y: float, theta: Any, P: Any, omega: float, gain: Any) -> None:
     """Least squares with one more sample; `gain` is scratch."""
     m = theta.size
-    gain[:] = 0.0
+    for j in range(m):
+        gain[j] = 0.0
     for k in range(m):
         for j in range(m):
             gain[j] += P[k, j] * phi[k]
@@ -68,50 +60,44 @@ def rank_one(phi: Any, y: float, theta: Any, P: Any, omega: float, gain: Any) ->
             P[j, k] -= (gain[j] * gain[k]) * shrink  # symmetric to the last bit
 
 
-@compiled
 def scalar_updates(
     phi: Any, y: Any, first: int, theta: Any, P: Any, ceiling: Any, forgetting: float, innovations: int,
-    omega: float, history: Any,
+    omega: float, history: Any, scratch: Any,
 ) -> None:  # fmt: skip
     """Least squares by rank-one updates over the last samples (TMILS, Song 2020, 4-12); RLS with one.
 
     Rows before `first` are history. `theta`, `P` are changed in place; `history` receives each theta.
     """
-    m = theta.shape[1]
-    gain = np.empty(m)
     for t in range(first, phi.shape[0]):
         for s in range(theta.shape[0]):
             if forgetting < 1.0:
-                forget(P[s], forgetting, ceiling[s])
+                forget(P[s], forgetting, ceiling[s], scratch)
             for i in range(max(t - innovations + 1, 0), t + 1):
-                rank_one(phi[i, s], y[i, s], theta[s], P[s], omega, gain)
-            history[t - first, s] = theta[s]
+                rank_one(phi[i, s], y[i, s], theta[s], P[s], omega, scratch)
+            for j in range(theta.shape[1]):
+                history[t - first, s, j] = theta[s, j]
 
 
-@compiled
 def matrix_updates(
     phi: Any, y: Any, first: int, theta: Any, P: Any, ceiling: Any, forgetting: float, innovations: int,
-    omega: float, history: Any,
+    omega: float, history: Any, scratch: Any,
 ) -> None:  # fmt: skip
     """Multi-innovation least squares with its matrix of innovations solved (MILS, Song 2020, 4-11)."""
     for t in range(first, phi.shape[0]):
-        low = max(t - innovations + 1, 0)
+        window = slice(max(t - innovations + 1, 0), t + 1)
         for s in range(theta.shape[0]):
             if forgetting < 1.0:
-                forget(P[s], forgetting, ceiling[s])
-            Phi = np.ascontiguousarray(phi[low : t + 1, s].T)
-            errors = y[low : t + 1, s] - theta[s] @ Phi
-            for i in range(errors.size):
-                errors[i] = innovation(errors[i], omega)
-            PPhi = P[s] @ Phi
-            L = np.linalg.solve(np.eye(errors.size) + Phi.T @ PPhi, np.ascontiguousarray(PPhi.T)).T
-            theta[s] += np.ascontiguousarray(L) @ errors
-            P[s] -= np.ascontiguousarray(L) @ np.ascontiguousarray(PPhi.T)
+                forget(P[s], forgetting, ceiling[s], scratch)
+            X = phi[window, s]
+            errors = y[window, s] - X @ theta[s]
+            XP = X @ P[s]
+            _, gain, _ = dposv(np.eye(len(X)) + XP @ X.T, XP)
+            theta[s] += (np.tanh(omega * errors) / omega if omega > 0.0 else errors) @ gain
+            P[s] -= XP.T @ gain
             P[s] = 0.5 * (P[s] + P[s].T)  # else forgetting blows rounding errors up
             history[t - first, s] = theta[s]
 
 
-@compiled
 def gradient_updates(
     phi: Any, y: Any, theta: Any, r: Any, forgetting: float, omega: float, history: Any
 ) -> None:
@@ -126,4 +112,21 @@ def gradient_updates(
             step = innovation(error, omega) / r[s] if r[s] > 0.0 else 0.0
             for j in range(theta.shape[1]):
                 theta[s, j] += step * phi[t, s, j]
-            history[t, s] = theta[s]
+            for j in range(theta.shape[1]):
+                history[t, s, j] = theta[s, j]
+
+
+@cache
+def least_squares(one_by_one: bool = True) -> Any:
+    """`scalar_updates`, compiled, or `matrix_updates`, whose time is spent in LAPACK."""
+    arguments = f"{CUBE}, {TABLE}, int64, {TABLE}, {CUBE}, {TABLE}, float64, int64, float64, {CUBE}, {VECTOR}"
+    if not one_by_one:
+        return matrix_updates
+    return compiled(scalar_updates, f"void({arguments})", {}, "recursive least squares")
+
+
+@cache
+def stochastic_gradient() -> Any:
+    """`gradient_updates`, compiled."""
+    arguments = f"{CUBE}, {TABLE}, {TABLE}, {VECTOR}, float64, float64, {CUBE}"
+    return compiled(gradient_updates, f"void({arguments})", {}, "the stochastic gradient")

@@ -12,6 +12,8 @@ from identification.validation.start import with_start
 from shipgym import ShipModel, Trial, UnstableModelError
 from shipgym.arrays import Floats
 from shipgym.manoeuvres.execution import reversals, rudder
+from shipgym.ships.manoeuvring_model import checked_orders, two_commands
+from shipgym.ships.simulate import Conditions, Passage
 
 STEP = 0.02  # of the time to sail one ship length
 LONGEST_LEG = 2.0  # times the measured one; a heading that is not reached by then is never reached
@@ -27,7 +29,7 @@ def closed_loop(model: ShipModel, trial: Trial) -> Trial | None:
         return None
     start, turns = reversals(trial)
     delta, edges = rudder(trial), [float(trial.t[0]), start, *turns, float(trial.t[-1])]
-    begun = with_start(model, trial)
+    begun, passage = with_start(model, trial), Passage(model, Conditions(), STEP * model.travel_time)
     state = np.array([begun[c][0] if c in trial.channels else 0.0 for c in model.state_names])
     t, states, orders = np.array(edges[:1]), state[None], []
     for leg, (begin, end) in enumerate(pairwise(edges)):
@@ -37,7 +39,7 @@ def closed_loop(model: ShipModel, trial: Trial) -> Trial | None:
         order = float(np.median(delta[held]))
         target = float(np.interp(end, trial.t, trial["psi"])) if 1 <= leg <= len(turns) else None
         try:
-            times, sailed = _leg(model, trial, states[-1], order, t[-1], end - begin, target)
+            times, sailed = _leg(passage, trial, states[-1], order, t[-1], end - begin, target)
         except UnstableModelError:
             return None
         if not len(times):
@@ -50,22 +52,22 @@ def closed_loop(model: ShipModel, trial: Trial) -> Trial | None:
 
 
 def _leg(
-    model: ShipModel, trial: Trial, state: Floats, order: float, begin: float, duration: float,
+    passage: Passage, trial: Trial, state: Floats, order: float, begin: float, duration: float,
     target: float | None,
 ) -> tuple[Floats, Floats]:  # fmt: skip
     """Times and states of a leg of some begin and measured duration; none where a target is not reached."""
-    dt = STEP * model.travel_time
+    model, dt = passage.model, passage.dt
     count = max(int(np.ceil((duration if target is None else LONGEST_LEG * duration) / dt)), 2)
     t = begin + dt * np.arange(count + 1, dtype=float)
     commands = np.tile(model.service_command, (count, 1))
     commands[:, 0] = order
     if "n" in model.command_names and "n" in trial.channels:
         commands[:, 1] = np.interp(t[:-1], trial.t, trial["n"])
-    run = model.simulate(commands, dt, state)
-    sailed = np.stack([run[name] for name in model.state_names], axis=-1)
+    sailed = passage.states(state, count)
+    passage.run("simulate", sailed, two_commands(checked_orders(model, commands)), dt)
     if target is None:
         return t[1:], sailed[1:]
-    psi = run["psi"]
+    psi = sailed[:, model.state_names.index("psi")]
     beyond = np.flatnonzero((psi - target) * np.sign(target - psi[0]) >= 0.0)
     if not len(beyond) or beyond[0] == 0:
         return np.empty(0), sailed[:0]

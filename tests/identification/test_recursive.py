@@ -309,9 +309,9 @@ def test_one_sample_of_one_regressor_by_hand() -> None:
 
 
 def test_an_innovation_is_bounded_by_one_over_omega_and_odd() -> None:
-    bounded = [kernels.innovation.py_func(error, 2.0) for error in (-50.0, -1e-6, 0.0, 1e-6, 0.3, 50.0)]
+    bounded = [kernels.innovation(error, 2.0) for error in (-50.0, -1e-6, 0.0, 1e-6, 0.3, 50.0)]
     assert bounded == pytest.approx([-0.5, -1e-6, 0.0, 1e-6, np.tanh(0.6) / 2.0, 0.5], abs=1e-15)
-    assert kernels.innovation.py_func(7.0, 0.0) == 7.0
+    assert kernels.innovation(7.0, 0.0) == 7.0
 
 
 @pytest.mark.parametrize(
@@ -328,7 +328,7 @@ def test_a_covariance_forgets_up_to_where_it_began(variances: list[float], expec
     """By 0.9, from ceilings of 1; rows and columns alike, so that the correlation stays."""
     cross = 0.5 * np.sqrt(np.prod(variances))
     P = np.array([[variances[0], cross], [cross, variances[1]]])
-    kernels.forget.py_func(P, 0.9, np.ones(2))
+    kernels.forget(P, 0.9, np.ones(2), np.empty(2))
     np.testing.assert_allclose(np.diag(P), expected)
     np.testing.assert_allclose([P[0, 1], P[1, 0]], 0.5 * np.sqrt(np.prod(expected)))
 
