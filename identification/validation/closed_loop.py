@@ -4,7 +4,9 @@ Open loop, a tenth of a degree of neutral helm moves the second overshoot of a 1
 because the rudder is reversed when the measured ship got there, not the simulated one.
 """
 
+from functools import lru_cache
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 
@@ -27,40 +29,51 @@ def closed_loop(model: ShipModel, trial: Trial) -> Trial | None:
     """
     if not set(model.state_names) <= {*trial.channels, "x", "y"}:
         return None
-    start, turns = reversals(trial)
-    delta, edges = rudder(trial), [float(trial.t[0]), start, *turns, float(trial.t[-1])]
     begun, passage = with_start(model, trial), Passage(model, Conditions(), STEP * model.travel_time)
     state = np.array([begun[c][0] if c in trial.channels else 0.0 for c in model.state_names])
-    t, states, orders = np.array(edges[:1]), state[None], []
-    for leg, (begin, end) in enumerate(pairwise(edges)):
-        held = (trial.t >= 0.5 * (begin + end)) & (trial.t <= end)
-        if end <= begin or not held.any():
-            continue
-        order = float(np.median(delta[held]))
-        target = float(np.interp(end, trial.t, trial["psi"])) if 1 <= leg <= len(turns) else None
+    t, states, orders = trial.t[:1], state[None], []
+    for leg in _legs(trial):
         try:
-            times, sailed = _leg(passage, trial, states[-1], order, t[-1], end - begin, target)
+            times, sailed = _sailed(passage, trial, states[-1], leg, t[-1])
         except UnstableModelError:
             return None
         if not len(times):
             return None
         t, states = np.append(t, times), np.vstack([states, sailed])
-        orders += [order] * len(times)
+        orders += [leg.order] * len(times)
     channels = dict(zip(model.state_names, states.T, strict=True))
     channels["delta_command"] = np.array([*orders, orders[-1]])
     return Trial(t, channels, name=trial.name, kind=trial.kind, length=model.particulars["length"])
 
 
-def _leg(
-    passage: Passage, trial: Trial, state: Floats, order: float, begin: float, duration: float,
-    target: float | None,
-) -> tuple[Floats, Floats]:  # fmt: skip
-    """Times and states of a leg of some begin and measured duration; none where a target is not reached."""
-    model, dt = passage.model, passage.dt
-    count = max(int(np.ceil((duration if target is None else LONGEST_LEG * duration) / dt)), 2)
+class Leg(NamedTuple):
+    """What is held between two reversals of the rudder."""
+
+    order: float  # rudder angle, rad
+    duration: float  # s, as measured
+    target: float | None  # the heading at which it ends, rad; None where it ends by the clock
+
+
+@lru_cache(maxsize=16)  # every model drawn sails the same trials
+def _legs(trial: Trial) -> tuple[Leg, ...]:
+    start, turns = reversals(trial)
+    delta, edges = rudder(trial), [float(trial.t[0]), start, *turns, float(trial.t[-1])]
+    found = []
+    for leg, (begin, end) in enumerate(pairwise(edges)):
+        held = (trial.t >= 0.5 * (begin + end)) & (trial.t <= end)
+        if end > begin and held.any():
+            target = float(np.interp(end, trial.t, trial["psi"])) if 1 <= leg <= len(turns) else None
+            found.append(Leg(float(np.median(delta[held])), end - begin, target))
+    return tuple(found)
+
+
+def _sailed(passage: Passage, trial: Trial, state: Floats, leg: Leg, begin: float) -> tuple[Floats, Floats]:
+    """Times and states of a leg that begins at some time; none where its target is not reached."""
+    model, dt, target = passage.model, passage.dt, leg.target
+    count = max(int(np.ceil(leg.duration * (1.0 if target is None else LONGEST_LEG) / dt)), 2)
     t = begin + dt * np.arange(count + 1, dtype=float)
     commands = np.tile(model.service_command, (count, 1))
-    commands[:, 0] = order
+    commands[:, 0] = leg.order
     if "n" in model.command_names and "n" in trial.channels:
         commands[:, 1] = np.interp(t[:-1], trial.t, trial["n"])
     sailed = passage.states(state, count)

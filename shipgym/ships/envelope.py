@@ -69,9 +69,9 @@ def smallest_ellipsoid(points: Floats, tolerance: float = 1e-3) -> tuple[Floats,
     lifted = np.column_stack([points, np.ones(len(points))])
     weights = np.full(len(points), 1.0 / len(points))
     ridge = np.diag([*np.diag(floor), 0.0])
+    moment = lifted.T @ lifted / len(points)
     for _ in range(1000):
-        moment = lifted.T @ (weights[:, None] * lifted) + ridge
-        distances = np.einsum("ij,ij->i", lifted @ np.linalg.inv(moment), lifted)
+        distances = np.einsum("ij,ij->i", lifted @ np.linalg.inv(moment + ridge), lifted)
         farthest = int(np.argmax(distances))
         excess = distances[farthest] / (d + 1.0) - 1.0
         if excess <= tolerance:
@@ -79,6 +79,7 @@ def smallest_ellipsoid(points: Floats, tolerance: float = 1e-3) -> tuple[Floats,
         step = (distances[farthest] - d - 1.0) / ((d + 1.0) * (distances[farthest] - 1.0))
         weights *= 1.0 - step
         weights[farthest] += step
+        moment += step * (np.outer(lifted[farthest], lifted[farthest]) - moment)
     centre = weights @ points
     scatter = points.T @ (weights[:, None] * points) - np.outer(centre, centre) + floor
     return centre, np.linalg.inv(scatter) / d
