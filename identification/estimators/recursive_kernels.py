@@ -22,22 +22,12 @@ def forget(P: Any, forgetting: float, ceiling: Any, stretch: Any) -> None:
 
     Rows and columns are stretched alike, so that the matrix stays positive; `stretch` is scratch.
     """
-    m = P.shape[0]
-    free = True
-    for i in range(m):
-        free = free and P[i, i] <= forgetting * ceiling[i]
-    if free:
-        grown = 1.0 / forgetting
-        for i in range(m):
-            for j in range(m):
-                P[i, j] *= grown
-        return
     full = 1.0 / np.sqrt(forgetting)
-    for i in range(m):
+    for i in range(ceiling.size):
         room = ceiling[i] / P[i, i] if P[i, i] > 0.0 else 1.0
         stretch[i] = min(full, max(np.sqrt(room), 1.0))
-    for i in range(m):
-        for j in range(m):
+    for i in range(ceiling.size):
+        for j in range(ceiling.size):
             P[i, j] *= stretch[i] * stretch[j]  # in this order the matrix stays symmetric to the last bit
 
 
@@ -117,11 +107,9 @@ def gradient_updates(
 
 
 @cache
-def least_squares(one_by_one: bool = True) -> Any:
-    """`scalar_updates`, compiled, or `matrix_updates`, whose time is spent in LAPACK."""
+def least_squares() -> Any:
+    """`scalar_updates`, compiled."""
     arguments = f"{CUBE}, {TABLE}, int64, {TABLE}, {CUBE}, {TABLE}, float64, int64, float64, {CUBE}, {VECTOR}"
-    if not one_by_one:
-        return matrix_updates
     return compiled(scalar_updates, f"void({arguments})", {}, "recursive least squares")
 
 

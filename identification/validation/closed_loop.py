@@ -34,7 +34,7 @@ def closed_loop(model: ShipModel, trial: Trial) -> Trial | None:
     t, states, orders = trial.t[:1], state[None], []
     for leg in _legs(trial):
         try:
-            times, sailed = _sailed(passage, trial, states[-1], leg, t[-1])
+            times, sailed = _sail(passage, trial, states[-1], leg, t[-1])
         except UnstableModelError:
             return None
         if not len(times):
@@ -67,7 +67,7 @@ def _legs(trial: Trial) -> tuple[Leg, ...]:
     return tuple(found)
 
 
-def _sailed(passage: Passage, trial: Trial, state: Floats, leg: Leg, begin: float) -> tuple[Floats, Floats]:
+def _sail(passage: Passage, trial: Trial, state: Floats, leg: Leg, begin: float) -> tuple[Floats, Floats]:
     """Times and states of a leg that begins at some time; none where its target is not reached."""
     model, dt, target = passage.model, passage.dt, leg.target
     count = max(int(np.ceil(leg.duration * (1.0 if target is None else LONGEST_LEG) / dt)), 2)

@@ -6,6 +6,7 @@ function comes as a `Part` with instructions of its own.
 
 from collections.abc import Callable, Iterator, Mapping
 from functools import partial, reduce
+from operator import attrgetter
 from typing import Any
 
 from shipgym.engine.records import LANES, Record, Rows, field_types, is_list, is_record, is_table, leaves
@@ -15,6 +16,7 @@ Path = tuple[int, ...]
 #: LLVM instructions of a function: of Numba's context, a builder, types and values of the arguments.
 Generate = Callable[[Any, Any, Any, Any], Any]
 Answer = Callable[[], Any] | None  # Numba's type of what a function returns
+Read = Callable[[Any, int], Any]  # a number or a record from an array, of a lane
 OfNumber = Callable[[str, Any], Any]  # what is made of a number, of its path and kind
 
 
@@ -22,16 +24,23 @@ def loader(rows: Rows, lanes: int = LANES) -> Part:
     """`load(array, lane)`: a record from a tile; from a vector, one lane, `lane` is not used."""
     places = rows.places
 
-    def load(array: Any, lane: int) -> Any:
-        def number(path: str, kind: Any) -> Any:
-            if is_table(kind):
-                return array[places[f"{path}.0"] * lanes + (lane if lanes > 1 else 0) :: lanes]
-            if path not in places:
-                return 0.0
-            at = places[path]
-            return array[at:] if is_list(kind) else array[at * lanes + (lane if lanes > 1 else 0)]
+    def reader(path: str, kind: Any) -> Read:
+        at = places.get(f"{path}.0" if is_table(kind) else path)
+        if at is None:
+            return lambda array, lane: 0.0
+        if is_list(kind):
+            return lambda array, lane: array[at:]
+        if is_table(kind):
+            return lambda array, lane: array[at * lanes + lane :: lanes]
+        return lambda array, lane: array[at * lanes + lane]
 
-        return _made(rows.record, number)
+    def made(one: Record, items: list[Read]) -> Read:
+        return lambda array, lane: one(*[item(array, lane) for item in items])
+
+    read = _fold(rows.record, reader, made)
+
+    def load(array: Any, lane: int) -> Any:
+        return read(array, lane if lanes > 1 else 0)
 
     def generate(context: Any, builder: Any, kinds: Any, values: Any) -> Any:
         def number(path: str, kind: Any) -> Any:
@@ -65,10 +74,11 @@ def row_reader(lanes: int = LANES) -> Part:
 
 def storer(rows: Rows, lanes: int = LANES) -> Part:
     """`store(array, lane, record)`: a record into a tile, or into a vector."""
+    numbers = [(row, attrgetter(path)) for path, row in rows.places.items()]
 
     def store(array: Any, lane: int, record: Any) -> None:
-        for path, row in rows.places.items():
-            array[row * lanes + (lane if lanes > 1 else 0)] = _number(record, path)
+        for row, number in numbers:
+            array[row * lanes + (lane if lanes > 1 else 0)] = number(record)
 
     def generate(context: Any, builder: Any, kinds: Any, values: Any) -> Any:
         places = dict(_places(rows.record))
@@ -82,11 +92,11 @@ def storer(rows: Rows, lanes: int = LANES) -> Part:
 
 def bounded_storer(rows: Rows, bounds: Mapping[str, tuple[float, float]]) -> Part:
     """`store(array, lane, record, scale)`: numbers times those of `scale`, clipped to their bounds."""
+    numbers = [(row, attrgetter(path), bounds[path]) for path, row in rows.places.items()]
 
     def store(array: Any, lane: int, record: Any, scale: Any) -> None:
-        for path, row in rows.places.items():
-            number, (low, high) = _number(record, path) * _number(scale, path), bounds[path]
-            array[row * LANES + lane] = min(max(number, low), high)
+        for row, number, (low, high) in numbers:
+            array[row * LANES + lane] = min(max(number(record) * number(scale), low), high)
 
     def generate(context: Any, builder: Any, kinds: Any, values: Any) -> Any:
         places = dict(_places(rows.record))
@@ -140,9 +150,10 @@ def chooser(record: Record, stored: bool = False) -> Part:
 
 def zero(record: Record) -> Part:
     """`none()`: a record of zeros."""
+    nothing = _fold(record, lambda path, kind: 0.0, lambda one, items: one(*items))
 
     def none() -> Any:
-        return _made(record, lambda path, kind: 0.0)
+        return nothing
 
     def generate(context: Any, builder: Any, kinds: Any, values: Any) -> Any:
         return _coded(context, builder, record, lambda path, kind: _constant(context, 0.0))
@@ -154,7 +165,7 @@ def summer(record: Record) -> Part:
     """`total(record)`: the sum of its numbers, one after another."""
 
     def total(given: Any) -> float:
-        return float(sum(_number(given, path) for path in leaves(record)))
+        return float(sum(attrgetter(path)(given) for path in leaves(record)))
 
     def generate(context: Any, builder: Any, kinds: Any, values: Any) -> Any:
         return reduce(
@@ -229,15 +240,6 @@ def _shape(record: Record) -> Any:
         return kind.rows if is_table(kind) else is_list(kind)
 
     return _fold(record, kind_of, lambda one, kinds: (one.__name__, *field_types(one), *kinds))
-
-
-def _made(record: Record, number: OfNumber) -> Any:
-    """A record of its numbers."""
-    return _fold(record, number, lambda one, items: one(*items))
-
-
-def _number(record: Any, path: str) -> Any:
-    return reduce(getattr, path.split("."), record)
 
 
 def _type(record: Record) -> Any:
