@@ -20,7 +20,7 @@ from sklearn.utils.validation import check_is_fitted
 from identification.estimators.decomposition import scales_of
 from identification.estimators.linear import LinearRegressor, settings, validated
 from identification.estimators.lssvm import LSSVM
-from identification.estimators.recursive_kernels import least_squares, matrix_updates, stochastic_gradient
+from identification.estimators.recursive_kernels import least_squares, stochastic_gradient
 from shipgym import InputError
 from shipgym.arrays import Floats
 from shipgym.checks import check_number, check_whole
@@ -215,7 +215,7 @@ class RecursiveLeastSquares(Recursion):
     def _advance(self, phi: Floats, y: Floats, history: Floats) -> None:
         first = len(self._past[1])
         phi, y = np.concatenate([self._past[0], phi]), np.concatenate([self._past[1], y])
-        (least_squares() if self.inverse_free else matrix_updates)(
+        least_squares(self.inverse_free)(
             phi, y, first, self._theta, self._P, self._ceiling, float(self.forgetting), self.innovations,
             float(self.omega), history, np.empty(phi.shape[-1]),
         )  # fmt: skip
@@ -267,8 +267,9 @@ class StochasticGradient(Recursion):
         self._r = np.zeros(len(self._theta))
 
     def _advance(self, phi: Floats, y: Floats, history: Floats) -> None:
-        own = float(self.forgetting), float(self.omega)
-        stochastic_gradient()(phi, y, self._theta, self._r, *own, history)
+        stochastic_gradient()(
+            phi, y, self._theta, self._r, float(self.forgetting), float(self.omega), history
+        )
 
 
 def _shaped(phi: ArrayLike, y: ArrayLike) -> tuple[Floats, Floats]:

@@ -5,7 +5,6 @@ from math import tanh
 from typing import Any
 
 import numpy as np
-from scipy.linalg.lapack import dposv
 
 from shipgym.engine.compiling import compiled
 
@@ -74,15 +73,17 @@ def matrix_updates(
 ) -> None:  # fmt: skip
     """Multi-innovation least squares with its matrix of innovations solved (MILS, Song 2020, 4-11)."""
     for t in range(first, phi.shape[0]):
-        window = slice(max(t - innovations + 1, 0), t + 1)
+        low = max(t - innovations + 1, 0)
         for s in range(theta.shape[0]):
             if forgetting < 1.0:
                 forget(P[s], forgetting, ceiling[s], scratch)
-            X = phi[window, s]
-            errors = y[window, s] - X @ theta[s]
+            X = np.ascontiguousarray(phi[low : t + 1, s])
+            errors = y[low : t + 1, s] - X @ theta[s]
+            for i in range(errors.size):
+                errors[i] = innovation(errors[i], omega)
             XP = X @ P[s]
-            _, gain, _ = dposv(np.eye(len(X)) + XP @ X.T, XP)
-            theta[s] += (np.tanh(omega * errors) / omega if omega > 0.0 else errors) @ gain
+            gain = np.linalg.solve(np.eye(errors.size) + XP @ X.T, XP)
+            theta[s] += errors @ gain
             P[s] -= XP.T @ gain
             P[s] = 0.5 * (P[s] + P[s].T)  # else forgetting blows rounding errors up
             history[t - first, s] = theta[s]
@@ -102,15 +103,15 @@ def gradient_updates(
             step = innovation(error, omega) / r[s] if r[s] > 0.0 else 0.0
             for j in range(theta.shape[1]):
                 theta[s, j] += step * phi[t, s, j]
-            for j in range(theta.shape[1]):
                 history[t, s, j] = theta[s, j]
 
 
 @cache
-def least_squares() -> Any:
-    """`scalar_updates`, compiled."""
+def least_squares(one_by_one: bool = True) -> Any:
+    """`scalar_updates` or `matrix_updates`, compiled."""
     arguments = f"{CUBE}, {TABLE}, int64, {TABLE}, {CUBE}, {TABLE}, float64, int64, float64, {CUBE}, {VECTOR}"
-    return compiled(scalar_updates, f"void({arguments})", {}, "recursive least squares")
+    loop = scalar_updates if one_by_one else matrix_updates
+    return compiled(loop, f"void({arguments})", {}, "recursive least squares")
 
 
 @cache

@@ -152,13 +152,10 @@ def zero(record: Record) -> Part:
     """`none()`: a record of zeros."""
     nothing = _fold(record, lambda path, kind: 0.0, lambda one, items: one(*items))
 
-    def none() -> Any:
-        return nothing
-
     def generate(context: Any, builder: Any, kinds: Any, values: Any) -> Any:
         return _coded(context, builder, record, lambda path, kind: _constant(context, 0.0))
 
-    return _part("zero", record, None, none, generate, lambda: _type(record))
+    return _part("zero", record, None, lambda: nothing, generate, lambda: _type(record))
 
 
 def summer(record: Record) -> Part:
