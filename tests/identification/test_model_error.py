@@ -17,7 +17,7 @@ from identification.regression.grey_box import chosen_box
 from identification.uncertainty import model_error as errors_of
 from identification.uncertainty.bootstrap import influence_covariance
 from identification.uncertainty.model_error import DEFAULT, model_error, scale_of, without_trial
-from identification.validation.closed_loop import _leg, closed_loop
+from identification.validation.closed_loop import Leg, _sail, closed_loop
 from identification.validation.prediction import predict
 from identification.validation.warnings import (
     _not_corrected,
@@ -201,19 +201,24 @@ def test_a_leg_ends_where_its_heading_is_reached_within_twice_the_measured_time(
     """A ship that turns by 0.1 rad/s whatever is ordered, in steps of a fiftieth of a ship length, 0.2 s."""
     orders: list[np.ndarray] = []
 
-    def simulate(commands: np.ndarray, dt: float, state: np.ndarray) -> dict[str, np.ndarray]:
+    def states(first: np.ndarray, n_steps: int) -> np.ndarray:
+        return np.vstack([first, np.empty((n_steps, 3))])
+
+    def run(name: str, states: np.ndarray, commands: np.ndarray, dt: float) -> None:
         orders.append(commands)
-        t = dt * np.arange(len(commands) + 1)
-        return {"psi": state[0] + state[1] * t, "u": state[1] + 0.0 * t, "x": t**2}
+        t, (psi, rate, _) = dt * np.arange(len(states)), states[0]
+        states[:] = np.column_stack([psi + rate * t, rate + 0.0 * t, t**2])
 
     ship = SimpleNamespace(
-        travel_time=10.0, service_command=np.array([0.0, 9.0]), command_names=("delta", "n"),
-        state_names=("psi", "u", "x"), simulate=simulate,
+        name="turning", service_command=np.array([0.0, 9.0]), command_names=("delta", "n"),
+        state_names=("psi", "u", "x"), turns_astern=False, service_shaft_speed=9.0,
     )  # fmt: skip
+    passage = SimpleNamespace(model=ship, dt=0.2, states=states, run=run)
     trial = Trial(np.array([0.0, 50.0, 100.0]), {"n": [1.0, 1.5, 2.0]})
 
     def sailed(duration: float, target: float | None, rate: float = 0.1) -> tuple[np.ndarray, np.ndarray]:
-        return _leg(ship, trial, np.array([0.0, rate, 0.0]), -0.3, 50.0, duration, target)  # type: ignore[arg-type]
+        leg, state = Leg(-0.3, duration, target), np.array([0.0, rate, 0.0])
+        return _sail(passage, trial, state, leg, 50.0)  # type: ignore[arg-type]
 
     times, states = sailed(1.0, None)
     np.testing.assert_allclose(times, 50.0 + 0.2 * np.arange(1, 6))
