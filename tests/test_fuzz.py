@@ -22,7 +22,7 @@ from shipgym.errors import InputError
 from shipgym.files import read_json
 
 ROOT = Path(__file__).parents[1]
-INPUTS = 1000  # of the fast kinds
+INPUTS = 2000  # of the fast kinds
 
 
 @pytest.fixture

@@ -330,13 +330,13 @@ def test_doctor_tells_of_a_cache_that_is_damaged_or_open_to_others(tmp_path, mon
 def test_warm_compiles_into_the_cache_and_writes_nothing_else(tmp_path):
     cache, here = tmp_path / "cache", tmp_path / "here"
     here.mkdir()
-    command = [sys.executable, "-m", "agents.cli", "warm", "mariner", "--json"]
+    command = [sys.executable, "-m", "agents.cli", "warm", "shipgym/CourseKeeping-v0", "--json"]
     environment = {**os.environ, "SHIPGYM_CACHE": str(cache), "PYTHONPATH": str(ROOT)}
     answer = subprocess.run(command, cwd=here, env=environment, capture_output=True, text=True, check=True)
     told = json.loads(answer.stdout)
     assert told["cache"] == str(cache)
-    assert {one["refused"] for one in told["ready"]} == {""}
-    assert len(list(cache.glob("*.loop"))) == len(told["ready"]) >= 4
+    assert [one["refused"] for one in told["ready"]] == ["", ""]
+    assert len(list(cache.glob("*.loop"))) == 2
     assert not list(here.iterdir())
 
 

@@ -13,7 +13,7 @@ from shipgym.ships import load_model
 from shipgym.tasks.task import course_keeping_task
 
 SEEDS = np.arange(64)
-ROUNDS, TRIED, KEPT = 10, 20, 5
+ROUNDS, TRIED, KEPT = 16, 24, 6
 MARINER = load_model("mariner")
 TANKER = load_model("tanker")  # unstable on its course
 

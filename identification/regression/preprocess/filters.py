@@ -98,7 +98,7 @@ class Reinsch:
     def smoothed(self, values: Floats, stiffness: float) -> Floats:
         """Values of the spline at the knots, shape (n_knots,) or (n_splines, n_knots)."""
         bends = self.left * values[..., :-2] + self.middle * values[..., 1:-1] + self.right * values[..., 2:]
-        forces = solveh_banded(self.curvature + stiffness * self.roughness, bends.T, check_finite=False).T
+        forces = solveh_banded(self.curvature + stiffness * self.roughness, bends.T).T
         pull = np.zeros_like(values)
         pull[..., :-2] += self.left * forces
         pull[..., 1:-1] += self.middle * forces
