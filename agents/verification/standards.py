@@ -131,7 +131,8 @@ def _sea(model: ShipModel, pilot: Controller) -> dict[str, float]:
     met = encounter_frequency(wave, model.particulars["speed"], radians(45.0))  # from north-east
     period = 2.0 * np.pi / float(met)
     try:
-        found = {f"heading_{sea}": _rms(_settled(kept(model, pilot, sea).error)) for sea in seas}
+        errors = {sea: _settled(kept(model, pilot, sea).error) for sea in seas}
+        found = {f"heading_{sea}": float(np.sqrt(np.mean(e**2))) for sea, e in errors.items()}
         pilots = [FilteredPID.from_model(model, wave_period=one) for one in (period, None)]
     except InputError:
         return {}
@@ -196,7 +197,3 @@ def _unwarned(found: Run, size: Floats, text: str) -> float:
 
 def _settled(values: Floats) -> Floats:
     return values[len(values) // 4 :]
-
-
-def _rms(values: Floats) -> float:
-    return float(np.sqrt(np.mean(np.square(values))))

@@ -47,11 +47,12 @@ def compiled(loop: Any, signature: str, parts: Parts, what: str) -> Any:
     else:
         dispatcher._cache = disk = DiskCache(folder, tag, signature)
         if not disk.ready():
+            dispatcher.targetctx.refresh()  # what reading takes as well, so before waiting for others
             with locked(disk.path):
                 if not disk.ready():  # another process may have been first
                     _announce(what, folder)
-                _compile(dispatcher, signature, what)
-                return dispatcher
+                    _compile(dispatcher, signature, what)
+                    return dispatcher
     _compile(dispatcher, signature, what)
     return dispatcher
 
@@ -63,7 +64,8 @@ def plain(loop: Any, parts: Parts) -> Any:
 
 def plain_python() -> bool:
     """Whether nothing is compiled (`NUMBA_DISABLE_JIT=1`)."""
-    import numba
+    with _uncollected():
+        import numba
 
     return bool(numba.config.DISABLE_JIT)
 

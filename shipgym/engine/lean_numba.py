@@ -87,10 +87,6 @@ def _replaced() -> Iterator[Replace]:
             setattr(owner, name, value)
 
 
-def _is_called(name: str) -> bool:
-    return name.endswith(CALLED)
-
-
 def _link_once(replace: Replace, loop: str) -> None:
     library, machine = codegen.JITCodeLibrary, codegen.JITCPUCodegen
     optimise, finish, set_env = library._optimize_functions, library.finalize, machine.set_env
@@ -100,7 +96,7 @@ def _link_once(replace: Replace, loop: str) -> None:
     passes.add_simplify_cfg_pass()
 
     def optimise_functions(self: Any, module: Any) -> None:
-        if not (self.name == loop or _is_called(self.name)):
+        if not (self.name == loop or self.name.endswith(CALLED)):
             optimise(self, module)
             return
         module.data_layout = self._codegen._data_layout
@@ -110,7 +106,7 @@ def _link_once(replace: Replace, loop: str) -> None:
                 passes.run(function, builder)
 
     def finalize(self: Any) -> None:
-        if _is_called(self.name):
+        if self.name.endswith(CALLED):
             self._finalize_dynamic_globals()
             self._finalized, self._shared_module = True, self._final_module
             for function in self._final_module.functions:
@@ -144,7 +140,7 @@ def _use_long_vectors(replace: Replace, loop: str) -> None:
     add_module = codegen.CPUCodeLibrary.add_ir_module
 
     def add_with_long_vectors(self: Any, module: Any) -> None:
-        if self.name == loop or _is_called(self.name):
+        if self.name == loop or self.name.endswith(CALLED):
             features = self._codegen._tm_features
             twice = self.name.startswith(CHAINS) and "+avx2" in features and "+avx512f" not in features
             for function in module.functions:
@@ -182,7 +178,7 @@ def _beneath(library: Any, found: dict[Any, None]) -> dict[Any, None]:
     """Libraries that one calls and those beneath them that were not linked, each after what it calls."""
     for other in library._linking_libraries:
         if other not in found:
-            if _is_called(other.name):
+            if other.name.endswith(CALLED):
                 _beneath(other, found)
             found[other] = None
     return found

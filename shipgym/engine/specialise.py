@@ -16,6 +16,8 @@ from pathlib import Path
 from types import CodeType, FunctionType, ModuleType
 from typing import Any
 
+import numpy as np
+
 from shipgym.engine.records import is_record
 from shipgym.errors import InputError
 
@@ -138,7 +140,10 @@ def traced(function: Any, parts: Parts) -> tuple[str, tuple[Any, ...]]:
     def add(text: object) -> None:
         digest.update(repr(text).encode() + b"\0")
 
-    def visit(value: Any) -> None:
+    def visit(value: Any, attributes: tuple[str, ...] = ()) -> None:
+        if hasattr(value, "py_func"):  # what Numba compiles already
+            add(value.targetoptions)
+            value = value.py_func
         if isinstance(value, Part):
             add((value.inline, value.key))
             if value.code is None:
@@ -150,12 +155,16 @@ def traced(function: Any, parts: Parts) -> tuple[str, tuple[Any, ...]]:
                 add(value.__defaults__)
                 for name, other in named_globals(value, parts):
                     add(name)
-                    visit(other)
+                    visit(other, value.__code__.co_names)
         elif is_record(value):
             add((value.__name__, value._fields))
             records.append(value)
         elif isinstance(value, ModuleType):
             add(value.__name__)
+            for name in attributes:
+                visit(vars(value).get(name))
+        elif isinstance(value, np.ndarray):
+            add((value.dtype, value.shape, value.tobytes()))  # its own text leaves out what is in the middle
         elif isinstance(value, type) or callable(value):
             add(getattr(value, "__qualname__", str(type(value))))
         else:
@@ -177,11 +186,10 @@ def traced(function: Any, parts: Parts) -> tuple[str, tuple[Any, ...]]:
 @cache
 def _machine() -> str:
     """What writes machine code, versions, and the processor that it is made for."""
-    import llvmlite.binding as llvm
     import numba
+    from numba.core.registry import cpu_target
 
     sources = b"".join(Path(__file__).with_name(f"{name}.py").read_bytes() for name in GENERATORS)
     written = hashlib.sha256(sources).hexdigest()
-    features = sorted(llvm.get_host_cpu_features().items())
-    versions = (written, platform.python_version(), numba.__version__)
-    return repr((*versions, platform.machine(), llvm.get_host_cpu_name(), features))
+    versions = (written, platform.python_version(), numba.__version__, numba.config.OPT)
+    return repr((*versions, *cpu_target.target_context.codegen().magic_tuple()))

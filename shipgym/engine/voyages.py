@@ -158,7 +158,4 @@ def view_of_lane(common: Any, ships: Any, lane: int) -> Any:
     return load_envelope(ships, lane), load_scale(ships, lane)
 
 
-@cache
-def voyages(vessel: Vessel, task: TaskDefinition, sensors: SensorSet, windy: bool, shared: bool) -> Voyages:
-    """Episodes, compiled once in a process."""
-    return Voyages(vessel, task, sensors, windy, shared)
+voyages = cache(Voyages)  # compiled once in a process

@@ -9,12 +9,13 @@ import sys
 import warnings
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
-from types import FunctionType
+from types import FunctionType, ModuleType
 from typing import NamedTuple
 
 import numpy as np
 import pytest
 from llvmlite.binding import get_host_cpu_features
+from numba import config, njit
 
 import shipgym
 from shipgym.engine import addresses, compiling, lean_numba, mathematics, places, specialise
@@ -374,6 +375,50 @@ def test_all_that_machine_code_depends_on_is_in_its_name():
         set_code(co_consts=(text, 2.0))(function)
 
     assert named(tell) == own
+
+
+def looks_up(k):
+    return TABLE[k] * helper(k) + tools.share(k)  # noqa: F821
+
+
+def double(k):
+    return 2.0 * k
+
+
+def triple(k):
+    return 3.0 * k
+
+
+def test_tables_compiled_helpers_and_modules_of_a_user_are_in_the_name_too():
+    doubles = njit(double)
+
+    def named(helper=doubles, shared=doubles, row=1000, **more):
+        table, tools = np.zeros(2000), ModuleType("tools")
+        table[row], tools.share = 1.0, shared
+        names = {"__name__": "my_ship", "TABLE": table, "helper": helper, "tools": tools, **more}
+        return fingerprint(FunctionType(looks_up.__code__, names), {})
+
+    assert named() == named()
+    others = {
+        "the middle of a table": named(row=1001),
+        "the kind of a table": named(TABLE=np.zeros(2000, dtype=np.float32)),
+        "the shape of a table": named(TABLE=np.zeros((2, 1000))),
+        "a helper": named(njit(triple)),
+        "how a helper is compiled": named(njit(double, fastmath=True)),
+        "a helper that is not compiled yet": named(double),
+        "a helper in a module": named(shared=njit(triple)),
+    }
+    assert len({named(), *others.values()}) == 1 + len(others)
+
+
+def test_for_whom_numba_was_told_to_write_is_in_the_name(monkeypatch):
+    names = set()
+    for setting, value in (("OPT", config.OPT), ("OPT", 1), ("CPU_NAME", "generic")):
+        monkeypatch.setattr(config, setting, value)
+        specialise._machine.cache_clear()
+        names.add(fingerprint(double, {}))
+    specialise._machine.cache_clear()
+    assert len(names) == 3
 
 
 def test_places_that_nobody_filled_say_who_does():
