@@ -1,10 +1,7 @@
 """What `identify` returns: a fit with its summary, figures and files."""
 
-from __future__ import annotations
-
 import warnings
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from identification.fit import Fit
 from identification.report.figures import all_figures
@@ -12,9 +9,7 @@ from identification.report.page import report_page
 from identification.report.summary import summary_table
 from shipgym import InputError
 from shipgym.files import draft_folder, write_json, write_text
-
-if TYPE_CHECKING:
-    from plotly.graph_objects import Figure
+from shipgym.plots.style import Figure
 
 #: Files of a saved result.
 FILES = ("model.json", "metrics.json", "settings.json", "report.html")

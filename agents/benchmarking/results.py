@@ -4,8 +4,6 @@ What stands in `results.json` is told by `agents.benchmarking.results_shape`.
 `episodes.parquet` has one row for each contestant, task, run and seed, with the figures of `metrics`.
 """
 
-from __future__ import annotations
-
 import platform
 from collections import Counter
 from collections.abc import Sequence
@@ -14,7 +12,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
@@ -90,7 +88,7 @@ class BenchmarkResult:
         values: Floats = self.episodes[name][rows].reshape(-1, self.summary["seeds"]["count"])
         return values
 
-    def save(self, folder: str | Path | None) -> BenchmarkResult:
+    def save(self, folder: str | Path | None) -> Self:
         """Write `episodes.parquet` and then `results.json`, each whole or not at all; None: nowhere.
 
         Returns the result with the hash of `episodes.parquet` in its summary.

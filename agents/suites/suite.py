@@ -5,14 +5,12 @@ A suite is a TOML file of `agents/suites`, as docs/benchmark.md describes it. A 
 what they were made for.
 """
 
-from __future__ import annotations
-
 import hashlib
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, replace
 from functools import cache, cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
@@ -91,7 +89,7 @@ class BenchmarkTask:
         return replace(ship, steering=gear), task, randomisation
 
     @property
-    def handed_out(self) -> BenchmarkTask:
+    def handed_out(self) -> Self:
         """What contestants are made for: the design model, without the ship."""
         return replace(self, name=self.base or self.name, behind="", far={}, on="ship", base="")
 

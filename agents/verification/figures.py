@@ -1,13 +1,12 @@
 """The figures of the report."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from agents.verification.index_uncertainty import ManoeuvreUncertainty
+from agents.verification.tracks import Track
 from identification.report.predictions import RUDDER
 from shipgym import plots
 from shipgym.arrays import Floats
@@ -15,10 +14,6 @@ from shipgym.manoeuvres import Criterion
 from shipgym.manoeuvres.intervals import LEVELS
 from shipgym.plots import LIMIT, MEASURED, MODEL, MUTED, Panel, axis, line, panels, translucent
 from shipgym.plots.style import Figure
-
-if TYPE_CHECKING:
-    from agents.verification.tracks import Track
-
 
 PILOT_COLOURS = ("#0f8a7e", "#a1478f", "#d9822b", "#6b7a1e", "#3b5b92", "#8c564b")
 

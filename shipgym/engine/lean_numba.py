@@ -15,9 +15,10 @@ from typing import Any
 import numba.np.linalg
 from llvmlite import ir
 from llvmlite.binding.newpassmanagers import create_new_function_pass_manager
-from numba.core import codegen
+from numba.core import codegen, types
 from numba.core.compiler import Compiler
 from numba.core.compiler_machinery import PassManager
+from numba.core.types.functions import BaseFunction
 
 from shipgym.engine.specialise import CALLED
 
@@ -38,7 +39,10 @@ INSIDE = {
     ),
     codegen.JITCPUCodegen: ("set_env",),
     codegen.CPUCodeLibrary: ("add_ir_module",),
+    BaseFunction: ("get_call_type",),
 }
+# Signatures of operators on numbers, by Numba's types of operator and numbers
+OPERATORS: dict[Any, Any] = {}
 # LLVM halves the vectors of processors that slow down when a few long ones are used; loops use nothing else
 LONG_VECTORS = '"prefer-vector-width"="512"'
 # Loops that are a long chain of dependent operations: of two vectors of 256 bits neither waits for the other.
@@ -53,6 +57,7 @@ def lean(loop: str) -> Iterator[None]:
     with _replaced() as replace:
         if all(hasattr(owner, name) for owner, names in INSIDE.items() for name in names):
             _link_once(replace, loop)
+            _look_up_operators(replace)
             _use_long_vectors(replace, loop)
         yield
 
@@ -134,6 +139,24 @@ def _link_once(replace: Replace, loop: str) -> None:
     replace(library, "_optimize_final_module", optimise_module)
     replace(library, "finalize", finalize)
     replace(machine, "set_env", set_environment)
+
+
+def _look_up_operators(replace: Replace) -> None:
+    """Go through Numba's rules for an operator on numbers, and say which did not fit, only once."""
+    find = BaseFunction.get_call_type
+
+    def signature(self: Any, context: Any, args: Any, kws: Any) -> Any:
+        asked = (self, *args, *dict(kws).items())
+        if asked not in OPERATORS:
+            found: Any = find(self, context, args, kws)
+            # what Numba writes in Python is compiled anew where options differ
+            written = any(found.args in getattr(rule, "_compiled_overloads", ()) for rule in self.templates)
+            if written or not all(isinstance(one, types.Number | types.Boolean) for one in args):
+                return found
+            OPERATORS[asked] = found
+        return OPERATORS[asked]
+
+    replace(BaseFunction, "get_call_type", signature)
 
 
 def _use_long_vectors(replace: Replace, loop: str) -> None:

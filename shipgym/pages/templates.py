@@ -1,20 +1,16 @@
 """Pages from Jinja2 templates, which escape every text that they show."""
 
-from __future__ import annotations
-
 import json
 from functools import cache
 from importlib.resources import files
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from jinja2 import Environment, FunctionLoader, StrictUndefined
 from markupsafe import Markup
 
 import shipgym
 from shipgym.pages.numbers import NONE, counted, degrees, fixed, number, percent
-
-if TYPE_CHECKING:
-    from plotly.graph_objects import Figure
+from shipgym.plots.style import Figure
 
 
 def render(template: str, **data: Any) -> str:

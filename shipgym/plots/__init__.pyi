@@ -16,7 +16,6 @@ from .style import Panel as Panel
 from .style import axis as axis
 from .style import compact as compact
 from .style import graph_objects as graph_objects
-from .style import label as label
 from .style import layout as layout
 from .style import line as line
 from .style import line_styles as line_styles

@@ -118,12 +118,6 @@ def axis(title: str = "", zero: bool = False, **changes: Any) -> dict[str, Any]:
     return shared | changes
 
 
-def label(figure: Figure, x: Axis, y: Axis, row: int | None = None, col: int | None = None) -> None:
-    """Style the axes of a figure or of one panel: each a title, or an `axis` with more than that."""
-    figure.update_xaxes(axis(x) if isinstance(x, str) else x, row=row, col=col)
-    figure.update_yaxes(axis(y) if isinstance(y, str) else y, row=row, col=col)
-
-
 def compact(values: ArrayLike) -> NDArray[np.float32]:
     """Values in single precision: half the size in a file, and finer than a pixel."""
     return np.asarray(values, dtype=np.float32)

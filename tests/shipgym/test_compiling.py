@@ -455,6 +455,33 @@ def test_the_plan_of_a_lane_stands_behind_its_rows_and_is_written_in_place():
     assert tile[4 * 64 + 7] == -1.0
 
 
+def mixed(numbers):
+    for k in range(1, len(numbers)):
+        numbers[0] += min(numbers[k] * k, 2) / (k + 1) - (k // 2) ** 2 * (numbers[k] < k)
+
+
+def test_operators_that_are_looked_up_once_make_the_same_machine_code(monkeypatch):
+    def code():
+        dispatcher = compiling._lean_jit()(**specialise.SEMANTICS)(mixed)
+        compiling._compile(dispatcher, "void(float64[::1])", "mixed")
+        (text,) = dispatcher.inspect_llvm().values()
+        numbers = np.linspace(0.0, 3.0, 7)
+        dispatcher(numbers)
+        return re.sub(r"B\d+v\d+", "", text), numbers[0]
+
+    monkeypatch.setattr(lean_numba, "OPERATORS", {})
+    first, known = code(), set(lean_numba.OPERATORS)
+    assert any("mul" in str(asked) for asked in known)
+    assert not any("min" in str(asked) for asked in known)  # Numba writes it in Python, and compiles it
+    assert code() == first
+    assert set(lean_numba.OPERATORS) == known
+    monkeypatch.setattr(lean_numba, "_look_up_operators", lambda replace: None)
+    assert code() == first
+    expected = np.linspace(0.0, 3.0, 7)
+    mixed(expected)
+    assert first[1] == pytest.approx(expected[0], rel=1e-14)
+
+
 def test_what_is_replaced_in_numba_is_put_back_even_after_an_error():
     owner = type("Owner", (), {"one": 1, "two": 2})
     with suppress(ZeroDivisionError), lean_numba._replaced() as replace:
