@@ -51,7 +51,7 @@ def read_options(
     definition = read_definition(task, options.get("reward"))
     sensors = options.get("sensors")
     own = Task.option_names(definition, None if sensors is None else read_sensors(sensors))
-    known = [*taken, "reward", *own, *Randomisation.names()]
+    known = list(dict.fromkeys([*taken, "reward", *own, *Randomisation.names()]))
     for name in options:
         if name not in known:
             raise UnknownKeywordError(name, known)
