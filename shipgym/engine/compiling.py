@@ -47,7 +47,6 @@ def compiled(loop: Any, signature: str, parts: Parts, what: str) -> Any:
     else:
         dispatcher._cache = disk = DiskCache(folder, tag, signature)
         if not disk.ready():
-            dispatcher.targetctx.refresh()  # what reading takes as well, so before waiting for others
             with locked(disk.path):
                 if not disk.ready():  # another process may have been first
                     _announce(what, folder)
