@@ -141,8 +141,9 @@ def traced(function: Any, parts: Parts) -> tuple[str, tuple[Any, ...]]:
         digest.update(repr(text).encode() + b"\0")
 
     def visit(value: Any, attributes: tuple[str, ...] = ()) -> None:
+        value = getattr(value, "_dispatcher", value)  # of what Numba vectorises
         if hasattr(value, "py_func"):  # what Numba compiles already
-            add(value.targetoptions)
+            add((type(value).__name__, getattr(value, "targetoptions", None)))
             value = value.py_func
         if isinstance(value, Part):
             add((value.inline, value.key))

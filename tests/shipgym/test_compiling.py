@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 import pytest
 from llvmlite.binding import get_host_cpu_features
-from numba import config, njit
+from numba import config, njit, vectorize
 
 import shipgym
 from shipgym.engine import addresses, compiling, lean_numba, mathematics, places, specialise
@@ -406,6 +406,8 @@ def test_tables_compiled_helpers_and_modules_of_a_user_are_in_the_name_too():
         "a helper": named(njit(triple)),
         "how a helper is compiled": named(njit(double, fastmath=True)),
         "a helper that is not compiled yet": named(double),
+        "a helper for arrays": named(vectorize(double)),
+        "another helper for arrays": named(vectorize(triple)),
         "a helper in a module": named(shared=njit(triple)),
     }
     assert len({named(), *others.values()}) == 1 + len(others)
