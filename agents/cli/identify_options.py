@@ -27,8 +27,9 @@ def takes_identify_options(command: Callable[..., None]) -> Callable[..., None]:
     @functools.wraps(command)
     def wrapped(**arguments: Any) -> None:
         named = {name: value for name in COMMON if (value := arguments.pop(name)) not in (None, [])}
+        tables = [f"{name}={value}" for name, value in named.items() if str(value).lstrip().startswith("{")]
         others = parsed_options(arguments.pop(SET) or ())
-        command(options=others | check_options(named, "options"), **arguments)
+        command(options=others | check_options(named, "options") | parsed_options(tables), **arguments)
 
     parameters: dict[str, inspect.Parameter] = {}
     for name, one in typed_parameters(command).items():

@@ -424,3 +424,15 @@ def test_the_tables_of_options_are_those_of_the_dataclass():
 def test_every_option_and_method_is_documented():
     page = (Path(__file__).parents[2] / "docs" / "identification.md").read_text(encoding="utf-8")
     assert [name for name in (*OPTIONS, *METHODS) if f"`{name}`" not in page] == []
+
+
+def test_a_current_that_is_known_is_given_as_its_help_shows(demo, tmp_path):
+    where, known = tmp_path / "identified", "{ north = 0.2, east = -0.1 }"
+    result = shipgym("identify", demo, "--structure", "nomoto", "--out", where, "--current", known)
+    assert result.exit_code == 0, result.output
+    settings = json.loads((where / "settings.json").read_text())
+    assert settings["current"] == {"north": 0.2, "east": -0.1}
+    result = shipgym("identify", demo, "--out", tmp_path / "not", "--current", "{ nort = 0.2, east = 1 }")
+    assert result.exit_code == 2
+    assert "current: unknown key 'nort'" in result.output
+    assert not (tmp_path / "not").exists()
