@@ -2,11 +2,17 @@
 
 import hashlib
 import sys
+from collections.abc import Callable
 from pathlib import Path
+from sysconfig import get_path
 from traceback import extract_tb
 from types import ModuleType
+from typing import Any
 
 from shipgym.errors import InputError
+
+#: Where code is that is not a user's own.
+LIBRARIES = (str(Path(__file__).parent), *(get_path(name) for name in ("stdlib", "purelib", "platlib")))
 
 
 def load_file(path: Path, expected: str = "a Python file") -> ModuleType:
@@ -29,12 +35,36 @@ def load_file(path: Path, expected: str = "a Python file") -> ModuleType:
         # independent of what this file may import from __future__
         code = compile(resolved.read_bytes(), str(resolved), "exec", dont_inherit=True)
         exec(code, vars(module))
-    except Exception as error:
+    except BaseException as error:
         del sys.modules[name]
         if isinstance(error, InputError):
             raise InputError(f"{path}: {error}") from None
+        if not isinstance(error, Exception | SystemExit):  # Ctrl-C
+            raise
         passed = (one.lineno for one in extract_tb(error.__traceback__) if one.filename == str(resolved))
         line = [getattr(error, "lineno", None), *passed][-1]  # the last one in the file
         place = f"{path}, line {line}" if line else path
         raise InputError(f"{place}: cannot be executed: {type(error).__name__}: {error}") from error
     return module
+
+
+def asked(function: Callable[..., Any], *arguments: Any) -> Any:
+    """What a function of a user's own answers; an error in it is an InputError that names file and line."""
+    try:
+        return function(*arguments)
+    except InputError:
+        raise
+    except Exception as error:
+        raise InputError(f"{place_of(function, error)}: {type(error).__name__}: {error}") from error
+
+
+def place_of(function: Any, error: BaseException | None = None) -> str:
+    """File, line and name of a function, or of what failed in a user's own code while it was called."""
+    code = getattr(function, "__code__", None)
+    if code is None:
+        return repr(function)
+    file, line, name = code.co_filename, code.co_firstlineno, code.co_name
+    for frame in extract_tb(error.__traceback__) if error else ():
+        if frame.filename == code.co_filename or not frame.filename.startswith(LIBRARIES):
+            file, line, name = frame.filename, frame.lineno or line, frame.name
+    return f"{file}, line {line}, in {name}"

@@ -8,7 +8,7 @@ is, where others cannot rename what is not theirs.
 import os
 import stat
 import warnings
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from errno import ENOENT
 from functools import cache
@@ -25,8 +25,11 @@ DIGEST = 32  # bytes of a SHA-256, at the beginning of a file
 
 
 def cache_folder() -> Path:
-    """Where compiled loops are kept."""
-    return Path(os.environ.get(CACHE_VARIABLE) or user_cache_path("shipgym"))
+    """Where compiled loops are kept; below ``~`` if nobody knows where the user's home is."""
+    try:
+        return Path(os.environ.get(CACHE_VARIABLE) or user_cache_path("shipgym"))
+    except RuntimeError:  # of a user without an entry in the list of users, in a container
+        return Path("~", ".cache", "shipgym")
 
 
 @cache
@@ -110,16 +113,21 @@ def write_loop(content: bytes, path: Path) -> None:
 
 
 @contextmanager
-def locked(path: Path) -> Iterator[None]:
+def locked(path: Path, waiting: Callable[[], None]) -> Iterator[None]:
     """One process compiles a loop's file, the others wait; the lock of a process that was killed is free.
 
-    Where no lock can be had, in a folder that may only be read or on a disk without locks, each compiles.
+    `waiting` is called where another process holds the lock. Where no lock can be had, in a folder that may
+    only be read or on a disk without locks, each compiles.
     """
-    from filelock import FileLock
+    from filelock import FileLock, Timeout
 
     lock = FileLock(path.with_name(path.name.partition("-")[0] + ".lock"))  # the name begins with a hash
     with suppress(OSError, NotImplementedError):
-        lock.acquire()
+        try:
+            lock.acquire(blocking=False)
+        except Timeout:
+            waiting()
+            lock.acquire()
     try:
         yield
     finally:
@@ -135,7 +143,11 @@ def warn_of(folder: Path, error: BaseException) -> None:
     )
 
 
+class CacheWarning(UserWarning):
+    """What is compiled cannot be kept, or read."""
+
+
 @cache
 def tell(message: str) -> None:
     """Warn, once in a process."""
-    warnings.warn(message, stacklevel=3)
+    warnings.warn(message, CacheWarning, stacklevel=3)

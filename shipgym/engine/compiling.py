@@ -7,7 +7,6 @@ so a cache that was filled beforehand and may only be read is used as it is.
 """
 
 import gc
-import re
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -18,7 +17,8 @@ from typing import Any
 import numpy as np
 
 from shipgym.engine.cache_folder import locked, usable_folder
-from shipgym.engine.specialise import CALLED, SEMANTICS, Parts, Specialisation, fingerprint, is_shipped
+from shipgym.engine.numba_errors import explanation
+from shipgym.engine.specialise import SEMANTICS, Parts, Specialisation, fingerprint, is_shipped
 from shipgym.errors import InputError
 
 SECONDS = 4  # about what a loop takes to compile on a laptop; what is told to who waits
@@ -47,7 +47,9 @@ def compiled(loop: Any, signature: str, parts: Parts, what: str) -> Any:
     else:
         dispatcher._cache = disk = DiskCache(folder, tag, signature)
         if not disk.ready():
-            with locked(disk.path):
+            with locked(
+                disk.path, partial(_say, f"shipgym: another process compiles {what}; waiting for it")
+            ):
                 if not disk.ready():  # another process may have been first
                     _announce(what, folder)
                     _compile(dispatcher, signature, what)
@@ -91,6 +93,11 @@ def _compile(dispatcher: Any, signature: str, what: str) -> None:
     try:
         with global_compiler_lock, _uncollected(), lean(name):
             dispatcher.compile(signature)
+            for code in dispatcher.overloads.values():
+                for (
+                    found
+                ) in code._find_referenced_environments():  # of what the loop calls, and what it prints
+                    code.library.codegen.set_env(found.env_name, found)
     except (NumbaError, TypeError) as error:  # TypeError: a record made of other fields
         raise InputError(explanation(error, what)) from None
 
@@ -107,25 +114,12 @@ def _uncollected() -> Iterator[None]:
             gc.enable()
 
 
-def explanation(error: Exception, what: str) -> str:
-    """Numba's reason in one sentence, with the function and the line of the innermost call."""
-    text = re.sub(r"\x1b\[[\d;]*m", "", str(error))  # in colour where colorama is installed
-    lines = [line.strip() for line in text.splitlines() if line.strip()]
-    reason = next((line for line in lines if not line.startswith("Failed in")), "no reason given")
-    if reason.endswith("signature:"):
-        reason = reason[: -len(" found for signature:")] + next(
-            (f": {line[4:]}" for line in lines if line.startswith(">>> ")), ""
-        )
-    place = re.search(r"at (\S+) \((\d+)\)", text)
-    function = re.search(rf"^def (\w+)\(|<function (\w+)_[0-9a-f]{{24}}(?:{CALLED})? at", text, re.MULTILINE)
-    where = f" in {function[1] or function[2]}" if function else ""
-    if place and (function is None or function[1]):
-        where += f" ({place[1]}, line {place[2]})"
-    return f"{what}: cannot be compiled{where}: {reason}"
-
-
 def _announce(what: str, folder: Path | None) -> None:
+    kept = f"kept in {folder} (beforehand: shipgym warm)" if folder else "kept in memory only"
+    _say(f"shipgym: compiling {what}, once, about {SECONDS} s; {kept}")
+
+
+def _say(words: str) -> None:
     """Tell a person who waits what is going on; programs and log files are told nothing."""
     if "ipykernel" in sys.modules or sys.stderr.isatty():
-        kept = f"kept in {folder} (beforehand: shipgym warm)" if folder else "kept in memory only"
-        print(f"shipgym: compiling {what}, once, about {SECONDS} s; {kept}", file=sys.stderr, flush=True)
+        print(words, file=sys.stderr, flush=True)

@@ -11,6 +11,7 @@ import hashlib
 import platform
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
+from enum import EnumType
 from functools import cache
 from pathlib import Path
 from types import CodeType, FunctionType, ModuleType
@@ -20,6 +21,7 @@ import numpy as np
 
 from shipgym.engine.records import is_record
 from shipgym.errors import InputError
+from shipgym.python_files import place_of
 
 Parts = Mapping[str, Any]
 
@@ -60,7 +62,12 @@ class Specialisation:
         """A function that others call, with all that it calls."""
         key = (part.function, part.inline)
         if key not in self.made:
+            self.made[key] = None
             self.made[key] = self._inner(part)
+        if self.made[key] is None:
+            raise InputError(
+                f"{place_of(part.function)}: calls itself, expected a loop, which can be compiled"
+            )
         return self.made[key]
 
     def _inner(self, part: Part) -> Any:
@@ -90,6 +97,7 @@ class Specialisation:
                 value = self.inner(Part(value))
             namespace[name] = value
         copy = FunctionType(function.__code__, namespace, function.__name__, function.__defaults__)
+        copy.__kwdefaults__ = function.__kwdefaults__
         copy.__qualname__ = f"{function.__name__}_{self.tag}"  # symbols of all that is compiled differ
         copy.__module__ = __name__  # the cache imports it, and could not import a user's file
         return copy
@@ -99,14 +107,20 @@ def named_globals(function: Any, parts: Parts) -> Iterator[tuple[str, Any]]:
     """Globals that a function names, those of `parts` in place of its own."""
     if function.__closure__:
         raise InputError(
-            f"{function.__module__}.{function.__name__}: uses variables of the function around it "
+            f"{place_of(function)}: uses variables of the function around it "
             f"({', '.join(function.__code__.co_freevars)}), expected a function at the top of a file"
         )
+    return _named(function, parts)
+
+
+def _named(function: Any, parts: Parts) -> Iterator[tuple[str, Any]]:
     for name in _loaded_names(function.__code__):
         if is_shipped(function) and name in parts:  # a user's names are the user's
             yield name, parts[name]
         elif name in function.__globals__:
             yield name, function.__globals__[name]
+    for name, cell in zip(function.__code__.co_freevars, function.__closure__ or (), strict=True):
+        yield name, cell.cell_contents
 
 
 def is_shipped(function: Any) -> bool:
@@ -121,9 +135,23 @@ def _is_plain(value: Any) -> bool:
 
 @cache
 def _loaded_names(code: CodeType) -> tuple[str, ...]:
-    """Names that a function takes from its globals; attributes are none of them."""
-    loads = (i.argval for i in dis.get_instructions(code) if i.opname in ("LOAD_GLOBAL", "LOAD_NAME"))
-    return tuple(dict.fromkeys(loads))
+    """Names that a function and those within it take from its globals; attributes are none of them."""
+    return tuple(
+        dict.fromkeys(
+            i.argval
+            for one in _nested(code)
+            for i in dis.get_instructions(one)
+            if i.opname in ("LOAD_GLOBAL", "LOAD_NAME")
+        )
+    )
+
+
+def _nested(code: CodeType) -> Iterator[CodeType]:
+    """The code of a function and of those within it, comprehensions among them."""
+    yield code
+    for constant in code.co_consts:
+        if isinstance(constant, CodeType):
+            yield from _nested(constant)
 
 
 def fingerprint(function: Any, parts: Parts) -> str:
@@ -133,55 +161,94 @@ def fingerprint(function: Any, parts: Parts) -> str:
 
 def traced(function: Any, parts: Parts) -> tuple[str, tuple[Any, ...]]:
     """Hash of all that a specialised function depends on, and the records that it and what it calls name."""
-    digest = hashlib.sha256(_machine().encode())
-    seen: set[Any] = set()
-    records: list[Any] = []
+    trace = Trace(parts)
+    trace.add(_machine())
+    trace.visit(function)
+    return trace.digest.hexdigest()[:24], tuple(trace.records)
 
-    def add(text: object) -> None:
-        digest.update(repr(text).encode() + b"\0")
 
-    def visit(value: Any, attributes: tuple[str, ...] = ()) -> None:
-        value = getattr(value, "_dispatcher", value)  # of what Numba vectorises
-        if hasattr(value, "py_func"):  # what Numba compiles already
-            add((type(value).__name__, getattr(value, "targetoptions", None)))
-            value = value.py_func
+class Trace:
+    """What machine code depends on, hashed on the way from a function to all that it names.
+
+    An object goes by what Numba compiles of it, not by its text, which may leave out the middle of a long
+    array or everything but a name.
+    """
+
+    def __init__(self, parts: Parts) -> None:
+        self.parts = parts
+        self.digest = hashlib.sha256()
+        self.seen: set[Any] = set()
+        self.records: list[Any] = []
+
+    def add(self, value: object) -> None:
+        """Take a value by its text."""
+        self.digest.update(repr(value).encode() + b"\0")
+
+    def visit(self, value: Any, attributes: tuple[str, ...] = ()) -> None:
+        """Take a value, and of modules what is called by one of the `attributes`."""
         if isinstance(value, Part):
-            add((value.inline, value.key))
+            self.add((value.inline, value.key))
             if value.code is None:
-                visit(value.function)
-        elif _is_plain(value):
-            if value not in seen:
-                seen.add(value)
-                visit_code(value.__code__, value.__doc__)
-                add(value.__defaults__)
-                for name, other in named_globals(value, parts):
-                    add(name)
-                    visit(other, value.__code__.co_names)
-        elif is_record(value):
-            add((value.__name__, value._fields))
-            records.append(value)
-        elif isinstance(value, ModuleType):
-            add(value.__name__)
-            for name in attributes:
-                visit(vars(value).get(name))
+                self.visit(value.function)
         elif isinstance(value, np.ndarray):
-            add((value.dtype, value.shape, value.tobytes()))  # its own text leaves out what is in the middle
+            self.add((value.dtype, value.shape, value.strides, value.tobytes()))
+        elif isinstance(value, ModuleType):
+            self.add(value.__name__)
+            if (value, attributes) not in self.seen:
+                self.seen.add((value, attributes))
+                for name in attributes:
+                    self.visit(vars(value).get(name), attributes)
+        elif isinstance(value, tuple | list):
+            self.add((type(value).__qualname__, getattr(value, "_fields", len(value))))
+            for one in value:
+                self.visit(one, attributes)
+        elif is_record(value):
+            self.add((value.__name__, value._fields, value._field_defaults))
+            self.records.append(value)
+        elif isinstance(value, EnumType):
+            self.add((value.__qualname__, dict(value.__members__)))
         elif isinstance(value, type) or callable(value):
-            add(getattr(value, "__qualname__", str(type(value))))
+            self._visit_callable(value)
         else:
-            add(value)
+            self.add(value)
 
-    def visit_code(code: CodeType, doc: str | None) -> None:
-        digest.update(code.co_code)
-        add((code.co_names, code.co_varnames))
+    def _visit_callable(self, value: Any) -> None:
+        value = getattr(value, "_dispatcher", value)  # of what Numba vectorises
+        options = (type(value).__name__, getattr(value, "targetoptions", None))
+        function = getattr(value, "py_func", None) or getattr(value, "_defn", None)  # compiled; an intrinsic
+        kind = getattr(value, "class_type", None)  # of a class that Numba compiles
+        if function is not None:
+            self.add(options)
+            self._visit_function(function)
+        elif kind is not None:
+            self.add(kind.struct)
+            for method in (*kind.jit_methods.values(), *kind.jit_static_methods.values()):
+                self._visit_callable(method)
+        elif _is_plain(value):
+            named_globals(value, self.parts)  # refuses what uses variables of a function around it
+            self._visit_function(value)
+        else:
+            self.add(getattr(value, "__qualname__", str(type(value))))
+
+    def _visit_function(self, function: Any) -> None:
+        if function in self.seen:
+            return
+        self.seen.add(function)
+        self._visit_code(function.__code__, function.__doc__)
+        self.visit((function.__defaults__, *(function.__kwdefaults__ or {}).items()))
+        names = tuple(name for code in _nested(function.__code__) for name in code.co_names)
+        for name, other in _named(function, self.parts):
+            self.add(name)
+            self.visit(other, names)
+
+    def _visit_code(self, code: CodeType, doc: str | None) -> None:
+        self.digest.update(code.co_code)
+        self.add((code.co_names, code.co_varnames))
         for constant in code.co_consts:
             if isinstance(constant, CodeType):
-                visit_code(constant, None)
+                self._visit_code(constant, None)
             elif doc is None or constant != doc:
-                add(constant)
-
-    visit(function)
-    return digest.hexdigest()[:24], tuple(records)
+                self.add(constant)
 
 
 @cache

@@ -284,7 +284,7 @@ def test_a_full_disk_is_said_once_and_nothing_is_left(tmp_path):
         full + WORKER.format(while_compiling="pass"), cache=tmp_path, errors=subprocess.PIPE
     ).communicate()
     assert told.split() == ["compiles", "done"]
-    assert said.count("UserWarning") == said.count("cannot be written (File too large)") == 1
+    assert said.count("CacheWarning") == said.count("cannot be written (File too large)") == 1
     assert not [path for path in tmp_path.iterdir() if path.suffix != ".lock"]
 
 
@@ -325,6 +325,41 @@ def test_loops_over_ships_are_vectorised(task, monkeypatch):
     assert alone == alone_too == 0
 
 
+PRINTS = """
+import sys
+from shipgym.engine import compiling
+def told(numbers):
+    print(numbers[0])
+def tell(numbers):
+    told(numbers)
+def tell_twice(numbers):
+    told(numbers)
+    told(numbers)
+import numpy as np
+for loop in (tell, tell_twice):
+    compiling.compiled(loop, "void(float64[::1])", {}, "it")(np.array([1.5]))
+"""
+
+
+def test_what_loops_call_may_print_freshly_compiled_or_from_the_cache(tmp_path):
+    for _ in range(2):
+        told, _ = start(PRINTS, cache=tmp_path).communicate(timeout=120)
+        assert told.split() == ["1.5"] * 3
+    assert len(list(tmp_path.glob("*.loop"))) == 2
+
+
+def test_a_user_whom_the_list_of_users_lacks_has_no_home(monkeypatch):
+    def unknown(name):
+        raise RuntimeError("Could not determine home directory.")
+
+    monkeypatch.delenv("SHIPGYM_CACHE", raising=False)
+    monkeypatch.setattr(cache_folder, "user_cache_path", unknown)
+    cache_folder.usable_folder.cache_clear()
+    with pytest.warns(cache_folder.CacheWarning, match="cannot be written .the user has no home., so ships"):
+        assert cache_folder.usable_folder() is None
+    cache_folder.usable_folder.cache_clear()
+
+
 def test_a_user_without_a_home_has_no_folder_of_that_name_made(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("SHIPGYM_CACHE", "~/.cache/shipgym")
@@ -361,8 +396,12 @@ def test_loops_may_be_read_by_others_whatever_the_user_s_habit(folder):
 
 def test_a_lock_is_held_while_a_loop_is_compiled_and_free_afterwards(folder):
     other = FileLock(folder / "hash.lock")
-    with cache_folder.locked(folder / "hash-signature.loop"), pytest.raises(Timeout):
+    waits = []
+    with cache_folder.locked(folder / "hash-signature.loop", lambda: waits.append(1)), pytest.raises(Timeout):
         other.acquire(timeout=0)
+    assert waits == []
+    with other, cache_folder.locked(folder / "hash-signature.loop", other.release):  # who waits is told
+        assert not other.is_locked
     other.acquire(timeout=0)
     other.release()
     assert [path.name for path in folder.iterdir() if path.suffix != ".lock"] == []

@@ -9,18 +9,21 @@ import sys
 import warnings
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
+from enum import IntEnum
 from types import FunctionType, ModuleType
 from typing import NamedTuple
 
 import numpy as np
 import pytest
 from llvmlite.binding import get_host_cpu_features
-from numba import config, njit, vectorize
+from numba import config, njit, types, vectorize
+from numba.experimental import jitclass
+from numba.extending import intrinsic
 
 import shipgym
 from shipgym.engine import addresses, compiling, lean_numba, mathematics, places, specialise
-from shipgym.engine.compiling import explanation
 from shipgym.engine.loops import LOOPS, ship_loop
+from shipgym.engine.numba_errors import explanation
 from shipgym.engine.record_code import (
     bounded_storer,
     chooser,
@@ -315,10 +318,12 @@ def test_a_function_within_another_is_refused_with_what_it_uses_of_it():
 
         return within
 
+    within = around(3)
     with pytest.raises(InputError) as caught:
-        fingerprint(around(3), {})
+        fingerprint(within, {})
     assert str(caught.value) == (
-        f"{__name__}.within: uses variables of the function around it (inner), expected a function at the "
+        f"{__file__}, line {within.__code__.co_firstlineno}, in within: "
+        "uses variables of the function around it (inner), expected a function at the "
         "top of a file"
     )
 
@@ -377,6 +382,37 @@ def test_all_that_machine_code_depends_on_is_in_its_name():
     assert named(tell) == own
 
 
+def with_default(value, where="__defaults__"):
+    function = FunctionType(double.__code__, {"__name__": "my_ship"}, "double")
+    setattr(function, where, (value,) if where == "__defaults__" else {"k": value})
+    return function
+
+
+def times(factor):
+    def multiplied(k):
+        return factor * k
+
+    return multiplied
+
+
+def typed_double(context, k):
+    return k(k), lambda context, builder, signature, values: builder.fadd(values[0], values[0])
+
+
+def typed_triple(context, k):
+    return k(k), lambda context, builder, signature, values: builder.fmul(values[0], values[0])
+
+
+class Doubler:
+    def __init__(self, k):
+        self.k = 2 * k
+
+
+class Tripler:
+    def __init__(self, k):
+        self.k = 3 * k
+
+
 def looks_up(k):
     return TABLE[k] * helper(k) + tools.share(k)  # noqa: F821
 
@@ -409,8 +445,50 @@ def test_tables_compiled_helpers_and_modules_of_a_user_are_in_the_name_too():
         "a helper for arrays": named(vectorize(double)),
         "another helper for arrays": named(vectorize(triple)),
         "a helper in a module": named(shared=njit(triple)),
+        "an array in a tuple": named(TABLE=(np.zeros(2000), 1.0)),
+        "another array in a tuple": named(TABLE=(np.eye(2000)[1000], 1.0)),
+        "an array in a record": named(TABLE=Fix(np.zeros(2000), 1.0)),
+        "another array in a record": named(TABLE=Fix(np.eye(2000)[1000], 1.0)),
+        "an array as a default": named(with_default(np.zeros(2000))),
+        "another array as a default": named(with_default(np.eye(2000)[1000])),
+        "a default by its name": named(with_default(2.0, "__kwdefaults__")),
+        "another default by its name": named(with_default(3.0, "__kwdefaults__")),
+        "an enumeration": named(TABLE=IntEnum("Berth", {"OUTER": 2})),
+        "an enumeration of other values": named(TABLE=IntEnum("Berth", {"OUTER": 3})),
+        "an intrinsic": named(intrinsic(typed_double)),
+        "another intrinsic": named(intrinsic(typed_triple)),
+        "a class that Numba compiles": named(jitclass([("k", types.int64)])(Doubler)),
+        "another class that Numba compiles": named(jitclass([("k", types.int64)])(Tripler)),
+        "what a compiled helper has from around it": named(njit(times(2.0))),
+        "what another has from around it": named(njit(times(3.0))),
     }
     assert len({named(), *others.values()}) == 1 + len(others)
+
+
+def test_what_a_module_within_a_module_holds_is_in_the_name():
+    def reads(k):
+        return harbour.tide.HEIGHT * k  # noqa: F821
+
+    def named(height):
+        harbour, tide = ModuleType("harbour"), ModuleType("harbour.tide")
+        harbour.tide, harbour.self, tide.HEIGHT = tide, harbour, height
+        return fingerprint(FunctionType(reads.__code__, {"__name__": "my_ship", "harbour": harbour}), {})
+
+    assert named(1.0) == named(1.0) != named(2.0)
+
+
+def test_what_comprehensions_name_is_in_the_name_and_compiled():
+    def summed(numbers):
+        for _ in range(1):
+            numbers[0] = sum([WEIGHT * k for k in numbers])  # noqa: F821
+
+    def copied(weight):
+        return FunctionType(summed.__code__, {"__name__": "my_ship", "WEIGHT": weight, "sum": sum}, "summed")
+
+    assert fingerprint(copied(2.0), {}) != fingerprint(copied(3.0), {})
+    numbers = np.array([1.0, 2.0])
+    compiling.compiled(copied(3.0), "void(float64[::1])", {}, "summed")(numbers)
+    assert numbers.tolist() == [9.0, 2.0]
 
 
 def test_for_whom_numba_was_told_to_write_is_in_the_name(monkeypatch):

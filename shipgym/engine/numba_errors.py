@@ -1,0 +1,59 @@
+"""Why a function does not compile: what Numba says on a page, in one sentence."""
+
+import dis
+import re
+from traceback import walk_tb
+from types import CodeType, SimpleNamespace
+from typing import Any
+
+from shipgym.engine.specialise import CALLED, SHARED
+
+NOWHERE = SimpleNamespace(filename="", line=0)
+
+
+def explanation(error: Exception, what: str) -> str:
+    """Numba's reason in one sentence, with the function and the line of the innermost call."""
+    text = re.sub(r"\x1b\[[\d;]*m", "", str(error))  # in colour where colorama is installed
+    lines = [line.strip() for line in text.splitlines() if line.strip()]
+    reason = next((line for line in lines if not line.startswith("Failed in")), "no reason given")
+    if reason.endswith("signature:"):
+        reason = reason[: -len(" found for signature:")] + next(
+            (f": {line[4:]}" for line in lines if line.startswith(">>> ")), ""
+        )
+    callee = re.search(rf"<function ((\w+)_[0-9a-f]{{24}}(?:{CALLED})?) at", text)
+    own = text[: callee.start()] if callee else text  # behind it stands who calls it
+    written = re.search(r"^def (\w+)\(", own, re.MULTILINE)
+    function = written[1] if written else callee[2] if callee else ""
+    place = re.search(r"at (\S+) \((\d+)\)", own) or re.search(r'File "([^"]+)", line (\d+)', own)
+    if code := _code_of(callee[1] if callee else None):
+        file, line = code.co_filename, place[2] if place else _line_of(code, reason)
+    elif place:
+        file, line = place.groups()
+    else:
+        at = _looked_at(error)
+        file, line = at.filename, at.line
+    where = f" in {function}" * bool(function) + f" ({file}, line {line})" * bool(file)
+    return f"{what}: cannot be compiled{where}: {reason}"
+
+
+def _code_of(name: str | None) -> CodeType | None:
+    """The code of a function that others call, by its name as it is compiled."""
+    functions = (one.py_func for one in SHARED.values() if hasattr(one, "py_func"))
+    return next((one.__code__ for one in functions if one.__qualname__ == name), None)
+
+
+def _line_of(code: CodeType, reason: str) -> int:
+    """The line in which a function names what a reason quotes, or its first."""
+    lines = (
+        (i.positions and i.positions.lineno) for i in dis.get_instructions(code) if f"'{i.argval}'" in reason
+    )
+    return next(filter(None, lines), code.co_firstlineno)
+
+
+def _looked_at(error: Exception) -> Any:
+    """The place in a function that Numba was looking at when it failed."""
+    seen = [
+        frame.f_locals.get(name) for frame, _ in walk_tb(error.__traceback__) for name in ("self", "inst")
+    ]
+    places = (getattr(one, "loc", None) for one in reversed(seen))
+    return next((one for one in places if hasattr(one, "filename")), NOWHERE)
