@@ -16,9 +16,10 @@ from shipgym.checks import check_whole
 from shipgym.engine import episodes
 from shipgym.engine.addresses import addresses
 from shipgym.engine.records import LANES
-from shipgym.engine.voyages import voyages
+from shipgym.engine.voyages import Voyages, voyages
 from shipgym.envs.lanes import Lanes
 from shipgym.envs.outputs import STEP_OUTCOME, Outputs
+from shipgym.envs.plain_python import plain_loop
 from shipgym.envs.randomisation import Randomisation
 from shipgym.errors import InputError
 from shipgym.ships import ShipModel
@@ -50,12 +51,14 @@ class Engine(Lanes):
         Number of threads that share the lanes; the results do not depend on it.
     model_index : int, optional
         The one of the ships that are drawn from that all episodes have.
+    loop : callable, optional
+        Makes the loop that steps the ships; by default it is compiled.
     """
 
     def __init__(
         self, models: ShipModel | Sequence[ShipModel], num_envs: int, task: Task | None = None,
         randomisation: Randomisation | None = None, allow_unstable: bool = False, threads: int = 1,
-        model_index: int | None = None,
+        model_index: int | None = None, loop: Callable[[Voyages], Any] | None = None,
     ) -> None:  # fmt: skip
         self.remade: Callable[..., Engine] = partial(
             Engine, models, num_envs, randomisation=randomisation, allow_unstable=allow_unstable,
@@ -83,8 +86,14 @@ class Engine(Lanes):
         made = voyages(model.vessel, task.definition, task.instruments(windy), windy, len(own) == 1)
         super().__init__(made, model, task, num_envs, own, drawn)
         self._connect(min(threads, len(self._states)))
-        self._run = made.run  # compiled last, when nothing is left that may be refused
+        self._run = (loop or self._compiled)(made)  # last, when nothing is left that may be refused
         self.reset(np.arange(num_envs))
+
+    def _compiled(self, made: Voyages) -> Any:
+        try:
+            return made.run
+        except InputError as error:
+            raise InputError(fault_in_python(self.model, self.task) or str(error)) from None
 
     def _connect(self, threads: int) -> None:
         """Tell the loops where the arrays are: a world for each thread, with its share of the tiles."""
@@ -232,6 +241,20 @@ class Engine(Lanes):
     def reward_parts(self) -> Floats:
         """Parts of the last rewards in the order of the task's, shape (num_envs, n_parts)."""
         return np.stack([self.info(name) for name in self.task.reward_parts], axis=-1)
+
+
+def fault_in_python(model: ShipModel, task: Task) -> str:
+    """What plain Python finds wrong with the functions of a task in its first step; empty if nothing.
+
+    Errors of arithmetic are passed over: compiled code goes on with infinities and NaN.
+    """
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            Engine(model, 1, task, allow_unstable=True, loop=plain_loop).step(np.zeros((1, task.n_commands)))
+    except InputError as error:
+        return "" if isinstance(error.__cause__, ArithmeticError | ValueError) else str(error)
+    return ""
 
 
 def as_array(actions: Any) -> NDArray[Any]:

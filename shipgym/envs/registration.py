@@ -5,6 +5,7 @@ from typing import Any
 
 import gymnasium
 
+from shipgym.checks import check_text
 from shipgym.errors import InputError
 from shipgym.tasks.source import kept_source
 
@@ -58,8 +59,8 @@ def register_environments() -> None:
 def register_task(env_id: str, task: str | Path | Any, **options: Any) -> None:
     """Register a task of your own, so that `gym.make` and `gym.make_vec` know it.
 
-    Raises InputError if the task is not what the contract asks, or the id belongs to another; nothing is
-    registered then.
+    Its first step is tried in plain Python. Raises InputError if the task is not what the contract asks or
+    does not fit the ship, or the id belongs to another; nothing is registered then.
 
     Parameters
     ----------
@@ -70,13 +71,14 @@ def register_task(env_id: str, task: str | Path | Any, **options: Any) -> None:
     **options
         Keywords of the environment that differ from their defaults.
     """
+    from shipgym.envs.engine import fault_in_python
     from shipgym.envs.environment import DEFAULT_MODEL, ENV_OPTIONS, read_options
 
     given = {"task": kept_source(task), **options}
     given |= {name: kept_source(options[name]) for name in ("reward", "sensors") if name in options}
     own = {name: value for name, value in options.items() if name == "reward" or name not in ENV_OPTIONS}
-    _, asked, _ = read_options(task, options.get("model", DEFAULT_MODEL), own)
-    if env_id in gymnasium.registry:
+    ship, asked, _ = read_options(task, options.get("model", DEFAULT_MODEL), own)
+    if check_text(env_id, "env_id") in gymnasium.registry:
         if gymnasium.registry[env_id].kwargs == given:
             return
         raise InputError(
@@ -89,6 +91,8 @@ def register_task(env_id: str, task: str | Path | Any, **options: Any) -> None:
         raise InputError(
             f"{env_id!r} found, expected an id such as 'harbour/{asked.name}-v0': {error}"
         ) from None
+    if fault := fault_in_python(ship, asked):
+        raise InputError(fault)
     _register(env_id, given)
 
 

@@ -1,6 +1,5 @@
 """What is wrong with a task: a battery for any task, reward or sensor set of a user's own."""
 
-import traceback
 from collections.abc import Iterator
 from typing import Any
 
@@ -9,13 +8,16 @@ from numpy.typing import NDArray
 
 from shipgym.arrays import Floats
 from shipgym.checks import Findings
-from shipgym.engine import episodes
-from shipgym.engine.compiling import plain as plain_loop
 from shipgym.engine.records import flat, leaves
 from shipgym.engine.specialise import Part
+from shipgym.engine.voyages import Voyages
 from shipgym.envs.engine import Engine
 from shipgym.envs.environment import DEFAULT_MODEL, read_options
+from shipgym.envs.plain_python import plain_loop
+from shipgym.envs.randomisation import Randomisation
 from shipgym.errors import InputError
+from shipgym.python_files import asked
+from shipgym.ships import ShipModel
 from shipgym.tasks.task import Task
 
 STEPS, PLAIN_STEPS = 400, 40
@@ -40,44 +42,42 @@ def check_task(task: Any, **options: Any) -> TaskCheck:
     keywords of the environment, `model`, `reward` and `sensors` among them.
     """
     try:
-        model, asked, randomisation = read_options(task, options.pop("model", DEFAULT_MODEL), options)
-        name = asked.name
-        few = Engine(model, PLAIN_LANES, asked, randomisation)
-        plain, seen = _plain_engine(few)
-        many = Engine(model, LANES, asked, randomisation)
-        one = Engine(model, 1, asked, randomisation)
+        model, given, randomisation = read_options(task, options.pop("model", DEFAULT_MODEL), options)
+        plain, seen = _plain_engine(model, given, randomisation)
+        _sail_in_python(plain)
+        few = Engine(model, PLAIN_LANES, given, randomisation)
+        many = Engine(model, LANES, given, randomisation)
+        one = Engine(model, 1, given, randomisation)
     except InputError as error:
         return TaskCheck(str(task), (str(error),))
-    with np.errstate(all="ignore"):  # the random numbers' words overflow, as they should
-        problem = _fails_in_python(plain)
-        if problem:
-            return TaskCheck(name, (problem,))
-        problems = [
-            *_not_finite(many),
-            *_differ(few, plain, slice(None), PLAIN_STEPS, AGREEMENT, ("compiled", "in plain Python")),
-            *_differ(many, one, slice(-1, None), STEPS // 4, 0.0, ("among many ships", "alone")),
-        ]
-    return TaskCheck(name, tuple(problems), tuple(_often_clipped(asked, seen)))
+    problems = [
+        *_not_finite(many),
+        *_differ(few, plain, slice(None), PLAIN_STEPS, AGREEMENT, ("compiled", "in plain Python")),
+        *_differ(many, one, slice(-1, None), STEPS // 4, 0.0, ("among many ships", "alone")),
+    ]
+    return TaskCheck(given.name, tuple(problems), tuple(_often_clipped(given, seen)))
 
 
-def _plain_engine(engine: Engine) -> tuple[Engine, dict[str, list[float]]]:
-    """An engine alike whose loop is plain Python, and all that it observes, before it is clipped, by path."""
-    plain = Engine(engine.model, engine.num_envs, engine.task)
-    made = plain._voyages
-    store = made.parts["store_observation"].function
-    seen: dict[str, list[float]] = {quantity.path: [] for quantity in engine.task.observed(engine.model)}
-    paths = leaves(engine.task.definition.Observation)
+def _plain_engine(
+    model: ShipModel, task: Task, randomisation: Randomisation
+) -> tuple[Engine, dict[str, list[float]]]:
+    """An engine in plain Python, and all that it observes, before it is clipped, by path."""
+    seen: dict[str, list[float]] = {quantity.path: [] for quantity in task.observed(model)}
+    paths = leaves(task.definition.Observation)
 
-    def noted(tile: Any, lane: int, record: Any, scale: Any) -> None:
-        if lane < plain.num_envs:
-            for path, value, per_scale in zip(paths, flat(record), flat(scale), strict=True):
-                if path in seen:
-                    seen[path].append(value * per_scale)
-        store(tile, lane, record, scale)
+    def loop(made: Voyages) -> Any:
+        store = made.parts["store_observation"].function
 
-    parts = {**made.parts, "store_observation": Part(noted, code=lambda: None, key="noted")}
-    plain._run = plain_loop(episodes.run, parts)
-    return plain, seen
+        def noted(tile: Any, lane: int, record: Any, scale: Any) -> None:
+            if lane < PLAIN_LANES:
+                for path, value, per_scale in zip(paths, flat(record), flat(scale), strict=True):
+                    if path in seen:
+                        seen[path].append(value * per_scale)
+            store(tile, lane, record, scale)
+
+        return plain_loop(made, {"store_observation": Part(noted, code=lambda: None, key="noted")})
+
+    return Engine(model, PLAIN_LANES, task, randomisation, loop=loop), seen
 
 
 def _orders(engine: Engine, step: int) -> Floats:
@@ -89,24 +89,13 @@ def _orders(engine: Engine, step: int) -> Floats:
     return np.repeat(rudder[:, None], engine.task.n_commands, axis=1)
 
 
-def _fails_in_python(plain: Engine) -> str | None:
-    """The first error that plain Python meets, with its line."""
-    step = -1
-    try:
-        plain.reset(np.arange(plain.num_envs))
-        for step in range(PLAIN_STEPS):
-            plain.step(_orders(plain, step))
-    except InputError as error:
-        return str(error)
-    except Exception as error:
-        own = plain.task.definition.source
-        frames = traceback.extract_tb(error.__traceback__)
-        at = next((frame for frame in reversed(frames) if frame.filename == own), frames[-1])
-        return (
-            f"{at.filename}, line {at.lineno}, in {at.name}: {type(error).__name__}: {error}, "
-            f"at step {step + 1} in plain Python"
-        )
-    return None
+def _sail_in_python(plain: Engine) -> None:
+    """Some steps in plain Python; the first error is an InputError that names its line and the step."""
+    for step in range(PLAIN_STEPS):
+        try:
+            asked(plain.step, _orders(plain, step))
+        except InputError as error:
+            raise InputError(f"{error}, at step {step + 1} in plain Python") from error
 
 
 def _not_finite(engine: Engine) -> Iterator[str]:

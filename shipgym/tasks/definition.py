@@ -11,13 +11,21 @@ from typing import Any
 
 import numpy as np
 
-from shipgym.checks import did_you_mean, quoted
+from shipgym.checks import check_choice, check_number, check_text, check_whole, did_you_mean, quoted, shown
 from shipgym.engine.places import reward_of_another, step_of_task
 from shipgym.engine.records import Record, field_types, is_record, leaves
 from shipgym.engine.specialise import is_shipped
 from shipgym.errors import InputError
+from shipgym.python_files import asked
 from shipgym.tasks.contract import Seen
-from shipgym.tasks.source import Configurable, annotated, check_namespace, keywords, read_source
+from shipgym.tasks.source import (
+    Configurable,
+    annotated,
+    check_function,
+    check_namespace,
+    keywords,
+    read_source,
+)  # fmt: skip
 
 RECORDS = ("Settings", "State", "Reward", "Observation")
 MOMENT = ("motion", "state", "interval", "ship", "settings")
@@ -27,6 +35,8 @@ FUNCTIONS = {
     "plan_length": ("settings",), "check": ("settings", "model"), "listed": ("value",),
 }  # fmt: skip
 NEEDED = ("begin", "step", "observe")
+#: What shows an observation beside the others: an environment with `roll`, or with orders to the shaft.
+OPTIONS = ("", "roll", "shaft", "shaft speed")
 #: Names in `info` that are the engine's.
 TAKEN = ("reward", "terminated", "truncated", "envelope_distance", "extrapolating", "end")
 #: Registered tasks: name to module name.
@@ -125,7 +135,7 @@ class TaskDefinition(Configurable):
     def make_settings(self, options: Mapping[str, Any]) -> Any:
         """Settings by keywords; InputError for an unknown one, or a value that does not fit."""
         settings = super().make_settings(options)
-        self.check(settings, None)
+        asked(self.check, settings, None)
         return settings
 
 
@@ -174,21 +184,35 @@ def _named(source: Any) -> tuple[Any, str]:
 def _definition(namespace: Any, where: str) -> TaskDefinition:
     optional = [name for name in FUNCTIONS if name not in NEEDED]
     found = check_namespace(namespace, where, RECORDS, FUNCTIONS, optional)
+    reported = getattr(namespace, "REPORTED", ())
+    for name in reported if isinstance(reported, tuple | list) else [reported]:
+        if not isinstance(name, str) or name not in found["State"]._fields or name in TAKEN:
+            raise InputError(
+                f"{where}: REPORTED: {shown(name)} found, expected fields of State, none of {TAKEN}"
+            )
     definition = TaskDefinition(
-        name=getattr(namespace, "NAME", None) or Path(where).stem, source=where,
-        reported=tuple(getattr(namespace, "REPORTED", ())),
-        episode_steps=getattr(namespace, "EPISODE_STEPS", 600), **found,
+        name=check_text(getattr(namespace, "NAME", Path(where).stem), f"{where}: NAME"), source=where,
+        reported=tuple(reported),
+        episode_steps=check_whole(
+            getattr(namespace, "EPISODE_STEPS", 600), f"{where}: EPISODE_STEPS", at_least=1
+        ),
+        **found,
     )  # fmt: skip
     for path, seen in definition.seen.items():
-        if seen is None or not (np.isfinite(seen.low) and np.isfinite(seen.high) and seen.low < seen.high):
-            raise InputError(
-                f"{where}: Observation.{path}: no bounds found, expected "
-                "Annotated[float, Seen(low, high, unit, scale)] with finite bounds"
-            )
-    for name in definition.reported:
-        if name not in definition.State._fields or name in TAKEN:  # type: ignore[attr-defined]
-            raise InputError(f"{where}: REPORTED: {name!r} found, expected fields of State, none of {TAKEN}")
+        _check_seen(seen, f"{where}: Observation.{path}")
     return definition
+
+
+def _check_seen(seen: Seen | None, where: str) -> None:
+    if seen is None:
+        raise InputError(f"{where}: no bounds found, expected Annotated[float, Seen(low, high, unit, scale)]")
+    check_number(seen.low, f"{where}: lower bound")
+    check_number(seen.high, f"{where}: upper bound", above=seen.low)
+    check_choice(seen.option, OPTIONS, f"{where}: option")
+    if callable(seen.scale):
+        check_function(seen.scale, 2, f"{where}: scale", "a function of ship and settings")
+    else:
+        check_number(seen.scale, f"{where}: scale", above=0.0)
 
 
 def _check_names(definition: TaskDefinition) -> None:

@@ -3,7 +3,9 @@
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from inspect import CO_ASYNC_GENERATOR, CO_COROUTINE, CO_GENERATOR, CO_VARARGS, CO_VARKEYWORDS
 from pathlib import Path
+from types import FunctionType
 from typing import Any
 
 import numpy as np
@@ -11,8 +13,10 @@ import numpy as np
 from shipgym.checks import check_keys, check_number, check_whole
 from shipgym.engine.records import Record, field_types, is_list, is_record, leaves
 from shipgym.errors import InputError
-from shipgym.python_files import load_file
+from shipgym.python_files import asked, load_file
 from shipgym.tasks.contract import Setting
+
+NOT_PLAIN = CO_VARARGS | CO_VARKEYWORDS | CO_GENERATOR | CO_COROUTINE | CO_ASYNC_GENERATOR
 
 
 def read_source(source: Any) -> tuple[Any, str]:
@@ -46,15 +50,23 @@ def check_namespace(
         if not hasattr(namespace, name):
             raise InputError(f"{where}: no {name!r} found, expected {what} (see shipgym.tasks.contract)")
         found[name] = value = getattr(namespace, name)
-        code = getattr(value, "__code__", None)
         if name not in functions:
             if not is_record(value):
                 raise InputError(f"{where}: {name} is no NamedTuple, expected {what}")
             _check_record(value, name, where)
-        elif code is None or code.co_argcount != len(functions[name]):
-            count = "no plain function" if code is None else f"{code.co_argcount} arguments"
-            raise InputError(f"{where}: {name}: {count} found, expected {what}")
+        else:
+            check_function(value, len(functions[name]), f"{where}: {name}", what)
     return found
+
+
+def check_function(value: Any, count: int, where: str, what: str) -> None:
+    """Refuse what is not a plain function of so many arguments; `what` says what is expected."""
+    code = value.__code__ if isinstance(value, FunctionType) else None
+    if code is None:
+        raise InputError(f"{where}: no plain function found, expected {what}")
+    if code.co_flags & NOT_PLAIN or code.co_argcount != count:
+        more = " or more, a generator or a coroutine" if code.co_flags & NOT_PLAIN else ""
+        raise InputError(f"{where}: {code.co_argcount} arguments{more} found, expected {what}")
 
 
 def _check_record(record: Any, name: str, where: str) -> None:
@@ -64,6 +76,10 @@ def _check_record(record: Any, name: str, where: str) -> None:
         raise InputError(f"{where}: {name}: an annotation cannot be read: {error}") from None
     if not leaves(record):
         raise InputError(f"{where}: {name}: no fields found, expected one number at least")
+    if name == "Settings":
+        for field, setting, default in keywords(record):
+            if isinstance(default, float | int):
+                _number(default, f"{where}: Settings.{field}: default", setting)
     for field, kind in kinds.items():
         default = record._field_defaults.get(field)
         if name == "Settings" and field not in record._field_defaults:
@@ -148,7 +164,7 @@ def _small_record(kind: Any, value: Any, name: str, bounds: Setting) -> Any:
 def _list_of_numbers(value: Any, name: str, bounds: Setting, listed: Callable[[Any], Any]) -> Any:
     if value is None:
         return np.zeros(0)
-    numbers = np.asarray(listed(value))
+    numbers = np.asarray(asked(listed, value))
     if numbers.ndim != 1:
         raise InputError(f"{name}: {value!r} found, expected a list")
     if len(numbers) == 0:

@@ -12,6 +12,7 @@ from shipgym.checks import check_choice, check_keys, check_number, check_whole
 from shipgym.engine.motion import Ship
 from shipgym.errors import InputError
 from shipgym.instruments.sensor_set import SensorSet, read_sensors, shipped_sensors
+from shipgym.python_files import asked
 from shipgym.sea.conditions import Weather
 from shipgym.sea.weather_column import as_weather
 from shipgym.ships import ShipModel
@@ -22,7 +23,10 @@ from shipgym.tasks.steering import Helm
 Sea = str | Weather
 
 LONGEST_INTERVAL = 5.0  # ship lengths at service speed
-ENVIRONMENT_KEYWORDS = ("model", "task", "reward", "render_mode", "allow_unstable", "num_envs", "threads")
+ENVIRONMENT_KEYWORDS = (
+    "model", "task", "reward", "render_mode", "allow_unstable", "num_envs", "threads", "autoreset_mode",
+    "max_episode_steps",
+)  # fmt: skip
 STEPS_PER_LENGTH = 20.0  # control intervals in the time to travel one ship length, about
 
 ACTIONS = ("rudder", "rudder-discrete", "rudder-shaft")
@@ -200,7 +204,12 @@ class Task:
             )
         if self.action == "rudder-shaft" and not model.service_shaft_speed > 0.0:
             raise InputError(f"action: 'rudder-shaft' found, but {model.name!r} has no shaft speed")
-        self.definition.check(self.settings, model)
+        asked(self.definition.check, self.settings, model)
+        for quantity in self.observed(model):
+            where = f"{self.definition.source}: Observation.{quantity.path}: scale for {model.name!r}"
+            check_number(quantity.scale, where, above=0.0)
+        where = f"{self.definition.source}: plan_length"
+        check_whole(asked(self.definition.plan_length, self.settings), where, at_least=0)
 
     def observed(self, model: ShipModel) -> tuple[Observed, ...]:
         """What is observed of a ship, in order."""
@@ -221,7 +230,7 @@ class Task:
     def scale(self, path: str, ship: Ship) -> float:
         """Physical value of an observation of 1."""
         scale = self.definition.seen[path].scale
-        return float(scale(ship, self.settings)) if callable(scale) else float(scale)
+        return asked(scale, ship, self.settings) if callable(scale) else scale
 
     @property
     def n_commands(self) -> int:

@@ -185,6 +185,28 @@ WRONG = [
     ("class Reward", "class Reward(", "fairway.py, line .*: cannot be executed: SyntaxError"),
     ("drawn(random, 1,", "drwn(random, 1,", "in begin.*drwn"),
     ("return 2.0 + settings", "return settings.weight + settings", "in worst_cost.*weight"),
+    ("return 2.0 + settings.over_speed_weight", "pass", "in worst_cost: .*nothing, expected a number"),
+    ("max(motion.u", "mox(motion.u", "line 52, in step: NameError: name 'mox'"),
+    ("Reward(-off * off, ", "Reward(", "line 54, in step: TypeError: .*'over_speed'"),
+    ("Reward(-off", "(-off", r"in step: .*\(a number, a number, a number\), expected Reward"),
+    ("fabs(off) > 1.0, ", "", r"line 48, in step: what it returns is \(State, Reward, true or false\), "),
+    ("fabs(off) > 1.0", "off", "in step: what it returns is a number, expected true or false"),
+    ("motion.y, limit", "motion.y, (limit, 1.0)", r"State.limit is \(a number, a number\), exp"),
+    ("return motion, State", "return State", "in begin: what it returns is State, expected .Motion, State."),
+    ("def begin", "def plan_length(_):\n    return -1\n\n\ndef begin", "plan_length: -1 found, expected"),
+    ("def begin", "def plan_length(s):\n    return s.w\n\n\ndef begin", "line 43, in plan_length: Attr"),
+    ("def begin", "def check(s, m):\n    1 / 0\n\n\ndef begin", "line 43, in check: ZeroDivisionError"),
+    ("    aside = 0.5", "    plan[40] = 1.0\n    aside = 0.5", "line 43, in begin: IndexError: index 40"),
+    ("def worst_cost(settings)", "def worst_cost(*settings)", "0 arguments or more, a generator or a co"),
+    ("def step", "import numba\n\n\n@numba.njit\ndef step", "step: no plain function found, expected a"),
+    ("return 2.0 + ", "return worst_cost(settings) + ", "line 59, in worst_cost: calls itself, expected a"),
+    ("] = 50.0", "] = -50.0", "Settings.over_speed_weight: default: -50 found, expected a number >= 0"),
+    ("half_width: Annotated", "autoreset_mode: Annotated", "Settings.autoreset_mode found, which is a keyw"),
+    ('REPORTED = (', 'REPORTED = "x" or (', "REPORTED: 'x' found, expected fields of State"),
+    ('REPORTED = (', 'REPORTED = 3 or (', "REPORTED: 3 found, expected fields of State"),
+    ('REPORTED = (', 'NAME = ["a"]\nREPORTED = (', r"NAME: \['a'\] found, expected a text"),
+    ('REPORTED = (', 'EPISODE_STEPS = -1\nREPORTED = (', "fairway.py: EPISODE_STEPS: -1 found"),
+    ('REPORTED = (', 'raise SystemExit(3)\nREPORTED = (', "line 8: cannot be executed: SystemExit: 3"),
 ]  # fmt: skip
 
 
@@ -195,12 +217,35 @@ def test_what_is_wrong_is_named_and_nothing_is_registered(tmp_path, old, new, me
     found = check_task(path, **SHIP)
     assert len(found.problems) == 1
     assert re.search(message, found.problems[0])
-    if "in " not in message:  # what compiling would find is found when an environment is made
+    with pytest.raises(InputError, match=message):
+        register_task("harbour/Wrong-v0", path, **SHIP)
+    assert "harbour/Wrong-v0" not in gymnasium.registry
+    if not message.endswith(("index 40", "expected Reward")):  # compiled code looks at neither
         with pytest.raises(InputError, match=message):
             gymnasium.make(COURSE, task=str(path), **SHIP)
-        with pytest.raises(InputError, match=message):
-            register_task("harbour/Wrong-v0", path, **SHIP)
-        assert "harbour/Wrong-v0" not in gymnasium.registry
+
+
+@pytest.mark.parametrize(
+    ("new", "message"),
+    [
+        ("    if x > 3.0:\n        fathom\n", r"in step \(.*fairway.py, line 51\): NameError: name 'fathom'"),
+        ("    if x > 3.0:\n        return 1.0, 2.0\n", r"in step \(.*fairway.py, line 5[18]\): Can't unify"),
+        ("    if x > 3.0:\n        Reward(1.0)\n", r"compiled \(.*fairway.py, line 51\): .*'delay'"),
+    ],
+)
+def test_what_only_numba_finds_is_told_with_function_and_line(tmp_path, new, message):
+    assert FAIRWAY.splitlines()[49].startswith("    inside =")
+    text = FAIRWAY.replace("    inside =", f"{new}    inside =")
+    path = written(tmp_path, "fairway.py", text)
+    with pytest.raises(InputError, match=message):
+        gymnasium.make(COURSE, task=path, **SHIP)
+
+
+def test_what_is_interrupted_while_it_is_read_is_read_anew(tmp_path):
+    path = written(tmp_path, "own.py", "first = 1\nraise KeyboardInterrupt\n")
+    for _ in range(2):
+        with pytest.raises(KeyboardInterrupt):
+            load_file(path)
 
 
 AS_TEXT = "from __future__ import annotations\n"
@@ -318,6 +363,12 @@ def test_what_is_often_clipped_is_remarked(tmp_path):
     _, furthest, low, high, part = re.match(shown, remark).groups()
     assert not float(low) <= float(furthest) <= float(high)
     assert 50 < float(part) < 100
+
+
+def test_ids_are_texts():
+    for one in (None, 3, ""):
+        with pytest.raises(InputError, match=r"env_id: .* found, expected a text that is not empty"):
+            register_task(one, "CourseKeeping")
 
 
 def test_ids_are_taken_once(fairway, tmp_path):
@@ -579,15 +630,34 @@ def test_a_task_without_events_and_plan_is_complete():
 
 
 def test_bounds_of_an_observation_are_finite_and_in_order(tmp_path):
-    for bounds in ("1.0, -1.0", "1.0, 1.0", "-float('inf'), 1.0", "-1.0, float('nan')"):
+    for bounds, wrong in {
+        "1.0, -1.0": "upper bound: -1 found, expected a number > 1",
+        "1.0, 1.0": "upper bound: 1 found, expected a number > 1",
+        "-float('inf'), 1.0": "lower bound: -inf found, expected a number",
+        "-1.0, float('nan')": "upper bound: nan found, expected a number > -1",
+        "'0', 1.0": "lower bound: '0' (a text; write the number without quotes) found, expected a number",
+        "-1.0, None": "upper bound: None found, expected a number > -1",
+        "-1.0, 1.0, option='rol'": "option: 'rol' found, expected one of '', 'roll', 'shaft', 'shaft speed'",
+        "-1.0, 1.0, scale=0.0": "scale: 0 found, expected a number > 0",
+        "-1.0, 1.0, scale=-2.0": "scale: -2 found, expected a number > 0",
+        "-1.0, 1.0, scale=float('nan')": "scale: nan found, expected a number > 0",
+        "-1.0, 1.0, scale='8'": "scale: '8' (a text; write the number without quotes) found",
+        "-1.0, 1.0, scale=lambda ship: 1.0": "scale: 1 arguments found, expected a function of ship and sett",
+        "-1.0, 1.0, scale=lambda ship, _: 0.0": "scale for 'mariner-tls-svm': 0 found, expected a number > 0",
+        "-1.0, 1.0, scale=lambda ship, _: ship.w": "AttributeError: 'Ship' object has no attribute 'w'",
+    }.items():
         text = FAIRWAY.replace(
             "g_sin: Annotated[float, Seen(-1.0, 1.0)]", f"g_sin: Annotated[float, Seen({bounds})]"
         )
         path = written(tmp_path, "fairway.py", text)
-        with pytest.raises(
-            InputError, match=r"Observation.heading_sin: no bounds found, expected Annotated\[f"
-        ):
-            read_definition(path)
+        (problem,) = check_task(path).problems
+        assert problem.startswith(str(path)), problem
+        assert wrong in problem, problem
+    path = written(
+        tmp_path, "fairway.py", FAIRWAY.replace("g_sin: Annotated[float, Seen(-1.0, 1.0)]", "g_sin: float")
+    )
+    with pytest.raises(InputError, match=r"Observation.heading_sin: no bounds found, expected Annotated\[f"):
+        read_definition(path)
 
 
 def test_names_that_the_engine_has_in_info_are_not_reported(tmp_path):
