@@ -4,6 +4,7 @@ import time
 import warnings
 from collections.abc import Callable, Iterator
 from functools import partial
+from pathlib import Path
 from typing import Annotated, Any
 
 from typer import Argument, Option
@@ -11,31 +12,42 @@ from typer import Argument, Option
 from agents.cli.command import answered
 
 Wanted = Annotated[
-    list[str] | None, Argument(metavar="[ID|MODEL]...", help="Environment ids, names of models, model files.")
+    list[str] | None,
+    Argument(
+        metavar="[ID|MODEL|FILE]...", help="Ids of environments, models, files of models, ships and tasks."
+    ),
+]
+Ship = Annotated[
+    str | None, Option("--model", help="Ship of the environments and tasks, by default their own.")
 ]
 All = Annotated[bool, Option("--all", help="All environments, calm and in a sea, and all shipped models.")]
 SEAS = (None, "rough")  # every sea but the calm one shares what is compiled
 
 
 @answered
-def warm_command(wanted: Wanted = None, everything: All = False) -> None:
+def warm_command(wanted: Wanted = None, everything: All = False, model: Ship = None) -> None:
     """Compile ships in advance. Without arguments, both tasks with the Mariner.
 
-    An environment stands for its default ship in calm water and in a sea, a model for its manoeuvres and
-    simulations in calm water. Writes only to the cache (SHIPGYM_CACHE or the user's cache folder).
+    An environment, or the file of a task, stands for its ship in calm water and in a sea, a model for its
+    manoeuvres and simulations in calm water. Writes only to the cache (SHIPGYM_CACHE or the user's cache
+    folder).
     """
     from agents.cli.terminal import answer, say
-    from shipgym.engine.cache_folder import usable_folder
+    from shipgym.engine.cache_folder import CacheWarning, usable_folder
     from shipgym.errors import InputError
 
     if (folder := usable_folder()) is None:
         raise InputError("there is no cache to fill, for the reason above")
-    jobs = dict(job for name in _names(wanted, everything) for job in _jobs(name))
+    jobs = dict(job for name in _names(wanted, everything) for job in _jobs(name, model))
     done: list[dict[str, Any]] = []
     for number, (what, job) in enumerate(jobs.items(), start=1):
         begin, refused = time.perf_counter(), ""
         try:
-            job()
+            with warnings.catch_warnings():
+                warnings.simplefilter("error", CacheWarning)
+                job()
+        except CacheWarning as error:
+            raise InputError(f"{what}: {error}") from None
         except InputError as error:
             if not everything:
                 raise
@@ -57,18 +69,26 @@ def _names(wanted: list[str] | None, everything: bool) -> list[str]:
     return wanted or [*map(env_id, TASKS), "mariner"]
 
 
-def _jobs(name: str) -> Iterator[tuple[str, Callable[[], Any]]]:
+def _jobs(name: str, ship: str | None = None) -> Iterator[tuple[str, Callable[[], Any]]]:
     """What is to be compiled for an id or a model, each with words for it."""
-    import gymnasium
-
     import shipgym
     from shipgym.engine.loops import LOOPS, ship_loop
+    from shipgym.envs.environment import DEFAULT_TASK
+    from shipgym.envs.registration import env_id, environments
     from shipgym.errors import InputError
+    from shipgym.python_files import load_file
 
-    if name in gymnasium.registry:
+    path = Path(name)
+    task = path.suffix == ".py" and not hasattr(
+        load_file(path, "the Python file of a task or a ship"), "SHIP"
+    )
+    if task or name in environments():
+        given: dict[str, Any] = {"model": ship} if ship else {}
+        given |= {"task": name} if task else {}
         for sea in SEAS:
-            options: dict[str, Any] = {} if sea is None else {"sea": sea}
-            yield f"{name} in {'calm water' if sea is None else 'a sea'}", partial(_make, name, options)
+            options = given if sea is None else {**given, "sea": sea}
+            make = partial(_make, env_id(DEFAULT_TASK) if task else name, options)
+            yield f"{name} in {'calm water' if sea is None else 'a sea'}", make
         return
     try:
         model = shipgym.load_model(name)

@@ -28,6 +28,7 @@ from agents.engines.jobs import JobEngine, WorkerDiedError
 from agents.training.plan import Given
 from agents.training.run_folder import CHECKPOINT
 from shipgym import InputError, ManoeuvreError, UnstableModelError, load_model
+from shipgym.engine.cache_folder import CacheWarning
 from tests.golden.texts import same_page, same_text
 
 ROOT = Path(__file__).parents[2]
@@ -364,7 +365,7 @@ def test_warm_says_what_cannot_be_and_goes_on_only_where_all_was_asked_for(monke
 
     jobs = {"one": [("first", refuses)], "other": [("second", int)]}
     monkeypatch.setattr("agents.cli.warm._names", lambda wanted, everything: list(jobs))
-    monkeypatch.setattr("agents.cli.warm._jobs", lambda name: iter(jobs[name]))
+    monkeypatch.setattr("agents.cli.warm._jobs", lambda name, ship: iter(jobs[name]))
     answer = shipgym("warm", "--all", "--json")
     assert answer.exit_code == 0
     ready = json.loads(answer.stdout)["ready"]
@@ -432,6 +433,33 @@ def test_warm_fills_no_cache_that_would_not_be_used(tmp_path):
     assert "may be written by other users" in answer.stderr
     assert "there is no cache to fill" in answer.stderr
     assert not list(tmp_path.iterdir())
+
+
+def test_warm_takes_the_file_of_a_task_with_a_ship(tmp_path, monkeypatch):
+    fairway = str(ROOT / "examples" / "fairway.py")
+    assert [what for what, _ in _jobs(fairway, "kvlcc2")] == [
+        f"{fairway} in calm water", f"{fairway} in a sea"
+    ]  # fmt: skip
+    made = []
+    monkeypatch.setattr(warm, "_make", lambda env_id, options: made.append((env_id, options)))
+    for _, job in _jobs(fairway, "kvlcc2"):
+        job()
+    options = {"model": "kvlcc2", "task": fairway}
+    assert made == [
+        ("shipgym/CourseKeeping-v0", options),
+        ("shipgym/CourseKeeping-v0", {**options, "sea": "rough"}),
+    ]
+    with pytest.raises(InputError, match="'CartPole-v1' found, expected an environment's id or a model"):
+        list(_jobs("CartPole-v1"))
+
+
+def test_warm_ends_with_an_error_where_nothing_can_be_kept(monkeypatch):
+    def kept_nowhere():
+        warnings.warn("/cache: cannot be written", CacheWarning, stacklevel=1)
+
+    monkeypatch.setattr("agents.cli.warm._jobs", lambda name, ship: iter([("first", kept_nowhere)]))
+    answer = shipgym("warm", "--all")
+    assert (answer.exit_code, answer.stderr) == (2, "error: first: /cache: cannot be written\n")
 
 
 def test_warm_knows_environments_and_models():
@@ -841,7 +869,7 @@ def test_warming_is_told_to_a_hundredth_of_a_second(monkeypatch):
     clock = iter([10.0, 11.23456])
     monkeypatch.setattr(warm, "time", SimpleNamespace(perf_counter=lambda: next(clock)))
     monkeypatch.setattr(warm, "_names", lambda wanted, everything: ["one"])
-    monkeypatch.setattr(warm, "_jobs", lambda name: iter([("first", int)]))
+    monkeypatch.setattr(warm, "_jobs", lambda name, ship: iter([("first", int)]))
     assert [one["seconds"] for one in json.loads(shipgym("warm", "--json").stdout)["ready"]] == [1.23]
 
 
