@@ -3,14 +3,16 @@
 import hashlib
 import sys
 from collections.abc import Callable
+from inspect import CO_ASYNC_GENERATOR, CO_COROUTINE, CO_GENERATOR, CO_VARARGS, CO_VARKEYWORDS
 from pathlib import Path
 from sysconfig import get_path
 from traceback import extract_tb
-from types import ModuleType
+from types import FunctionType, ModuleType
 from typing import Any
 
 from shipgym.errors import InputError
 
+NOT_PLAIN = CO_VARARGS | CO_VARKEYWORDS | CO_GENERATOR | CO_COROUTINE | CO_ASYNC_GENERATOR
 #: Where code is that is not a user's own.
 LIBRARIES = (str(Path(__file__).parent), *(get_path(name) for name in ("stdlib", "purelib", "platlib")))
 
@@ -46,6 +48,16 @@ def load_file(path: Path, expected: str = "a Python file") -> ModuleType:
         place = f"{path}, line {line}" if line else path
         raise InputError(f"{place}: cannot be executed: {type(error).__name__}: {error}") from error
     return module
+
+
+def check_function(value: Any, count: int, where: str, what: str) -> None:
+    """Refuse what is not a plain function of so many arguments; `what` says what is expected."""
+    code = value.__code__ if isinstance(value, FunctionType) else None
+    if code is None:
+        raise InputError(f"{where}: no plain function found, expected {what}")
+    if code.co_flags & NOT_PLAIN or code.co_argcount != count:
+        more = " or more, a generator or a coroutine" if code.co_flags & NOT_PLAIN else ""
+        raise InputError(f"{where}: {code.co_argcount} arguments{more} found, expected {what}")
 
 
 def asked(function: Callable[..., Any], *arguments: Any) -> Any:

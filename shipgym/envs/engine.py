@@ -22,6 +22,7 @@ from shipgym.envs.outputs import STEP_OUTCOME, Outputs
 from shipgym.envs.plain_python import plain_loop
 from shipgym.envs.randomisation import Randomisation
 from shipgym.errors import InputError
+from shipgym.python_files import asked
 from shipgym.ships import ShipModel
 from shipgym.tasks.task import Task, course_keeping_task
 
@@ -248,10 +249,15 @@ def fault_in_python(model: ShipModel, task: Task) -> str:
 
     Errors of arithmetic are passed over: compiled code goes on with infinities and NaN.
     """
+
+    def sail() -> None:
+        engine = Engine(model, 1, task, allow_unstable=True, loop=plain_loop)
+        engine.step(np.zeros((1, task.n_commands)))
+
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            Engine(model, 1, task, allow_unstable=True, loop=plain_loop).step(np.zeros((1, task.n_commands)))
+            asked(sail)
     except InputError as error:
         return "" if isinstance(error.__cause__, ArithmeticError | ValueError) else str(error)
     return ""

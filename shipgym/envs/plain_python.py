@@ -51,7 +51,8 @@ def _fault(given: Any, form: Any, name: str) -> str:
     """Where something differs from a record, a number (float), a truth value (bool) or a tuple of these."""
     if isinstance(form, tuple):
         if isinstance(given, tuple) and len(given) == len(form):
-            faults = (_fault(one, kind, name) for one, kind in zip(given, form, strict=True))
+            each = enumerate(zip(given, form, strict=True), start=1)
+            faults = (_fault(one, kind, f"result {k}") for k, (one, kind) in each)
             return next(filter(None, faults), "")
     elif is_record(form):
         if type(given) is form:

@@ -7,7 +7,6 @@ ship)`, and `SHIP`, which says the rest. The functions are plain Python; `shipgy
 
 import importlib
 import math
-import traceback
 from collections import namedtuple
 from collections.abc import Callable, Mapping
 from dataclasses import KW_ONLY, dataclass, field
@@ -17,13 +16,13 @@ from typing import Any, ClassVar
 import numpy as np
 
 from shipgym.arrays import Floats
-from shipgym.checks import check_number, check_text
+from shipgym.checks import check_flag, check_number, check_text, placed
 from shipgym.engine.motion import Motion, Ship
 from shipgym.engine.records import Record, field_types, is_record
 from shipgym.engine.specialise import Part
 from shipgym.engine.vessel import Vessel, vessel_of
 from shipgym.errors import InputError
-from shipgym.python_files import load_file
+from shipgym.python_files import asked, check_function, load_file
 from shipgym.ships.particulars import Particulars
 from shipgym.ships.steering import SteeringGear
 
@@ -82,9 +81,17 @@ class ShipEquations:
             if name not in valued:
                 raise InputError(f"{where}: coefficient {name!r} has no value, expected a default")
             check_number(valued[name], f"{where}: coefficient {name!r}")
-        for function in (self.accelerations, self.shaft_acceleration):
-            if function is not None and not callable(function):
-                raise InputError(f"{where}: {function!r} found, expected a function")
+        for name in self.switches if isinstance(self.switches, tuple) else (self.switches,):
+            if name not in self.coefficient_names:
+                raise InputError(
+                    f"{where}: switches: {name!r} found, expected a tuple of names of coefficients"
+                )
+        for name in ("rolls", "shallow_water", "astern"):
+            check_flag(getattr(self, name), f"{where}: {name}")
+        check_function(self.accelerations, 3, f"{where}: accelerations", "a function (motion, c, ship)")
+        if self.shaft_acceleration is not None:
+            what = "a function (n, command, c, ship)"
+            check_function(self.shaft_acceleration, 4, f"{where}: shaft_acceleration", what)
         if self.shaft_acceleration is not None or self.service_shaft_speed:
             check_number(self.service_shaft_speed, f"{where}: service_shaft_speed", above=0.0)
         self.particulars.require("speed")
@@ -97,21 +104,19 @@ class ShipEquations:
         ship = Ship(L, U, limit, rate, 0.0, n, math.inf, U)
         motion = Motion(0.0, 0.0, 0.1, 0.9 * U, 0.1 * U, 0.1 * U / L, 0.01, 0.01, 0.0, 0.1, n)
         coefficients = self.coefficients_record()
-        try:
-            found = self.accelerations(motion, coefficients, ship)
-            shaft = self.shaft_acceleration and self.shaft_acceleration(n, 0.9 * n, coefficients, ship)
-        except Exception as error:
-            at = traceback.extract_tb(error.__traceback__)[-1]
-            reason = f"{type(error).__name__}: {error}"
-            raise InputError(f"{where}: {at.name} ({at.filename}, line {at.lineno}): {reason}") from error
-        if not isinstance(found, tuple) or len(found) != len(RATES):
-            raise InputError(
-                f"{where}: accelerations returns {found!r}, expected five numbers: udot, vdot, rdot, pdot, "
-                "qdot, 0 for those that the ship does not have"
-            )
-        for name, value in zip((*RATES, "shaft_acceleration"), (*found, shaft or 0.0), strict=True):
-            if not isinstance(value, (int, float)):
-                raise InputError(f"{where}: {name} is {value!r}, expected a number")
+        with placed(where):
+            found = asked(self.accelerations, motion, coefficients, ship)
+            if not isinstance(found, tuple) or len(found) != len(RATES):
+                raise InputError(
+                    f"accelerations returns {found!r}, expected five numbers, a tuple: udot, vdot, rdot, "
+                    "pdot, qdot, 0 for those that the ship does not have"
+                )
+            rates = dict(zip(RATES, found, strict=True))
+            if self.shaft_acceleration is not None:
+                rates["shaft_acceleration"] = asked(self.shaft_acceleration, n, 0.9 * n, coefficients, ship)
+            for name, value in rates.items():
+                if not isinstance(value, (int, float)):
+                    raise InputError(f"{name} is {value!r}, expected a number, int or float")
 
     def __reduce__(self) -> Any:
         """Another process finds a ship of this package by her name, another by her file."""

@@ -19,7 +19,8 @@ and may define
 * `NAME`, by default that of the file, and `EPISODE_STEPS`, by default 600.
 * `REPORTED`: names of fields of `State` that `info` has; those annotated `Flag` as true or false.
 * `plan_length(settings) -> int`: how many numbers `plan` holds, an array that lasts over an episode.
-* `check(settings, model)`: raises `InputError` for settings that do not fit; `listed(value)`: what a keyword
+* `check(settings, model)`: raises `InputError` for settings that do not fit, first without a ship, `model`
+  None, then with one; `listed(value)`: what a keyword
   of another kind, such as a list of waypoints, means as numbers.
 
 A field `course` of `State`, rad, is the course to steer in `physical_state()` and in pictures.

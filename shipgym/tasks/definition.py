@@ -16,16 +16,9 @@ from shipgym.engine.places import reward_of_another, step_of_task
 from shipgym.engine.records import Record, field_types, is_record, leaves
 from shipgym.engine.specialise import is_shipped
 from shipgym.errors import InputError
-from shipgym.python_files import asked
+from shipgym.python_files import asked, check_function
 from shipgym.tasks.contract import Seen
-from shipgym.tasks.source import (
-    Configurable,
-    annotated,
-    check_function,
-    check_namespace,
-    keywords,
-    read_source,
-)  # fmt: skip
+from shipgym.tasks.source import Configurable, annotated, check_namespace, keywords, read_source  # fmt: skip
 
 RECORDS = ("Settings", "State", "Reward", "Observation")
 MOMENT = ("motion", "state", "interval", "ship", "settings")
@@ -185,11 +178,12 @@ def _definition(namespace: Any, where: str) -> TaskDefinition:
     optional = [name for name in FUNCTIONS if name not in NEEDED]
     found = check_namespace(namespace, where, RECORDS, FUNCTIONS, optional)
     reported = getattr(namespace, "REPORTED", ())
-    for name in reported if isinstance(reported, tuple | list) else [reported]:
-        if not isinstance(name, str) or name not in found["State"]._fields or name in TAKEN:
-            raise InputError(
-                f"{where}: REPORTED: {shown(name)} found, expected fields of State, none of {TAKEN}"
-            )
+    expected = f"expected a tuple of fields of State, none of {TAKEN}"
+    if not isinstance(reported, tuple | list):
+        raise InputError(f"{where}: REPORTED: {shown(reported)} found, {expected}")
+    for name in reported:
+        if name not in found["State"]._fields or name in TAKEN:
+            raise InputError(f"{where}: REPORTED: {shown(name)} found, {expected}")
     definition = TaskDefinition(
         name=check_text(getattr(namespace, "NAME", Path(where).stem), f"{where}: NAME"), source=where,
         reported=tuple(reported),

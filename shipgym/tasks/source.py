@@ -3,9 +3,7 @@
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from inspect import CO_ASYNC_GENERATOR, CO_COROUTINE, CO_GENERATOR, CO_VARARGS, CO_VARKEYWORDS
 from pathlib import Path
-from types import FunctionType
 from typing import Any
 
 import numpy as np
@@ -13,10 +11,8 @@ import numpy as np
 from shipgym.checks import check_keys, check_number, check_whole
 from shipgym.engine.records import Record, field_types, is_list, is_record, leaves
 from shipgym.errors import InputError
-from shipgym.python_files import asked, load_file
+from shipgym.python_files import asked, check_function, load_file
 from shipgym.tasks.contract import Setting
-
-NOT_PLAIN = CO_VARARGS | CO_VARKEYWORDS | CO_GENERATOR | CO_COROUTINE | CO_ASYNC_GENERATOR
 
 
 def read_source(source: Any) -> tuple[Any, str]:
@@ -57,16 +53,6 @@ def check_namespace(
         else:
             check_function(value, len(functions[name]), f"{where}: {name}", what)
     return found
-
-
-def check_function(value: Any, count: int, where: str, what: str) -> None:
-    """Refuse what is not a plain function of so many arguments; `what` says what is expected."""
-    code = value.__code__ if isinstance(value, FunctionType) else None
-    if code is None:
-        raise InputError(f"{where}: no plain function found, expected {what}")
-    if code.co_flags & NOT_PLAIN or code.co_argcount != count:
-        more = " or more, a generator or a coroutine" if code.co_flags & NOT_PLAIN else ""
-        raise InputError(f"{where}: {code.co_argcount} arguments{more} found, expected {what}")
 
 
 def _check_record(record: Any, name: str, where: str) -> None:

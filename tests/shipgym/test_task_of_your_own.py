@@ -188,9 +188,9 @@ WRONG = [
     ("return 2.0 + settings.over_speed_weight", "pass", "in worst_cost: .*nothing, expected a number"),
     ("max(motion.u", "mox(motion.u", "line 52, in step: NameError: name 'mox'"),
     ("Reward(-off * off, ", "Reward(", "line 54, in step: TypeError: .*'over_speed'"),
-    ("Reward(-off", "(-off", r"in step: .*\(a number, a number, a number\), expected Reward"),
+    ("Reward(-off", "(-off", r"in step: result 2 is \(a number, a number, a number\), expected Reward"),
     ("fabs(off) > 1.0, ", "", r"line 48, in step: what it returns is \(State, Reward, true or false\), "),
-    ("fabs(off) > 1.0", "off", "in step: what it returns is a number, expected true or false"),
+    ("fabs(off) > 1.0", "off", "in step: result 3 is a number, expected true or false"),
     ("motion.y, limit", "motion.y, (limit, 1.0)", r"State.limit is \(a number, a number\), exp"),
     ("return motion, State", "return State", "in begin: what it returns is State, expected .Motion, State."),
     ("def begin", "def plan_length(_):\n    return -1\n\n\ndef begin", "plan_length: -1 found, expected"),
@@ -202,8 +202,8 @@ WRONG = [
     ("return 2.0 + ", "return worst_cost(settings) + ", "line 59, in worst_cost: calls itself, expected a"),
     ("] = 50.0", "] = -50.0", "Settings.over_speed_weight: default: -50 found, expected a number >= 0"),
     ("half_width: Annotated", "autoreset_mode: Annotated", "Settings.autoreset_mode found, which is a keyw"),
-    ('REPORTED = (', 'REPORTED = "x" or (', "REPORTED: 'x' found, expected fields of State"),
-    ('REPORTED = (', 'REPORTED = 3 or (', "REPORTED: 3 found, expected fields of State"),
+    ('REPORTED = (', 'REPORTED = "speeding" or (', "REPORTED: 'speeding' found, expected a tuple of fields"),
+    ('REPORTED = (', 'REPORTED = 3 or (', "REPORTED: 3 found, expected a tuple of fields"),
     ('REPORTED = (', 'NAME = ["a"]\nREPORTED = (', r"NAME: \['a'\] found, expected a text"),
     ('REPORTED = (', 'EPISODE_STEPS = -1\nREPORTED = (', "fairway.py: EPISODE_STEPS: -1 found"),
     ('REPORTED = (', 'raise SystemExit(3)\nREPORTED = (', "line 8: cannot be executed: SystemExit: 3"),
@@ -662,7 +662,9 @@ def test_bounds_of_an_observation_are_finite_and_in_order(tmp_path):
 
 def test_names_that_the_engine_has_in_info_are_not_reported(tmp_path):
     text = FAIRWAY.replace("speeding: Flag", "truncated: Flag").replace('"speeding", ', '"truncated", ')
-    with pytest.raises(InputError, match=r"REPORTED: 'truncated' found, expected fields of State, none of"):
+    with pytest.raises(
+        InputError, match=r"REPORTED: 'truncated' found, expected a tuple of fields of State, none of"
+    ):
         read_definition(written(tmp_path, "fairway.py", text))
 
 
