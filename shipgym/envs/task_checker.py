@@ -115,6 +115,8 @@ def _not_finite(engine: Engine) -> Iterator[str]:
                 found.add(name)
                 lane = int(np.argmax(~np.isfinite(values)))
                 own = definition.reward_source if name.startswith("reward_") else definition.source
+                if name.startswith("Observation.") and engine.task.sensors is not None:
+                    own = f"{own}, or the sensors of {engine.task.sensors.source}"
                 yield (
                     f"{own}: {name} is {values[lane]} in lane {lane} at step "
                     f"{step + 1}, expected finite numbers"

@@ -210,7 +210,6 @@ def _check_seen(seen: Seen | None, where: str) -> None:
 
 
 def _check_names(definition: TaskDefinition) -> None:
-    where = definition.source
     seen = tuple(path.rpartition(".")[2] for path in definition.seen)
     settings = tuple(name for name, *_ in keywords(definition.Settings))
     rewards = ("end", *definition.reward_names)
@@ -218,6 +217,7 @@ def _check_names(definition: TaskDefinition) -> None:
         twice = [name for name in names if names.count(name) > 1]
         if twice:
             also = "; the engine has one of that name" if twice[0] == "end" else ""
+            where = definition.reward_source if kind == "Reward" else definition.source
             raise InputError(
                 f"{where}: {kind}: two fields named {twice[0]!r} found, expected names that differ{also}"
             )
