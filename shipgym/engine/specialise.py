@@ -56,11 +56,12 @@ class Specialisation:
     parts: Parts
     tag: str
     jit: Callable[..., Any] | None
-    made: dict[tuple[Any, bool], Any] = field(default_factory=dict)
+    made: dict[tuple[Any, bool, bool], Any] = field(default_factory=dict)
+    bounds: bool = False  # whether indices are looked at
 
     def inner(self, part: Part) -> Any:
         """A function that others call, with all that it calls."""
-        key = (part.function, part.inline)
+        key = (part.function, part.inline, self.bounds)
         if key not in self.made:
             self.made[key] = None
             self.made[key] = self._inner(part)
@@ -80,11 +81,16 @@ class Specialisation:
         # passes, takes a tenth of the time
         counted = not is_shipped(part.function)
         code = part.function.__code__  # errors name the place of a user's function
-        key = (self.jit, tag, records, part.inline, counted and (code.co_filename, code.co_firstlineno))
+        # a user's function that is called may write its plan, and beside that is the state of other ships
+        bounds = self.bounds or (counted and not part.inline)
+        place = counted and (code.co_filename, code.co_firstlineno)
+        key = (self.jit, tag, records, part.inline, bounds, place)
         if key not in SHARED:
-            copy = Specialisation(self.parts, tag + CALLED, self.jit, self.made).copy(part.function)
+            copy = Specialisation(self.parts, tag + CALLED, self.jit, self.made, bounds).copy(part.function)
             # stated for each: Numba lets a function without these options inherit those of its first caller
-            SHARED[key] = self.jit(forceinline=part.inline, _nrt=counted, **INNER, **SEMANTICS)(copy)
+            SHARED[key] = self.jit(
+                forceinline=part.inline, _nrt=counted, boundscheck=bounds, **INNER, **SEMANTICS
+            )(copy)
         return SHARED[key]
 
     def copy(self, function: Any) -> FunctionType:

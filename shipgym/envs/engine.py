@@ -187,7 +187,11 @@ class Engine(Lanes):
 
     def _begin(self, which: NDArray[np.bool_], next_one: bool) -> None:
         self._which[:] = which
-        self._run(self._worlds[0], episodes.BEGIN_NEXT if next_one else episodes.BEGIN)
+        try:
+            self._run(self._worlds[0], episodes.BEGIN_NEXT if next_one else episodes.BEGIN)
+        except IndexError as error:  # of a user's function
+            why = fault_in_python(self.model, self.task) or f"{self.task.definition.source}: begin: {error}"
+            raise InputError(why) from None
 
     def order(self, actions: ArrayLike) -> None:
         """Set the commands for the next step, which refuses those that are not finite.

@@ -220,7 +220,7 @@ def test_what_is_wrong_is_named_and_nothing_is_registered(tmp_path, old, new, me
     with pytest.raises(InputError, match=message):
         register_task("harbour/Wrong-v0", path, **SHIP)
     assert "harbour/Wrong-v0" not in gymnasium.registry
-    if not message.endswith(("index 40", "expected Reward")):  # compiled code looks at neither
+    if not message.endswith("expected Reward"):  # compiled, a tuple does as well
         with pytest.raises(InputError, match=message):
             gymnasium.make(COURSE, task=str(path), **SHIP)
 
