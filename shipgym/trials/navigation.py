@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 
 #: A straight part lasts this long, s, with heading and rudder within this range, rad.
 STRAIGHT_S, STRAIGHT_RANGE = 20.0, 2.0 * DEGREE
+#: Less than this part of an overshoot's curvature is that of a straight heading.
+BENT = 0.3
 #: Courses this far apart tell an offset of the heading, and a current across, from each other.
 APART = 60.0 * DEGREE
 _EQUATOR, _ECCENTRICITY_2 = 6378137.0, 6.69437999014e-3  # WGS 84
@@ -119,10 +121,11 @@ def correct_offsets(log: Log, tools: Instruments) -> None:
             straight = straight_parts(log.t, channels)
             if name == "psi":
                 found: Sequence[float] | None = heading_offset(channels, straight)
+                needed = "with sog and cog on courses over 60 deg apart"
             else:
-                found = [float(np.mean(channels["delta"][straight]))] if straight.any() else None
+                found = rudder_offset(log.t, channels, straight)
+                needed = "and a heading that does not turn back in them, as at an overshoot"
             if found is None:
-                needed = "with sog and cog on courses over 60 deg apart" if name == "psi" else "and a heading"
                 raise InputError(
                     f'{log.where}: {key} = "estimate" found, expected straight parts of {STRAIGHT_S:g} s '
                     f"{needed}; give {key} in degrees, or leave it out"
@@ -130,6 +133,26 @@ def correct_offsets(log: Log, tools: Instruments) -> None:
             offset = found[0]
             log.notes.append(f"{key} {offset / DEGREE:.2f}, estimated from straight parts and removed")
         channels[name] = channels[name] - offset if offset else channels[name]
+
+
+def rudder_offset(t: Floats, channels: Mapping[str, Floats], straight: Flags) -> tuple[float] | None:
+    """Mean rudder, rad, of the straight parts; None without any in which the heading is straight.
+
+    At an overshoot the heading hardly changes either, and the rudder is held, but the heading is bent. Of
+    several angles held the one counts at which it is bent least, by far.
+    """
+    psi, delta = channels.get("psi", t), channels["delta"]
+    half = math.ceil(0.5 * STRAIGHT_S / float(np.median(np.diff(t))))
+    rows = np.flatnonzero(straight[half : t.size - half]) + half
+    if not rows.size:
+        return None
+    rows = rows[np.argsort(delta[rows])]
+    held = np.split(rows, np.flatnonzero(np.diff(delta[rows]) > STRAIGHT_RANGE) + 1)
+    bent = [abs(np.mean(psi[one + half] - 2.0 * psi[one] + psi[one - half])) for one in held]
+    best = int(np.argmin(bent))
+    if len(held) > 1 and bent[best] > BENT * max(bent):
+        return None
+    return (float(np.mean(delta[held[best]])),)
 
 
 def heading_offset(channels: Mapping[str, Floats], straight: Flags) -> tuple[float, float] | None:

@@ -7,8 +7,10 @@ import numpy as np
 import pytest
 
 from shipgym.errors import InputError
+from shipgym.manoeuvres import zigzag
+from shipgym.ships import load_model
 from shipgym.trials.clock_texts import read_angles, read_clock
-from shipgym.trials.navigation import local_metres
+from shipgym.trials.navigation import local_metres, rudder_offset, straight_parts
 from shipgym.trials.ship_file import ShipFile
 from shipgym.trials.tables import read_log
 from shipgym.trials.trial import Trial
@@ -479,6 +481,23 @@ def test_the_zero_of_the_rudder_is_estimated_from_straight_parts(tmp_path):
     trial = Trial.from_csv(path, sensors={"rudder_offset_deg": "estimate"})
     assert error(trial, "delta") < 0.05 * DEGREE
     assert error(Trial.from_csv(path, sensors={"rudder_offset_deg": 1.5}), "delta") < 1e-6
+
+
+@pytest.mark.parametrize("name", ["kvlcc2", "mariner", "container"])
+@pytest.mark.parametrize("angle", [5.0, 10.0])
+def test_overshoots_are_not_taken_for_straight_parts(name, angle):
+    """Heading and rudder hardly change at an overshoot: only a log with a straight approach has a zero."""
+    trial = zigzag(load_model(name), angle, angle, dt=1.0)
+    noise = np.random.default_rng(0).normal(0.0, 0.1 * DEGREE, (2, len(trial) + 60))
+    psi = np.append(np.full(60, trial["psi"][0]), trial["psi"]) + noise[0]
+    delta = np.append(np.zeros(60), trial["delta"]) + noise[1] + 3.0 * DEGREE
+    t = np.arange(psi.size, dtype=float)
+    found = []
+    for first in (0, 60):
+        channels = {"psi": psi[first:], "delta": delta[first:]}
+        found.append(rudder_offset(t[first:], channels, straight_parts(t[first:], channels)))
+    assert found[0][0] == pytest.approx(3.0 * DEGREE, abs=0.1 * DEGREE)
+    assert found[1] is None
 
 
 def test_a_ship_at_berth_is_named(tmp_path):
