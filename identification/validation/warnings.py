@@ -163,19 +163,22 @@ def _lost_headings(fit: Fit) -> list[str]:
     worst = ", ".join(f"{PurePath(name).name} ({error:.0f} deg)" for name, error in errors.items())
     if not errors:
         return []
+    fitted = not errors.keys() <= heading_errors_deg(fit, "validate").keys()
     return [
         f"the predicted heading drifts from the measured one by more than {LOST_HEADING_DEG:.0f} deg rms on "
-        f"{worst}: {_why_lost(fit.model)}"
+        f"{worst}: {_why_lost(fit.model, fitted)}"
     ]
 
 
-def _why_lost(model: ShipModel) -> str:
-    """The likely cause of a prediction that lost the heading."""
+def _why_lost(model: ShipModel, fitted: bool) -> str:
+    """The likely cause of a prediction that lost the heading, of trials that were fitted or of others."""
     try:
         drawn = [model] if model.covariance is None else [model, *model.sample(DRAWS, 0)]
         unstable = float(np.mean([not is_course_stable(one) for one in drawn]))
     except InputError:
         return "the model, or one drawn from its covariance, has no straight course"
+    if unstable < SURE and fitted:
+        return "it was fitted to such, so its structure is too simple for them, or they are not as declared"
     if unstable < SURE:
         return "likely the model is taken beyond the manoeuvres that it was fitted to"
     return "a ship that is unstable on a straight course magnifies small errors"

@@ -173,7 +173,11 @@ def record_guard() -> dict[str, Any]:
     wild = linear.with_coefficients(np.array(list((linear.coefficients | {"c_r": 30.0}).values())))
     found["never"] = [predict(wild, one) is None, closed_loop(wild, one) is None]
     gone = replace(fitted("tables", LINEAR), predictions=dict.fromkeys(("runs/0", "runs/1")))
-    found["why"] = [warnings.why_unstable(gone), warnings._why_lost(linear), warnings._why_lost(wild)]
+    found["why"] = [
+        warnings.why_unstable(gone),
+        warnings._why_lost(linear, False),
+        warnings._why_lost(wild, True),
+    ]
     diverged = {name: {**m, "diverged": True} for name, m in gone.metrics["trials"].items()}
     found["diverged"] = warnings.held_out_error(replace(gone, metrics={"trials": diverged}))
     headless = {

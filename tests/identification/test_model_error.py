@@ -298,9 +298,10 @@ def test_shaft_speeds_that_a_structure_ignores_are_said(mariner: ShipModel) -> N
 
 def test_only_a_ship_that_is_unstable_for_sure_is_said_to_be(noisy_fit: IdentificationResult) -> None:
     """Of a stable ship whose model is uncertain nothing is said about her course stability."""
-    assert _why_lost(noisy_fit.model).startswith("likely the model is taken beyond")
+    assert _why_lost(noisy_fit.model, False).startswith("likely the model is taken beyond")
+    assert _why_lost(noisy_fit.model, True).startswith("it was fitted to such, so its structure")
     unstable = {**noisy_fit.coefficients, "N_r": noisy_fit.coefficients["N_r"] * 0.5}
     sure = replace(noisy_fit.model, coefficients=unstable, covariance=1e-6 * noisy_fit.model.covariance)
-    assert _why_lost(sure).startswith("a ship that is unstable on a straight course")
+    assert _why_lost(sure, True).startswith("a ship that is unstable on a straight course")
     unsure = replace(sure, covariance=400.0 * noisy_fit.model.covariance)
-    assert not _why_lost(unsure).startswith("a ship that is unstable")
+    assert not _why_lost(unsure, True).startswith("a ship that is unstable")

@@ -708,7 +708,10 @@ def test_offsets_are_estimated_from_straight_parts_on_several_courses_only():
     ):
         correct_offsets(Log(t[:200], one_course, "log", []), tools)
     turning = {"psi": 0.1 * t, "delta": np.full(400, 0.1)}
-    with pytest.raises(InputError, match=r'rudder_offset_deg = "estimate" found.*and a heading that does not turn back in them'):
+    with pytest.raises(
+        InputError,
+        match=r'rudder_offset_deg = "estimate" found.*and a heading that does not turn back in them',
+    ):
         correct_offsets(Log(t, turning, "log", []), Instruments(rudder_offset="estimate"))
 
 
