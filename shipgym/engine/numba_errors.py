@@ -3,12 +3,9 @@
 import dis
 import re
 from traceback import walk_tb
-from types import CodeType, SimpleNamespace
-from typing import Any
+from types import CodeType
 
 from shipgym.engine.specialise import CALLED, SHARED
-
-NOWHERE = SimpleNamespace(filename="", line=0)
 
 
 def explanation(error: Exception, what: str) -> str:
@@ -30,8 +27,7 @@ def explanation(error: Exception, what: str) -> str:
     elif place:
         file, line = place.groups()
     else:
-        at = _looked_at(error)
-        file, line = at.filename, at.line
+        file, line = _looked_at(error)
     where = f" in {function}" * bool(function) + f" ({file}, line {line})" * bool(file)
     return f"{what}: cannot be compiled{where}: {reason}"
 
@@ -50,10 +46,11 @@ def _line_of(code: CodeType, reason: str) -> int:
     return next(filter(None, lines), code.co_firstlineno)
 
 
-def _looked_at(error: Exception) -> Any:
-    """The place in a function that Numba was looking at when it failed."""
-    seen = [
-        frame.f_locals.get(name) for frame, _ in walk_tb(error.__traceback__) for name in ("self", "inst")
-    ]
-    places = (getattr(one, "loc", None) for one in reversed(seen))
-    return next((one for one in places if hasattr(one, "filename")), NOWHERE)
+def _looked_at(error: Exception) -> tuple[str, int]:
+    """File and line that Numba was looking at when it failed, as far as that is known."""
+    for frame, _ in reversed([*walk_tb(error.__traceback__)]):
+        for name in ("inst", "self"):
+            place = getattr(frame.f_locals.get(name), "loc", None)
+            if hasattr(place, "filename"):
+                return place.filename, place.line
+    return "", 0

@@ -105,10 +105,11 @@ def test_changed_coefficients_compile_nothing_anew(tug: Path) -> None:
         ("return udot, vdot, rdot, 0.0, 0.0", "return [udot, vdot, rdot, 0.0, 0.0]", "five numbers, a tuple"),
         ("(motion, c, ship)", "(motion, c)", "accelerations: 2 arguments found, expected a function"),
         ("return (command - n) / c.T_shaft", "pass", "shaft_acceleration is None, expected a number"),
-        (
+        pytest.param(
             "def accelerations",
             "import numba\n\n\n@numba.njit\ndef accelerations",
             r"tug\.py: equations of 'tug': accelerations: no plain function found, expected a function",
+            marks=pytest.mark.compiled,
         ),
         ("speed=2.357,", "speed=2.357, switches=('FORM',),", "switches: 'FORM' found, expected a tuple"),
         ("speed=2.357,", "speed=2.357, switches='FORM',", "switches: 'FORM' found, expected a tuple"),
