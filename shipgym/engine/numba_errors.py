@@ -4,6 +4,7 @@ import dis
 import re
 from traceback import walk_tb
 from types import CodeType
+from typing import Any
 
 from shipgym.engine.specialise import CALLED, SHARED
 
@@ -50,7 +51,7 @@ def _looked_at(error: Exception) -> tuple[str, int]:
     """File and line that Numba was looking at when it failed, as far as that is known."""
     for frame, _ in reversed([*walk_tb(error.__traceback__)]):
         for name in ("inst", "self"):
-            place = getattr(frame.f_locals.get(name), "loc", None)
+            place: Any = getattr(frame.f_locals.get(name), "loc", None)
             if hasattr(place, "filename"):
                 return place.filename, place.line
     return "", 0
