@@ -43,11 +43,11 @@ def check_folder(folder: Path, names: Collection[str]) -> None:
 def check_writable(folder: Path) -> None:
     """Refuse a folder that can neither be made nor written; raises InputError naming what is in the way."""
     target = folder.absolute()
-    ancestor = target if _stands_alone(target) else target.parent
-    while not ancestor.exists():
-        ancestor = ancestor.parent
-    if not ancestor.is_dir() or not os.access(ancestor, os.W_OK | os.X_OK):
-        raise InputError(f"{folder}: {ancestor} cannot be written to; choose another folder")
+    there = [one for one in (target, *target.parents) if one.exists()]
+    both = target.is_dir() and not _stands_alone(target)  # it is renamed within the folder above, and emptied
+    for one in there[: 1 + both]:
+        if not one.is_dir() or not os.access(one, os.W_OK | os.X_OK):
+            raise InputError(f"{folder}: {one} cannot be written to; choose another folder")
 
 
 def present(folder: Path) -> list[str]:
@@ -92,6 +92,8 @@ def in_use(folder: Path) -> Iterator[Path]:
         with suppress(NotImplementedError):
             lock.acquire(timeout=0)
     except Timeout:
+        if not lock_path.exists():  # as in /proc, where no file can be made
+            raise InputError(f"{folder}: cannot be written; choose another folder") from None
         raise InputError(
             f"{folder}: in use by {user}; wait until it has ended, or name another folder"
         ) from None

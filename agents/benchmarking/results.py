@@ -21,7 +21,7 @@ from agents.benchmarking.episode_table import Columns, joined, library, read_epi
 from agents.benchmarking.results_shape import SHAPE, check_summary
 from agents.benchmarking.summary import Done, summary_of
 from agents.controllers.controller import model_hash
-from agents.output import present
+from agents.output import check_writable, present
 from agents.suites.suite import FIRST_SEED, BenchmarkTask, suite_hash
 from shipgym.arrays import Floats
 from shipgym.checks import check_choice, check_fields, check_format
@@ -113,11 +113,10 @@ def check_new(folder: Path, resume: bool, suite: str) -> Path:
     Raises InputError saying what to do.
     """
     library()  # a missing extra is reported now, not after the work
-    if not folder.exists():
-        return folder
-    if not folder.is_dir():
+    if folder.exists() and not folder.is_dir():
         raise InputError(f"{folder}: is not a folder, expected one to write the results to; choose another")
-    found = present(folder)
+    check_writable(folder)
+    found = present(folder) if folder.exists() else []
     ours = any(name in (RESULTS, EPISODES, PARTS) for name in found)
     if ours and not resume:
         raise InputError(

@@ -1,5 +1,6 @@
 """The benchmark: every contestant steers every task of a suite, in the same episodes."""
 
+import shutil
 from collections.abc import Mapping, Sequence
 from contextlib import nullcontext
 from functools import partial
@@ -44,7 +45,8 @@ def benchmark(
     """Run controllers through the tasks of a suite and rank them.
 
     Returns results that are the same wherever the work is done, but for the times. Raises InputError for an
-    unknown contestant, suite or task, a broken agent or one for no task, or a folder in use.
+    unknown contestant, suite or task, a broken agent or one for no task, a folder in use, or if nobody took
+    part in any task.
 
     Parameters
     ----------
@@ -80,7 +82,17 @@ def benchmark(
         done = {(job["contestant"], job["task"]): checked_part(one, job) for job, one in pairs}
         own = product((one for one in who if not one.is_text), chosen)  # objects steer in this process
         done |= {(one.name, task.name): results_of(one, task, suite, episodes) for one, task in own}
+        if not any(part["runs"] for part in done.values()):
+            raise _nobody(done, None if resume or folder is None else folder / PARTS)
         return gathered(suite, chosen, who, done, episodes).save(folder)
+
+
+def _nobody(done: Mapping[tuple[str, str], Mapping[str, Any]], parts: Path | None) -> InputError:
+    """Say why the first contestant could take no part, where none could; `parts` are removed."""
+    if parts is not None:
+        shutil.rmtree(parts, ignore_errors=True)
+    (name, task), part = next(iter(done.items()))
+    return InputError(f"controllers: nobody took part in any task; '{name}' in '{task}': {part['refused']}")
 
 
 def checked_part(part: dict[str, Any], job: Mapping[str, Any]) -> dict[str, Any]:

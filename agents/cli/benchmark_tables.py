@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from rich.text import Text
 
 from agents.cli.terminal import between, number, plain_table
+from shipgym.pages.numbers import counted
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
 def ranking_table(result: BenchmarkResult) -> Table:
     """Contestants, the best first."""
     summary = result.summary
-    about = f"{len(result.tasks)} tasks of {summary['seeds']['count']} episodes"
+    about = f"{counted(len(result.tasks), 'task')} of {counted(summary['seeds']['count'], 'episode')}"
     table = plain_table(
         f"{summary['suite']['name']}: {about}, best first", "contestant", ">score", ">95 %",
         ">cost by\nthe lowest", ">tasks", ">runs", ">lost\ncontrol", ">failed", ">us by\naction",

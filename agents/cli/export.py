@@ -39,8 +39,10 @@ def export_command(
 
     if not (onnx or c or fmu):
         raise InputError("nothing to write: give --c FOLDER, --fmu OUT.FMU or --onnx OUT.ONNX")
-    if not (c or fmu) and (name, fmi, depth) != (None, "3.0", float("inf")):
-        raise InputError("--name, --fmi and --depth found, which are for --c and --fmu alone; leave them out")
+    if not (c or fmu) and (name, depth) != (None, float("inf")):
+        raise InputError("--name and --depth found, which are for --c and --fmu alone; leave them out")
+    if not fmu and fmi != "3.0":
+        raise InputError(f"--fmi: {fmi} found, which is for --fmu alone; leave it out")
     if c or fmu:
         source = _source(what, name, depth)
         for note in source.notes:

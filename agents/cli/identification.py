@@ -137,8 +137,9 @@ def advise_command(
     """
     from agents.cli.terminal import answer, identifying, say
     from agents.identifying import identify_ship
-    from identification.design.experiment import advise
+    from identification.design.experiment import advise, check_criterion
 
+    check_criterion(criterion, coefficient)
     read, settings = _chosen(ship, options, "abkowitz")
     with identifying("identifying"):
         result = identify_ship(read, settings)

@@ -59,7 +59,7 @@ def steer_command(
 
     limits = named_values(limit or (), "--limit", "silence_s=3")
     check_keys(limits, Limits.__dataclass_fields__, "--limit")
-    course = None if heading is None else radians(heading)
+    course = None if heading is None else _bearing(heading, "--heading")
     pilot = load_agent(agent)
     radius = getattr(pilot, "gains", {}).get("path_radius", 0.0)
     track = None if route is None else Route.from_csv(route, radius)
@@ -103,7 +103,16 @@ def simulate_command(
     from shipgym.ships import load_model
 
     given = named_values(drop or (), "--drop", "HDT=60")
-    dropped = {kind.upper(): check_number(after, f"--drop {kind}") for kind, after in given.items()}
-    ship = SimulatedShip(load_model(model), radians(leg), sea, seed)
+    dropped = {
+        kind.upper(): check_number(after, f"--drop {kind}", at_least=0.0) for kind, after in given.items()
+    }
+    ship = SimulatedShip(load_model(model), _bearing(leg, "--leg"), sea, seed)
     asyncio.run(simulate_ship(ship, nmea, duration=duration, speed_up=speed_up, drop=dropped))
     answer({"model": ship.model.name, "duration_s": round(ship.steps * STEP, 1), "state": ship.now})
+
+
+def _bearing(degrees: float, where: str) -> float:
+    """A direction in radians of one in degrees, which a compass has."""
+    from shipgym.checks import check_number
+
+    return radians(check_number(degrees, where, at_least=0.0, at_most=360.0))

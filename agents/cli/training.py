@@ -14,6 +14,7 @@ from agents.cli.command import INTERRUPTED, Address, EngineName, Workers, answer
 
 if TYPE_CHECKING:
     from agents.training.plan import Given
+    from agents.training.settings import Settings
     from agents.training.training import TrainingResult
     from agents.training.tuning import Tuning
 
@@ -99,6 +100,8 @@ def _train(given: Given, out: Path, resume: bool, max_seconds: float | None) -> 
         run_folder.check_resumable(out, plan)
         for line in run_folder.other_versions(out):
             warn(f"the run began with other versions: {line}; the result may differ in the last digits")
+    if "total_steps" in given.settings:
+        _tell_rounding(plan.settings)
     from agents.training.training import train
 
     command = shlex.join(["shipgym", *sys.argv[1:]])
@@ -109,6 +112,16 @@ def _train(given: Given, out: Path, resume: bool, max_seconds: float | None) -> 
         kept = (out / run_folder.CHECKPOINT).is_file()
         fail(f"interrupted; continue with --resume --out {out}" if kept else "interrupted", INTERRUPTED)
         raise  # not reached: `fail` leaves
+
+
+def _tell_rounding(settings: Settings) -> None:
+    """Say by how much more is learned than was asked for."""
+    from agents.cli.terminal import warn
+
+    total, rollout, each = settings.total_steps, settings.rollout, settings.each
+    if (whole := -(-total // rollout) * rollout) != total:
+        ships = f"{settings.ships} ships, {each} {getattr(settings, each)}"
+        warn(f"total_steps: {total:,} is rounded up to {whole:,}: rollouts have {rollout:,} steps ({ships})")
 
 
 def _print_result(result: TrainingResult, out: Path) -> None:

@@ -10,7 +10,7 @@ import numpy as np
 
 from agents.deployment.c99 import render
 from agents.deployment.nmea import Link, readings, sentences
-from shipgym.checks import check_number
+from shipgym.checks import check_keys, check_number
 from shipgym.engine.trajectories import SEA_CHANNELS
 from shipgym.errors import InputError
 from shipgym.sea.conditions import Weather
@@ -100,12 +100,15 @@ async def simulate_ship(
     """Sail a ship over NMEA 0183, in real time or `speed_up` times as fast, for a duration in s.
 
     Over TCP others connect to the `address` (`Link`), over UDP it sends there. `drop` names types of sentence
-    that fall silent, and when, s. Raises InputError for an address that cannot be opened.
+    that fall silent, and when, s. Raises InputError for a type that she does not send, or an address that
+    cannot be opened.
     """
     loop, link = asyncio.get_running_loop(), Link(ship.hear)
     check_number(speed_up, "speed_up", above=0.0)
+    dropped = dict(drop or {})
+    check_keys(dropped, sorted({line[3:6] for line in ship.sentences().splitlines()}), "drop")
     await link.open(address, serve=True)
-    begin, dropped = loop.time(), dict(drop or {})
+    begin = loop.time()
     with closing(link), suppress(asyncio.CancelledError):
         while (now := ship.steps * ship.step) < duration:
             await asyncio.sleep(max(0.0, begin + now / speed_up - loop.time()))

@@ -248,8 +248,8 @@ async def steer(
     `agent`, `heading`, `limits`, `route` and `rate` are those of `Helm`, `address` is that of a `Link`. Of
     simulated ships `speed_up` seconds pass in one. `told` is given a line for each change of state. It waits
     for an address at which nobody answers yet, and connects again when the connection was closed, which ends
-    in an alarm if it steered. Raises InputError for an address that cannot be opened at all, and for an
-    autopilot that reads what no sentence tells.
+    in an alarm if it steered. Raises InputError for an address that cannot be opened at all, or at which
+    nobody answered until the end, and for an autopilot that reads what no sentence tells.
     """
     for name, number in (("speed_up", speed_up), ("heading", heading or 0.0), ("rate", rate or 0.0)):
         check_number(number, name)
@@ -279,6 +279,8 @@ async def steer(
             if not link.ends and loop.time() >= retry_at:
                 missing, retry_at = await _missing(link, address), loop.time() + RETRY_S
             number += 1
+    if missing and not (link.ends or any(helm.counts.values())):
+        raise InputError(f"{missing[2:]}; nobody was heard in {number * tick:g} s: start the other end first")
     return helm
 
 

@@ -157,6 +157,16 @@ def standard_candidates(model: ShipModel) -> dict[str, Manoeuvre]:
     return found
 
 
+def check_criterion(criterion: str, coefficient: str | None) -> None:
+    """Refuse an unknown criterion, and a coefficient beside one that is of all coefficients."""
+    check_choice(criterion, CRITERIA, "criterion")
+    if coefficient is not None and criterion != "c":
+        raise InputError(
+            f"coefficient: '{coefficient}' found with criterion '{criterion}', which is of all coefficients; "
+            "leave it out, or take criterion 'c'"
+        )
+
+
 def advise(
     model: ShipModel, trials: Sequence[Trial], candidates: Mapping[str, Manoeuvre] | None = None,
     criterion: str = "c", coefficient: str | None = None, number: int = 1,
@@ -183,7 +193,7 @@ def advise(
     number : int
         How many to choose; the same one may be chosen again.
     """
-    check_choice(criterion, CRITERIA, "criterion")
+    check_criterion(criterion, coefficient)
     if coefficient is not None:
         check_choice(coefficient, model.coefficients, "coefficient")
     if number < 1:

@@ -182,7 +182,7 @@ class Episode:
 
         Raises InputError, naming the file and the field at fault.
         """
-        content = read_json(Path(path), "episode file", "record the episode again or take another copy")
+        content = read_json(Path(path), "recorded episode", "record the episode again or take another copy")
         with placed(str(path)):
             return cls(**from_file(content))
 

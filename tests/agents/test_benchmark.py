@@ -178,6 +178,29 @@ def test_one_that_cannot_take_part_is_said_and_the_rest_go_on():
     assert result.allow_code == ()
 
 
+def test_where_nobody_can_take_part_there_are_no_results(tmp_path):
+    for folder in ("new", "empty"):
+        out = tmp_path / folder
+        if folder == "empty":
+            out.mkdir()
+        answer = shipgym(
+            "--controllers", "math:sqrt", "--tasks", "mariner-calm", "--episodes", 1, "--workers", 1,
+            "--out", out,
+        )  # fmt: skip
+        assert (answer.exit_code, answer.stdout) == (2, "")
+        assert answer.stderr.startswith(
+            "error: controllers: nobody took part in any task; 'sqrt' in 'mariner-calm': TypeError: must be "
+        )
+    assert [path.name for path in tmp_path.rglob("*")] == ["empty"]
+
+
+def test_a_write_protected_folder_is_refused_before_the_work(tmp_path, monkeypatch):
+    monkeypatch.setattr("agents.output.os.access", lambda path, mode: path != tmp_path)
+    with pytest.raises(InputError, match="cannot be written to; choose another folder"):
+        benchmark("pid", tasks=TASKS, out=tmp_path / "out", episodes=2)
+    assert not list(tmp_path.iterdir())
+
+
 def test_an_agent_that_observes_what_no_task_shows_is_refused_before_anything_is_run(tmp_path):
     guide = WheelOver.from_model(load_model("mariner"))
     guide.save(tmp_path / "guide.json")
@@ -864,7 +887,7 @@ def test_the_command_ranks_and_writes(tmp_path):
     )  # fmt: skip
     assert answer.exit_code == 0, answer.stderr
     assert same_text("benchmark", answer.stdout + answer.stderr, r"(?m)(?<=  )\d+\.\d\d$")  # us by action
-    assert "1 tasks of 2 episodes" in answer.stdout
+    assert "1 task of 2 episodes" in answer.stdout
     assert "for a quick look, not for a ranking" in answer.stderr
     assert load_results(tmp_path / "r").ranking == ["pid"]
     page = tmp_path / "r" / "index.html"

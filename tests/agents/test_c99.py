@@ -418,6 +418,7 @@ def test_the_command_writes_c_and_says_what_it_cannot(tmp_path):
         ("nothing to write: give --c FOLDER", "mariner"),
         ("Did you mean 'mariner'", "marinr", "--c", tmp_path / "no"),
         ("--depth found, which are for --c and --fmu", "mariner", "--onnx", tmp_path / "no", "--depth", 9),
+        ("--fmi: 2.0 found, which is for --fmu alone", "mariner", "--c", tmp_path / "no", "--fmi", "2.0"),
         ("--depth: 9 found, but", tmp_path / "pid.json", "--c", tmp_path / "no", "--depth", 9),
     ):
         found = run(app, ["export", *map(str, arguments)])

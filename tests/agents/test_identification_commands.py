@@ -402,6 +402,10 @@ def test_advise_tells_information_and_what_to_run_next(demo):
     assert f"run next: {told['run_next'][0]}" in table
     assert same_text("advise", table)
     assert shipgym("advise", demo, "--coefficient", "N_vv").exit_code == 2
+    for wrong in (("--criterion", "D", "--coefficient", "N_vvv"), ("--criterion", "A")):  # before any work
+        refused = shipgym("advise", demo.with_name("absent.toml"), *wrong)
+        assert (refused.exit_code, refused.stderr.count("\n")) == (2, 1)
+        assert f"'{wrong[1]}'" in refused.stderr
 
 
 def test_reduce_writes_the_smaller_model_and_its_path(ship, tmp_path):

@@ -251,6 +251,25 @@ def test_what_cannot_be_written_is_refused(tmp_path, monkeypatch):
     check_writable(tmp_path / "ship")  # which is written to itself, nothing beside it
 
 
+def test_a_folder_that_is_write_protected_is_refused_and_nothing_is_left(tmp_path, monkeypatch):
+    (tmp_path / "ship").mkdir()
+    (tmp_path / "ship" / "model.json").write_text("mine")
+    monkeypatch.setattr(output.os, "access", lambda path, mode: path != tmp_path / "ship")
+    said = rf"ship: {tmp_path / 'ship'} cannot be written to; choose another folder"
+    with pytest.raises(InputError, match=said):
+        write_half(tmp_path / "ship", RuntimeError())
+    assert everything(tmp_path) == ["ship", "ship/model.json"]
+    assert (tmp_path / "ship" / "model.json").read_text() == "mine"
+
+
+def test_where_no_file_can_be_made_nobody_else_is_blamed():
+    """In /proc a file cannot be made even by root, to whom all folders seem to be open."""
+    with pytest.raises(InputError, match=r"^/proc/ship: .*cannot be written"):
+        write_half(Path("/proc/ship"), RuntimeError())
+    with pytest.raises(InputError, match=r"^/proc/ship: cannot be written"), in_use(Path("/proc/ship")):
+        pass
+
+
 def test_where_nothing_can_be_beside_a_folder_locks_and_drafts_are_in_it(tmp_path, monkeypatch):
     (tmp_path / "ship").mkdir()
     monkeypatch.setattr(output.os, "access", lambda path, mode: path != tmp_path)

@@ -216,7 +216,7 @@ def test_the_command_writes_the_page(recorded):
 @pytest.mark.parametrize(
     ("text", "said"),
     [
-        (None, "there is no such episode file"),
+        (None, "there is no such recorded episode"),
         ("x,y\n1,2\n", "broken JSON"),
         ("[1, 2]", "expected a table"),
         ('{"name": "mariner", "format": 1}', "kind: None found, expected 'episode'"),

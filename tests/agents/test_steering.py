@@ -631,6 +631,9 @@ def test_by_default_a_ship_is_simulated_as_time_goes_until_she_is_stopped(monkey
     [
         (["--drop", "HDT"], "--drop: 'HDT' found, expected name=value, such as --drop HDT=60"),
         (["--drop", "hdt='late'"], "--drop hdt: 'late' .*found, expected"),
+        (["--drop", "hdt=-1"], "--drop hdt: -1 found, expected a number >= 0"),
+        (["--drop", "XYZ=3"], "drop: unknown key 'XYZ'. Known keys: 'APB', 'BWC', 'HDT', 'RMC', 'ROT'"),
+        (["--leg", "360.5"], "--leg: 360.5 found, expected a number >= 0 and <= 360"),
         (["--sea", "ruff"], "weather: 'ruff' found, expected one of 'calm'"),
     ],
 )
@@ -655,6 +658,26 @@ def test_an_address_that_cannot_be_opened_is_refused_by_the_command(address, mes
     found = CliRunner().invoke(app, ["steer", str(tmp_path / "pid.json"), "--nmea", address])
     assert found.exit_code == 2, found.output
     assert message in " ".join(found.output.split())
+
+
+@pytest.mark.parametrize("heading", ["400", "-1", "nan"])
+def test_a_heading_is_one_of_the_compass(heading, tmp_path):
+    PID_MARINER.save(tmp_path / "pid.json")
+    words = ["steer", str(tmp_path / "pid.json"), "--nmea", "tcp:127.0.0.1:1", "--heading", heading]
+    found = CliRunner().invoke(app, words)
+    assert (found.exit_code, found.stdout) == (2, "")
+    assert found.stderr == f"error: --heading: {heading} found, expected a number >= 0 and <= 360\n"
+
+
+def test_where_nobody_answers_until_the_end_the_command_fails(tmp_path):
+    PID_MARINER.save(tmp_path / "pid.json")
+    address = f"tcp:127.0.0.1:{free_port()}"
+    words = ["steer", str(tmp_path / "pid.json"), "--nmea", address, "--duration", "2", "--speed-up", "20"]
+    found = CliRunner().invoke(app, words)
+    assert found.exit_code == 2
+    assert found.stderr.startswith(f"error: {address}: cannot be opened (Connect call failed")
+    assert found.stderr.endswith("; nobody was heard in 2 s: start the other end first\n")
+    assert found.stderr.count("\n") == 1
 
 
 def test_limits_are_those_of_the_page():

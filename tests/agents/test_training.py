@@ -460,12 +460,41 @@ def test_the_command_trains_and_resumes(tmp_path):
 
 
 @pytest.mark.parametrize(
+    ("algorithm", "steps", "said"),
+    [
+        ("ppo", 100, "total_steps: 100 is rounded up to 256: rollouts have 256 steps (8 ships, n_steps 32)"),
+        ("ppo", 512, ""),
+        ("sac", 1001, "1,001 is rounded up to 1,008: rollouts have 8 steps (8 ships, train_freq 1)"),
+    ],
+)
+def test_steps_that_are_no_whole_rollouts_are_told_before_the_training(
+    algorithm, steps, said, tmp_path, monkeypatch
+):
+    def stand_in(plan, *_, **__):
+        raise InputError("begins")
+
+    monkeypatch.setattr(training, "train", stand_in)
+    sizes = ["--set", "ships=8"] + ["--set", "n_steps=32", "--set", "batch_size=64"] * (algorithm == "ppo")
+    words = ["train", algorithm, "--total-steps", steps, *sizes, "--out", tmp_path / "run"]
+    code, printed = shipgym(*words)
+    assert (code, printed.count("\n")) == (2, 2 if said else 1)
+    assert f"{said}\n" * bool(said) + "error: begins\n" in printed
+
+
+def test_a_training_learns_whole_rollouts():
+    for plan in (tiny("ppo"), tiny("sac")):
+        found = train(replace(plan, settings=replace(plan.settings, total_steps=plan.settings.rollout + 1)))
+        assert found.steps == 2 * plan.settings.rollout
+
+
+@pytest.mark.parametrize(
     ("words", "expected"),
     [
         (["train", "pqo"], "Did you mean 'ppo'?"),
         (["train", "ppo", "--task", "mariner-clam"], "Did you mean 'mariner-calm'?"),
         (["train", "ppo", "--env", "curse-keeping"], "Did you mean 'course-keeping'?"),
         (["train", "ppo", "--set", "gama=0.9"], "Did you mean 'gamma'?"),
+        (["train", "ppo", "--set", "gamma=nan"], "--set gamma: nan found, expected a number of magnitude"),
         (["train", "ppo", "--set", "gamma=2"], "gamma: 2 found, expected a number >= 0 and <= 1"),
         (["train", "ppo", "--set", "batch_size=1000"], "a divisor above 1 of ships x n_steps, 32768"),
         (["train", "ppo", "--set", "base=lqq"], "Did you mean 'lq'?"),

@@ -148,7 +148,7 @@ def test_a_file_cut_in_half_is_told_so(tmp_path):
     path.write_text(path.read_text()[:200])
     with pytest.raises(InputError, match="cut short"):
         Episode.load(path)
-    with pytest.raises(InputError, match="there is no such episode file"):
+    with pytest.raises(InputError, match="there is no such recorded episode"):
         Episode.load(tmp_path / "absent.json")
 
 

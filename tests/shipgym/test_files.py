@@ -132,6 +132,11 @@ def test_values_given_by_name_are_read_as_toml_has_them():
     }  # fmt: skip
     for wrong in ("a", "=1", " = "):
         assert said(named_values, [wrong], "--set", "a=1").endswith("name=value, such as --set a=1")
+    assert named_values(["a=.5", "b=inf", "c='.5'"], "--set", "a=1") == {"a": 0.5, "b": math.inf, "c": ".5"}
+    for wrong in ("nan", "-nan", "1e200"):
+        assert said(named_values, [f"a={wrong}"], "--set", "a=1") == (
+            f"--set a: {float(wrong)} found, expected a number of magnitude 1e+100 at most"
+        )
 
 
 LIMITS = (Path(__file__).parents[2] / "docs" / "ship_file.md").read_text(encoding="utf-8")
