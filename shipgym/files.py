@@ -263,17 +263,10 @@ def named_values(texts: Iterable[str], where: str, example: str) -> dict[str, An
             raise InputError(f"{where}: {text!r} found, expected name=value, such as {where} {example}")
         found[name] = toml_value(value)
         if found[name] == value:  # not TOML, or more than a file may hold
-            found[name] = _number_or_text(value)
+            with suppress(ValueError):
+                found[name] = float(value)  # such as .5 or nan
             check_content({name: found[name]}, where, infinite=True)
     return found
-
-
-def _number_or_text(text: str) -> float | str:
-    """A number as Python has it, such as .5 or nan; any other text is itself."""
-    try:
-        return float(text)
-    except ValueError:
-        return text
 
 
 def check_content(value: Any, where: str, infinite: bool = False, depth: int = 1) -> None:

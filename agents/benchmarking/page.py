@@ -44,13 +44,9 @@ RARE = ("extrapolating", "shielded", "interventions")  # shown only where not 0 
 
 
 def write_page(
-    result: BenchmarkResult,
-    path: str | Path,
-    controllers: Any = None,
-    worst: int = WORST,
-    workers: int | None = 1,
-    progress: Progress | None = None,
-) -> None:
+    result: BenchmarkResult, path: str | Path, controllers: Any = None, worst: int = WORST,
+    workers: int | None = 1, progress: Progress | None = None,
+) -> None:  # fmt: skip
     """Write the page of a benchmark. The worst episodes are run again for it.
 
     Raises InputError if plotly is not installed or the page cannot be written; nothing is written then.
@@ -80,30 +76,19 @@ def write_page(
 def _page(result: BenchmarkResult, again: Rerun, count: int) -> str:
     """The text of the page, with so many of the worst episodes of each contestant to replay."""
     wins = [name for task in result.tasks for name in bests_of(result, task)]
+    scores, profile = figures.scores_figure(result), result.summary["profile"]
+    replays = {
+        "count": count, "episodes": len(again.episodes), "different": again.different,
+        "refused": dict.fromkeys((name, why) for (name, _), why in again.refused.items()),
+        "data": replay_data(result, again, count),
+    }  # fmt: skip
     return render(
-        "agents.benchmarking/page.html",
-        about=result.summary,
-        names=result.ranking,
-        best_known=BEST_KNOWN,
-        styles=figures.styles(result.ranking),
-        wins={name: wins.count(name) for name in result.ranking},
-        failures=result.failures,
-        figures={
-            "scores": figures.scores_figure(result),
-            "profile": figures.profile_figure(result.summary["profile"], result.ranking),
-        },
-        tasks=[_task(result, again, task) for task in result.tasks],
-        replays={
-            "count": count,
-            "episodes": len(again.episodes),
-            "different": again.different,
-            "refused": dict.fromkeys((name, why) for (name, _), why in again.refused.items()),
-            "data": replay_data(result, again, count),
-        },
-        command=command(result),
-        results_file=RESULTS,
-        packed=packed,
-    )
+        "agents.benchmarking/page.html", about=result.summary, names=result.ranking, best_known=BEST_KNOWN,
+        styles=figures.styles(result.ranking), wins={name: wins.count(name) for name in result.ranking},
+        failures=result.failures, tasks=[_task(result, again, task) for task in result.tasks],
+        figures={"scores": scores, "profile": figures.profile_figure(profile, result.ranking)},
+        replays=replays, command=command(result), results_file=RESULTS, packed=packed,
+    )  # fmt: skip
 
 
 def packed(text: str) -> str:

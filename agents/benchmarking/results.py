@@ -37,20 +37,11 @@ REMEDY = "run `shipgym benchmark` again"
 
 @dataclass(frozen=True, eq=False)
 class BenchmarkResult:
-    """Result of a benchmark.
+    """Result of a benchmark."""
 
-    Attributes
-    ----------
-    summary : dict
-        What `results.json` holds (`agents.benchmarking.results_shape`).
-    episodes : dict of str to array
-        One row an episode: contestant, task, run, seed, and figures by name (`metrics`).
-    allow_code : tuple of str
-        Functions of contestants that the user named when it was made; none of a file.
-    """
-
-    summary: dict[str, Any]
-    episodes: Columns
+    summary: dict[str, Any]  # what `results.json` holds (`agents.benchmarking.results_shape`)
+    episodes: Columns  # one row an episode: contestant, task, run, seed, and figures by name (`metrics`)
+    #: Functions of contestants that the user named when it was made; none of a file.
     allow_code: tuple[str, ...] = ()
 
     @property
@@ -148,13 +139,11 @@ def gathered(
     table = joined(rows)
     about_tasks = {task.name: _about_task(task) for task in tasks}
     about = {
-        "format": FORMAT,
-        "kind": KIND,
-        "versions": versions(),
+        "format": FORMAT, "kind": KIND, "versions": versions(),
         "suite": {"name": suite, "sha256": suite_hash(suite), "tasks": about_tasks},
         "seeds": {"first": FIRST_SEED, "count": episodes},
         "contestants": {one.name: _about_contestant(one, tasks, done) for one in who},
-    }
+    }  # fmt: skip
     found = summary_of(suite, tasks, [one.name for one in who], done)
     file = {"file": EPISODES, "rows": len(table["seed"]), "sha256": None}
     code = tuple(one.source for one in who if one.is_text and names_code(one.source))

@@ -30,18 +30,11 @@ PART: Shape = {"refused": (str,), "runs": [RUN]}  # what `results_of` returns
 
 
 def benchmark(
-    controllers: Any,
-    suite: str = DEFAULT_SUITE,
-    tasks: Sequence[str] | None = None,
-    out: str | Path | None = None,
-    workers: int | None = 1,
-    engine: str = "local",
-    progress: Progress | None = None,
-    *,
-    address: str | None = None,
-    resume: bool = False,
+    controllers: Any, suite: str = DEFAULT_SUITE, tasks: Sequence[str] | None = None,
+    out: str | Path | None = None, workers: int | None = 1, engine: str = "local",
+    progress: Progress | None = None, *, address: str | None = None, resume: bool = False,
     episodes: int = N_EPISODES,
-) -> BenchmarkResult:
+) -> BenchmarkResult:  # fmt: skip
     """Run controllers through the tasks of a suite and rank them.
 
     Returns results that are the same wherever the work is done, but for the times. Raises InputError for an
@@ -83,16 +76,12 @@ def benchmark(
         own = product((one for one in who if not one.is_text), chosen)  # objects steer in this process
         done |= {(one.name, task.name): results_of(one, task, suite, episodes) for one, task in own}
         if not any(part["runs"] for part in done.values()):
-            raise _nobody(done, None if resume or folder is None else folder / PARTS)
+            if folder is not None and not resume:
+                shutil.rmtree(folder / PARTS, ignore_errors=True)
+            (name, first), part = next(iter(done.items()))
+            why = f"'{name}' in '{first}': {part['refused']}"
+            raise InputError(f"controllers: nobody took part in any task; {why}")
         return gathered(suite, chosen, who, done, episodes).save(folder)
-
-
-def _nobody(done: Mapping[tuple[str, str], Mapping[str, Any]], parts: Path | None) -> InputError:
-    """Say why the first contestant could take no part, where none could; `parts` are removed."""
-    if parts is not None:
-        shutil.rmtree(parts, ignore_errors=True)
-    (name, task), part = next(iter(done.items()))
-    return InputError(f"controllers: nobody took part in any task; '{name}' in '{task}': {part['refused']}")
 
 
 def checked_part(part: dict[str, Any], job: Mapping[str, Any]) -> dict[str, Any]:
@@ -117,7 +106,8 @@ def _chosen(suite: str, names: Sequence[str] | None) -> tuple[BenchmarkTask, ...
     if not names:
         raise InputError("tasks: none found, expected at least one")
     sets = [
-        [task for task in found.tasks if one in (task.base, task.name)] or [found.task(one)] for one in names
+        [task for task in found.tasks if one and one in (task.base, task.name)] or [found.task(one)]
+        for one in names
     ]
     return tuple({task.name: task for tasks in sets for task in tasks}.values())
 

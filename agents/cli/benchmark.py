@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 from typer import Option
 
-from agents.cli.command import FAILED, INTERRUPTED, Address, EngineName, answered, fail
+from agents.cli.command import FAILED, INTERRUPTED, WRONG_INPUT, Address, EngineName, answered, fail
 
 if TYPE_CHECKING:
     from agents.benchmarking.results import BenchmarkResult
@@ -71,10 +71,13 @@ def benchmark_command(
     With --verify, exits with 1 if the repeated results differ from the file.
     """
     if verify is not None:
+        _refuse(
+            "--verify", {"--controllers": controllers, "--out": out, "--tasks": tasks, "--submit": submit}
+        )
         _verify(verify, sample, tolerance, workers, allow_code or [])
         return
     if allow_code or tolerance is not None:
-        fail("--allow-code and --tolerance are for --verify alone, leave them out", 2)
+        fail("--allow-code and --tolerance are for --verify alone, leave them out", WRONG_INPUT)
     from agents.benchmarking.page import PAGE, write_page
     from agents.benchmarking.run import benchmark
     from agents.benchmarking.submission import submit as write_submission
@@ -83,11 +86,11 @@ def benchmark_command(
     from agents.output import check_file
     from shipgym.errors import InputError
 
-    if submit is not None:
+    if submit is not None:  # which is of all episodes of all tasks
+        _refuse("--submit", {"--tasks": tasks, "--episodes": episodes < 100})
         check_file(submit)
     if out is None:
-        fail("--out: no folder found, expected one for the results: --out results/", 2)
-        return
+        fail("--out: no folder found, expected one for the results: --out results/", WRONG_INPUT)
     try:
         with progress_bars() as progress:
             result = benchmark(
@@ -105,8 +108,13 @@ def benchmark_command(
                     warn(f"there is no {PAGE}: {error}")
     except KeyboardInterrupt:
         fail(f"interrupted; what was done is kept in {out}: continue with --resume", INTERRUPTED)
-        return
     _print_result(result, out)
+
+
+def _refuse(beside: str, options: dict[str, Any]) -> None:
+    """Refuse options, by name, that are of no use beside another one."""
+    if given := [name for name, value in options.items() if value]:
+        fail(f"{given[0]}: found together with {beside}, which has no use for it; leave one out", WRONG_INPUT)
 
 
 def _print_result(result: BenchmarkResult, out: Path) -> None:
@@ -121,8 +129,8 @@ def _print_result(result: BenchmarkResult, out: Path) -> None:
     say(f"\nwritten: {out}")
     for failure in result.failures:
         warn(failure)
-    if result.summary["seeds"]["count"] < 100:
-        warn(f"{result.summary['seeds']['count']} of 100 episodes: for a quick look, not for a ranking")
+    if (count := result.summary["seeds"]["count"]) < 100:
+        warn(f"{count} of 100 episodes: for a quick look, not for a ranking")
 
 
 def _verify(

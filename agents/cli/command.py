@@ -7,7 +7,7 @@ import sys
 from collections.abc import Callable
 from errno import EBADF, ENOSPC, EPIPE
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, NoReturn
 
 import typer
 from typer import Argument, Option
@@ -94,7 +94,7 @@ class Commands(TyperGroup):
         return super().parse_args(ctx, args)
 
 
-def fail(message: str, code: int) -> None:
+def fail(message: str, code: int) -> NoReturn:
     """Print the message of an error and leave with an exit code."""
     from agents.cli.terminal import fail as tell
 

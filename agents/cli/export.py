@@ -33,9 +33,10 @@ def export_command(
     from agents.agent_file import load_agent
     from agents.cli.terminal import answer, say, warn
     from agents.deployment.fmu import write_fmu
-    from agents.output import whole_folder
-    from agents.policies.onnx_export import export_onnx
+    from agents.output import check_file, check_folder, whole_folder
+    from agents.policies.onnx_export import onnx_model
     from shipgym.errors import InputError
+    from shipgym.files import write_bytes
 
     if not (onnx or c or fmu):
         raise InputError("nothing to write: give --c FOLDER, --fmu OUT.FMU or --onnx OUT.ONNX")
@@ -47,15 +48,20 @@ def export_command(
         source = _source(what, name, depth)
         for note in source.notes:
             warn(note)
-    if c:
         texts = {f"{source.name}.h": source.header, f"{source.name}.c": source.source}
-        with whole_folder(c, texts) as draft:
-            for file, text in texts.items():
-                (draft / file).write_text(text, encoding="utf-8")
-    if fmu:
+    for file in filter(None, (fmu, onnx)):
+        check_file(file)
+    if c:
+        check_folder(c, texts)
+    graph = onnx_model(load_agent(what)) if onnx else None
+    if fmu:  # first what may still fail
         write_fmu(source, fmu, fmi)
-    if onnx:
-        export_onnx(load_agent(what), onnx)
+    if onnx and graph:
+        write_bytes(graph.SerializeToString(), onnx)
+    if c:
+        with whole_folder(c, texts) as draft:
+            for name, text in texts.items():
+                (draft / name).write_text(text, encoding="utf-8")
     written = [str(path) for path in (onnx, c, fmu) if path]
     answer({"written": written})
     say(*(f"written: {path}" for path in written))

@@ -2,7 +2,6 @@
 
 import json
 import os
-from contextlib import suppress
 from pathlib import Path
 from typing import Annotated
 
@@ -20,7 +19,7 @@ def new_ship_command(
     ],
     out: Annotated[Path, Option(metavar="FILE", help="The ship file to write.")] = Path("ship.toml"),
     length: Annotated[
-        float | None, Option(min=0.01, help="Length between perpendiculars, m; or fill it in later.")
+        float | None, Option(min=0.01, max=1e4, help="Length between perpendiculars, m; or fill it in later.")
     ] = None,
 ) -> None:
     """Write a ship file for recorded trials. Guesses columns, units and signs, and reports the guesses."""
@@ -37,8 +36,11 @@ def new_ship_command(
     guesses, side, trial = guess_trial(logs[0])
     speeds = []
     for log in logs:
-        with suppress(InputError):  # `look` says what is wrong with it
+        try:
             _, other, seen = guess_trial(log)
+        except InputError as error:
+            warn(str(error))
+        else:
             side = other if other == "port" else side  # starboard is also what a log says that does not tell
             known = [seen[name] for name in ("u", "stw", "sog") if name in seen.channels]
             speeds += [float(np.quantile(speed, 0.9)) for speed in known[:1]]

@@ -22,7 +22,8 @@ def steer_command(
     ],
     nmea: Address,
     heading: Annotated[
-        float | None, Option(metavar="DEG", help="Heading to steer; default: the plotter's (APB).")
+        float | None,
+        Option(metavar="DEG", min=0.0, max=360.0, help="Heading to steer; default: the plotter's (APB)."),
     ] = None,
     rate: Annotated[
         float | None,
@@ -59,7 +60,7 @@ def steer_command(
 
     limits = named_values(limit or (), "--limit", "silence_s=3")
     check_keys(limits, Limits.__dataclass_fields__, "--limit")
-    course = None if heading is None else _bearing(heading, "--heading")
+    course = None if heading is None else radians(heading)
     pilot = load_agent(agent)
     radius = getattr(pilot, "gains", {}).get("path_radius", 0.0)
     track = None if route is None else Route.from_csv(route, radius)
@@ -77,7 +78,9 @@ def steer_command(
 def simulate_command(
     model: Annotated[str, Argument(metavar="MODEL", help="A model file, or the name of a shipped model.")],
     nmea: Address,
-    leg: Annotated[float, Option(metavar="DEG", help="Leg that her plotter sends.")] = 0.0,
+    leg: Annotated[
+        float, Option(metavar="DEG", min=0.0, max=360.0, help="Leg that her plotter sends.")
+    ] = 0.0,
     sea: Annotated[str, Option(help="calm, slight, moderate or rough.")] = "calm",
     seed: Annotated[int, Option(min=0, help="Seed of the sea.")] = 0,
     drop: Annotated[
@@ -106,13 +109,6 @@ def simulate_command(
     dropped = {
         kind.upper(): check_number(after, f"--drop {kind}", at_least=0.0) for kind, after in given.items()
     }
-    ship = SimulatedShip(load_model(model), _bearing(leg, "--leg"), sea, seed)
+    ship = SimulatedShip(load_model(model), radians(leg), sea, seed)
     asyncio.run(simulate_ship(ship, nmea, duration=duration, speed_up=speed_up, drop=dropped))
     answer({"model": ship.model.name, "duration_s": round(ship.steps * STEP, 1), "state": ship.now})
-
-
-def _bearing(degrees: float, where: str) -> float:
-    """A direction in radians of one in degrees, which a compass has."""
-    from shipgym.checks import check_number
-
-    return radians(check_number(degrees, where, at_least=0.0, at_most=360.0))

@@ -14,7 +14,6 @@ from agents.cli.command import INTERRUPTED, Address, EngineName, Workers, answer
 
 if TYPE_CHECKING:
     from agents.training.plan import Given
-    from agents.training.settings import Settings
     from agents.training.training import TrainingResult
     from agents.training.tuning import Tuning
 
@@ -100,8 +99,10 @@ def _train(given: Given, out: Path, resume: bool, max_seconds: float | None) -> 
         run_folder.check_resumable(out, plan)
         for line in run_folder.other_versions(out):
             warn(f"the run began with other versions: {line}; the result may differ in the last digits")
-    if "total_steps" in given.settings:
-        _tell_rounding(plan.settings)
+    asked, rollout = given.settings.get("total_steps", 0), plan.settings.rollout
+    if asked % rollout:
+        whole = f"{-(-asked // rollout) * rollout:,}: rollouts of {plan.settings.ships} ships"
+        warn(f"total_steps: {asked:,} is rounded up to {whole} have {rollout:,}")
     from agents.training.training import train
 
     command = shlex.join(["shipgym", *sys.argv[1:]])
@@ -111,17 +112,6 @@ def _train(given: Given, out: Path, resume: bool, max_seconds: float | None) -> 
     except KeyboardInterrupt:
         kept = (out / run_folder.CHECKPOINT).is_file()
         fail(f"interrupted; continue with --resume --out {out}" if kept else "interrupted", INTERRUPTED)
-        raise  # not reached: `fail` leaves
-
-
-def _tell_rounding(settings: Settings) -> None:
-    """Say by how much more is learned than was asked for."""
-    from agents.cli.terminal import warn
-
-    total, rollout, each = settings.total_steps, settings.rollout, settings.each
-    if (whole := -(-total // rollout) * rollout) != total:
-        ships = f"{settings.ships} ships, {each} {getattr(settings, each)}"
-        warn(f"total_steps: {total:,} is rounded up to {whole:,}: rollouts have {rollout:,} steps ({ships})")
 
 
 def _print_result(result: TrainingResult, out: Path) -> None:
@@ -188,9 +178,12 @@ def tune_command(
     plan = make_plan(given)
     if "evaluate_every" not in fixed:
         plan = evaluated_evenly(plan)
-    with progress_bars() as bars:
-        tell = None if bars is None else (lambda done, total, _: bars("trials", done, total))
-        found = tune(plan, out, trials, fixed=tuple(fixed), where=where, progress=tell)
+    try:
+        with progress_bars() as bars:
+            tell = None if bars is None else (lambda done, total, _: bars("trials", done, total))
+            found = tune(plan, out, trials, fixed=tuple(fixed), where=where, progress=tell)
+    except KeyboardInterrupt:
+        fail("interrupted; the same command continues with the trials that are not done", INTERRUPTED)
     _print_tuning(found, out)
 
 

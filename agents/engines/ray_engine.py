@@ -19,12 +19,16 @@ RAY_PATIENCE_S = 30.0  # for ray to be imported and to connect
 CONNECT = "import ray, sys; ray.init(sys.argv[1], log_to_driver=False, configure_logging=False)"
 
 
+class EngineError(InputError):
+    """Ray is not installed, or not there: whatever the jobs are, they cannot be done."""
+
+
 def on_ray(
     function: JobFunction, texts: list[str], workers: int | None, address: str | None, retries: int
 ) -> Iterator[Outcome]:
     """Do jobs on ray: see `agents.engines.jobs.run_jobs`.
 
-    Raises InputError if ray is not installed, or there is no cluster at the address; WorkerDiedError if the
+    Raises EngineError if ray is not installed, or there is no cluster at the address; WorkerDiedError if the
     worker of a job dies more often than `retries`.
     """
     with _connected(workers, address) as ray:
@@ -59,7 +63,7 @@ def _connected(workers: int | None, address: str | None) -> Iterator[Any]:
         try:
             import ray
         except ImportError:
-            raise InputError(
+            raise EngineError(
                 "engine: 'ray' found, but it is not installed: pip install 'shipgym[ray]', or take 'local'"
             ) from None
         if ray.is_initialized():
@@ -73,7 +77,7 @@ def _connected(workers: int | None, address: str | None) -> Iterator[Any]:
             with environment(PYTHONPATH=os.pathsep.join(filter(None, sys.path)), **ONE_THREAD):
                 ray.init(**where, log_to_driver=False, configure_logging=False)
         except Exception as error:
-            raise InputError(f"engine: 'ray' found, but it does not start here: {error}") from None
+            raise EngineError(f"engine: 'ray' found, but it does not start here: {error}") from None
     try:
         yield ray
     finally:
@@ -84,12 +88,12 @@ def check_answers(address: str, ray_patience_s: float = RAY_PATIENCE_S) -> None:
     """Refuse an address at which no ray cluster answers.
 
     `address`: host and port, with ``ray://`` for a client's; or ``"auto"``; `ray_patience_s`: how long to
-    wait for ray to connect, s. Raises InputError naming what is wrong with the address, or what ray says.
+    wait for ray to connect, s. Raises EngineError naming what is wrong with the address, or what ray says.
     """
     if address != "auto":
         host, _, port = address.removeprefix("ray://").rpartition(":")
         if not host or not port.isdigit() or not 0 < int(port) < 65536:
-            raise InputError(
+            raise EngineError(
                 f"address: '{address}' found, expected 'HOST:PORT', 'ray://HOST:PORT' or 'auto'; the port of "
                 f"a cluster is 6379 unless it was started with another, that of its client server 10001"
             )
@@ -107,8 +111,8 @@ def check_answers(address: str, ray_patience_s: float = RAY_PATIENCE_S) -> None:
         raise _no_cluster(address, ray_patience_s, said[-1]) from None
 
 
-def _no_cluster(address: str, patience_s: float, reason: str) -> InputError:
-    return InputError(
+def _no_cluster(address: str, patience_s: float, reason: str) -> EngineError:
+    return EngineError(
         f"address: no ray cluster answers at '{address}' within {patience_s:g} s ({reason}). Is it the right "
         f"port? A cluster with a token (`ray get-auth-token`) wants RAY_AUTH_MODE=token and the same token "
         f"here. Start a cluster by `ray start --head`, or leave the address out to run on this computer"

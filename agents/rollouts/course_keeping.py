@@ -64,31 +64,18 @@ class Episodes:
 
 
 class StepResponses(NamedTuple):
-    """Responses to a step of the set-point; a ship that is lost stays where it was lost.
+    """Responses to a step of the set-point; a ship that is lost stays where it was lost."""
 
-    Attributes
-    ----------
-    t : array of shape (n_samples,)
-        Time from the step, s.
-    heading : array of shape (n_models, n_samples)
-        Change of heading, rad, positive to starboard.
-    rudder : array of shape (n_models, n_samples)
-        Rudder angle, rad, positive to starboard.
-    """
-
-    t: Floats
+    t: Floats  # time from the step, s, shape (n_samples,)
+    #: change of heading, and rudder angle, rad, positive to starboard, shape (n_models, n_samples)
     heading: Floats
     rudder: Floats
 
 
 def sail(
-    controller: Policy,
-    models: ShipModel | Sequence[ShipModel],
-    task: Task | None = None,
-    seeds: ArrayLike = 0,
-    *,
-    allow_unstable: bool = False,
-) -> Episodes:
+    controller: Policy, models: ShipModel | Sequence[ShipModel], task: Task | None = None,
+    seeds: ArrayLike = 0, *, allow_unstable: bool = False,
+) -> Episodes:  # fmt: skip
     """Sail episodes of course keeping with one controller, many at once.
 
     Returns the same for the same arguments, whatever else is sailed with them. Raises InputError if the
@@ -150,14 +137,9 @@ def _figures(run: Rollout) -> dict[str, NDArray[np.generic]]:
 
 
 def step_response(
-    controller: Policy,
-    models: ShipModel | Sequence[ShipModel],
-    step_deg: float = 20.0,
-    duration: float | None = None,
-    task: Task | None = None,
-    *,
-    allow_unstable: bool = False,
-) -> StepResponses:
+    controller: Policy, models: ShipModel | Sequence[ShipModel], step_deg: float = 20.0,
+    duration: float | None = None, task: Task | None = None, *, allow_unstable: bool = False,
+) -> StepResponses:  # fmt: skip
     """Turn ships from straight ahead to a new course, all at once.
 
     Raises InputError as `sail`; or if the step or the duration is out of its range.

@@ -71,14 +71,9 @@ class Rollout:
 
 
 def rollout(
-    policy: Policy,
-    engine: Engine,
-    seeds: ArrayLike,
-    *,
-    record: bool | Collection[str] = False,
-    tolerant: bool = False,
-    show: Callable[[NDArray[np.float32]], NDArray[np.float32]] | None = None,
-) -> Rollout:
+    policy: Policy, engine: Engine, seeds: ArrayLike, *, record: bool | Collection[str] = False,
+    tolerant: bool = False, show: Callable[[NDArray[np.float32]], NDArray[np.float32]] | None = None,
+) -> Rollout:  # fmt: skip
     """Steer the ships of an engine through one episode each.
 
     Returns the same for the same arguments; only the time differs. Raises InputError if the policy gives no

@@ -26,6 +26,7 @@ from shipgym.sea.weather_column import as_weather, weather_column
 #: Seeds below those that are scored: of training a thousand for each `seed`, then those held out.
 SEEDS_EACH = 1000
 LARGEST_SEED = 799
+MOST_THREADS = 1024
 EVALUATION_SEED = 900_000
 N_EVALUATIONS = 100
 SPEED_RANGE = (0.8, 1.1)
@@ -58,7 +59,7 @@ class Plan:
             )
         check_whole(self.seed, "seed", at_least=0, at_most=LARGEST_SEED)
         check_whole(self.settings.ships, "ships", at_least=1, at_most=SEEDS_EACH)
-        check_whole(self.threads, "threads", at_least=1)
+        check_whole(self.threads, "threads", at_least=1, at_most=MOST_THREADS)
         longest, hint = self.task.task.episode_steps, "no longer than an episode"
         check_whole(self.settings.action_repeat, "action_repeat", at_least=1, at_most=longest, hint=hint)
         self.task.task.check_fits(self.task.ship)

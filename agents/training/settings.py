@@ -36,7 +36,6 @@ class Settings:
     """What all algorithms have; a decision lasts `action_repeat` control intervals."""
 
     section: ClassVar[str] = "all"  # of `hyperparameters/settings.toml`, which says what each setting is
-    each: ClassVar[str]  # setting that says how many decisions a ship takes between two updates
 
     total_steps: int
     evaluate_every: int
@@ -77,8 +76,8 @@ class Settings:
 
     @property
     def rollout(self) -> int:
-        """Decisions of all ships between two updates, of which a training has whole ones only."""
-        return self.ships * int(getattr(self, self.each))
+        """Decisions of all ships between two updates; a training has whole ones."""
+        return self.ships * int(vars(self).get("n_steps") or vars(self)["train_freq"])
 
     def to_dict(self) -> dict[str, Any]:
         """The settings by name, ready for JSON."""
@@ -91,7 +90,6 @@ class PPOSettings(Settings):
     """Proximal policy optimisation (Schulman et al. 2017, arXiv:1707.06347)."""
 
     section: ClassVar[str] = "ppo"
-    each: ClassVar[str] = "n_steps"
 
     n_steps: int
     n_epochs: int
@@ -117,7 +115,6 @@ class OffPolicySettings(Settings):
     """What the algorithms have that learn from a replay buffer."""
 
     section: ClassVar[str] = "off-policy"
-    each: ClassVar[str] = "train_freq"
 
     buffer_size: int
     learning_starts: int

@@ -15,6 +15,7 @@ from agents.agent_file import load_agent
 from agents.controllers.controller import Controller
 from agents.controllers.registry import controller_class, controller_kinds
 from agents.engines.jobs import HERE, JobEngine
+from agents.engines.ray_engine import EngineError
 from agents.identifying import identification_settings, identify_trials, trials_of
 from agents.output import whole_folder
 from agents.rollouts.course_keeping import sail, step_response
@@ -129,6 +130,8 @@ def examined(
         _check_fits(guest, fit.model, where)
     try:
         found = verified()
+    except EngineError:
+        raise
     except (UnstableModelError, InputError) as error:  # the user's input was right, the model is not
         return AutopilotResult(ship, fit.trials, fit, str(error), None)
     return AutopilotResult(ship, fit.trials, fit, None, *_decided(found, fit))

@@ -6,6 +6,7 @@ import pytest
 
 from agents import LQ, LineOfSight, sail
 from agents.cli.terminal import ranking_table
+from agents.engines.jobs import JobEngine
 from agents.verification.chain import build_autopilot, verify
 from agents.verification.index_uncertainty import nominal_runs, sail_draws, uncertainty_of
 from agents.verification.page import write_report
@@ -119,6 +120,13 @@ def test_a_guest_of_another_environment_or_ship_is_wrong_input(demo, tmp_path, m
     with pytest.raises(InputError, match=f"agent '.*guest.json': .*{said}"):
         build_autopilot(demo, tmp_path / "out", draws=4, agents=[path])
     assert not (tmp_path / "out").exists()
+
+
+def test_a_cluster_that_does_not_answer_is_no_fault_of_the_model(demo, tmp_path):
+    where = JobEngine(engine="ray", address="127.0.0.1:1")
+    with pytest.raises(InputError, match=r"^address: no ray cluster answers|not installed"):
+        build_autopilot(demo, tmp_path / "out", draws=4, where=where)
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_an_unknown_guest_is_refused_with_the_nearest_name(tmp_path):

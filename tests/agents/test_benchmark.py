@@ -911,6 +911,9 @@ def test_bad_input_is_told_in_one_line_and_nothing_is_written(tmp_path):
         (["--controllers", "pid"], "--out"),
         (["--controllers", "pid", "--out", out, "--engine", "rai"], "engine: 'rai' found"),
         (["--verify", out], "there is no such file of benchmark results"),
+        (["--verify", out, "--tasks", "mariner-calm"], "--tasks: found together with --verify, which"),
+        (["--submit", tmp_path / "s.json", "--episodes", 9, "--out", out], "--episodes: found together with"),
+        (["--tasks", "mariner-calm,", "--out", out], "task: '' found, expected one of"),
         (["--controllers", f"pid,{cut}", "--tasks", "mariner-calm", "--out", out], "may be cut short"),
         (["--controllers", f"pid,{weightless}", "--tasks", "mariner-calm", "--out", out], "no such file"),
         (

@@ -418,12 +418,16 @@ def test_the_command_writes_c_and_says_what_it_cannot(tmp_path):
         ("nothing to write: give --c FOLDER", "mariner"),
         ("Did you mean 'mariner'", "marinr", "--c", tmp_path / "no"),
         ("--depth found, which are for --c and --fmu", "mariner", "--onnx", tmp_path / "no", "--depth", 9),
+        ("agent: 'mariner' found", "mariner", "--c", tmp_path / "no", "--onnx", tmp_path / "no.onnx"),
+        ("its folder does not exist", "mariner", "--c", tmp_path / "no", "--fmu", tmp_path / "a" / "no.fmu"),
+        ("name that ends in .fmu", "mariner", "--c", tmp_path / "no", "--fmu", tmp_path / "no.zip"),
         ("--fmi: 2.0 found, which is for --fmu alone", "mariner", "--c", tmp_path / "no", "--fmi", "2.0"),
         ("--depth: 9 found, but", tmp_path / "pid.json", "--c", tmp_path / "no", "--depth", 9),
     ):
         found = run(app, ["export", *map(str, arguments)])
         assert found.exit_code == 2
         assert said in " ".join(found.output.split())
+        assert not (tmp_path / "no").exists()
 
 
 def test_texts_have_angles_speeds_and_headings_in_four_digits():

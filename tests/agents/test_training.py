@@ -462,9 +462,9 @@ def test_the_command_trains_and_resumes(tmp_path):
 @pytest.mark.parametrize(
     ("algorithm", "steps", "said"),
     [
-        ("ppo", 100, "total_steps: 100 is rounded up to 256: rollouts have 256 steps (8 ships, n_steps 32)"),
+        ("ppo", 100, "total_steps: 100 is rounded up to 256: rollouts of 8 ships have 256"),
         ("ppo", 512, ""),
-        ("sac", 1001, "1,001 is rounded up to 1,008: rollouts have 8 steps (8 ships, train_freq 1)"),
+        ("sac", 1001, "1,001 is rounded up to 1,008: rollouts of 8 ships have 8"),
     ],
 )
 def test_steps_that_are_no_whole_rollouts_are_told_before_the_training(
@@ -494,6 +494,10 @@ def test_a_training_learns_whole_rollouts():
         (["train", "ppo", "--task", "mariner-clam"], "Did you mean 'mariner-calm'?"),
         (["train", "ppo", "--env", "curse-keeping"], "Did you mean 'course-keeping'?"),
         (["train", "ppo", "--set", "gama=0.9"], "Did you mean 'gamma'?"),
+        (
+            ["train", "ppo", "--threads", "1025"],
+            "threads: 1025 found, expected a whole number of at least 1 an",
+        ),
         (["train", "ppo", "--set", "gamma=nan"], "--set gamma: nan found, expected a number of magnitude"),
         (["train", "ppo", "--set", "gamma=2"], "gamma: 2 found, expected a number >= 0 and <= 1"),
         (["train", "ppo", "--set", "batch_size=1000"], "a divisor above 1 of ships x n_steps, 32768"),
