@@ -99,7 +99,7 @@ def simulate_command(
     """
     import asyncio
 
-    from agents.cli.terminal import answer
+    from agents.cli.terminal import answer, say
     from agents.deployment.simulated import STEP, SimulatedShip, simulate_ship
     from shipgym.checks import check_number
     from shipgym.files import named_values
@@ -112,3 +112,4 @@ def simulate_command(
     ship = SimulatedShip(load_model(model), radians(leg), sea, seed)
     asyncio.run(simulate_ship(ship, nmea, duration=duration, speed_up=speed_up, drop=dropped))
     answer({"model": ship.model.name, "duration_s": round(ship.steps * STEP, 1), "state": ship.now})
+    say(f"{ship.model.name}: sailed for {ship.steps * STEP:.1f} s")

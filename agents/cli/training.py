@@ -102,7 +102,7 @@ def _train(given: Given, out: Path, resume: bool, max_seconds: float | None) -> 
     asked, rollout = given.settings.get("total_steps", 0), plan.settings.rollout
     if asked % rollout:
         whole = f"{-(-asked // rollout) * rollout:,}: rollouts of {plan.settings.ships} ships"
-        warn(f"total_steps: {asked:,} is rounded up to {whole} have {rollout:,}")
+        warn(f"total_steps: {asked:,} is rounded up to {whole} have {rollout:,} steps")
     from agents.training.training import train
 
     command = shlex.join(["shipgym", *sys.argv[1:]])

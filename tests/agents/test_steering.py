@@ -622,7 +622,8 @@ def test_by_default_a_ship_is_simulated_as_time_goes_until_she_is_stopped(monkey
         asked.append((ship.leg, nmea, more))
 
     monkeypatch.setattr("agents.deployment.simulated.simulate_ship", stand_in)
-    assert CliRunner().invoke(app, ["simulate", "mariner", "--nmea", "udp:1:2"]).exit_code == 0
+    answer = CliRunner().invoke(app, ["simulate", "mariner", "--nmea", "udp:1:2"])
+    assert (answer.exit_code, answer.stdout) == (0, "mariner: sailed for 0.0 s\n")
     assert asked == [(0.0, "udp:1:2", {"duration": math.inf, "speed_up": 1.0, "drop": {}})]
 
 

@@ -462,9 +462,9 @@ def test_the_command_trains_and_resumes(tmp_path):
 @pytest.mark.parametrize(
     ("algorithm", "steps", "said"),
     [
-        ("ppo", 100, "total_steps: 100 is rounded up to 256: rollouts of 8 ships have 256"),
+        ("ppo", 100, "total_steps: 100 is rounded up to 256: rollouts of 8 ships have 256 steps"),
         ("ppo", 512, ""),
-        ("sac", 1001, "1,001 is rounded up to 1,008: rollouts of 8 ships have 8"),
+        ("sac", 1001, "1,001 is rounded up to 1,008: rollouts of 8 ships have 8 steps"),
     ],
 )
 def test_steps_that_are_no_whole_rollouts_are_told_before_the_training(
