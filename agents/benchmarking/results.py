@@ -37,11 +37,20 @@ REMEDY = "run `shipgym benchmark` again"
 
 @dataclass(frozen=True, eq=False)
 class BenchmarkResult:
-    """Result of a benchmark."""
+    """Result of a benchmark.
 
-    summary: dict[str, Any]  # what `results.json` holds (`agents.benchmarking.results_shape`)
-    episodes: Columns  # one row an episode: contestant, task, run, seed, and figures by name (`metrics`)
-    #: Functions of contestants that the user named when it was made; none of a file.
+    Attributes
+    ----------
+    summary : dict
+        What `results.json` holds (`agents.benchmarking.results_shape`).
+    episodes : dict of str to array
+        One row an episode: contestant, task, run, seed, and figures by name (`metrics`).
+    allow_code : tuple of str
+        Functions of contestants that the user named when it was made; none of a file.
+    """
+
+    summary: dict[str, Any]
+    episodes: Columns
     allow_code: tuple[str, ...] = ()
 
     @property

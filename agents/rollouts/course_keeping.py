@@ -64,10 +64,19 @@ class Episodes:
 
 
 class StepResponses(NamedTuple):
-    """Responses to a step of the set-point; a ship that is lost stays where it was lost."""
+    """Responses to a step of the set-point; a ship that is lost stays where it was lost.
 
-    t: Floats  # time from the step, s, shape (n_samples,)
-    #: change of heading, and rudder angle, rad, positive to starboard, shape (n_models, n_samples)
+    Attributes
+    ----------
+    t : array of shape (n_samples,)
+        Time from the step, s.
+    heading : array of shape (n_models, n_samples)
+        Change of heading, rad, positive to starboard.
+    rudder : array of shape (n_models, n_samples)
+        Rudder angle, rad, positive to starboard.
+    """
+
+    t: Floats
     heading: Floats
     rudder: Floats
 

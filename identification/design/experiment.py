@@ -48,17 +48,34 @@ class TrialInformation:
 
 @dataclass(frozen=True, eq=False)
 class Advice:
-    """Which manoeuvres to run next."""
+    """Which manoeuvres to run next.
 
-    criterion: str  # "c", "D" or "E"
-    coefficient: str  # that which "c" shrinks
-    trials: tuple[TrialInformation, ...]  # of the trials so far
-    before: dict[str, float]  # relative standard error of each coefficient from the trials so far
-    #: Of each choice the gain of all candidates, the largest is best: by what factor the standard error
-    #: ("c"), the mean axis ("D") or the longest axis ("E") of the relative errors shrinks.
+    Attributes
+    ----------
+    criterion : str
+        "c", "D" or "E".
+    coefficient : str
+        That which "c" shrinks.
+    trials : tuple of TrialInformation
+        Of the trials so far.
+    before : dict of str to float
+        Relative standard error of each coefficient from the trials so far.
+    steps : tuple of dict of str to float
+        Of each choice the gain of all candidates, the largest is best: by what factor the standard error
+        ("c"), the mean axis ("D") or the longest axis ("E") of the relative errors shrinks.
+    chosen : tuple of str
+        The candidates to run, in this order.
+    after : dict of str to float
+        Relative standard errors with them.
+    """
+
+    criterion: str
+    coefficient: str
+    trials: tuple[TrialInformation, ...]
+    before: dict[str, float]
     steps: tuple[dict[str, float], ...]
-    chosen: tuple[str, ...]  # the candidates to run, in this order
-    after: dict[str, float]  # relative standard errors with them
+    chosen: tuple[str, ...]
+    after: dict[str, float]
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values, ready for JSON; of each trial's information the diagonal."""
