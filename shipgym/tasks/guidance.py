@@ -54,15 +54,13 @@ class Path:
     @cached_property
     def lengths(self) -> Floats:
         """Length of each leg, m, shape (n_legs,)."""
-        lengths: Floats = np.hypot(*np.diff(self.waypoints, axis=0).T)
-        return lengths
+        return np.asarray(np.hypot(*np.diff(self.waypoints, axis=0).T))
 
     @cached_property
     def courses(self) -> Floats:
         """Direction of each leg, rad, shape (n_legs,)."""
         north, east = np.diff(self.waypoints, axis=0).T
-        courses: Floats = np.arctan2(east, north)
-        return courses
+        return np.asarray(np.arctan2(east, north))
 
     @cached_property
     def turns(self) -> Floats:
@@ -111,8 +109,7 @@ class Path:
         legs = np.arange(self.n_legs)
         where = self.position(north[..., None], east[..., None], legs)
         beyond = np.maximum(np.maximum(-where.along, where.to_go * -1.0), 0.0)
-        nearest: Floats = np.hypot(where.cross_track, beyond).min(axis=-1)
-        return nearest
+        return np.asarray(np.hypot(where.cross_track, beyond).min(axis=-1))
 
 
 def line_of_sight(where: PathPosition, lookahead: ArrayLike) -> Floats:
@@ -136,8 +133,7 @@ def integral_line_of_sight(
 
 def wrapped(angle: ArrayLike) -> Floats:
     """The same angle in [-pi, pi)."""
-    values: Floats = (np.asarray(angle, dtype=float) + np.pi) % (2.0 * np.pi) - np.pi
-    return values
+    return np.asarray((np.asarray(angle, dtype=float) + np.pi) % (2.0 * np.pi) - np.pi)
 
 
 def random_path(
