@@ -162,8 +162,7 @@ class AdaptiveLQ(Controller):
     def _doubt(self) -> Floats:
         """Variance of the model's scaled coefficients, shape (2, 4): each may be as wrong as it is large."""
         size = np.abs(self.prior * SIZES / self.error_size[:, None])
-        doubt: Floats = np.maximum(size, 0.01) ** 2
-        return doubt
+        return np.asarray(np.maximum(size, 0.01) ** 2)
 
     def _at_rest(self, kept: Records, now: Floats, begins: Flags) -> Flags:
         """Whether the yaw rate's second difference, over the last ship lengths, is what noise explains."""
@@ -172,8 +171,7 @@ class AdaptiveLQ(Controller):
         share = 1.0 / self.design["redesign_steps"]
         kept["restless"] += share * (oscillation - kept["restless"])
         kept["change"] = change
-        at_rest: Flags = kept["restless"] < self.design["restless_limit"] ** 2
-        return at_rest
+        return kept["restless"] < self.design["restless_limit"] ** 2
 
     def _learn(self, kept: Records, now: Floats, begins: Flags, at_rest: Flags) -> None:
         """TMILS with the last interval's mean motion and accelerations; all ships side by side."""
@@ -215,8 +213,7 @@ class AdaptiveLQ(Controller):
         `state`: that `predict` returns, shape (memory_size,) or (n, memory_size).
         """
         theta = records(np.asarray(state), self.record)["theta"]
-        found: Floats = theta * self.error_size[:, None] / SIZES
-        return found
+        return np.asarray(theta * self.error_size[:, None] / SIZES)
 
     def _redesigned(self, kept: Records) -> Records:
         """What is remembered, with new gains and a new neutral rudder where they can be believed."""
@@ -252,8 +249,7 @@ def has_sway(model: ShipModel) -> bool:
 def _stable(A: Floats, B: Floats, rows: Floats) -> Flags:
     """Whether ships are held by feedback rows, shape (n,)."""
     poles = np.linalg.eigvals(A + B[:, :, None] * rows[:, None, :])
-    held: Flags = np.abs(poles).max(axis=1) < 1.0
-    return held
+    return np.asarray(np.abs(poles).max(axis=1) < 1.0)
 
 
 def prime_steering(model: ShipModel) -> Floats:

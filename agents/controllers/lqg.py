@@ -200,5 +200,4 @@ def kalman_gain(transition: Floats, process: Floats, output: Floats, noise: Floa
 
 def _times(rows: Floats, matrix: Floats) -> Floats:
     """Matrix product whose rows do not depend on how many there are."""
-    product: Floats = np.einsum("ij,jk->ik", rows, matrix)
-    return product
+    return np.asarray(np.einsum("ij,jk->ik", rows, matrix))

@@ -73,8 +73,7 @@ def begun(memory: Any, starts: Any, shape: tuple[int, ...], size: int) -> tuple[
 
 def heading_error(seen: dict[str, Floats]) -> Floats:
     """Heading error of each ship, rad, in (-pi, pi]."""
-    error: Floats = np.arctan2(seen["heading_error_sin"], seen["heading_error_cos"])
-    return error
+    return np.arctan2(seen["heading_error_sin"], seen["heading_error_cos"])
 
 
 def on_course(seen: NDArray[Any], error: Floats, integral: Floats, reach: float) -> NDArray[np.float32]:

@@ -172,8 +172,7 @@ def _engine(ship: ShipModel, n: int, dt: float, depth: float) -> Engine:
 def _added(plan: Floats, at: Any) -> Floats:
     """Course that plans add at a number of knots from their beginning: straight between knots."""
     shares = np.maximum(1.0 - np.abs(np.asarray(at)[..., None] - np.arange(KNOTS)), 0.0)
-    added: Floats = (plan * shares).sum(axis=-1)
-    return added
+    return np.asarray((plan * shares).sum(axis=-1))
 
 
 def _turned(ahead: Any, aside: Any, angle: Any) -> tuple[Any, Any]:

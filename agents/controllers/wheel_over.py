@@ -115,8 +115,7 @@ class WheelOver(Guided):
 
     def over_ground(self, seen: Mapping[str, Floats]) -> Floats:
         """Angle from the heading to the course over ground, rad."""
-        way: Floats = seen["heading_error"] - np.arctan2(*(seen[name] for name in COURSE_ERROR))
-        return way
+        return seen["heading_error"] - np.arctan2(*(seen[name] for name in COURSE_ERROR))
 
     def shift(self, turns: Sequence[Floats]) -> Floats | float:
         """See `Guided.shift`: on a path with arcs half a lookahead ahead."""
@@ -126,8 +125,7 @@ class WheelOver(Guided):
     def heading(self, seen: Mapping[str, Floats], turns: Sequence[Floats]) -> Floats:
         """Heading against the course of the path beside the ship, rad."""
         to_path = np.arctan2(seen["cross_track"], self.gains["task_lookahead"])
-        heading: Floats = self.shift(turns) - to_path - seen["heading_error"]
-        return heading
+        return self.shift(turns) - to_path - seen["heading_error"]
 
     def course_along(self, cross: Floats, turns: Sequence[Floats]) -> Floats:
         """Course over ground to steer, against that of the path beside the ship, rad.

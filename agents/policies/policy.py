@@ -266,8 +266,7 @@ def check_part(agent: Any) -> None:
 def toward(outputs: Numbers, before: Numbers, rate_limit: float) -> Numbers:
     """Outputs limited to [-1, 1], and to what can be reached in one control interval from those before."""
     step = np.float32(rate_limit)
-    limited: Numbers = np.clip(np.clip(outputs, -1.0, 1.0), before - step, before + step)
-    return limited
+    return np.clip(np.clip(outputs, -1.0, 1.0), before - step, before + step)
 
 
 def network_fields(network: Network) -> tuple[dict[str, Any], Tensors]:

@@ -213,8 +213,7 @@ def total(values: Floats | Flags) -> Floats:
 
 def ratio(above: Floats, below: Floats) -> Floats:
     """A quotient, NaN where the divisor is 0."""
-    found: Floats = np.divide(above, below, out=np.full(np.shape(above), np.nan), where=below != 0.0)
-    return found
+    return np.asarray(np.divide(above, below, out=np.full(np.shape(above), np.nan), where=below != 0.0))
 
 
 class Evaluation(NamedTuple):

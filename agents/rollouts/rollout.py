@@ -66,8 +66,7 @@ class Rollout:
     @property
     def steps(self) -> Floats:
         """Intervals of each episode, shape (n,)."""
-        steps: Floats = self.sailing.sum(axis=0, dtype=np.float64)
-        return steps
+        return np.asarray(self.sailing.sum(axis=0, dtype=np.float64))
 
 
 def rollout(

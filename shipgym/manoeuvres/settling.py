@@ -45,8 +45,7 @@ class Voyage:
     @property
     def state(self) -> Floats:
         """The state now, and what is recorded of the weather, shape (n_columns,)."""
-        state: Floats = self._states[-1][-1]
-        return state
+        return np.asarray(self._states[-1][-1])
 
     def go(self, sail: Sail, n_steps: int) -> tuple[Floats, Floats]:
         """Sail some steps; states of shape (n_steps, n_columns) and commands of shape (n_steps, 2)."""

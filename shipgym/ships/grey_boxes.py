@@ -204,5 +204,4 @@ def accelerations(motion: Motion, c: Any, ship: Ship) -> tuple[float, float, flo
 def _coefficients(reference: Record, terms: Record) -> Record:
     """The record of a grey box's coefficients: the known ship, hers, and those of the terms."""
     fields = [("known", Ship), ("reference", reference), ("terms", terms)]
-    record: Record = NamedTuple("GreyBoxCoefficients", fields)  # type: ignore[misc]
-    return record
+    return NamedTuple("GreyBoxCoefficients", fields)  # type: ignore[return-value]

@@ -102,8 +102,7 @@ def kernel_inputs(channels: Mapping[str, Any], particulars: Particulars) -> Floa
 def gaussians(x: Floats, centres: Floats) -> Floats:
     """exp(-|x - centre|^2 / 2), shape (n_samples, n_centres)."""
     squares = (x**2).sum(axis=1)[:, None] - 2.0 * x @ centres.T + (centres**2).sum(axis=1)
-    found: Floats = np.exp(-0.5 * np.maximum(squares, 0.0))
-    return found
+    return np.asarray(np.exp(-0.5 * np.maximum(squares, 0.0)))
 
 
 @dataclass(frozen=True)
@@ -125,8 +124,7 @@ class KernelBox(GreyBox):
     ) -> Floats:
         """As of `Structure`: the features of the kernel by U^2, shape (n_samples, n_features)."""
         u, v = (np.asarray(channels[name], dtype=float) for name in ("u", "v"))
-        found: Floats = (u * u + v * v)[:, None] * self.kernel.features(channels, particulars)
-        return found
+        return np.asarray((u * u + v * v)[:, None] * self.kernel.features(channels, particulars))
 
     def vessel(self, coefficients: Mapping[str, float], lag: bool) -> Vessel:
         """What is compiled: the reference ship's functions and the sum over centres, read at run time."""
@@ -227,5 +225,4 @@ SUMMED = {
 @cache
 def _kernel_record(size: int) -> Record:
     fields = [(name, float) for name in KernelCoefficients._fields[:-1]]
-    record: Record = NamedTuple("KernelCoefficients", [*fields, ("table", table_of(ROW * size))])  # type: ignore[misc]
-    return record
+    return NamedTuple("KernelCoefficients", [*fields, ("table", table_of(ROW * size))])  # type: ignore[return-value]

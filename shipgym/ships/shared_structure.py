@@ -114,8 +114,7 @@ class SharedStructure(Structure):
         """Coefficients of the SI features: the forces by mass and added mass (see `Structure`)."""
         p = particulars.completed()
         forces = np.concatenate([self._velocity_forces(axis, coefficients, p) for axis in AXES])
-        numbers: Floats = self.term_scales(p) * (self._from_forces(self.inertia(coefficients, p)) @ forces)
-        return numbers
+        return np.asarray(self.term_scales(p) * (self._from_forces(self.inertia(coefficients, p)) @ forces))
 
     def _velocity_forces(self, axis: str, coefficients: Mapping[str, float], p: Particulars) -> Floats:
         """Coefficient of each term of an equation in its force, that of the ship's own mass included."""

@@ -103,8 +103,7 @@ def accelerations_function(source: str) -> Any:
 @cache
 def coefficients_record(n: int, name: str = "TermCoefficients") -> Record:
     """Record of the numbered coefficients of n terms."""
-    record: Record = NamedTuple(name, [(f"c{k}", float) for k in range(n)])  # type: ignore[misc]
-    return record
+    return NamedTuple(name, [(f"c{k}", float) for k in range(n)])  # type: ignore[return-value]
 
 
 def factored(monomials: Sequence[Monomial]) -> str:

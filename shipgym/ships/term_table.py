@@ -219,8 +219,7 @@ class Structure:
     ) -> Floats:
         """Coefficients of the SI features of the accelerations, in order; shape (n_terms,)."""
         matrix = self.acceleration_matrix(particulars, shaft_speed)
-        values: Floats = matrix @ np.array(list(coefficients.values()))
-        return values
+        return np.asarray(matrix @ np.array(list(coefficients.values())))
 
     def terms(self, equation: str) -> tuple[Term, ...]:
         """Terms of one equation."""
