@@ -6,12 +6,12 @@ import asyncio
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from functools import cache
-from importlib import import_module
 from math import copysign, radians
 from pathlib import Path
 from types import ModuleType
 from typing import Any, NamedTuple
 
+from shipgym import extras
 from shipgym.errors import InputError
 from shipgym.files import read_toml
 from shipgym.trials.units import UNITS
@@ -36,10 +36,7 @@ class Reading(NamedTuple):
 @cache
 def library(name: str = "pynmea2") -> ModuleType:
     """pynmea2, taught what it does not know, or pyserial; InputError where it is not installed."""
-    try:
-        found = import_module(name)
-    except ImportError:
-        raise InputError(f"{name} is not installed: pip install 'shipgym[nmea]'") from None
+    found: ModuleType = extras.library(name, "nmea")
     if name == "pynmea2":
         for one in TABLES["fields"].keys() - found.TalkerSentence.sentence_types.keys():
             type(one, (found.TalkerSentence,), {"fields": ()})
@@ -108,9 +105,6 @@ class Line(asyncio.Protocol, asyncio.DatagramProtocol):
         """One datagram, of whole lines."""
         self.peer = address
         self.data_received(data + b"\n")
-
-    def error_received(self, error: Exception) -> None:
-        """Nobody listens at the other end yet."""
 
     def send(self, data: bytes) -> None:
         """Send bytes; a datagram to whoever was heard last, or to where the socket is connected."""

@@ -12,6 +12,7 @@ import numpy as np
 
 from agents.policies.policy import ORDERS, LearnedPolicy
 from shipgym.errors import InputError
+from shipgym.extras import library
 from shipgym.files import write_bytes
 
 OPSET, IR_VERSION = 17, 8  # of 2022: what runs on ships is not of this year
@@ -35,12 +36,8 @@ def onnx_model(policy: Any) -> Any:
             f"controller has a memory and rules that are not a network; of a shielded one export its policy, "
             f"and keep the shield around it"
         )
-    try:
-        import onnx
-        from onnx import helper
-    except ImportError:
-        raise InputError("onnx is not installed, the export needs it: pip install 'shipgym[onnx]'") from None
-    real = onnx.TensorProto.FLOAT
+    onnx = library("onnx", "onnx", "the export needs it")
+    helper, real = onnx.helper, onnx.TensorProto.FLOAT
     width = policy.frame_stack * len(policy.observation_names)
     ends = [{"observations": width}, {"action": 2 if policy.action == "rudder-shaft" else 1}]
     if policy.base is not None:

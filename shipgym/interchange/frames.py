@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -19,6 +18,7 @@ from shipgym.checks import check_table
 from shipgym.envs.episode import Episode
 from shipgym.envs.episode_file import SERIES, from_file, to_file
 from shipgym.errors import InputError
+from shipgym.extras import library
 from shipgym.trials.trial import Trial
 from shipgym.trials.units import QUANTITIES, UNITS
 
@@ -36,9 +36,10 @@ def to_frame(recorded: Trial | Episode) -> DataFrame:
 
     In the last row of an episode commands, actions and rewards are nan: there is no step after its end.
     """
+    import pandas as pd
+
     t, series, facts = taken_apart(recorded)
-    index = library("pandas").Index(t, name="t")
-    frame = library("pandas").DataFrame(padded(series, len(t)), index=index)
+    frame = pd.DataFrame(padded(series, len(t)), index=pd.Index(t, name="t"))
     frame.attrs[KEY] = facts
     return frame
 
@@ -62,21 +63,13 @@ def to_xarray(recorded: Trial | Episode) -> Dataset:
     for name, values in series.items():
         units = {"units": next(iter(UNITS[QUANTITIES[name]]))} if name in QUANTITIES else {}
         variables[name] = ("t" if len(values) == len(t) else "step", values, units)
-    return library("xarray").Dataset(variables, {"t": ("t", t, {"units": "s"})}, {KEY: facts})
+    return library("xarray", "xarray").Dataset(variables, {"t": ("t", t, {"units": "s"})}, {KEY: facts})
 
 
 def from_xarray(dataset: Dataset) -> Trial | Episode:
     """The trial or episode of `to_xarray`; a trial's `raw` is lost. Raises InputError for another dataset."""
     series = {str(name): values.to_numpy() for name, values in dataset.data_vars.items()}
     return put_together(dataset["t"].to_numpy(), series, dataset.attrs, "expected one of to_xarray")
-
-
-def library(name: str) -> Any:
-    """A library that is needed only here; InputError if it is not installed."""
-    try:
-        return import_module(name)
-    except ModuleNotFoundError as error:
-        raise InputError(f"{name} is not installed: pip install 'shipgym[{name}]'") from error
 
 
 def taken_apart(recorded: Trial | Episode) -> tuple[Floats, dict[str, Floats], str]:

@@ -11,7 +11,8 @@ import numpy as np
 from shipgym.arrays import Floats
 from shipgym.envs.episode import Episode
 from shipgym.errors import InputError
-from shipgym.interchange.frames import KEY, library, padded, put_together, taken_apart
+from shipgym.extras import library
+from shipgym.interchange.frames import KEY, padded, put_together, taken_apart
 
 if TYPE_CHECKING:
     from minari import MinariDataset
@@ -27,7 +28,7 @@ def to_minari(episodes: Sequence[Episode], dataset_id: str, **metadata: Any) -> 
     Raises InputError if there is no episode, they are of several environments, one has no seed or
     costs something else when it is run again, or Minari is not installed.
     """
-    minari = library("minari")
+    minari = library("minari", "minari")
     kinds = {(one.environment, repr(one.arguments)) for one in episodes}
     if len(kinds) != 1:
         raise InputError(f"episodes: of {len(kinds)} environments found, expected all of one")

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from importlib import import_module
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from shipgym.errors import InputError
+from shipgym.extras import library
 
 if TYPE_CHECKING:
     from plotly.graph_objects import Figure as Figure
@@ -21,27 +20,19 @@ Axis: TypeAlias = "str | dict[str, Any]"  # a title, or an `axis` with more than
 INK, MUTED, GRID = "#1f2a37", "#64748b", "#e5e9ef"
 MEASURED, MODEL, LIMIT = "#1f2a37", "#1d70b8", "#c2412d"
 PALETTE = (MODEL, "#d9822b", "#0f8a7e", "#a1478f", "#6b7a1e", "#7a5c45")
+USE = "figures and reports need it"  # of plotly
 UNTITLED = {"title": {"text": ""}}  # of an axis
 FONT = "Inter, 'Segoe UI', 'Helvetica Neue', Arial, 'Liberation Sans', sans-serif"
 
 
 def graph_objects() -> Any:
     """The module `plotly.graph_objects`; InputError if plotly is not installed."""
-    return _plotly("graph_objects")
-
-
-def _plotly(module: str) -> Any:
-    try:
-        return import_module(f"plotly.{module}")
-    except ModuleNotFoundError as error:
-        raise InputError(
-            "plotly is not installed, figures and reports need it: pip install 'shipgym[report]'"
-        ) from error
+    return library("plotly.graph_objects", "report", USE)
 
 
 def subplots(rows: int, columns: int, titles: Sequence[str] = (), **settings: Any) -> Figure:
     """A figure of panels, rows by columns, with a title above each where given."""
-    figure = _plotly("subplots").make_subplots(
+    figure = library("plotly.subplots", "report", USE).make_subplots(
         rows=rows, cols=columns, subplot_titles=list(titles) or None, **settings
     )
     figure.update_annotations(font={"size": 12.5, "color": INK})
