@@ -10,6 +10,7 @@ import numpy as np
 from agents.controllers.controller import Controller
 from agents.controllers.los_autopilot import Guided
 from agents.controllers.memory import gathered
+from agents.controllers.wheel_over import COURSE_ERROR
 from shipgym.engine.records import field_types
 from shipgym.errors import InputError
 from shipgym.files import read_toml
@@ -24,7 +25,6 @@ VARIABLES = read_toml(Path(__file__).with_name("variables.toml"), "table of vari
 INPUTS = VARIABLES["autopilot_input"]
 #: Observations that an autopilot makes itself.
 OWN = ("heading_error_sin", "heading_error_cos", "last_command", "heading_error_integral")
-COURSE_ERROR = ("course_error_sin", "course_error_cos")  # made of the course over ground
 
 
 def _reads(agent: Any) -> set[str]:

@@ -12,6 +12,7 @@ from shipgym.tasks.guidance import wrapped
 DIGITS = 7  # significant, of the numbers in the page: a millimetre in a kilometre; nine decimals at most
 BEAM = 1.0 / 6.5  # of the length, drawn where the beam is not known
 COURSE_ORDERS = ("set_point", "course_order", "heading_order", "desired_course", "los_course")
+FACTS = ("environment", "model", "number", "dt", "length", "corridor")  # of an episode, as they are
 SHOWN = ("x", "y", "psi", "r", "phi", "delta", "n", "heading_error")  # each by itself
 CROSS_TRACK = ("cross_track_error", "cross_track")
 
@@ -52,20 +53,15 @@ def run(name: str, episode: Episode) -> dict[str, Any]:
     other = {key: values for key, values in recorded.items() if key not in shown}
     return {
         "name": name,
-        "environment": episode.environment,
-        "model": episode.model,
+        **{fact: getattr(episode, fact) for fact in FACTS},
         "seed": None if episode.seed is None else str(episode.seed),  # too long for a number in a browser
-        "number": episode.number,
-        "dt": episode.dt,
         "steps": episode.n_steps,
-        "length": episode.length,
         "beam": BEAM * episode.length if episode.beam is None else episode.beam,
         "rudderLimit": float(np.degrees(episode.rudder_limit)),
         "outcome": outcome(episode),
         "total": float(np.sum(episode.rewards)),
         "waypoints": None if episode.waypoints is None else rounded(episode.waypoints),
         "path": None if episode.path is None else rounded(episode.path),
-        "corridor": episode.corridor,
         "series": {key: rounded(values) for key, values in series(episode).items()},
         "parts": {key: rounded(np.append(0.0, values)) for key, values in episode.reward_parts.items()},
         "rewards": rounded(np.append(0.0, episode.rewards)),

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
+from itertools import pairwise
 from typing import Literal
 
 import numpy as np
@@ -103,12 +104,8 @@ def zigzag_indices(
     if not turns:
         return ZigzagIndices(None, None, None, None)
     threshold = switch_heading_deg(trial) if heading_deg is None else heading_deg
-    ends = [*turns[1:3], trial.t[-1]][: len(turns)]
-    overshoots = [
-        _overshoot_deg(trial, start, turn, end, threshold)
-        for turn, end in zip(turns[:2], ends[:2], strict=True)
-    ]
-    first, second, *_ = [*overshoots, None]
+    spans = pairwise([*turns, trial.t[-1]][:3])
+    first, second, *_ = [*(_overshoot_deg(trial, start, *span, threshold) for span in spans), None]
     lengths = _initial_turning(trial, start, threshold, ship_length(trial, length))
     return ZigzagIndices(first, second, lengths, turns[2] - turns[0] if len(turns) > 2 else None)
 

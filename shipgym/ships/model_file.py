@@ -95,8 +95,6 @@ def read_model(fields: Mapping[str, Any], where: str, make: Callable[..., Model]
             "coefficients and covariance: they were changed after the file was written; take another copy, "
             "or, if the change is yours, leave out the field sha256"
         )
-    if model.particulars.speed is None:
-        raise InputError(f"{where}: particulars.speed: missing, expected the service speed in m/s")
     model.ship_numbers()  # refuses particulars that the structure cannot do with
     return model
 

@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from shipgym.arrays import Floats
 from shipgym.checks import check_number
 from shipgym.errors import InputError
 from shipgym.ships.envelope import Envelope
@@ -60,13 +59,14 @@ def scale_model(
     if isinstance(table, Structure) and table.normalisation == "si":
         factors = _coefficient_factors(table, size, fast)
     scale = np.array(list(factors.values()))
+    box, unit = model.envelope, np.array([fast, fast, quick, 1.0])
     origin = {"from_length": model.particulars.length, "from_speed": model.particulars["speed"]}
     return replace(
         model, steering=gear,
         particulars=_particulars(model.particulars, size, float(speed), water_density),
         coefficients={name: value * factors[name] for name, value in model.coefficients.items()},
         covariance=None if model.covariance is None else model.covariance * np.outer(scale, scale),
-        envelope=_envelope(model.envelope, np.array([fast, fast, quick, 1.0])),
+        envelope=box and Envelope(box.low * unit, box.high * unit, box.centre * unit, box.shape / unit),
         provenance=(model.provenance or {}) | {"scaled": origin},
         service_shaft_speed=model.service_shaft_speed * fast / size,
     )  # fmt: skip
@@ -90,11 +90,3 @@ def _particulars(ship: Particulars, size: float, speed: float, water_density: fl
         denser = 1.0 if water_density is None else water_density / ship.require("water_density")
         changes["mass"] = ship.mass * size**3 * denser
     return replace(ship, length=ship.length * size, speed=speed, water_density=density, **changes)
-
-
-def _envelope(envelope: Envelope | None, scale: Floats) -> Envelope | None:
-    if envelope is None:
-        return None
-    return Envelope(
-        envelope.low * scale, envelope.high * scale, envelope.centre * scale, envelope.shape / scale
-    )

@@ -98,10 +98,9 @@ def short_terms(words: str, surge: str = "du") -> tuple[Term, ...]:
     `u` is Abkowitz's perturbation from service speed, so that `0u` is the constant's change with it, or the
     symbol that `surge` says.
     """
-    return tuple(_short_term(word, {"u": surge, "d": "delta"}) for word in words.split())
-
-
-def _short_term(word: str, symbols: dict[str, str]) -> Term:
-    factors = re.findall(r"\|.\||.", word.lstrip("0"))
-    powers = {symbols.get(factor, factor): factors.count(factor) for factor in factors}
-    return Term(word, tuple(powers.items()))
+    symbols, terms = {"u": surge, "d": "delta"}, []
+    for word in words.split():
+        factors = re.findall(r"\|.\||.", word.lstrip("0"))
+        powers = {symbols.get(factor, factor): factors.count(factor) for factor in factors}
+        terms.append(Term(word, tuple(powers.items())))
+    return tuple(terms)
