@@ -7,10 +7,9 @@ from typing import TYPE_CHECKING, TypeAlias
 
 from agents.controllers.controller import Controller
 from agents.controllers.controller_file import POLICIES, REMEDY, read_controller
+from shipgym import InputError, ShipModel
 from shipgym.checks import did_you_mean
-from shipgym.errors import InputError
 from shipgym.files import read_json
-from shipgym.ships import ShipModel
 
 if TYPE_CHECKING:
     from agents.policies.one_for_all import OneForAll

@@ -7,11 +7,10 @@ from identification import IdentificationResult, identify
 from identification.design.reduced import ReducedIdentification, identify_reduced
 from identification.estimators.methods import METHODS
 from identification.validation.comparison import Comparison, compare_methods
+from shipgym import ShipFile, Trial
 from shipgym.checks import placed
 from shipgym.ships.grey_boxes import GREY_BOX
 from shipgym.trials.identify_table import AUTO, check_options
-from shipgym.trials.ship_file import ShipFile
-from shipgym.trials.trial import Trial
 
 RM_SVM = "rm-svm"  # needs a grey box, so a reference ship beside it implies the structure
 MODELS = ("reference_model", "prior", "anchor")  # options that may name a model's file

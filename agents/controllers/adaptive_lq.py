@@ -17,9 +17,8 @@ from agents.controllers.linear_loop import SIGNALS, length_time, sampled_ships
 from agents.controllers.lq import LQ, lq_rows
 from agents.controllers.memory import Flags, Floats, Records, deviations, records
 from identification.estimators.recursive_kernels import least_squares
+from shipgym import InputError, ShipModel
 from shipgym.checks import check_number
-from shipgym.errors import InputError
-from shipgym.ships import ShipModel
 from shipgym.ships.linear import LARGEST_RUDDER, linearise, straight_running
 from shipgym.tasks.steering import RUDDER_WEIGHT
 from shipgym.trials.sensors import SEA_TRIAL

@@ -8,10 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from agents.controllers.controller import SCALE_TOLERANCE, Policy, check_names
+from shipgym import InputError, ShipModel, load_model
 from shipgym.checks import check_whole
 from shipgym.envs.engine import Engine
-from shipgym.errors import InputError
-from shipgym.ships import ShipModel, load_model
 from shipgym.tasks.task import Task, course_keeping_task
 
 Observations = NDArray[np.float32]

@@ -16,9 +16,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from agents.controllers.linear_loop import SIGNALS, Compensator, Margins, SampledShip, sample_ship
 from agents.controllers.memory import Flags, Floats, begun, checked_observation, deviations, size_of
-from shipgym.errors import InputError
+from shipgym import InputError, ShipModel
 from shipgym.files import write_json
-from shipgym.ships import ShipModel
 from shipgym.tasks.task import OBSERVATION_NAMES, observation_scales
 
 Action = NDArray[np.float32]

@@ -13,8 +13,7 @@ from shipgym.checks import (
     check_array, check_choice, check_format, check_keys, check_number, check_table, check_text, placed,
     quoted, shown,
 )  # fmt: skip
-from shipgym.errors import InputError
-from shipgym.ships import ShipModel
+from shipgym import InputError, ShipModel
 
 REMEDY = "design the controller again or take another copy"
 RUDDER, ANY = Range(-np.pi, np.pi), Range(-np.inf, np.inf)  # rad; any finite number

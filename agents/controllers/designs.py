@@ -11,8 +11,7 @@ from agents.controllers.controller import Controller, model_hash
 from agents.controllers.registry import BUILT_IN, controller_class
 from agents.suites.reference import load_tuned
 from agents.suites.suite import BenchmarkTask, suite_of
-from shipgym.errors import InputError
-from shipgym.ships import ShipModel
+from shipgym import InputError, ShipModel
 
 #: In an order in which those come first that others build on; the suites know no rate of turn to steer.
 CLASSICAL = tuple(kind for kind in BUILT_IN if kind != "turn-rate")

@@ -15,8 +15,8 @@ from agents.controllers.controller import Controller, Range
 from agents.controllers.linear_loop import ERROR, SIGNALS, YAW_RATE, Compensator, length_time, sample_ship
 from agents.controllers.memory import Flags, Floats, Records, heading_error, records
 from agents.controllers.pid import PID
+from shipgym import ShipModel
 from shipgym.checks import check_number
-from shipgym.ships import ShipModel
 from shipgym.tasks.guidance import wrapped
 
 DEEP, WIDE = 0.1, 0.7  # damping ratios of the notch's numerator and denominator (Fossen 2011, 11.1.2)

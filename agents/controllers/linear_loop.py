@@ -12,9 +12,8 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from shipgym import InputError, ShipModel
 from shipgym.arrays import Floats
-from shipgym.errors import InputError
-from shipgym.ships import ShipModel
 from shipgym.ships.linear import StraightRunning, linearise, nomoto_of, straight_running
 from shipgym.tasks.steering import RATE_WEIGHT
 

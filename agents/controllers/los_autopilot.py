@@ -21,9 +21,8 @@ from agents.controllers.controller import NUMBERS, Action, Controller, Policy, R
 from agents.controllers.linear_loop import Compensator, Margins, length_time
 from agents.controllers.lq import LQ
 from agents.controllers.memory import Floats, begun, checked_observation, gathered, heading_error, on_course
+from shipgym import InputError, ShipModel
 from shipgym.checks import check_number
-from shipgym.errors import InputError
-from shipgym.ships import ShipModel
 from shipgym.tasks.guidance import PathPosition, integral_line_of_sight, wrapped
 from shipgym.tasks.task import OBSERVATION_NAMES, Task, path_following_task
 

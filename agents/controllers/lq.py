@@ -19,7 +19,7 @@ from agents.controllers.linear_loop import (
 )  # fmt: skip
 from shipgym.arrays import Floats
 from shipgym.checks import check_number
-from shipgym.ships import ShipModel
+from shipgym import ShipModel
 from shipgym.tasks.steering import RUDDER_WEIGHT
 from shipgym.tasks.task import control_interval
 

@@ -17,8 +17,7 @@ from agents.controllers.linear_loop import (
 from agents.controllers.lq import LQ, Weights
 from agents.controllers.memory import Flags, Floats, heading_error
 from shipgym.checks import check_number
-from shipgym.errors import InputError
-from shipgym.ships import ShipModel
+from shipgym import InputError, ShipModel
 from shipgym.ships.linear import StraightRunning, linearise
 from shipgym.tasks.guidance import wrapped
 from shipgym.tasks.steering import RUDDER_WEIGHT

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from shipgym.errors import InputError
+from shipgym import InputError
 from shipgym.tasks.steering import INTEGRAL_ZONE
 from shipgym.tasks.task import OBSERVATION_NAMES
 

@@ -22,9 +22,8 @@ from agents.controllers.controller import Controller, Range
 from agents.controllers.linear_loop import RUDDER, SIGNALS, check_stable, length_time, sample_ship
 from agents.controllers.lq import LQ, Weights, without_yaw_memory
 from agents.controllers.memory import Flags, Floats, deviations
+from shipgym import InputError, ShipModel
 from shipgym.checks import check_number
-from shipgym.errors import InputError
-from shipgym.ships import ShipModel
 from shipgym.tasks.steering import RATE_WEIGHT, RUDDER_WEIGHT
 
 ACCURACY = 1e-4  # of the solver, rad

@@ -12,8 +12,8 @@ import numpy as np
 
 from agents.controllers.controller import Controller
 from agents.controllers.linear_loop import length_time, rate_weight, sample_ship
+from shipgym import ShipModel
 from shipgym.checks import check_number
-from shipgym.ships import ShipModel
 from shipgym.ships.linear import Nomoto, linearise, nomoto_of
 from shipgym.tasks.steering import RUDDER_WEIGHT
 from shipgym.tasks.task import control_interval

@@ -21,10 +21,9 @@ from agents.controllers.controller import Policy, Range
 from agents.controllers.lq import LQ
 from agents.controllers.memory import Floats
 from agents.controllers.wheel_over import WheelOver
+from shipgym import InputError, ShipModel
 from shipgym.checks import check_number
 from shipgym.envs.engine import Engine
-from shipgym.errors import InputError
-from shipgym.ships import ShipModel
 from shipgym.tasks.guidance import wrapped
 from shipgym.tasks.steering import HEADING_SCALE
 from shipgym.tasks.task import STEPS_PER_LENGTH, Task, course_keeping_task, path_following_task

@@ -4,8 +4,8 @@ from importlib import import_module
 from typing import TypeVar
 
 from agents.controllers.controller import Controller
+from shipgym import InputError
 from shipgym.checks import check_choice
-from shipgym.errors import InputError
 
 _HOMES = {
     "pid": "agents.controllers.pid:PID",

@@ -9,9 +9,8 @@ from numpy.typing import NDArray
 
 from agents.controllers.controller import Controller
 from agents.controllers.linear_loop import Margins
+from shipgym import InputError, ShipModel
 from shipgym.arrays import Floats
-from shipgym.errors import InputError
-from shipgym.ships import ShipModel
 
 
 @dataclass(frozen=True, eq=False)

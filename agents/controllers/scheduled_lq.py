@@ -14,9 +14,8 @@ from agents.controllers.controller import Controller
 from agents.controllers.linear_loop import SIGNALS, Compensator, sample_ship
 from agents.controllers.lq import LQ, Weights, without_yaw_memory
 from agents.controllers.memory import Flags, Floats, deviations
+from shipgym import InputError, ShipModel
 from shipgym.checks import check_number
-from shipgym.errors import InputError
-from shipgym.ships import ShipModel
 from shipgym.tasks.steering import RUDDER_WEIGHT
 
 SPEEDS = (0.6, 0.7, 0.8, 0.9, 1.0, 1.1)  # over service speed

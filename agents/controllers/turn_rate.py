@@ -17,9 +17,8 @@ from agents.controllers.controller import NUMBERS, Controller, Range
 from agents.controllers.linear_loop import Compensator, length_time, sample_ship
 from agents.controllers.memory import Flags, Floats, heading_error, records
 from agents.controllers.scheduled_lq import rising
+from shipgym import InputError, ShipModel
 from shipgym.checks import check_number
-from shipgym.errors import InputError
-from shipgym.ships import ShipModel
 from shipgym.ships.linear import linearise, nomoto_of, steady_turn_rudder
 from shipgym.tasks.task import control_interval
 

@@ -21,10 +21,9 @@ from agents.controllers.controller import NUMBERS, Policy, Range
 from agents.controllers.los_autopilot import Guided
 from agents.controllers.lq import LQ
 from agents.controllers.memory import Floats
+from shipgym import InputError, ShipModel
 from shipgym.checks import check_number
-from shipgym.errors import InputError
 from shipgym.manoeuvres.turning import turning_circle, turning_indices
-from shipgym.ships import ShipModel
 from shipgym.ships.linear import linearise, straight_running
 from shipgym.tasks.guidance import wrapped
 from shipgym.tasks.task import Task, path_following_task

@@ -11,8 +11,8 @@ from agents.controllers.controller import Controller
 from agents.controllers.los_autopilot import Guided
 from agents.controllers.memory import gathered
 from agents.controllers.wheel_over import COURSE_ERROR
+from shipgym import InputError
 from shipgym.engine.records import field_types
-from shipgym.errors import InputError
 from shipgym.files import read_toml
 from shipgym.tasks import path_following, path_following_v0
 from shipgym.tasks.contract import Seen

@@ -17,14 +17,12 @@ from agents.controllers.wheel_over import STEEPEST
 from agents.deployment.autopilot import VARIABLES, Autopilot, bounds
 from agents.deployment.translator import KEYWORDS, Translator, literal
 from agents.policies.policy import ORDERS, LearnedPolicy
+from shipgym import InputError, ShipModel, Weather, Wind
 from shipgym.engine.mathematics import sin_cos
 from shipgym.engine.motion import Motion, Push, Ship, lost, sail
 from shipgym.engine.records import flat, leaves
-from shipgym.errors import InputError
-from shipgym.sea.conditions import Weather, Wind
 from shipgym.sea.open_sea import Sea, SeaParameters, push, sea_functions
 from shipgym.sea.weather_column import CALM, weather_column
-from shipgym.ships import ShipModel
 from shipgym.ships.simulate import LONGEST_STEP
 from shipgym.tasks.steering import INTEGRAL_ZONE
 from shipgym.trials.units import UNITS

@@ -11,8 +11,8 @@ from pathlib import Path
 from zipfile import ZIP_DEFLATED, ZipFile, ZipInfo
 
 from agents.deployment.c99 import Source, render
+from shipgym import InputError
 from shipgym.checks import check_choice
-from shipgym.errors import InputError
 from shipgym.files import atomic_path
 
 VERSIONS = ("2.0", "3.0")

@@ -11,8 +11,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any, NamedTuple
 
-from shipgym import extras
-from shipgym.errors import InputError
+from shipgym import InputError, extras
 from shipgym.files import read_toml
 from shipgym.trials.units import UNITS
 

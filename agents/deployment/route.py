@@ -6,9 +6,9 @@ from typing import Any, NamedTuple, Self
 
 import numpy as np
 
+from shipgym import InputError
 from shipgym.arrays import Floats
 from shipgym.checks import check_number, placed
-from shipgym.errors import InputError
 from shipgym.tasks.guidance import Path
 from shipgym.tasks.path_following import fix, leg_from, next_turn, turned_off
 from shipgym.trials.csv_reader import read_table

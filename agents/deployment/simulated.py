@@ -10,11 +10,9 @@ import numpy as np
 
 from agents.deployment.c99 import render
 from agents.deployment.nmea import Link, readings, sentences
+from shipgym import InputError, ShipModel, Weather
 from shipgym.checks import check_keys, check_number
 from shipgym.engine.trajectories import SEA_CHANNELS
-from shipgym.errors import InputError
-from shipgym.sea.conditions import Weather
-from shipgym.ships import ShipModel
 from shipgym.ships.simulate import Conditions, Passage
 
 STEP = 0.1  # s, between two sentences of a compass

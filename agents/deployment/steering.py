@@ -16,8 +16,8 @@ from agents.deployment.c99 import render
 from agents.deployment.nmea import TABLES, Link, Reading, readings, sentences
 from agents.deployment.route import Route
 from agents.deployment.scheduling import short_slice
+from shipgym import InputError
 from shipgym.checks import check_number
-from shipgym.errors import InputError
 from shipgym.tasks.guidance import wrapped
 from shipgym.trials.units import KNOT
 

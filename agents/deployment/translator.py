@@ -18,10 +18,10 @@ from typing import Any
 
 import numpy as np
 
+from shipgym import InputError
 from shipgym.engine.mathematics import power_of_bits
 from shipgym.engine.records import field_types, is_record, is_table
 from shipgym.engine.specialise import Part, named_globals
-from shipgym.errors import InputError
 
 Kind = Any  #: float, int, bool, a record, a table, or a tuple of kinds
 NUMBERS = {float: "double", int: "int", bool: "int"}

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from shipgym import InputError
 from shipgym.checks import check_choice
-from shipgym.errors import InputError
 
 Numbers = NDArray[np.float32]
 Layer = tuple[Numbers, Numbers]

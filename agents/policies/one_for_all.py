@@ -25,10 +25,9 @@ from agents.controllers.wheel_over import WheelOver, own_lead, own_turn
 from agents.policies.network import Network
 from agents.policies.policy import LARGEST_AUTHORITY, LearnedPolicy, network_fields
 from agents.policies.weights_file import as_json, write_policy
+from shipgym import InputError, ShipModel
 from shipgym.arrays import Floats
 from shipgym.checks import check_keys, check_number
-from shipgym.errors import InputError
-from shipgym.ships import ShipModel
 from shipgym.ships.linear import steering_state_space
 from shipgym.tasks.steering import RUDDER_WEIGHT
 from shipgym.tasks.task import Task

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from agents.policies.policy import ORDERS, LearnedPolicy
-from shipgym.errors import InputError
+from shipgym import InputError
 from shipgym.extras import library
 from shipgym.files import write_bytes
 

@@ -24,9 +24,8 @@ from agents.controllers.memory import checked_memory, checked_observation, check
 from agents.policies.network import Network, Numbers
 from agents.policies.policy_extraction import sb3_fields, task_showing
 from agents.policies.weights_file import Tensors, as_json, write_policy
+from shipgym import InputError, ShipModel
 from shipgym.checks import check_choice, check_number, check_whole
-from shipgym.errors import InputError
-from shipgym.ships import ShipModel
 from shipgym.tasks.definition import read_definition
 from shipgym.tasks.task import ACTIONS, RUDDER_ORDERS, Task
 

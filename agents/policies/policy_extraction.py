@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 from agents.controllers.controller import Controller, model_hash
 from agents.policies.network import Network
 from agents.policies.weights_file import as_json
+from shipgym import InputError
 from shipgym.checks import quoted
 from shipgym.envs.registration import env_id
-from shipgym.errors import InputError
 
 #: What acts in a policy: its hidden layers, the last one where it stands apart, what follows that, and the
 #: usual activation; PPO and A2C, SAC and TQC, TD3 and DDPG.

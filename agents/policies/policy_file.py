@@ -20,7 +20,7 @@ from shipgym.checks import (
     check_array, check_format, check_keys, check_number, check_table, check_text, check_whole, placed,
     quoted,
 )  # fmt: skip
-from shipgym.errors import InputError
+from shipgym import InputError
 from shipgym.ships.model_file import read_envelope
 from shipgym.tasks.task import OBSERVATION_NAMES
 

@@ -22,11 +22,10 @@ from agents.controllers.controller import model_hash
 from agents.policies.network import Network
 from agents.policies.policy import LearnedPolicy
 from agents.policies.policy_extraction import SDE, actor_network, task_showing
+from shipgym import InputError, ShipModel
 from shipgym.checks import check_table, placed, quoted
 from shipgym.envs.registration import env_id
-from shipgym.errors import InputError
 from shipgym.files import LARGEST_TENSORS, parse_json, read_bytes
-from shipgym.ships import ShipModel
 from shipgym.tasks.task import Task
 
 REMEDY = "save the agent again"

@@ -18,8 +18,8 @@ from agents.controllers.lq import LQ
 from agents.controllers.memory import Flags, Floats, Records, begun, heading_error, records, size_of
 from agents.policies.policy import LearnedPolicy
 from agents.policies.weights_file import Tensors, write_policy
+from shipgym import InputError
 from shipgym.checks import check_number
-from shipgym.errors import InputError
 from shipgym.ships import Envelope, ShipModel
 from shipgym.tasks.task import OBSERVATION_NAMES, control_interval
 

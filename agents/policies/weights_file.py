@@ -14,10 +14,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from shipgym.errors import InputError
+from shipgym import InputError, ShipModel, Weather
 from shipgym.files import LARGEST_TENSORS, read_bytes, write_bytes, write_json
-from shipgym.sea.conditions import Weather
-from shipgym.ships import ShipModel
 
 Tensors = dict[str, NDArray[Any]]
 

@@ -12,11 +12,10 @@ from agents.controllers.linear_loop import length_time
 from agents.controllers.memory import gathered, on_course
 from agents.rollouts.metrics import costs, mean, steering
 from agents.rollouts.rollout import Rollout, check_fits, rollout
+from shipgym import InputError, ShipModel
 from shipgym.arrays import Flags, Floats, Integers
 from shipgym.checks import check_number
 from shipgym.envs.engine import Engine
-from shipgym.errors import InputError
-from shipgym.ships import ShipModel
 from shipgym.tasks.task import Task, course_keeping_task, observation_scales
 
 RECORDED = ("psi", "delta", "set_point", *course_keeping_task().info_names)

@@ -8,9 +8,9 @@ import numpy as np
 from agents.controllers.controller import Policy
 from agents.rollouts.rollout import Rollout, rollout
 from agents.suites.suite import BenchmarkTask
+from shipgym import Episode
 from shipgym.arrays import Floats
 from shipgym.envs.engine import Engine
-from shipgym.envs.episode import Episode
 from shipgym.envs.recording import SUCCESS, plain
 
 SAMPLES = 300  # of a history at most

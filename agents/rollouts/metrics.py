@@ -17,8 +17,8 @@ from numpy.typing import ArrayLike
 from agents.controllers.controller import Policy
 from agents.rollouts.rollout import Rollout, rollout
 from agents.suites.suite import BenchmarkTask
+from shipgym import ShipModel
 from shipgym.arrays import Flags, Floats
-from shipgym.ships import ShipModel
 from shipgym.tasks.guidance import wrapped
 from shipgym.tasks.steering import HEADING_SCALE
 from shipgym.tasks.task import Task

@@ -5,8 +5,7 @@ from pathlib import Path
 
 from agents.output import check_page
 from agents.rollouts.replay_series import quantities, run
-from shipgym.envs.episode import Episode
-from shipgym.errors import InputError
+from shipgym import Episode, InputError
 from shipgym.files import write_text
 from shipgym.pages import render
 

@@ -5,8 +5,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from shipgym import Episode
 from shipgym.arrays import Floats
-from shipgym.envs.episode import Episode
 from shipgym.tasks.guidance import wrapped
 
 DIGITS = 7  # significant, of the numbers in the page: a millimetre in a kilometre; nine decimals at most

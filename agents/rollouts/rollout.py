@@ -10,10 +10,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from agents.controllers.controller import Policy
 from agents.policies.shield import ShieldState, interventions
+from shipgym import InputError, ShipModel
 from shipgym.arrays import Flags, Floats
 from shipgym.envs.engine import Engine
-from shipgym.errors import InputError
-from shipgym.ships import ShipModel
 from shipgym.tasks.task import Task
 
 

@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 
 from agents.suites.suite import N_EPISODES, BenchmarkTask, suite_file
+from shipgym import InputError
 from shipgym.arrays import Floats
 from shipgym.checks import ANY_KEY, Shape, check_shape, check_table
-from shipgym.errors import InputError
 from shipgym.files import read_json
 
 BEST: Shape = {ANY_KEY: {"zero": (int, float), "costs": [(int, float)], "by": [(str,)]}}

@@ -14,16 +14,13 @@ from typing import Any, Self
 
 import numpy as np
 
+from shipgym import InputError, ShipModel, SteeringGear, Weather
 from shipgym.arrays import Integers
 from shipgym.checks import check_choice, check_keys, check_table, check_text, data_only, placed
 from shipgym.envs.engine import Engine
 from shipgym.envs.environment import read_options
 from shipgym.envs.randomisation import Randomisation
-from shipgym.errors import InputError
 from shipgym.files import parse_toml
-from shipgym.sea.conditions import Weather
-from shipgym.ships import ShipModel
-from shipgym.ships.steering import SteeringGear
 from shipgym.tasks.task import Task
 
 #: Environments by their names in suites and on the command line: id, and task.
