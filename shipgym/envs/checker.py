@@ -1,12 +1,12 @@
 """A conformance suite for vector environments, which Gymnasium's own checker refuses."""
 
 from collections.abc import Callable
-from contextlib import ExitStack, closing
+from contextlib import closing
 from typing import Any
 
 import gymnasium
 import numpy as np
-from gymnasium.vector import AutoresetMode, VectorEnv
+from gymnasium.vector import AutoresetMode, SyncVectorEnv, VectorEnv
 from numpy.typing import NDArray
 
 from shipgym.errors import InputError
@@ -213,40 +213,13 @@ def _check_rows(
     make_single: Callable[[], gymnasium.Env[Any, Any]],
     n_steps: int,
 ) -> None:
-    with closing(make()) as env, ExitStack() as stack:
-        singles = [stack.enter_context(closing(make_single())) for _ in range(env.num_envs)]
-        mode = autoreset_mode(env)
-        env.action_space.seed(SEED)
-        observations, _ = env.reset(seed=SEED)
-        for i, single in enumerate(singles):
-            _expect_row(i, observations[i], single.reset(seed=SEED + i)[0])
-        ended = np.zeros(env.num_envs, dtype=np.bool_)
-        for _ in range(n_steps):
-            actions = env.action_space.sample()
-            observations, rewards, terminated, truncated, _ = env.step(actions)
-            for i, single in enumerate(singles):
-                expect = _row(single, actions[i], bool(ended[i]), mode)
-                found = (observations[i], rewards[i], terminated[i], truncated[i])
-                for one, other in zip(found, expect, strict=True):
-                    _expect_row(i, one, other)
-            ended = terminated | truncated
-            if mode is AutoresetMode.DISABLED and np.any(ended):
-                break
-
-
-def _row(single: gymnasium.Env[Any, Any], action: Any, ended: bool, mode: AutoresetMode) -> tuple[Any, ...]:
-    """What a single environment that is reset by hand shows in place of a row."""
-    if ended and mode is AutoresetMode.NEXT_STEP:
-        observation, _ = single.reset()
-        return observation, 0.0, False, False
-    observation, reward, terminated, truncated, _ = single.step(action)
-    if mode is AutoresetMode.SAME_STEP and (terminated or truncated):
-        observation, _ = single.reset()
-    return observation, reward, terminated, truncated
-
-
-def _expect_row(i: int, found: Any, expected: Any) -> None:
-    _expect(
-        bool(np.array_equal(found, expected)),
-        f"row {i} shows {found}, expected {expected} of the single environment with seed {SEED + i}",
-    )
+    with closing(make()) as env:
+        singles = [make_single] * env.num_envs
+        with closing(SyncVectorEnv(singles, autoreset_mode=autoreset_mode(env))) as reference:
+            steps = zip(_rollout(env, SEED, n_steps), _rollout(reference, SEED, n_steps), strict=False)
+    for found, expected in ((one[i], other[i]) for one, other in steps for i in range(len(one))):
+        for row, (shown, due) in enumerate(zip(found, expected, strict=True)):
+            alone = (
+                f"row {row} shows {shown}, expected {due} of the single environment with seed {SEED + row}"
+            )
+            _expect(bool(np.array_equal(shown, due)), alone)
