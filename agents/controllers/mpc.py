@@ -13,7 +13,6 @@ Computation 12.
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from importlib import import_module
 from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
@@ -22,8 +21,9 @@ from agents.controllers.controller import Controller, Range
 from agents.controllers.linear_loop import RUDDER, SIGNALS, check_stable, length_time, sample_ship
 from agents.controllers.lq import LQ, Weights, without_yaw_memory
 from agents.controllers.memory import Flags, Floats, deviations
-from shipgym import InputError, ShipModel
+from shipgym import ShipModel
 from shipgym.checks import check_number
+from shipgym.extras import library
 from shipgym.tasks.steering import RATE_WEIGHT, RUDDER_WEIGHT
 
 ACCURACY = 1e-4  # of the solver, rad
@@ -95,7 +95,7 @@ class MPC(Controller):
             Weight of the rudder rate, s^2; by default the environment's own. LQ's is higher
             (`linear_loop.rate_weight`), because LQ's model has no slow gear.
         """
-        _solver_library()
+        library("osqp", "mpc", "MPC needs it")
         check_number(horizon_lengths, "horizon_lengths", above=0.0, at_most=20.0)
         weight = RATE_WEIGHT * length_time(model) ** 2 if rate_weight_s2 is None else rate_weight_s2
         weights = Weights.of(model, dt, integral_lengths, rudder_weight, weight)
@@ -153,7 +153,7 @@ class MPC(Controller):
 
         matrix = sparse.csc_matrix(self.plan.by_correction)
         rows, steps = matrix.shape
-        solver = _solver_library().OSQP()
+        solver = library("osqp", "mpc", "MPC needs it").OSQP()
         solver.setup(
             sparse.identity(steps, format="csc"), np.zeros(steps), matrix, -np.ones(rows), np.ones(rows),
             verbose=False, eps_abs=ACCURACY, eps_rel=ACCURACY, max_iter=MOST_ITERATIONS, rho=STEP_SIZE,
@@ -164,12 +164,3 @@ class MPC(Controller):
     def __getstate__(self) -> dict[str, Any]:
         """Everything but the solver, which another process sets up again."""
         return {name: value for name, value in self.__dict__.items() if name != "_solver"}
-
-
-def _solver_library() -> Any:
-    try:
-        return import_module("osqp")
-    except ModuleNotFoundError:
-        raise InputError(
-            "MPC: the solver OSQP is not installed; install it with: pip install 'shipgym[mpc]'"
-        ) from None

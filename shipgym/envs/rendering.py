@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from shipgym.arrays import Floats
 from shipgym.checks import check_choice
-from shipgym.errors import InputError
+from shipgym.extras import library
 from shipgym.tasks.guidance import track
 
 Picture = NDArray[np.uint8]
@@ -95,14 +95,7 @@ class Renderer:
     def __init__(self, mode: str) -> None:
         self.mode = check_choice(mode, RENDER_MODES, "render_mode")
         os.environ.setdefault("PYGAME_HIDE_SUPPORT_PROMPT", "1")
-        try:
-            import pygame
-        except ImportError:
-            raise InputError(
-                f"render_mode: {mode!r} needs the package pygame-ce; install it with "
-                "pip install 'shipgym[render]'"
-            ) from None
-        self._pygame = pygame
+        self._pygame = pygame = library("pygame", "render", f"render_mode {mode!r} needs it")
         self._brush = _Brush(pygame)
         self._surface = pygame.Surface((SIZE, SIZE))
         self._window: Any = None

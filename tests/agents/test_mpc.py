@@ -153,7 +153,9 @@ def test_a_file_of_before_the_rudder_s_weight_was_a_setting_steers_the_same(tmp_
 
 def test_without_the_solver_the_extra_is_named(monkeypatch):
     monkeypatch.setitem(sys.modules, "osqp", None)
-    with pytest.raises(InputError, match=r"OSQP is not installed; .* pip install 'shipgym\[mpc\]'"):
+    with pytest.raises(
+        InputError, match=r"osqp is not installed, MPC needs it: pip install 'shipgym\[mpc\]'"
+    ):
         MPC.from_model(MARINER)
 
 
