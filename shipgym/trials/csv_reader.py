@@ -61,20 +61,20 @@ class Table:
         cells = self.column(name)
         if isinstance(cells, np.ndarray) and cells.dtype.kind in "fiub":
             return cells.astype(np.float64)
-        with suppress(ValueError, TypeError):  # as in most files, in a third of the time
-            return np.array([float("nan" if cell == "" else cell) for cell in cells])
+        if "_" not in "".join(map(str, cells)):
+            with suppress(ValueError, TypeError):  # as in most files, in a third of the time
+                return np.array([float("nan" if cell == "" else cell) for cell in cells])
         texts = self.texts(name)
         if self.decimal_comma:
             texts = [text.replace(",", ".") if "." not in text else text for text in texts]
-        try:
-            return np.array([float(text or "nan") for text in texts])
-        except ValueError:
-            row = next(k for k, text in enumerate(texts) if text and not is_number(text))
+        wrong = [row for row, text in enumerate(texts) if text and not is_number(text)]
+        if wrong:
             raise InputError(
-                f"{self.path}: {self.place(row)}, column '{name}': '{str(cells[row]).strip()}' found, "
-                "expected a number; correct the cell, or leave it empty where the value is missing and "
-                'import with repair = "interpolate"'
-            ) from None
+                f"{self.path}: {self.place(wrong[0])}, column '{name}': '{str(cells[wrong[0]]).strip()}' "
+                "found, expected a number; correct the cell, or leave it empty where the value is missing "
+                'and import with repair = "interpolate"'
+            )
+        return np.array([float(text or "nan") for text in texts])
 
 
 def column_table(
@@ -167,9 +167,9 @@ def _check_header(path: Path, header: tuple[str, ...], line: int) -> None:
 
 
 def is_number(text: str) -> bool:
-    """Whether a text is a number as Python reads it."""
+    """Whether a text is a number as Python reads it, but without the underscores of its source code."""
     try:
         float(text)
     except ValueError:
         return False
-    return True
+    return "_" not in text

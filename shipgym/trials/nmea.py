@@ -101,7 +101,7 @@ def _values_of(message: Any) -> Iterator[tuple[str, float]]:
         if told in (None, "") or not getattr(message, field[:3], " "):  # the latitude of an empty lat
             continue
         value = si_factor(channel, unit) * float(told)
-        if np.isinf(value):
+        if np.isinf(value) or "_" in str(told):
             raise ValueError(told)
         if kind == "HDG":
             for size, side in ((message.deviation, message.dev_dir), (message.variation, message.var_dir)):

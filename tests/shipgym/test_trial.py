@@ -517,6 +517,8 @@ def test_fewer_than_three_samples_are_refused(tmp_path, rows):
         (b"t,x\n0,1\n1,1e150\n2,1\n", "x = 1e+150 m found, expected at most 1e+08 m"),
         (b"t,u\n0,1\n1e200,1\n2e200,1\n", "t = 1e+200 s found, expected at most 1e+10 s"),
         (b"t,u\n0,1\n1e-300,1\n1,1\n", "time stands still at 1e-300 s"),
+        (b"t,u\n0,1\n1,1_0\n2,1\n", "line 3 (data row 2), column 'u': '1_0' found, expected a number"),
+        (b"t;u\n0;1\n1;1_0,5\n2;1\n", "line 3 (data row 2), column 'u': '1_0,5' found, expected a number"),
     ],
 )
 def test_what_is_not_a_table_of_numbers_is_refused(tmp_path, content, message):
