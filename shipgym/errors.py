@@ -1,5 +1,6 @@
 """The errors a user of shipgym meets, each with one message that says what to do."""
 
+from collections.abc import Sequence
 from typing import Any
 
 LONGEST_MESSAGE = 2000  # characters
@@ -10,13 +11,15 @@ class InputError(ValueError):
 
     The message names the file, the row or field, the value found, what is expected, and the remedy.
     The command line prints it and exits with code 2. Of a message longer than `LONGEST_MESSAGE` the middle is
-    left out: it repeats what was found, which may be a whole file.
+    left out: it repeats what was found, which may be a whole file. `instead`: of a log that seems to be read
+    with a wrong declaration the likely ones, each a channel with its unit or a convention with its value.
     """
 
-    def __init__(self, message: str) -> None:
+    def __init__(self, message: str, instead: Sequence[tuple[str, str]] = ()) -> None:
         half = LONGEST_MESSAGE // 2
         long = len(message) > LONGEST_MESSAGE
         super().__init__(f"{message[:half]} ... {message[-half:]}" if long else message)
+        self.instead = tuple(instead)
 
 
 class UnstableModelError(RuntimeError):

@@ -33,6 +33,7 @@ _OTHER_SIGN = (
     "with the opposite sign, expected a positive rudder to turn the bow to starboard; write "
     'rudder_positive = "port" in [conventions], or take it out if it stands there'
 )
+_OTHER_SIDE = (("rudder_positive", "port"),)
 
 
 class ClockOffset(NamedTuple):
@@ -123,21 +124,25 @@ def corrected_clocks(log: Log, series: Series, choice: str | None) -> tuple[Seri
 
     The series are those that the log was made of; `choice` is that of
     :class:`shipgym.trials.navigation.Instruments`: without one, channels on one clock are left, and more than
-    `REFUSED_S` between them is an InputError. So is a rudder of the wrong sign.
+    `REFUSED_S` between them is an InputError. So is a rudder of the wrong sign, which is judged by a yaw rate
+    only where this does not contradict the heading.
     """
     t, values, where = log.t, log.channels, log.where
     found: dict[str, ClockOffset | None] = {}
     if {"psi", "r"} <= values.keys() and _reverses(values["r"]):
         found["r"] = clock_offset(t, values["psi"], values["r"], {})
+    rate = found.get("r")
+    contradicted = rate is not None and rate.gain < 0.0 and rate.sure > _SURE
     if "delta" in values and {"psi", "r"} & values.keys() and _reverses(values["delta"], _LEAST_RUDDER):
-        late = rate.late if (rate := found.get("r")) else 0.0
+        late = rate.late if rate else 0.0
         r = np.interp(t + late, t, values["r"]) if "r" in values else time_derivative(t, values["psi"])
         found["delta"] = rudder_offset(t, r, values["delta"])
         plain = clock_offset(t, r, values["delta"], {"r": r})
-        if all(one is not None and one.gain < 0.0 and one.sure > _SURE for one in (found["delta"], plain)):
-            raise InputError(f"{where}: the yaw acceleration follows the rudder {_OTHER_SIGN}")
+        against = [one is not None and one.gain < 0.0 and one.sure > _SURE for one in (found["delta"], plain)]
+        if all(against) and not contradicted:
+            raise InputError(f"{where}: the yaw acceleration follows the rudder {_OTHER_SIGN}", _OTHER_SIDE)
     elif {"psi", "delta"} <= values.keys() and _turns_against(values["psi"], values["delta"]):
-        raise InputError(f"{where}: the ship turns away from the rudder, {_OTHER_SIGN}")
+        raise InputError(f"{where}: the ship turns away from the rudder, {_OTHER_SIGN}", _OTHER_SIDE)
     own, notes = len({id(clock) for clock, _ in series.values()}) > 1, []
     changed: Series = {}
     for name, offset in found.items():

@@ -28,6 +28,8 @@ FASTEST, SLOWEST = 50.0, 0.3
 _MOST_OUTLIERS = 0.1  # share of the steps; more are two ships in turn
 _SAME, _COMPASS, _CONTRADICTION, _TURNED = 0.3 * DEGREE, 2.0 * DEGREE, 25.0 * DEGREE, 20.0 * DEGREE
 _HALF_HOUR, _LONGEST_ZONE = 1800.0, 14.0 * 3600.0
+_ALIKE = 0.5  # logarithm of the ratio of two rates that are the same in the right units
+_USUAL_STEPS = 0.01, 10.0  # s, between the rows of a log; of others the unit of time is doubted
 NO_RUDDER = (
     "no rudder angle in this log: without rudder nothing can be identified from it, it can only be looked "
     "at; log the rudder too (in NMEA 0183 the sentence RSA)"
@@ -49,10 +51,16 @@ def check_ranges(channels: Mapping[str, Floats], source: Source) -> None:
         unit = source.columns[channel].unit
         factor = si_factor(channel, unit)
         found = _spelled(channels[channel][first] / factor, channel, unit)
+        fitting = _units_within(channel, unit, float(size.max()) / limit)
+        remedy = (
+            f"likely a wrong unit: declare {source.declare(channel, fitting[0])}"
+            if fitting
+            else "check the column and its unit, or correct the value"
+        )
         raise InputError(
             f"{source.at(first, channel)}: {channel} = {found} found, "
-            f"expected at most {_spelled(limit / factor, channel, unit)}; "
-            f"{_unit_remedy(channel, float(size.max()) / limit, source)}"
+            f"expected at most {_spelled(limit / factor, channel, unit)}; {remedy}",
+            [(channel, other) for other in fitting[:1]],
         )
 
 
@@ -68,10 +76,12 @@ def check_heading(t: Floats, psi: Floats, raw_psi: Floats, source: Source) -> No
     several_turns = np.abs(np.diff(raw_psi)) > 2.0 * math.pi + _LARGEST_JUMP
     unit = source.columns["psi"].unit
     factor = si_factor("psi", unit)
+    instead: list[tuple[str, str]] = []
     if several_turns.any() or np.mean(fast) > 0.05:
         k = int(np.argmax(several_turns if several_turns.any() else fast))
-        other = "deg" if unit == "rad" else "rad"
-        remedy = f"likely a wrong unit: declare {source.declare('psi', other)}"
+        times = _time_units(t, source) if np.ptp(raw_psi) < 2.0 * math.pi + _LARGEST_JUMP else {}
+        instead = [("t", next(iter(times)))] if times else [("psi", "deg" if unit == "rad" else "rad")]
+        remedy = f"likely a wrong unit: declare {source.declare(*instead[0])}"
     elif jump.any():
         k = int(np.argmax(jump))
         remedy = 'empty the wrong cells and import with repair = "interpolate", or correct them'
@@ -80,7 +90,8 @@ def check_heading(t: Floats, psi: Floats, raw_psi: Floats, source: Source) -> No
     before, after = raw_psi[k : k + 2] / factor
     raise InputError(
         f"{source.at(k + 1, 'psi')}: heading goes from {before:g} to {after:g} {unit} "
-        f"within {t[k + 1] - t[k]:g} s, expected at most 60 deg/s; {remedy}"
+        f"within {t[k + 1] - t[k]:g} s, expected at most 60 deg/s; {remedy}",
+        instead,
     )
 
 
@@ -112,9 +123,12 @@ def _check_yaw_rate(log: Log, source: Source) -> None:
             f"{head} have opposite signs, expected both to be positive when the bow turns to starboard "
             "(clockwise seen from above); change the sign of the column that is positive to port"
         )
+    instead = _nearest_units(gain.real, log.t, source)
+    whose = "of time" if {channel for channel, _ in instead} == {"t"} else "of one of them"
     raise InputError(
         f"{head} disagree: the heading changes {gain.real:.3g} times as fast as the yaw rate says, expected "
-        f"1; likely a wrong unit of one of them, {_angle_remedy(gain.real, source)}"
+        f"1; likely a wrong unit {whose}, declare {' or '.join(source.declare(*one) for one in instead)}",
+        instead,
     )
 
 
@@ -131,12 +145,21 @@ def _check_velocity(log: Log, frame: str, source: Source) -> None:
     if misfit > 0.03 and other_misfit < 0.2 * misfit and 0.8 < other_gain.real < 1.25:
         raise InputError(
             f"{head}: columns '{u}' and '{v}' follow the positions as velocities in the {other} frame, "
-            f'velocity_frame = "{frame}" found; declare velocity_frame = "{other}"'
+            f'velocity_frame = "{frame}" found; declare velocity_frame = "{other}"',
+            [("velocity_frame", other)],
         )
     if misfit < 0.2 and not 0.55 < abs(gain) < 1.8:
+        scales = _time_units(t, source)
+        instead = [("t", one) for one, scale in scales.items() if 0.55 < abs(gain) / scale < 1.8]
+        remedy = (
+            f"time, declare {source.declare(*instead[0])}"
+            if instead
+            else f"'{x}', '{y}' or of '{u}', '{v}' (a knot is 0.514 m/s): declare it"
+        )
         raise InputError(
             f"{head}: the position changes {abs(gain):.3g} times as fast as the velocities say, expected 1; "
-            f"likely a wrong unit of '{x}', '{y}' or of '{u}', '{v}' (a knot is 0.514 m/s): declare it"
+            f"likely a wrong unit of {remedy}",
+            instead,
         )
 
 
@@ -170,27 +193,38 @@ def _spelled(value: float, channel: str, unit: str) -> str:
     return text
 
 
-def _unit_remedy(channel: str, excess: float, source: Source) -> str:
-    """Name the unit in which values `excess` times too large would be plausible."""
-    declared = si_factor(channel, source.columns[channel].unit)
-    fitting = [u for u, f in UNITS[QUANTITIES[channel]].items() if f < declared and excess * f <= declared]
-    if fitting:
-        return f"likely a wrong unit: declare {source.declare(channel, fitting[0])}"
-    return "check the column and its unit, or correct the value"
+def _units_within(channel: str, declared: str, excess: float) -> list[str]:
+    """The units in which values `excess` times too large in the declared one would be plausible."""
+    own = si_factor(channel, declared)
+    return [u for u, f in UNITS[QUANTITIES[channel]].items() if f < own and excess * f <= own]
 
 
-def _angle_remedy(gain: float, source: Source) -> str:
-    """Name the unit of heading or yaw rate that would bring the two together."""
-    distances = {}  # of the gain from 1, by declaration
+def _time_units(t: Floats, source: Source) -> dict[str, float]:
+    """Units of time by the declared one, where the steps are unusual in this and usual in those."""
+    (low, high), step = _USUAL_STEPS, float(np.median(np.diff(t)))
+    if low <= step <= high:
+        return {}
+    own = si_factor("t", source.columns["t"].unit)
+    scales = {unit: factor / own for unit, factor in UNITS["time"].items() if "unix" not in unit}
+    return {unit: scale for unit, scale in scales.items() if low <= step * scale <= high}
+
+
+def _nearest_units(gain: float, t: Floats, source: Source) -> list[tuple[str, str]]:
+    """The channels, with their units, of which one would bring heading and yaw rate together.
+
+    Where none does and the unit of time is doubted, that comes first: two units are wrong.
+    """
+    gains: dict[tuple[str, str], float] = {}
     for channel, sign in (("psi", 1.0), ("r", -1.0)):
         own = source.columns[channel].unit
-        for unit, factor in UNITS[QUANTITIES[channel]].items():
-            if unit != own:
-                changed = gain * (factor / si_factor(channel, own)) ** sign
-                distance = abs(math.log(changed)) if changed > 0.0 else math.inf
-                distances[source.declare(channel, unit)] = distance
+        factors = UNITS[QUANTITIES[channel]]
+        gains |= {(channel, u): gain * (f / factors[own]) ** sign for u, f in factors.items() if u != own}
+    times = {("t", unit): gain / scale for unit, scale in _time_units(t, source).items()}
+    distances = {one: abs(math.log(changed)) for one, changed in (gains | times).items()}  # from 1
     nearest = min(distances.values())
-    return "declare " + " or ".join(text for text, distance in distances.items() if distance < nearest + 0.01)
+    if times and nearest > _ALIKE:
+        return list(times)[:1]
+    return [one for one, distance in distances.items() if distance < nearest + 0.01]
 
 
 def find_outliers(
@@ -243,6 +277,11 @@ def check_log(log: Log, tools: Instruments, source: Source, gnss: bool) -> list[
     """
     t, values = log.t, log.channels
     notes = [NO_RUDDER] if gnss and "delta" not in values else []
+    for unit in list(_time_units(t, source))[:1]:
+        notes.append(
+            f"the rows are {np.median(np.diff(t)):.4g} s apart, which is unusual in a manoeuvre; if the unit "
+            f"of time is wrong, declare {source.declare('t', unit)}"
+        )
     if "ground_north" in values:
         velocity = values["ground_north"] + 1j * values["ground_east"]
     elif gnss and "x" in values:

@@ -19,6 +19,7 @@ from shipgym.trials.resampling import Log, Series, have_own_clocks, on_one_clock
 from shipgym.trials.units import QUANTITIES, si_factor
 
 RUDDER_SIGNS = ("starboard", "port")
+_REPAIRED = (("repair", "interpolate"),)
 
 #: A run of more rows without a value that lasts more median time steps is too long to fill.
 LONGEST_HOLE_ROWS = 10
@@ -211,7 +212,8 @@ def _local_positions(
             raise InputError(
                 f"{source.at(k, 'lat')}: position {lat[k]:.5f}, {lon[k]:.5f} found, an outlier that no ship "
                 f"reaches from those beside it ({far.size} of {here.size} are); empty its cells, or leave "
-                'such rows to be filled with repair = "interpolate"'
+                'such rows to be filled with repair = "interpolate"',
+                _REPAIRED,
             )
         local[:, far] = np.nan
     return dict(zip(("x", "y"), local, strict=True)), far.size
@@ -309,7 +311,8 @@ def _repaired(values: Floats, source: Source, repair: str | None) -> tuple[Float
         )
         raise InputError(
             f"{source.at(k, names[c])}: no value ({values[k, c]:g}) found, expected a number; {remedy} "
-            f"({np.unique(rows).size} of {len(values)} rows lack a value)"
+            f"({np.unique(rows).size} of {len(values)} rows lack a value)",
+            _REPAIRED if names[c] != "t" else (),
         )
     _check_time(values, source)
     if not rows.size:

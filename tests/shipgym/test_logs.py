@@ -404,6 +404,33 @@ def test_a_rudder_of_the_wrong_sign_is_named(tmp_path):
     assert not Trial.from_csv(path, rudder_positive="port").notes
 
 
+def test_a_yaw_rate_or_heading_of_the_wrong_sign_is_not_taken_for_the_rudders(tmp_path):
+    for changed in ({"r": -SAILED["r"]}, {"psi": -SAILED["psi"]}):
+        path = written(tmp_path / "run.csv", **changed)
+        with pytest.raises(InputError, match=r"'psi' \(heading\) and 'r' \(yaw rate\) have opposite signs"):
+            Trial.from_csv(path)
+
+
+@pytest.mark.parametrize("shown", [("psi", "r", "delta"), ("psi", "u", "v", "x", "y")])
+def test_time_in_milliseconds_or_minutes_is_named_and_no_other_unit(tmp_path, shown):
+    for unit, scale in (("ms", 1e3), ("min", 1.0 / 60.0)):
+        columns = {"t": scale * SAILED["t"], **{name: SAILED[name] for name in shown}}
+        rows = (",".join(f"{value:.9g}" for value in row) for row in zip(*columns.values(), strict=True))
+        (tmp_path / "run.csv").write_text("\n".join([",".join(columns), *rows]))
+        with pytest.raises(
+            InputError, match=rf'wrong unit(:| of time,) declare t = {{ column = "t", unit = "{unit}" }}'
+        ):
+            Trial.from_csv(tmp_path / "run.csv")
+
+
+def test_rows_that_are_unusually_far_apart_are_a_remark(tmp_path):
+    lines = ["t,psi", *(f"{1000 * k},{0.1 * math.sin(0.1 * k)}" for k in range(100))]
+    (tmp_path / "run.csv").write_text("\n".join(lines))
+    (note,) = Trial.from_csv(tmp_path / "run.csv").notes
+    assert "the rows are 1000 s apart" in note
+    assert 'declare t = { column = "t", unit = "ms" }' in note
+
+
 # --- mistakes
 
 
