@@ -9,6 +9,10 @@ from typer import Argument, Option
 
 from agents.cli.command import answered
 
+NO_FILE_YET = (
+    "; new-ship has written no ship file in which to do so: write one, of which docs/ship_file.md and "
+    "`python -c 'import shipgym; print(shipgym.example_ship())'` show examples"
+)
 HISTORIES = ("psi", "r", "delta", "u", "v", "n", "phi", "wind_speed")
 
 
@@ -26,35 +30,48 @@ def new_ship_command(
     import numpy as np
 
     from agents.cli.terminal import answer, say, warn
+    from shipgym.checks import check_number, shown
     from shipgym.errors import InputError
     from shipgym.files import write_text
     from shipgym.pages import render
+    from shipgym.ships.particulars import BOUNDS
     from shipgym.trials.guesses import guess_trial
 
     if out.exists():
         raise InputError(f"{out}: exists already; choose another name with --out, or remove it")
-    guesses, side, trial = guess_trial(logs[0])
-    speeds = []
-    for log in logs:
+    if length is not None:
+        check_number(length, "--length", **BOUNDS["length"])
+    try:
+        read = [guess_trial(logs[0])]
+    except InputError as error:
+        declared = any(word in str(error) for word in ("[columns]", "[conventions]", "[sensors]", "declare "))
+        raise InputError(f"{error}{NO_FILE_YET if declared else ''}") from None
+    for log in logs[1:]:
         try:
-            _, other, seen = guess_trial(log)
+            read.append(guess_trial(log))
         except InputError as error:
             warn(str(error))
-        else:
-            side = other if other == "port" else side  # starboard is also what a log says that does not tell
-            known = [seen[name] for name in ("u", "stw", "sog") if name in seen.channels]
-            speeds += [float(np.quantile(speed, 0.9)) for speed in known[:1]]
+    guesses, _, trial, unused = read[0]
+    # one log with another convention is enough: the usual one is also what a log says that does not tell
+    found = {name: value for one in read for name, value in one.conventions.items()}
+    side = found.pop("rudder_positive", "starboard")
+    known = [[one.trial[name] for name in ("u", "stw", "sog") if name in one.trial.channels] for one in read]
+    speeds = [float(np.quantile(speed[0], 0.9)) for speed in known if speed]
     page = render(
         "shipgym.pages/ship.toml.jinja", name=out.name, length=length, guesses=guesses, side=side,
-        trial=trial, speed=max(speeds, default=None),
+        conventions=found, unused=", ".join(map(shown, unused)), trial=trial, speed=max(speeds, default=None),
         files=[json.dumps(os.path.relpath(log, out.parent), ensure_ascii=False) for log in logs],
     )  # fmt: skip
     write_text(page, out)
     columns = {one.channel: {"column": one.column, "unit": one.unit} for one in guesses}
-    answer({"written": str(out), "columns": columns, "rudder_positive": side, "notes": list(trial.notes)})
+    words = {"rudder_positive": side, **found}
+    answer({"written": str(out), "columns": columns, "unused": unused, **words, "notes": [*trial.notes]})
     told = [f"{one.channel}: column '{one.column}' in {one.unit}, unit {one.reason}" for one in guesses]
     told += [] if guesses else [f"channels: {', '.join(trial.channels)}"]
+    told += [f"columns not used: {', '.join(map(shown, unused))}"] if unused else []
     told += [f"a positive rudder steers to {side}, by the yaw that follows"] if "delta" in trial else []
+    told += [f'{name} = "{value}", without which a log is refused' for name, value in found.items()]
+    told += [f"{count} missing values of {name} were filled in" for name, count in trial.repaired.items()]
     told.append(f"written: {out}{'' if length else ', fill in the length'}; next: shipgym look {out}")
     say("\n".join(told))
     for note in trial.notes:
@@ -76,7 +93,7 @@ def look_command(
     from shipgym.trials.ship_file import ShipFile
 
     check_page(out)
-    trials = ShipFile.load(log).trials() if log.suffix == ".toml" else [guess_trial(log)[2]]
+    trials = ShipFile.load(log).trials() if log.suffix == ".toml" else [guess_trial(log).trial]
     tracks = [path_figure({"measured": one}) if {"x", "y"} <= one.channels.keys() else None for one in trials]
     histories = [history_figure({"measured": one}, HISTORIES) for one in trials]
     shown = zip(trials, tracks, histories, strict=True)

@@ -252,7 +252,7 @@ KINDS = (
     Kind("route", lambda path: Route.from_csv(path, 500.0), use_route),
     Kind("ship-file", lambda path: ShipFile.load(path).trials(), use_ship, main="ship.toml", slow=3),
     Kind("trial", lambda path: [Trial.from_csv(path)], use_ship),
-    Kind("log", lambda path: [guess_trial(path)[2]], use_ship, slow=4),
+    Kind("log", lambda path: [guess_trial(path).trial], use_ship, slow=4),
     Kind("model", ShipModel.load, use_model, slow=2),
     Kind("controller", load_agent, use_agent),
     Kind("policy", read_policy, use_agent, main="agent.json", slow=4),

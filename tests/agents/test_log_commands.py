@@ -1,9 +1,17 @@
 """From a log to a ship file and a page, in commands that say what they guessed."""
 
+import csv
+import json
+import shutil
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from agents.cli import main
+from shipgym.errors import InputError
+from shipgym.trials.csv_reader import column_table
+from shipgym.trials.guesses import guess_columns, guess_trial
 from shipgym.trials.ship_file import ShipFile
 from tests.golden.texts import same_page, same_text
 
@@ -90,3 +98,125 @@ def test_a_log_that_does_not_tell_the_rudders_sign_leaves_it_to_the_others(log, 
     (log / "straight.csv").write_text("\n".join(straight))
     code, said = command(monkeypatch, capsys, "new-ship", "straight.csv", "log.csv", "--length", "150")
     assert (code, "a positive rudder steers to port" in said) == (0, True)
+
+
+EXAMPLE = Path(__file__).parents[2] / "examples" / "mariner" / "zigzag_10_10.csv"
+OF_EXAMPLE = {"time_s": "t", "compass_deg": "psi", "gyro_deg_s": "r", "rudder_deg": "delta"}
+
+
+def example(folder, edit=lambda row: row):
+    """The example's zigzag with names that tell no unit, its rows changed."""
+    with EXAMPLE.open() as file:
+        rows = [edit({new: row[old] for old, new in OF_EXAMPLE.items()}) for row in csv.DictReader(file)]
+    lines = [",".join(rows[0]), *(",".join(row.values()) for row in rows)]
+    (folder / "run.csv").write_text("\n".join(lines))
+    return folder / "run.csv"
+
+
+def test_every_column_of_the_examples_log_is_recognised_in_its_unit(log, monkeypatch, capsys):
+    shutil.copy(EXAMPLE, log)
+    code, said = command(monkeypatch, capsys, "new-ship", EXAMPLE.name, "--length", "160.9")
+    assert (code, "not used" in said) == (0, False), said
+    assert "r: column 'gyro_deg_s' in deg/s, unit from its name" in said
+    assert "psi: column 'compass_deg' in deg, unit from its name" in said
+    (trial,) = ShipFile.load(log / "ship.toml").trials()
+    given = ShipFile.load(EXAMPLE.parent / "ship.toml").trial(EXAMPLE.name)
+    for name in given.channels:
+        assert np.array_equal(trial[name], given[name])
+
+
+def test_columns_that_are_not_used_are_listed(log, monkeypatch, capsys):
+    text = EXAMPLE.read_text().replace("compass_deg", "bearing", 1)
+    (log / "run.csv").write_text(text.replace("log_ahead_kn", "log one", 1))
+    code, said = command(monkeypatch, capsys, "new-ship", "run.csv", "--length", "160.9")
+    assert (code, "columns not used: 'bearing', 'log one'" in said) == (0, True), said
+    assert "r: column 'gyro_deg_s'" in said
+    assert "# not used: 'bearing', 'log one'\n" in (log / "ship.toml").read_text()
+    (log / "ship.toml").unlink()
+    _, said = command(monkeypatch, capsys, "new-ship", "run.csv", "--json")
+    assert json.loads(said)["unused"] == ["bearing", "log one"]
+
+
+@pytest.mark.parametrize(
+    ("name", "channel", "unit"),
+    [
+        ("gyro_deg_s", "r", "deg/s"),
+        ("Gyro [°/s]", "r", "deg/s"),
+        ("yaw rad per s", "r", "rad/s"),
+        ("heading_deg", "psi", "deg"),
+        ("compass", "psi", "rad"),
+        ("yaw_rate_deg_min", "r", "deg/min"),
+        ("t_ms", "t", "ms"),
+        ("u_m_s", "u", "m/s"),
+        ("log_ahead_kn", "u", "knots"),
+        ("gnss_north_m", "x", "m"),
+        ("Lat [deg min]", "lat", "ddmm.mm"),
+        ("Rudder S", "delta", "rad"),  # of starboard, no unit
+        ("rudder_deg_s", None, None),
+        ("gnss_north_m_s", None, None),
+    ],
+)
+def test_a_name_is_a_channels_where_its_unit_is_one_of_it(name, channel, unit):
+    found = guess_columns(column_table(Path("log"), {name: np.zeros(3)}, range(3)))
+    assert [(one.channel, one.unit) for one in found] == ([(channel, unit)] if channel else [])
+
+
+@pytest.mark.parametrize(
+    ("name", "largest", "unit"),
+    [
+        ("time_s", 1.7e9, "unix"),
+        ("t_ms", 1.7e12, "unix ms"),
+        ("time", 1.7e12, "unix ms"),
+        ("t_ms", 5e8, "ms"),
+    ],
+)
+def test_times_since_1970_are_known_by_their_size(name, largest, unit):
+    (found,) = guess_columns(column_table(Path("log"), {name: np.array([largest] * 3)}, range(3)))
+    assert found.unit == unit
+
+
+def test_the_unit_that_a_check_names_is_tried_and_written(log, monkeypatch, capsys):
+    example(log)
+    code, said = command(monkeypatch, capsys, "new-ship", "run.csv", "--length", "160.9")
+    told = "unit by the check that refused deg/min (from its size, up to 0.637)"
+    assert (code, f"r: column 'r' in deg/s, {told}" in said) == (0, True), said
+    assert f'r = {{ column = "r", unit = "deg/s" }}   # {told}' in (log / "ship.toml").read_text()
+    (trial,) = ShipFile.load(log / "ship.toml").trials()
+    assert np.abs(trial["r"]).max() == pytest.approx(np.radians(0.637))
+
+
+def test_time_in_milliseconds_is_tried_and_a_unit_in_a_name_is_kept(log):
+    def late(row):
+        return {**row, "t": f"{1000.0 * float(row['t']):g}"}
+
+    found = guess_trial(example(log, late))
+    assert {one.channel: one.unit for one in found.columns}["t"] == "ms"
+    assert found.trial.duration == 440.0
+    example(log, lambda row: {**row, "r_deg_min": row["r"], "r": ""})
+    text = (log / "run.csv").read_text().replace("t,psi,r,", "t,psi,spare,", 1)
+    (log / "run.csv").write_text(text)
+    with pytest.raises(InputError, match=r'declare r = \{ column = "r_deg_min", unit = "deg/s" \}'):
+        guess_trial(log / "run.csv")
+
+
+def test_blank_cells_are_filled_and_the_ship_file_says_so(log, monkeypatch, capsys):
+    example(log, lambda row: {**row, "psi": ""} if row["t"] in ("0.0", "20.0", "20.5") else row)
+    code, said = command(monkeypatch, capsys, "new-ship", "run.csv", "--length", "160.9")
+    assert (code, 'repair = "interpolate", without which a log is refused' in said) == (0, True), said
+    assert "2 missing values of psi were filled in" in said
+    (trial,) = ShipFile.load(log / "ship.toml").trials()
+    assert dict(trial.repaired) == {"psi": 2}
+
+
+def test_a_remedy_for_the_ship_file_says_that_there_is_none_yet(log, monkeypatch, capsys):
+    (log / "bad.csv").write_text("a;b\n1;2\n")
+    code, said = command(monkeypatch, capsys, "new-ship", "bad.csv")
+    assert (code, "new-ship has written no ship file in which to do so: write one" in said) == (2, True)
+
+
+@pytest.mark.parametrize("length", ["1e9", "0.005", "nan"])
+def test_a_length_that_no_ship_has_is_refused_before_a_log_is_read(log, monkeypatch, capsys, length):
+    code, said = command(monkeypatch, capsys, "new-ship", "log.csv", "--length", length)
+    assert code == 2
+    assert f"--length: {float(length):g} found, expected a number > 0.01 and < 2000; between" in said
+    assert not (log / "ship.toml").exists()

@@ -981,14 +981,18 @@ def guessed() -> Answers:
             for size in (0.93 * limit, limit, 1.04 * limit)
         ]
 
+    def read(path: str | Path) -> tuple[Any, ...]:
+        found = guesses.guess_trial(path)
+        return found.columns, found.conventions.get("rudder_positive", "starboard"), found.trial
+
     limits = {"t": 1e8, "psi": 6.3, "r": 0.2, "n": 10.0, "delta": 1.0, "delta_command": 1.0, "phi": 1.0}
     return {
         "columns": lambda: guesses.guess_columns(csv_reader.read_table("bridge.csv")),
         "quoted": [one.quoted for one in guesses.guess_columns(csv_reader.read_table("bridge.csv"))],
-        "trial": lambda: guesses.guess_trial("simple.csv"),
-        "corpus": lambda: guesses.guess_trial(CORPUS / "log" / "bridge.csv"),
-        "nmea": lambda: guesses.guess_trial(CORPUS / "log" / "bridge.nmea")[:2],
-        "nothing": lambda: guesses.guess_trial("nothing.csv"),
+        "trial": lambda: read("simple.csv"),
+        "corpus": lambda: read(CORPUS / "log" / "bridge.csv"),
+        "nmea": lambda: read(CORPUS / "log" / "bridge.nmea")[:2],
+        "nothing": lambda: read("nothing.csv"),
         "sizes": {name: sizes(name, limit) for name, limit in limits.items()},
     }
 
