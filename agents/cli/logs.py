@@ -9,10 +9,7 @@ from typer import Argument, Option
 
 from agents.cli.command import answered
 
-NO_FILE_YET = (
-    "; new-ship has written no ship file in which to do so: write one, of which docs/ship_file.md and "
-    "`python -c 'import shipgym; print(shipgym.example_ship())'` show examples"
-)
+NO_FILE_YET = "; new-ship has written no ship file in which to do so: write one as in docs/ship_file.md"
 HISTORIES = ("psi", "r", "delta", "u", "v", "n", "phi", "wind_speed")
 
 

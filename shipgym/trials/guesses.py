@@ -17,7 +17,6 @@ from shipgym.trials.units import QUANTITIES, UNITS
 
 WORDS: dict[str, dict[str, Any]] = shipped_toml("shipgym.trials", "guesses.toml")
 _NAMED = "from its name"
-_SINCE_1970 = 1e8  # s; more is no time since the start of a log
 
 
 class Guess(NamedTuple):
@@ -49,43 +48,40 @@ def guess_columns(table: Table) -> list[Guess]:
     A column whose name ends with a unit of another quantity is not taken: a gyro in deg/s is no heading.
     """
     found: dict[str, Guess] = {}
-    readings = {name: _without_units(name) for name in table.header}
-    for words in ("names", "names_with_unit"):
-        for channel, pattern in WORDS[words].items():
-            for name, bare in readings.items():
-                fitting = [unit for unit in bare if unit in UNITS[QUANTITIES[channel]]]
-                known = any(re.fullmatch(pattern, bare[unit]) for unit in ("", *fitting))
-                any_unit = words == "names" and max(map(len, bare)) < 2  # one letter may be none: "Rudder S"
-                taken = channel in found or any(name == one.column for one in found.values())
-                if known and not taken and (fitting or any_unit):
-                    found[channel] = _guess(table, channel, name, fitting)
+    for channel, pattern in WORDS["names"].items():
+        for name in table.header:
+            text = name.lower().replace("_", " ")
+            forms = (re.sub(r"[\[(].*", "", text).strip(), re.sub(r"[\[\]() ]+", " ", text).strip())
+            unit = _unit_named(text, QUANTITIES[channel])
+            known = name not in found and any(re.fullmatch(pattern, form) for form in forms)
+            if known and unit is not None:
+                found[name] = Guess(channel, name, unit, _NAMED) if unit else _by_size(table, channel, name)
+                break
     return list(found.values())
 
 
-def _without_units(name: str) -> dict[str, str]:
-    """A name without brackets as it is, and by each unit that may end it, the longer ones first, without."""
-    text = name.lower().replace("_", " ")
-    ends = {unit: rf"(?:(.*)[\[( ])?(?:{words})[\]) ]*" for unit, words in WORDS["units"].items()}
-    found = {unit: re.fullmatch(end, text) for unit, end in {"": "(.*)", **ends}.items()}
-    return {unit: re.sub(r"[\[(].*", "", match[1] or "").strip() for unit, match in found.items() if match}
+def _unit_named(name: str, quantity: str) -> str | None:
+    """The unit of a quantity with which a name ends, empty where it ends with none; None: another's."""
+    ends = {unit: rf"(.*[\[( ])?({words})[\]) ]*" for unit, words in WORDS["units"].items()}
+    found = [unit for unit, end in ends.items() if re.fullmatch(end, name)]
+    other = None if max(map(len, found), default=0) > 1 else ""  # one letter may be no unit: "Heading M"
+    return next((unit for unit in found if unit in UNITS[quantity]), other)
 
 
-def _guess(table: Table, channel: str, name: str, named: list[str]) -> Guess:
-    if named and channel != "t":
-        return Guess(channel, name, named[0], _NAMED)
+def _by_size(table: Table, channel: str, name: str) -> Guess:
+    quantity = QUANTITIES[channel]
     try:
         values = table.numbers(name)
     except InputError:  # clock times, degrees and minutes
         values = np.zeros(0)
-    quantity = QUANTITIES[channel]
     largest = float(np.max(np.abs(values[np.isfinite(values)]), initial=0.0))
     limit, unit = WORDS["large"].get(channel) or WORDS["large"].get(quantity) or (np.inf, "")
-    size = f"from its size, up to {largest:.4g}" if values.size else "from its content"
-    if named or largest <= limit:
-        unit = (*named, *UNITS[quantity])[0]
-    if channel == "t" and largest * UNITS[quantity][unit] > _SINCE_1970:
-        return Guess(channel, name, "unix ms" if largest > 1e3 * _SINCE_1970 else "unix", size)
-    return Guess(channel, name, unit, _NAMED if named else size)
+    if largest <= limit:
+        unit = next(iter(UNITS[quantity]))
+    if unit == "unix" and largest > 1e11:
+        unit = "unix ms"
+    reason = f"from its size, up to {largest:.4g}" if values.size else "from its content"
+    return Guess(channel, name, unit, reason)
 
 
 def guess_trial(path: str | Path) -> GuessedTrial:

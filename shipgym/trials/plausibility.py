@@ -51,7 +51,8 @@ def check_ranges(channels: Mapping[str, Floats], source: Source) -> None:
         unit = source.columns[channel].unit
         factor = si_factor(channel, unit)
         found = _spelled(channels[channel][first] / factor, channel, unit)
-        fitting = _units_within(channel, unit, float(size.max()) / limit)
+        units = UNITS[QUANTITIES[channel]].items()
+        fitting = [u for u, f in units if f < factor and size.max() * (f / factor) <= limit]
         remedy = (
             f"likely a wrong unit: declare {source.declare(channel, fitting[0])}"
             if fitting
@@ -191,12 +192,6 @@ def _spelled(value: float, channel: str, unit: str) -> str:
     if QUANTITIES[channel] in ("angle", "angular rate") and unit.startswith("rad"):
         return f"{text} ({math.degrees(value):g} {unit.replace('rad', 'deg')})"
     return text
-
-
-def _units_within(channel: str, declared: str, excess: float) -> list[str]:
-    """The units in which values `excess` times too large in the declared one would be plausible."""
-    own = si_factor(channel, declared)
-    return [u for u, f in UNITS[QUANTITIES[channel]].items() if f < own and excess * f <= own]
 
 
 def _time_units(t: Floats, source: Source) -> dict[str, float]:

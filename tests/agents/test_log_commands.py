@@ -165,12 +165,13 @@ def test_a_name_is_a_channels_where_its_unit_is_one_of_it(name, channel, unit):
     ("name", "largest", "unit"),
     [
         ("time_s", 1.7e9, "unix"),
-        ("t_ms", 1.7e12, "unix ms"),
+        ("time_s", 1e3, "s"),
+        ("time unix ms", 1.7e12, "unix ms"),
         ("time", 1.7e12, "unix ms"),
         ("t_ms", 5e8, "ms"),
     ],
 )
-def test_times_since_1970_are_known_by_their_size(name, largest, unit):
+def test_times_since_1970_are_known_by_their_name_and_size(name, largest, unit):
     (found,) = guess_columns(column_table(Path("log"), {name: np.array([largest] * 3)}, range(3)))
     assert found.unit == unit
 
