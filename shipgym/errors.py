@@ -11,8 +11,8 @@ class InputError(ValueError):
 
     The message names the file, the row or field, the value found, what is expected, and the remedy.
     The command line prints it and exits with code 2. Of a message longer than `LONGEST_MESSAGE` the middle is
-    left out: it repeats what was found, which may be a whole file. `instead`: of a log that seems to be read
-    with a wrong declaration the likely ones, each a channel with its unit or a convention with its value.
+    left out: it repeats what was found, which may be a whole file. `instead`: what a log may be read with
+    instead, the likely one first, each a channel with its unit or a convention with its value.
     """
 
     def __init__(self, message: str, instead: Sequence[tuple[str, str]] = ()) -> None:

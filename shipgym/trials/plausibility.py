@@ -53,15 +53,12 @@ def check_ranges(channels: Mapping[str, Floats], source: Source) -> None:
         found = _spelled(channels[channel][first] / factor, channel, unit)
         units = UNITS[QUANTITIES[channel]].items()
         fitting = [u for u, f in units if f < factor and size.max() * (f / factor) <= limit]
-        remedy = (
-            f"likely a wrong unit: declare {source.declare(channel, fitting[0])}"
-            if fitting
-            else "check the column and its unit, or correct the value"
-        )
+        remedies = [f"likely a wrong unit: declare {source.declare(channel, other)}" for other in fitting]
+        remedies.append("check the column and its unit, or correct the value")
         raise InputError(
             f"{source.at(first, channel)}: {channel} = {found} found, "
-            f"expected at most {_spelled(limit / factor, channel, unit)}; {remedy}",
-            [(channel, other) for other in fitting[:1]],
+            f"expected at most {_spelled(limit / factor, channel, unit)}; {remedies[0]}",
+            [(channel, other) for other in fitting],
         )
 
 
@@ -150,17 +147,13 @@ def _check_velocity(log: Log, frame: str, source: Source) -> None:
             [("velocity_frame", other)],
         )
     if misfit < 0.2 and not 0.55 < abs(gain) < 1.8:
-        scales = _time_units(t, source)
-        instead = [("t", one) for one, scale in scales.items() if 0.55 < abs(gain) / scale < 1.8]
-        remedy = (
-            f"time, declare {source.declare(*instead[0])}"
-            if instead
-            else f"'{x}', '{y}' or of '{u}', '{v}' (a knot is 0.514 m/s): declare it"
-        )
+        times = [one for one, scale in _time_units(t, source).items() if 0.55 < abs(gain) / scale < 1.8]
+        likely = [f"time, declare {source.declare('t', one)}" for one in times]
+        likely.append(f"'{x}', '{y}' or of '{u}', '{v}' (a knot is 0.514 m/s): declare it")
         raise InputError(
             f"{head}: the position changes {abs(gain):.3g} times as fast as the velocities say, expected 1; "
-            f"likely a wrong unit of {remedy}",
-            instead,
+            f"likely a wrong unit of {likely[0]}",
+            [("t", one) for one in times],
         )
 
 
@@ -209,12 +202,13 @@ def _nearest_units(gain: float, t: Floats, source: Source) -> list[tuple[str, st
 
     Where none does and the unit of time is doubted, that comes first: two units are wrong.
     """
-    gains: dict[tuple[str, str], float] = {}
-    for channel, sign in (("psi", 1.0), ("r", -1.0)):
-        own = source.columns[channel].unit
-        factors = UNITS[QUANTITIES[channel]]
-        gains |= {(channel, u): gain * (f / factors[own]) ** sign for u, f in factors.items() if u != own}
     times = {("t", unit): gain / scale for unit, scale in _time_units(t, source).items()}
+    gains = {
+        (channel, unit): gain * (factor / si_factor(channel, source.columns[channel].unit)) ** sign
+        for channel, sign in (("psi", 1.0), ("r", -1.0))
+        for unit, factor in UNITS[QUANTITIES[channel]].items()
+        if unit != source.columns[channel].unit
+    }
     distances = {one: abs(math.log(changed)) for one, changed in (gains | times).items()}  # from 1
     nearest = min(distances.values())
     if times and nearest > _ALIKE:
@@ -272,11 +266,11 @@ def check_log(log: Log, tools: Instruments, source: Source, gnss: bool) -> list[
     """
     t, values = log.t, log.channels
     notes = [NO_RUDDER] if gnss and "delta" not in values else []
-    for unit in list(_time_units(t, source))[:1]:
-        notes.append(
-            f"the rows are {np.median(np.diff(t)):.4g} s apart, which is unusual in a manoeuvre; if the unit "
-            f"of time is wrong, declare {source.declare('t', unit)}"
-        )
+    notes += [
+        f"the rows are {np.median(np.diff(t)):.4g} s apart, which is unusual in a manoeuvre; if the unit of "
+        f"time is wrong, declare {source.declare('t', unit)}"
+        for unit in list(_time_units(t, source))[:1]
+    ]
     if "ground_north" in values:
         velocity = values["ground_north"] + 1j * values["ground_east"]
     elif gnss and "x" in values:
