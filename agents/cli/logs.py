@@ -3,7 +3,7 @@
 import json
 import os
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 from typer import Argument, Option
 
@@ -54,23 +54,16 @@ def new_ship_command(
     side = found.pop("rudder_positive", "starboard")
     known = [[one.trial[name] for name in ("u", "stw", "sog") if name in one.trial.channels] for one in read]
     speeds = [float(np.quantile(speed[0], 0.9)) for speed in known if speed]
-    page = render(
-        "shipgym.pages/ship.toml.jinja", name=out.name, length=length, guesses=guesses, side=side,
-        conventions=found, unused=", ".join(map(shown, unused)), trial=trial, speed=max(speeds, default=None),
-        files=[json.dumps(os.path.relpath(log, out.parent), ensure_ascii=False) for log in logs],
-    )  # fmt: skip
-    write_text(page, out)
+    facts: dict[str, Any] = {
+        "out": out, "length": length, "guesses": guesses, "side": side, "conventions": found, "trial": trial,
+        "unused": ", ".join(map(shown, unused)), "speed": max(speeds, default=None),
+        "files": [json.dumps(os.path.relpath(log, out.parent), ensure_ascii=False) for log in logs],
+    }  # fmt: skip
+    write_text(render("shipgym.pages/ship.toml.jinja", **facts), out)
     columns = {one.channel: {"column": one.column, "unit": one.unit} for one in guesses}
     words = {"rudder_positive": side, **found}
     answer({"written": str(out), "columns": columns, "unused": unused, **words, "notes": [*trial.notes]})
-    told = [f"{one.channel}: column '{one.column}' in {one.unit}, unit {one.reason}" for one in guesses]
-    told += [] if guesses else [f"channels: {', '.join(trial.channels)}"]
-    told += [f"columns not used: {', '.join(map(shown, unused))}"] if unused else []
-    told += [f"a positive rudder steers to {side}, by the yaw that follows"] if "delta" in trial else []
-    told += [f'{name} = "{value}", without which a log is refused' for name, value in found.items()]
-    told += [f"{count} missing values of {name} were filled in" for name, count in trial.repaired.items()]
-    told.append(f"written: {out}{'' if length else ', fill in the length'}; next: shipgym look {out}")
-    say("\n".join(told))
+    say(render("shipgym.pages/new_ship.txt.jinja", **facts).strip())
     for note in trial.notes:
         warn(note)
 
