@@ -20,24 +20,21 @@ def new_ship_command(
     ],
     out: Annotated[Path, Option(metavar="FILE", help="The ship file to write.")] = Path("ship.toml"),
     length: Annotated[
-        float | None, Option(min=0.01, max=1e4, help="Length between perpendiculars, m; or fill it in later.")
+        float | None, Option(min=0.01, max=2e3, help="Length between perpendiculars, m; or fill it in later.")
     ] = None,
 ) -> None:
     """Write a ship file for recorded trials. Guesses columns, units and signs, and reports the guesses."""
     import numpy as np
 
     from agents.cli.terminal import answer, say, warn
-    from shipgym.checks import check_number, shown
+    from shipgym.checks import shown
     from shipgym.errors import InputError
     from shipgym.files import write_text
     from shipgym.pages import render
-    from shipgym.ships.particulars import BOUNDS
     from shipgym.trials.guesses import guess_trial
 
     if out.exists():
         raise InputError(f"{out}: exists already; choose another name with --out, or remove it")
-    if length is not None:
-        check_number(length, "--length", **BOUNDS["length"])
     try:
         read = [guess_trial(logs[0])]
     except InputError as error:

@@ -215,9 +215,9 @@ def test_a_remedy_for_the_ship_file_says_that_there_is_none_yet(log, monkeypatch
     assert (code, "new-ship has written no ship file in which to do so: write one" in said) == (2, True)
 
 
-@pytest.mark.parametrize("length", ["1e9", "2000", "0.01", "inf"])
+@pytest.mark.parametrize("length", ["1e9", "2001", "0.009", "inf", "nan", "-5"])
 def test_a_length_that_no_ship_has_is_refused_before_a_log_is_read(log, monkeypatch, capsys, length):
     code, said = command(monkeypatch, capsys, "new-ship", "log.csv", "--length", length)
     assert code == 2
-    assert f"--length: {float(length):g} found, expected a number > 0.01 and < 2000; between" in said
+    assert "'--length'" in said
     assert not (log / "ship.toml").exists()
