@@ -86,12 +86,6 @@ def test_a_log_beside_others_that_cannot_be_read_is_told(log, monkeypatch, capsy
     assert "warning: lag.csv: there is no such CSV file. Did you mean 'log.csv'?\n" in said
 
 
-def test_a_length_is_a_number_of_metres(log, monkeypatch, capsys):
-    code, said = command(monkeypatch, capsys, "new-ship", "log.csv", "--length", "inf")
-    assert (code, "'--length': Input should be less than or equal to 10000" in said) == (2, True)
-    assert not (log / "ship.toml").exists()
-
-
 def test_a_log_that_does_not_tell_the_rudders_sign_leaves_it_to_the_others(log, monkeypatch, capsys):
     rows = (log / "log.csv").read_text().splitlines()
     straight = [rows[0], *(f"{row.rsplit(';', 1)[0]};0,0" for row in rows[1:60])]
