@@ -21,8 +21,7 @@ from identification.regression.rudder import rebuild, straight
 from shipgym import InputError, Particulars, SteeringGear, Trial
 from shipgym.arrays import Floats, Integers, integral
 from shipgym.checks import check_whole
-from shipgym.ships.grey_boxes import GreyBox
-from shipgym.ships.term_table import Structure
+from shipgym.ships import GreyBox, Structure
 
 SAMPLE_STRUCTURES = ("euler", "integral", "spline")
 LONGEST_WINDOW = 1.0 / 3.0  # of the time to sail one ship length

@@ -13,11 +13,9 @@ from typing import Any
 
 from shipgym.checks import check_keys, check_number
 from shipgym.errors import InputError
-from shipgym.ships.catalogue import load_model
+from shipgym.ships import ShipModel, get_structure, load_model
 from shipgym.ships.particulars import ADDED_MASSES, Particulars
-from shipgym.ships.ship_model import ShipModel
 from shipgym.ships.steering import SteeringGear
-from shipgym.ships.structures import get_structure
 
 MIRRORED = {"X_vr": "Xrv", "Y_uv": "Yvu", "Y_ur": "Yru", "N_uv": "Nvu", "N_ur": "Nru"}
 RENAMED = {"kappa": "kk", "gamma": "ga"}

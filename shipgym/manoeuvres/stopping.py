@@ -12,8 +12,7 @@ from shipgym.manoeuvres.execution import distance_sailed, reached, require, ship
 from shipgym.manoeuvres.registry import Manoeuvre
 from shipgym.manoeuvres.settling import Voyage
 from shipgym.sea.conditions import Weather
-from shipgym.ships.equations import ShipEquations
-from shipgym.ships.ship_model import ShipModel
+from shipgym.ships import ShipEquations, ShipModel
 from shipgym.ships.simulate import Conditions, Seed
 from shipgym.trials.navigation import rotate_to_body
 from shipgym.trials.trial import Trial
