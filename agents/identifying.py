@@ -1,6 +1,6 @@
 """Identification of a ship file: its options, those given beside it, and its trials."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
 from identification import IdentificationResult, identify
@@ -61,13 +61,6 @@ def identify_ship(ship: ShipFile, settings: Mapping[str, Any]) -> Identification
     `ship`: its trials are read; `settings`: from `identification_settings`.
     """
     trials, arguments = trials_of(ship, settings)
-    return identify_trials(ship, trials, arguments)
-
-
-def identify_trials(
-    ship: ShipFile, trials: Sequence[Trial], arguments: Mapping[str, Any]
-) -> IdentificationResult:
-    """`identify_ship` for trials that are read already, both from `trials_of`."""
     with placed(str(ship.path)):
         return identify(trials, **arguments)
 

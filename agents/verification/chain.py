@@ -16,7 +16,7 @@ from agents.controllers.controller import Controller
 from agents.controllers.registry import controller_class, controller_kinds
 from agents.engines.jobs import HERE, JobEngine
 from agents.engines.ray_engine import EngineError
-from agents.identifying import identification_settings, identify_trials, trials_of
+from agents.identifying import identification_settings, trials_of
 from agents.output import whole_folder
 from agents.rollouts.course_keeping import sail, step_response
 from agents.rollouts.rollout import check_fits
@@ -24,10 +24,10 @@ from agents.verification.monte_carlo import monte_carlo
 from agents.verification.refusal import helpful_trial, lost_control, simpler_structures, why_refused
 from agents.verification.result import STEP_DEG, AutopilotResult, Pilot, Verification
 from agents.verification.tracks import Track, keep_track, track_task
-from identification import IdentificationResult
+from identification import IdentificationResult, identify
 from identification.progress import PROGRESS, Progress
 from identification.validation.warnings import why_unstable
-from shipgym.checks import check_number, quoted
+from shipgym.checks import check_number, placed, quoted
 from shipgym.errors import InputError, UnstableModelError
 from shipgym.files import write_json
 from shipgym.manoeuvres.imo import with_measured
@@ -78,8 +78,8 @@ def build_autopilot(
             ship = ShipFile.load(ship_file)
             guests = [(f"agent '{agent}'", load_agent(agent)) for agent in agents]
             trials, arguments = trials_of(ship, identification_settings(ship, options or {}))
-        with _stage(tell, "identifying"):
-            fit = identify_trials(ship, trials, arguments)
+        with _stage(tell, "identifying"), placed(str(ship.path)):
+            fit = identify(trials, **arguments)
         others = [one for _, one in guests]
         verified = partial(verify, fit.model, int(draws), int(seed), tell, where, others, designs)
         result = examined(ship, fit, guests, verified)

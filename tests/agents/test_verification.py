@@ -211,14 +211,14 @@ def to_be_built(monkeypatch, verification="found", refusal=None):
         return f"{found} of {model}"
 
     stand_ins = {
-        "trials_of": lambda ship, settings: ("trials", "arguments"), "examined": examined,
+        "trials_of": lambda ship, settings: ("trials", {}), "examined": examined,
         "identification_settings": lambda ship, options: {}, "_to_standards": to_standards,
-        "identify_trials": lambda *_: fit, "_write": lambda result, folder: (folder / "report.html").touch(),
+        "identify": lambda *_: fit, "_write": lambda result, folder: (folder / "report.html").touch(),
         "load_agent": lambda agent: f"made of {agent}",
     }  # fmt: skip
     for name, one in stand_ins.items():
         monkeypatch.setattr(chain, name, one)
-    monkeypatch.setattr(chain.ShipFile, "load", lambda path: "ship")
+    monkeypatch.setattr(chain.ShipFile, "load", lambda path: SimpleNamespace(path="ship.toml"))
     return asked
 
 
