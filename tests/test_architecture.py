@@ -2,6 +2,7 @@
 
 import ast
 import re
+import tomllib
 import xml.etree.ElementTree as ElementTree
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
@@ -105,6 +106,16 @@ def test_no_function_is_longer_than_sixty_lines():
 
 def test_identification_has_few_files_at_its_top():
     assert len(list((ROOT / "identification").glob("*.py"))) <= 10
+
+
+def test_the_wheel_has_every_file_that_is_no_code():
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+    named = project["tool"]["setuptools"]["package-data"]
+    for package in PACKAGES:
+        folder = ROOT / package
+        files = {path for path in folder.rglob("*") if path.is_file() and "__pycache__" not in path.parts}
+        files -= {path for path in files if path.suffix in (".py", ".pyi")}
+        assert not files.difference(*(folder.glob(pattern) for pattern in named[package]))
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)

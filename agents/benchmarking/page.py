@@ -15,7 +15,7 @@ from agents.benchmarking.results import RESULTS, BenchmarkResult
 from agents.output import check_page
 from agents.suites.suite import N_EPISODES, load_suite
 from identification.progress import Progress
-from shipgym.files import write_text
+from shipgym.files import shipped_toml, write_text
 from shipgym.pages import render
 from shipgym.plots import graph_objects
 
@@ -23,23 +23,7 @@ PAGE = "index.html"
 WORST = 3  # episodes of each contestant in each task that may be replayed
 
 #: Further figures of a task: what the head shows, and how a number is written.
-METRICS = {
-    "heading_rmse_deg": ("heading RMSE, deg", "number"),
-    "cross_track_rmse_m": ("cross-track RMSE, m", "number"),
-    "rudder_travel_deg_min": ("rudder travel, deg/min", "number"),
-    "rudder_reversals_min": ("rudder reversals, 1/min", "number"),
-    "overshoot_percent": ("overshoot, %", "number"),
-    "settling_s": ("settling, s", "number"),
-    "unsettled": ("not settled", "share"),
-    "outside_corridor": ("time outside corridor", "share"),
-    "left_corridor": ("left corridor", "share"),
-    "grounded": ("aground", "share"),
-    "success": ("success", "share"),
-    "fuel": ("fuel, straight run = 1", "fixed"),
-    "extrapolating": ("outside model", "share"),
-    "shielded": ("shield steers", "share"),
-    "interventions": ("shield takes over", "number"),
-}
+METRICS: dict[str, tuple[str, str]] = shipped_toml("agents.benchmarking", "words.toml")["metrics"]
 RARE = ("extrapolating", "shielded", "interventions")  # shown only where not 0 throughout
 
 

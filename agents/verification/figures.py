@@ -10,6 +10,7 @@ from agents.verification.tracks import Track
 from identification.report.predictions import RUDDER
 from shipgym import plots
 from shipgym.arrays import Floats
+from shipgym.files import shipped_toml
 from shipgym.manoeuvres import Criterion
 from shipgym.manoeuvres.intervals import LEVELS
 from shipgym.plots import LIMIT, MEASURED, MODEL, MUTED, Panel, axis, line, panels, translucent
@@ -17,20 +18,12 @@ from shipgym.plots.style import Figure
 
 PILOT_COLOURS = ("#0f8a7e", "#a1478f", "#d9822b", "#6b7a1e", "#3b5b92", "#8c564b")
 
-CRITERIA = {
-    "advance": "Advance",
-    "tactical_diameter": "Tactical diameter",
-    "initial_turning": "Initial turning",
-    "overshoot_1_10_10": "First overshoot",
-    "overshoot_2_10_10": "Second overshoot",
-    "overshoot_1_20_20": "First overshoot",
-    "stopping": "Track reach, full astern stop",
-}
+WORDS: dict[str, dict[str, Any]] = shipped_toml("agents.verification", "words.toml")
 
 
 def criterion_name(name: str, criterion: Criterion) -> str:
     """A criterion in words, with its manoeuvre."""
-    return CRITERIA[name] + (f" ({criterion.manoeuvre})" if criterion.manoeuvre else "")
+    return str(WORDS["criteria"][name]) + (f" ({criterion.manoeuvre})" if criterion.manoeuvre else "")
 
 
 def band(t: Floats, values: Floats, name: str, colour: str, **more: Any) -> Any:

@@ -9,20 +9,12 @@ import numpy as np
 import shipgym
 from agents.controllers.controller import Controller
 from agents.verification import figures
-from agents.verification.figures import criterion_name
+from agents.verification.figures import WORDS, criterion_name
 from agents.verification.result import STEP_DEG, AutopilotResult, Verification, pilot_metrics, track_metrics
 from identification.report.view import fit_view, trial_figures
 from identification.validation.warnings import held_out_error
 from shipgym.files import write_text
 from shipgym.pages import NONE, render
-
-SIGNALS = {
-    "heading_error": ("heading error", "rad/rad"),
-    "yaw_rate": ("yaw rate", "s"),
-    "heading_error_integral": ("integral of heading error", "1/s"),
-    "sway": ("sway speed", "rad s/m"),
-    "rudder": ("rudder", "rad/rad"),
-}
 
 
 def write_report(result: AutopilotResult, path: str | Path) -> None:
@@ -99,7 +91,7 @@ def _gains(designs: Sequence[Controller]) -> list[tuple[str, str, list[tuple[str
     ]
     return [
         (name, unit, [gain.get(signal) for gain in gains])
-        for signal, (name, unit) in SIGNALS.items()
+        for signal, (name, unit) in WORDS["signals"].items()
         if any(signal in gain for gain in gains)
     ]
 
