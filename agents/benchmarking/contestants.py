@@ -92,22 +92,18 @@ class Contestant:
 
 def _models(policy: Any) -> set[str]:
     """Hashes of the models that a policy, and what it is made of, were made for."""
-    found: set[str] = set()
-    seen: dict[int, Any] = {}  # by id; the objects are kept, so that no id is used twice
-    waiting = [policy]
-    while waiting:
-        part = waiting.pop()
-        if part is None or id(part) in seen:
-            continue
-        if len(seen) == MOST_PARTS:
+    parts, known = [policy], {id(policy)}
+    for part in parts:  # which grow
+        for inner in (getattr(part, name, None) for name in PARTS):
+            if inner is not None and id(inner) not in known:
+                known.add(id(inner))
+                parts.append(inner)
+        if len(parts) > MOST_PARTS:
             raise InputError(
                 f"{type(policy).__name__}: more than {MOST_PARTS} policies within one another found, "
                 "expected a policy made of fewer"
             )
-        seen[id(part)] = part
-        found.add(getattr(part, "model_sha256", ""))
-        waiting += [getattr(part, name, None) for name in PARTS]
-    return found
+    return {getattr(part, "model_sha256", "") for part in parts}
 
 
 def remade(
@@ -121,11 +117,9 @@ def remade(
     if about.get("source") is None:
         raise InputError(f"'{name}' was given as an object, which results do not hold")
     source = check_text(about["source"], f"'{name}': source")
-    if source in _known():
-        return Contestant(name, source)
-    if names_code(source):
-        if source not in allow_code:
-            raise InputError(f"'{source}' is code, run only if you name it: --allow-code {source}")
+    if names_code(source) and source not in allow_code:
+        raise InputError(f"'{source}' is code, run only if you name it: --allow-code {source}")
+    if names_code(source) or source in _known():
         return Contestant(name, source)
     files = check_table(about.get("files"), f"'{name}': files")
     patterns = [Path(one.replace("{task}", task.name)).parts for one in source.split("+")]

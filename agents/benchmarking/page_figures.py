@@ -13,6 +13,7 @@ from shipgym.arrays import Floats, Integers
 from shipgym.envs.episode import Episode
 from shipgym.plots import INK, MUTED, Panel, axis, compact, graph_objects, line, panels, points, translucent
 from shipgym.plots.style import Figure
+from shipgym.tasks.guidance import wrapped
 
 # as in the replay player (chart.html)
 COLOURS = (
@@ -156,7 +157,8 @@ def histories_figure(episodes: Mapping[str, Episode], names: Sequence[str]) -> F
         below.traces.append(_line(t, rudder[at], name, style[name], 1.2))
     if not path:
         t = first.dt * np.arange(first.n_steps + 1)
-        course = np.degrees(_unwrapped(first.states["set_point"], np.unwrap(first.states["psi"])))
+        heading = np.unwrap(first.states["psi"])
+        course = np.degrees(heading + wrapped(first.states["set_point"] - heading))
         above.traces.append(line(t, course, "ordered course", INK, 1.3, line_dash="dash", line_shape="hv"))
     grid = {"shared_xaxes": True, "vertical_spacing": 0.05, "row_heights": [0.58, 0.42]}
     figure = bare_panels([above, below], 480, grid=grid)
@@ -164,12 +166,6 @@ def histories_figure(episodes: Mapping[str, Episode], names: Sequence[str]) -> F
         for bound in (-first.corridor, first.corridor):
             figure.add_hline(y=bound, line={"color": "#2f6b3c", "width": 1.2, "dash": "dash"}, row=1, col=1)
     return figure
-
-
-def _unwrapped(angle: Floats, other: Floats) -> Floats:
-    """An angle, by whole turns nearest to another, rad."""
-    near: Floats = other + np.remainder(angle - other + np.pi, 2.0 * np.pi) - np.pi
-    return near
 
 
 def _thinned(steps: int) -> Integers:

@@ -85,8 +85,7 @@ class BenchmarkResult:
         check_choice(task, self.tasks, "task")
         check_choice(name, self.episodes, "figure")
         rows = (self.episodes["contestant"] == contestant) & (self.episodes["task"] == task)
-        values: Floats = self.episodes[name][rows].reshape(-1, self.summary["seeds"]["count"])
-        return values
+        return np.asarray(self.episodes[name][rows].reshape(-1, self.summary["seeds"]["count"]))
 
     def save(self, folder: str | Path | None) -> Self:
         """Write `episodes.parquet` and then `results.json`, each whole or not at all; None: nowhere.

@@ -96,8 +96,7 @@ def interquartile_cost(costs: Floats, draws: Draws, task: int, who: int = 0) -> 
     n_runs, n_episodes = costs.shape
     counts = np.rint(draws.episodes[task] * n_episodes).astype(np.int64)
     runs = draws.runs(task, n_runs, who)
-    number = np.zeros((draws.n_draws, n_runs), dtype=np.int64)
-    np.add.at(number, (np.arange(draws.n_draws)[:, None], runs), 1)
+    number = (runs[:, :, None] == np.arange(n_runs)).sum(axis=1)
     weights = (number[:, :, None] * counts[:, None, :]).reshape(draws.n_draws, -1)
     drawn = weighted_interquartile_mean(costs.ravel(), weights)
     return interval(float(interquartile_mean(costs)), drawn)
@@ -115,8 +114,7 @@ def weighted_interquartile_mean(values: Floats, weights: Integers) -> Floats:
     cut = np.floor(TRIMMED * total).astype(np.int64)
     kept = np.clip(upper, cut, total - cut)
     inside = np.diff(kept, axis=1, prepend=cut)
-    found: Floats = inside @ values[order] / (total - 2 * cut)[:, 0]
-    return found
+    return np.asarray(inside @ values[order] / (total - 2 * cut)[:, 0])
 
 
 def score(cost: ArrayLike, zero: ArrayLike, best: ArrayLike) -> Floats:
@@ -172,5 +170,4 @@ def performance_profile(scores: ArrayLike, thresholds: ArrayLike) -> Floats:
     """Share of the scores, of any shape, above each threshold, shape (n_thresholds,)."""
     ordered = np.sort(np.ravel(scores))
     below = np.searchsorted(ordered, np.asarray(thresholds), side="right")
-    above: Floats = 1.0 - below / len(ordered)
-    return above
+    return np.asarray(1.0 - below / len(ordered))

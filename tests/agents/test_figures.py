@@ -45,7 +45,9 @@ def test_criteria_are_drawn_in_per_cent_of_their_limits():
     np.testing.assert_allclose(np.mean(model.y), 0.0, atol=1e-12)
     assert list(only(figure, "IMO limit").x) == [100.0, 100.0]
     assert list(figure.layout.yaxis.range) == [1.5, -0.5]
-    assert list(figure.layout.yaxis.ticktext) == [figures.WORDS["criteria"][name] for name in ("advance", "stopping")]
+    assert list(figure.layout.yaxis.ticktext) == [
+        figures.WORDS["criteria"][name] for name in ("advance", "stopping")
+    ]
 
 
 def test_tracks_are_drawn_east_to_the_right_in_ship_lengths_and_their_errors_along_the_way():
