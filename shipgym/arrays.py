@@ -1,4 +1,4 @@
-"""Types of arrays, as annotations name them, and their integral."""
+"""Types of arrays, as annotations name them, their integral, and a number as JSON knows it."""
 
 from typing import Any
 
@@ -8,6 +8,11 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 Integers = NDArray[np.int64]
 Flags = NDArray[np.bool_]
+
+
+def finite(number: float) -> float | None:
+    """A number as JSON knows it: null where it is not finite."""
+    return float(number) if np.isfinite(number) else None
 
 
 def integral(t: Floats, rate: NDArray[Any]) -> NDArray[Any]:

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.stats import trim_mean
 
-from shipgym.arrays import Floats, Integers
+from shipgym.arrays import Floats, Integers, finite
 
 N_DRAWS = 2000
 LEVEL = 0.95
@@ -40,11 +40,6 @@ class Interval(NamedTuple):
 
 
 NOTHING = Interval(np.nan, np.nan, np.nan)
-
-
-def finite(number: float) -> float | None:
-    """The number, None if it is not finite."""
-    return float(number) if np.isfinite(number) else None
 
 
 def interquartile_mean(values: ArrayLike, axis: int | None = None) -> Floats:

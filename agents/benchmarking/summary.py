@@ -8,10 +8,10 @@ import numpy as np
 
 from agents.benchmarking import statistics
 from agents.benchmarking.contestants import BEST_KNOWN
-from agents.benchmarking.statistics import NOTHING, Draws, Interval, finite, score
+from agents.benchmarking.statistics import NOTHING, Draws, Interval, score
 from agents.suites.reference import reference_costs
 from agents.suites.suite import N_EPISODES, SETS, BenchmarkTask
-from shipgym.arrays import Floats
+from shipgym.arrays import Floats, finite
 
 #: By contestant and task what `agents.benchmarking.run.results_of` answers.
 Done = Mapping[tuple[str, str], Mapping[str, Any]]

@@ -10,11 +10,11 @@ import numpy as np
 from agents.benchmarking.contestants import remade
 from agents.benchmarking.results import REMEDY, BenchmarkResult, load_results, versions
 from agents.benchmarking.run import job_of, run_job
-from agents.benchmarking.statistics import finite
 from agents.benchmarking.submission import KIND, read_submission
 from agents.controllers.designs import CLASSICAL
 from agents.engines.jobs import run_jobs
 from agents.suites.suite import load_suite, suite_hash
+from shipgym.arrays import finite
 from shipgym.checks import check_number, check_whole
 from shipgym.errors import InputError
 from shipgym.files import read_json

@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from agents.controllers.linear_loop import SIGNALS, Compensator, Margins, SampledShip, sample_ship
 from agents.controllers.memory import Flags, Floats, begun, checked_observation, deviations, size_of
 from shipgym import InputError, ShipModel
+from shipgym.arrays import finite
 from shipgym.files import write_json
 from shipgym.tasks.task import OBSERVATION_NAMES, observation_scales
 
@@ -270,7 +271,7 @@ class Controller:
             "observation_scales": list(self.observation_scales),
             "gains": self.gains, "neutral_rudder": self.neutral_rudder, "neutral_sway": self.neutral_sway,
             "model": {"name": self.model_name, "sha256": self.model_sha256},
-            "margins": {name: value if np.isfinite(value) else None for name, value in margins.items()},
+            "margins": {name: finite(value) for name, value in margins.items()},
             "design": self.design, **({"arrays": arrays} if arrays else {}),
         }  # fmt: skip
 

@@ -13,6 +13,7 @@ from agents.rollouts.course_keeping import Episodes, StepResponses
 from agents.verification.index_uncertainty import ManoeuvreUncertainty
 from agents.verification.tracks import Track
 from identification import IdentificationResult
+from shipgym.arrays import finite
 from shipgym.ships import ShipModel
 from shipgym.ships.linear import Nomoto
 from shipgym.trials.ship_file import ShipFile
@@ -113,7 +114,7 @@ def verification_metrics(found: Verification) -> dict[str, Any]:
             "unstable": int(found.manoeuvres.unstable.sum()),
             "course_unstable": int(found.course_unstable.sum()),
         },
-        "nomoto": {name: _finite(value) for name, value in asdict(found.nomoto).items()},
+        "nomoto": {name: finite(value) for name, value in asdict(found.nomoto).items()},
         "imo": {name: criterion.to_dict() for name, criterion in found.manoeuvres.criteria.items()},
         "controllers": {pilot.key: pilot_metrics(pilot) for pilot in found.pilots},
         "ranking": [pilot.key for pilot in found.pilots],
@@ -141,7 +142,7 @@ def pilot_metrics(pilot: Pilot) -> dict[str, Any]:
     episodes, design = pilot.episodes, pilot.design
     return {
         "gains": design and {name: float(value) for name, value in design.gains.items()},
-        "margins": design and {name: _finite(value) for name, value in asdict(design.margins).items()},
+        "margins": design and {name: finite(value) for name, value in asdict(design.margins).items()},
         "cost_mean": float(np.mean(episodes.cost)),
         "cost_quantile_95": float(np.quantile(episodes.cost, 0.95)),
         "heading_rmse_deg_mean": float(np.mean(episodes.heading_rmse_deg)),
@@ -150,8 +151,3 @@ def pilot_metrics(pilot: Pilot) -> dict[str, Any]:
         "extrapolating_mean": float(np.mean(episodes.extrapolating)),
         "lost_control": int(np.sum(episodes.terminated)),
     }
-
-
-def _finite(value: float) -> float | None:
-    """A number as JSON knows it: infinite margins become null."""
-    return float(value) if np.isfinite(value) else None

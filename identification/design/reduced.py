@@ -10,6 +10,7 @@ from identification.design.reduction import Reduction, reduce, reduced_structure
 from identification.pipeline import identify
 from identification.result import IdentificationResult
 from shipgym import InputError, ShipModel, Trial, UnstableModelError, register_structure
+from shipgym.arrays import finite
 from shipgym.manoeuvres import zigzag
 from shipgym.ships import GreyBox, Structure
 
@@ -39,7 +40,9 @@ class ReducedIdentification:
         """Plain values, ready for JSON."""
         equations = {}
         for q, found in self.reductions.items():
-            path = [asdict(step) | {"relative_errors": _finite(step.relative_errors)} for step in found.path]
+            path = [asdict(step) for step in found.path]
+            for step in path:
+                step["relative_errors"] = {k: finite(e) for k, e in step["relative_errors"].items()}
             equations[q] = {"chosen": found.chosen, "path": path}
         return {
             "structure": self.structure.name,
@@ -96,9 +99,4 @@ def zigzag_sensitivity(model: ShipModel) -> dict[str, float | None]:
         effects = sensitivity(model, partial(zigzag, rudder_deg=20.0, heading_deg=20.0, must_reverse=False))
     except UnstableModelError:
         return {}
-    return _finite(effects)
-
-
-def _finite(values: dict[str, float]) -> dict[str, float | None]:
-    """As JSON knows them: None where a value is infinite."""
-    return {name: value if value < float("inf") else None for name, value in values.items()}
+    return {name: finite(effect) for name, effect in effects.items()}

@@ -24,7 +24,7 @@ from identification.regression.preprocess import smoothed_channels
 from identification.regression.samples import Samples, build_samples
 from identification.validation.folds import TRIALS, held_out_rows
 from shipgym import InputError, ShipModel, Trial
-from shipgym.arrays import Floats
+from shipgym.arrays import Floats, finite
 from shipgym.checks import check_number, check_whole
 from shipgym.ships import GreyBox
 from shipgym.ships.grey_boxes import GREY_BOX
@@ -129,7 +129,7 @@ def fit_kernel(
     report = {
         "kind": RBF, "centres": len(kernel.centres), "features": kernel.basis.shape[1],
         "length": length, "C": weight, "remarks": remarks,
-        "heading_errors_held_out": {k: e if np.isfinite(e) else None for k, e in errors.items()},
+        "heading_errors_held_out": {k: finite(e) for k, e in errors.items()},
     }  # fmt: skip
     return replace(search.fitted(stages[length], weight), report=report)
 
