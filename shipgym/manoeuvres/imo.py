@@ -1,6 +1,6 @@
 """The manoeuvring criteria of the International Maritime Organization: resolution MSC.137(76), 2002."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -109,14 +109,12 @@ def imo_assessment(
     return assess_draws(model, draws)
 
 
-def assess_draws(
-    model: ShipModel, draws: Sequence[ShipModel], progress: Callable[[int], None] | None = None
-) -> dict[str, Criterion]:
-    """The criteria of a model and of models drawn from it; `progress` gets the number of draws done."""
+def assess_draws(model: ShipModel, draws: Sequence[ShipModel]) -> dict[str, Criterion]:
+    """The criteria of a model and of models drawn from it."""
     needed = imo_manoeuvres(model)
     own = {name: attempt(test.evaluate, model)[0] or test.no_indices for name, test in needed.items()}
     evaluated = {name: test.evaluate for name, test in needed.items()}
-    return imo_criteria(model, intervals_of(own, draws, evaluated, progress))
+    return imo_criteria(model, intervals_of(own, draws, evaluated))
 
 
 def imo_manoeuvres(model: ShipModel) -> dict[str, Manoeuvre]:
