@@ -43,8 +43,7 @@ def warm_command(wanted: Wanted = None, everything: All = False, model: Ship = N
     for number, (what, job) in enumerate(jobs.items(), start=1):
         begin, refused = time.perf_counter(), ""
         try:
-            with warnings.catch_warnings():
-                warnings.simplefilter("error", CacheWarning)
+            with warnings.catch_warnings(action="error", category=CacheWarning):
                 job()
         except CacheWarning as error:
             raise InputError(f"{what}: {error}") from None
@@ -101,6 +100,7 @@ def _jobs(name: str, ship: str | None = None) -> Iterator[tuple[str, Callable[[]
 def _make(env_id: str, options: dict[str, Any]) -> None:
     import gymnasium
 
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", DeprecationWarning)  # of ids that have a newer version
+    with warnings.catch_warnings(
+        action="ignore", category=DeprecationWarning
+    ):  # of ids that have a newer version
         gymnasium.make(env_id, **options).close()

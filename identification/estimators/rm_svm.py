@@ -147,8 +147,7 @@ def _through_zero(Z: Floats, e: Floats, C: float, band: float) -> Floats:
     """
     solver = {"dual": True, "tol": 1e-6, "max_iter": MOST_SWEEPS, "random_state": 0}
     quick = LinearSVR(C=C, epsilon=band, fit_intercept=False, **solver)
-    with warnings.catch_warnings():
-        warnings.simplefilter("error", ConvergenceWarning)
+    with warnings.catch_warnings(action="error", category=ConvergenceWarning):
         try:
             return np.asarray(quick.fit(Z, e).coef_, dtype=float)
         except ConvergenceWarning:

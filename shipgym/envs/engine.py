@@ -253,15 +253,10 @@ def fault_in_python(model: ShipModel, task: Task) -> str:
 
     Errors of arithmetic are passed over: compiled code goes on with infinities and NaN.
     """
-
-    def sail() -> None:
-        engine = Engine(model, 1, task, allow_unstable=True, loop=plain_loop)
-        engine.step(np.zeros((1, task.n_commands)))
-
+    still = np.zeros((1, task.n_commands))
     try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            asked(sail)
+        with warnings.catch_warnings(action="ignore"):
+            asked(lambda: Engine(model, 1, task, allow_unstable=True, loop=plain_loop).step(still))
     except InputError as error:
         return "" if isinstance(error.__cause__, ArithmeticError | ValueError) else str(error)
     return ""
