@@ -6,22 +6,10 @@ from typing import TypeVar
 from agents.controllers.controller import Controller
 from shipgym import InputError
 from shipgym.checks import check_choice
+from shipgym.files import shipped_toml
 
-_HOMES = {
-    "pid": "agents.controllers.pid:PID",
-    "pid-filtered": "agents.controllers.filtered_pid:FilteredPID",
-    "lq": "agents.controllers.lq:LQ",
-    "lq-scheduled": "agents.controllers.scheduled_lq:ScheduledLQ",
-    "lqg": "agents.controllers.lqg:LQG",
-    "turn-rate": "agents.controllers.turn_rate:TurnRate",
-    "mpc": "agents.controllers.mpc:MPC",
-    "lq-adaptive": "agents.controllers.adaptive_lq:AdaptiveLQ",
-    "los": "agents.controllers.los_autopilot:LineOfSight",
-    "ilos": "agents.controllers.los_autopilot:IntegralLineOfSight",
-    "alos": "agents.controllers.los_autopilot:AdaptiveLineOfSight",
-    "wheel-over": "agents.controllers.wheel_over:WheelOver",
-    "preview-mpc": "agents.controllers.preview_mpc:PreviewMPC",
-}
+#: Where the classes are, by their kind.
+_HOMES: dict[str, str] = shipped_toml("agents.controllers", "kinds.toml")
 #: Controllers of this package, imported when they are first used.
 BUILT_IN = tuple(_HOMES)
 C = TypeVar("C", bound=Controller)

@@ -1,12 +1,13 @@
 """What the replay page shows of an episode: its states in the units in which they are read."""
 
 from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from shipgym import Episode
 from shipgym.arrays import Floats
+from shipgym.files import shipped_toml
 from shipgym.tasks.guidance import wrapped
 
 DIGITS = 7  # significant, of the numbers in the page: a millimetre in a kilometre; nine decimals at most
@@ -17,29 +18,9 @@ SHOWN = ("x", "y", "psi", "r", "phi", "delta", "n", "heading_error")  # each by 
 CROSS_TRACK = ("cross_track_error", "cross_track")
 
 
-class Quantity(NamedTuple):
-    """One history: its name and unit, its series, that of its order (dashed), and a short name."""
-
-    label: str
-    unit: str
-    decimals: int
-    line: str
-    order: str | None = None
-    short: str | None = None
-
-
 #: What may be shown, in this order; a quantity that no episode has is left out.
-QUANTITIES = (
-    Quantity("heading", "deg", 1, "psi", "course_order"),
-    Quantity("cross-track error", "m", 1, "cross_track_error", short="cross-track"),
-    Quantity("heading error", "deg", 1, "heading_error"),
-    Quantity("rudder", "deg", 1, "delta", "rudder_order"),
-    Quantity("speed through water", "m/s", 2, "speed", short="speed"),
-    Quantity("yaw rate", "deg/s", 2, "yaw_rate"),
-    Quantity("heel", "deg", 1, "heel"),
-    Quantity("shaft speed", "1/min", 1, "shaft_speed"),
-    Quantity("reward so far", "", 2, "reward_so_far"),
-)
+QUANTITIES = shipped_toml("agents.rollouts", "quantities.toml")["quantity"]
+TOLD = ("label", "unit", "decimals", "line", "order", "short")  # of a quantity
 
 
 def run(name: str, episode: Episode) -> dict[str, Any]:
@@ -107,7 +88,8 @@ def series(episode: Episode) -> dict[str, Floats]:
 
 def quantities(runs: list[dict[str, Any]]) -> list[dict[str, Any]]:
     """The histories and read-outs that some of the runs have."""
-    return [one._asdict() for one in QUANTITIES if any(one.line in run["series"] for run in runs)]
+    shown = [one for one in QUANTITIES if any(one["line"] in run["series"] for run in runs)]
+    return [{name: one.get(name) for name in TOLD} for one in shown]
 
 
 def outcome(episode: Episode) -> str:

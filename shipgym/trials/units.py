@@ -9,19 +9,7 @@ from shipgym.files import shipped_toml
 DEGREE, KNOT = math.pi / 180.0, 1852.0 / 3600.0
 
 #: Factor from each unit to SI, by the quantity measured. The first unit of each is the SI one.
-UNITS: dict[str, dict[str, float]] = {
-    "time": {"s": 1.0, "ms": 1e-3, "min": 60.0, "h": 3600.0, "unix": 1.0, "unix ms": 1e-3},
-    "length": {"m": 1.0, "km": 1000.0, "ft": 0.3048, "nm": 1852.0},
-    "angle": {"rad": 1.0, "deg": DEGREE},
-    "angular rate": {"rad/s": 1.0, "deg/s": DEGREE, "deg/min": DEGREE / 60.0},
-    "speed": {"m/s": 1.0, "knots": KNOT, "kn": KNOT, "km/h": 1.0 / 3.6},
-    "shaft speed": {"rps": 1.0, "rpm": 1.0 / 60.0},
-    "force": {"N": 1.0, "kN": 1000.0},
-    "moment": {"N m": 1.0, "kN m": 1000.0},
-    "latitude or longitude": {"deg": 1.0, "ddmm.mm": 1.0},  # the second, as in NMEA 0183, by `read_angles`
-    "acceleration": {"m/s^2": 1.0},
-    "angular acceleration": {"rad/s^2": 1.0, "deg/s^2": DEGREE},
-}
+UNITS: dict[str, dict[str, float]] = shipped_toml("shipgym.trials", "units.toml")
 
 _CHANNELS = shipped_toml("shipgym.trials", "channels.toml")
 
