@@ -31,7 +31,7 @@ def curves() -> dict[str, Any]:
     found: dict[str, Any] = dict(read_json(FOUND, "results", "remove it")) if FOUND.exists() else {}
     for env_id, classical in CLASSICAL.items():
         task = make_plan(Given("ppo", environment=env_id)).task
-        held_out = HeldOut.of(task, EVALUATION_SEED, N_EVALUATIONS)
+        held_out = HeldOut(task, EVALUATION_SEED, N_EVALUATIONS)
         lines = {name: held_out.cost(design(name, task)) for name in classical}
         runs = found.setdefault(env_id, {"model": task.model, "classical": lines, "runs": []})["runs"]
         for seed in SEEDS[len(runs) :]:

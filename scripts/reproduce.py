@@ -11,8 +11,8 @@ from typing import Annotated
 import typer
 from papers.page import ALL, missed, page, papers_of, reproduce, terminal_table
 
-from agents.cli.command import FAILED, Json, answered, fail
-from agents.cli.terminal import err, print_json
+from agents.cli.command import FAILED, answered, fail
+from agents.cli.terminal import answer, err
 from agents.cli.terminal import out as console
 from shipgym.files import write_text
 
@@ -31,7 +31,6 @@ def main(
     images: Annotated[
         Path | None, typer.Option(metavar="FOLDER", help="Draw the papers' figures into this folder.")
     ] = None,
-    as_json: Json = False,
 ) -> None:
     """Run the papers' tables again: printed, ours their way, ours at its best, and whether the aim is met."""
     names = papers_of(paper)
@@ -44,16 +43,14 @@ def main(
         from papers.figures import draw  # matplotlib, and every paper
 
         drawn = [file for name in names for file in draw(name, images)]
-    if as_json:
-        print_json({name: [row.to_dict() for row in rows] for name, rows in results.items()})
-    else:
-        for name, rows in results.items():
-            console.print(terminal_table(name, rows))
-            console.print()
-        if markdown is not None:
-            console.print(f"written: {markdown}", soft_wrap=True)
-        for file in drawn:
-            console.print(f"written: {file}", soft_wrap=True)
+    answer({name: [row.to_dict() for row in rows] for name, rows in results.items()})
+    for name, rows in results.items():
+        console.print(terminal_table(name, rows))
+        console.print()
+    if markdown is not None:
+        console.print(f"written: {markdown}", soft_wrap=True)
+    for file in drawn:
+        console.print(f"written: {file}", soft_wrap=True)
     late = missed(results)
     if late:
         fail(f"{len(late)} aims missed: {'; '.join(late)}", FAILED)

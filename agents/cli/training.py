@@ -89,12 +89,9 @@ def _train(given: Given, out: Path, resume: bool, max_seconds: float | None) -> 
     from agents.training import run_folder
     from agents.training.plan import make_plan
 
-    stored = None
-    if resume:
-        stored = run_folder.read_plan(out, given)
-    else:
+    if not resume:
         run_folder.check_new(out)
-    plan = make_plan(given, stored)
+    plan = make_plan(given, run_folder.read_plan(out, given) if resume else None)
     if resume:
         run_folder.check_resumable(out, plan)
         for line in run_folder.other_versions(out):

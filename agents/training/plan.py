@@ -163,8 +163,7 @@ def read_environment(name: str) -> tuple[str, dict[str, Any]]:
     """Short name and variant's options of an environment, by name or id; InputError names the nearest one."""
     short_names = {task: short for short, (_, task) in ENVIRONMENTS.items()}
     ids = {name: (short_names[options.pop("task")], options) for name, options in environments().items()}
-    known: dict[str, tuple[str, dict[str, Any]]] = {short: (short, {}) for short in ENVIRONMENTS}
-    known |= ids
+    known = {short: (short, dict[str, Any]()) for short in ENVIRONMENTS} | ids
     return known[check_choice(name, known, "env")]
 
 

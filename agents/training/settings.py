@@ -6,12 +6,12 @@ setting of the algorithm to learn from scratch; those that differ beside a base 
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import MISSING, Field, asdict, dataclass, field, fields, replace
+from dataclasses import MISSING, Field, dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any, ClassVar
 
 from agents.controllers.registry import controller_kinds
-from agents.policies.weights_file import present_names
+from agents.policies.weights_file import as_json, present_names
 from agents.suites.suite import ENVIRONMENTS, suite_of
 from shipgym.checks import check_choice, check_keys, check_number, check_table, check_text, check_whole
 from shipgym.errors import InputError
@@ -81,8 +81,7 @@ class Settings:
 
     def to_dict(self) -> dict[str, Any]:
         """The settings by name, ready for JSON."""
-        pairs = asdict(self).items()
-        return {name: list(value) if isinstance(value, tuple) else value for name, value in pairs}
+        return dict(as_json(self))
 
 
 @dataclass(frozen=True)

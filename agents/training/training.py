@@ -9,10 +9,9 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, nullcontext, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, NamedTuple, Self
+from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from agents.agent_file import load_agent
 from agents.controllers.controller import Policy
@@ -24,7 +23,6 @@ from agents.suites.suite import BenchmarkTask
 from agents.training import run_folder
 from agents.training.plan import EVALUATION_SEED, N_EVALUATIONS, Plan
 from agents.training.safe_file import read_values, write_values
-from shipgym.envs.engine import Engine
 from shipgym.errors import InputError
 from shipgym.files import write_json
 
@@ -42,23 +40,20 @@ REACHED = 1.001  # of LQ's cost: a network that has learned nothing yet adds nea
 CHECKPOINT_SECONDS = 45.0  # with a rollout on top a checkpoint is at most a minute old
 
 
-@dataclass(frozen=True)
 class HeldOut:
-    """Episodes of a task that are not learned from, and what LQ costs on them."""
+    """Episodes of a task that are not learned from, with seeds from `first` on, and what LQ costs on them.
 
-    engine: Engine  # with a lane for each
-    seeds: NDArray[np.int64]  # shape (n,)
-    lq_cost: float | None  # mean cost of LQ designed on the task's ship; None where there is none for her
+    LQ follows paths by the course that the task shows.
+    """
 
-    @classmethod
-    def of(cls, task: BenchmarkTask, first: int, number: int, threads: int = 1) -> Self:
-        """The episodes with seeds from `first` on; LQ follows paths by the course that the task shows."""
-        found = cls(task.engine(number, threads=threads), first + np.arange(number), None)
+    def __init__(self, task: BenchmarkTask, first: int, number: int, threads: int = 1) -> None:
+        self.engine, self.seeds = task.engine(number, threads=threads), first + np.arange(number)
         lq = None
         if task.task.action == "rudder":
             with suppress(InputError):
                 lq = design("lq", task)
-        return found if lq is None else replace(found, lq_cost=found.cost(lq))
+        #: Mean cost of LQ designed on the task's ship; None where there is none for her.
+        self.lq_cost = None if lq is None else self.cost(lq)
 
     def cost(self, policy: Policy) -> float:
         """Mean cost of a policy."""
@@ -167,7 +162,7 @@ class _Training(BaseCallback):  # type: ignore[misc]  # stable-baselines3 is not
         self.plan, self.folder, self.tell, self.max_seconds = plan, folder, tell, max_seconds
         self.started = time.monotonic()
         base = design_base(plan.settings.base, plan.task)
-        self.held_out = HeldOut.of(plan.task, EVALUATION_SEED, N_EVALUATIONS, plan.threads)
+        self.held_out = HeldOut(plan.task, EVALUATION_SEED, N_EVALUATIONS, plan.threads)
         self.agent = make_agent(plan, base)
         self.policy: LearnedPolicy | None = None
         #: What evaluations found so far.

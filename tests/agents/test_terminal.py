@@ -273,10 +273,11 @@ def test_lines_have_110_characters_where_there_is_no_terminal():
 
 
 def test_a_result_for_programs_is_indented_json(capsys):
-    terminal.print_json({"a": [1.5], "b": None})
-    assert capsys.readouterr().out == '{\n "a": [\n  1.5\n ],\n "b": null\n}\n'
-    with pytest.raises(ValueError, match="JSON"):
-        terminal.print_json({"a": np.nan})
+    with terminal.printing(as_json=True, quiet=False):
+        terminal.answer({"a": [1.5], "b": None})
+        assert capsys.readouterr().out == '{\n "a": [\n  1.5\n ],\n "b": null\n}\n'
+        with pytest.raises(ValueError, match="JSON"):
+            terminal.answer({"a": np.nan})
 
 
 def state():
