@@ -15,6 +15,7 @@ from filelock import FileLock, Timeout
 
 from shipgym.errors import InputError
 from shipgym.files import DRAFT, abandoned_drafts, atomic_path, draft_folder, remove_drafts
+from shipgym.plots import graph_objects
 
 ASIDE = ".old"
 PROCESS = "process"
@@ -56,11 +57,13 @@ def present(folder: Path) -> list[str]:
     return sorted(one.name for one in folder.iterdir() if one.name != lock and not DRAFT.fullmatch(one.name))
 
 
-def check_page(path: Path) -> None:
+def check_page(path: Path, plots: bool = False) -> None:
     """Refuse a file for a page: one that does not end in .html, a folder, or one that cannot be written.
 
-    Raises InputError naming the file.
+    Raises InputError naming the file; or if there shall be `plots` and plotly is missing.
     """
+    if plots:
+        graph_objects()
     if path.suffix.lower() not in (".html", ".htm"):
         raise InputError(f"{path}: ending '{path.suffix}' found, expected a file that ends in .html")
     check_file(path)

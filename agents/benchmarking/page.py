@@ -17,7 +17,6 @@ from agents.suites.suite import N_EPISODES, load_suite
 from identification.progress import Progress
 from shipgym.files import shipped_toml, write_text
 from shipgym.pages import render
-from shipgym.plots import graph_objects
 
 PAGE = "index.html"
 WORST = 3  # episodes of each contestant in each task that may be replayed
@@ -51,8 +50,7 @@ def write_page(
         Told the stage of the work, what is done and the total.
     """
     target = Path(path)
-    check_page(target)
-    graph_objects()  # refuse a missing extra before the work
+    check_page(target, plots=True)
     count, episodes = replayable(result, worst)
     write_text(_page(result, rerun(result, episodes, controllers, workers, progress), count), target)
 

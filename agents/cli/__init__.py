@@ -76,14 +76,15 @@ def trials_command(
     """
     from agents.cli.standard_trials import standard_trials
     from agents.cli.terminal import answer, progress_bars
-    from agents.cli.trials_page import check_page, write_page
+    from agents.cli.trials_page import write_page
+    from agents.output import check_page
     from shipgym.ships import load_model
 
     ship = load_model(model)
     water_depth = float("inf") if depth is None else depth
     ship.check_depth(water_depth)
     if out is not None:
-        check_page(out)
+        check_page(out, plots=True)
     with progress_bars() as progress:
         tell = None if progress is None else (lambda done: progress("models drawn", done, draws))
         found = standard_trials(ship, draws, seed, tell, water_depth)

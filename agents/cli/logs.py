@@ -72,14 +72,14 @@ def look_command(
 ) -> None:
     """Draw the trials of a ship file, or a log. Shows track, channels, repairs and problems found."""
     from agents.cli.terminal import answer, say, warn
-    from agents.cli.trials_page import check_page
+    from agents.output import check_page
     from shipgym.files import write_text
     from shipgym.pages import render
     from shipgym.plots import history_figure, path_figure
     from shipgym.trials.guesses import guess_trial
     from shipgym.trials.ship_file import ShipFile
 
-    check_page(out)
+    check_page(out, plots=True)
     trials = ShipFile.load(log).trials() if log.suffix == ".toml" else [guess_trial(log).trial]
     tracks = [path_figure({"measured": one}) if {"x", "y"} <= one.channels.keys() else None for one in trials]
     histories = [history_figure({"measured": one}, HISTORIES) for one in trials]

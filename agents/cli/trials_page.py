@@ -3,28 +3,18 @@
 from pathlib import Path
 from typing import Any
 
-from agents import output
 from agents.cli.standard_trials import StandardTrials
 from agents.verification.figures import criterion_name
 from shipgym.files import write_text
 from shipgym.manoeuvres.spirals import Spiral
 from shipgym.manoeuvres.standard import FAMILIES, Manoeuvre
 from shipgym.pages import render
-from shipgym.plots import graph_objects, history_figure, manoeuvre_figure, path_figure, pull_out_figure
+from shipgym.plots import history_figure, manoeuvre_figure, path_figure, pull_out_figure
 from shipgym.ships import ShipModel
 from shipgym.trials.trial import Trial
 
 HISTORIES = ("psi", "delta", "r", "speed", "drift")
 UNITS = {"_deg_s": "deg/s", "_deg": "deg", "_lengths": "ship lengths", "_s": "s"}
-
-
-def check_page(path: Path) -> None:
-    """Refuse a file for figures that cannot be written, before any work.
-
-    Raises InputError if plotly is missing, the ending is not .html, or the folder cannot be written.
-    """
-    graph_objects()
-    output.check_page(path)
 
 
 def write_page(model: ShipModel, found: StandardTrials, path: Path) -> None:

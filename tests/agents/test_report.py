@@ -13,7 +13,8 @@ from jinja2 import UndefinedError
 
 from agents.cli import _print_result
 from agents.cli.standard_trials import StandardTrials
-from agents.cli.trials_page import _readable, check_page, write_page
+from agents.cli.trials_page import _readable, write_page
+from agents.output import check_page
 from agents.verification.figures import band, translucent
 from agents.verification.page import write_report
 from shipgym import InputError, Trial, load_model
@@ -248,10 +249,11 @@ def test_an_index_is_told_in_words_with_its_unit(index, words):
 
 
 def test_a_page_that_cannot_be_drawn_is_refused_before_any_work(tmp_path, monkeypatch):
-    check_page(tmp_path / "trials.html")
+    check_page(tmp_path / "trials.html", plots=True)
     monkeypatch.setitem(sys.modules, "plotly.graph_objects", None)
     with pytest.raises(InputError, match="plotly is not installed"):
-        check_page(tmp_path / "trials.html")
+        check_page(tmp_path / "trials.html", plots=True)
+    check_page(tmp_path / "trials.html")
 
 
 def test_a_figure_cannot_end_the_script_it_stands_in():
