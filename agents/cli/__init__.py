@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import os
 import sys
+import tomllib
 import warnings
-from collections.abc import Callable
 from io import TextIOWrapper
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -228,31 +228,18 @@ def doctor_command() -> None:
         raise typer.Exit(FAILED)
 
 
-#: The commands, each with the example that stands below its help.
-COMMANDS: dict[str, tuple[Callable[..., None], str]] = {
-    "new-ship": (new_ship_command, "zigzag.csv circle.csv --length 160.9"),
-    "look": (look_command, "ship.toml --out look.html"),
-    "identify": (identify_command, "ship.toml --structure abkowitz --out my_ship/"),
-    "advise": (advise_command, "ship.toml --criterion c --number 2"),
-    "reduce": (reduce_command, "ship.toml --direction backward --out my_ship/"),
-    "trials": (trials_command, "my_ship/model.json --out trials.html"),
-    "autopilot": (autopilot_command, "ship.toml --draws 200 --out report/"),
-    "export": (export_command, "report/lq.json --c lq/"),
-    "steer": (steer_command, "report/lq.json --nmea tcp:192.168.1.20:10110 --heading 45"),
-    "simulate": (simulate_command, "my_ship/model.json --nmea tcp:127.0.0.1:10110 --sea moderate"),
-    "train": (train_command, "sac --env path-following-v1 --model my_ship/model.json --out run/"),
-    "tune": (tune_command, "sac --trials 40 --workers 2 --out study/"),
-    "benchmark": (benchmark_command, "--suite shipgym-v1 --controllers pid,lq,ppo --out results/"),
-    "reproduce": (reproduce_command, "cao2015 --markdown tables.md"),
-    "warm": (warm_command, "my_ship/model.json"),
-    "replay": (replay_command, "recordings/episode-0.json --out replay.html"),
-    "doctor": (doctor_command, "--json"),
-}
+#: An example of each command, which stands below its help.
+EXAMPLES = tomllib.loads(Path(__file__).with_name("examples.toml").read_text("utf-8"))
+COMMANDS = (
+    new_ship_command, look_command, identify_command, advise_command, reduce_command, trials_command,
+    autopilot_command, export_command, steer_command, simulate_command, train_command, tune_command,
+    benchmark_command, reproduce_command, warm_command, replay_command, doctor_command,
+)  # fmt: skip
 IDENTIFYING = ("identify", "advise", "reduce", "autopilot")  # they take the options of `identify`
 
-for name, (function, example) in COMMANDS.items():
+for name, function in zip(EXAMPLES, COMMANDS, strict=True):
     kind = command.IdentifyCommand if name in IDENTIFYING else None
-    app.command(name, epilog=f"Example: shipgym {name} {example}", cls=kind)(function)
+    app.command(name, epilog=f"Example: shipgym {name} {EXAMPLES[name]}", cls=kind)(function)
 
 
 def _show_warning(message: Warning | str, *_: Any, **__: Any) -> None:

@@ -73,9 +73,14 @@ def printing(as_json: bool, quiet: bool) -> Iterator[None]:
 
 
 def answer(fields: Mapping[str, Any]) -> None:
-    """The result of a command, printed where `--json` asks for it: one JSON object, for programs to read."""
+    """The result of a command, printed where `--json` asks for it."""
     if AS_JSON.get():
-        print(json.dumps(fields, indent=1, allow_nan=False))
+        print_json(fields)
+
+
+def print_json(fields: Mapping[str, Any]) -> None:
+    """One JSON object, for programs to read."""
+    print(json.dumps(fields, indent=1, allow_nan=False))
 
 
 def say(*lines: str | Text) -> None:

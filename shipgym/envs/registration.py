@@ -7,26 +7,13 @@ import gymnasium
 
 from shipgym.checks import check_text
 from shipgym.errors import InputError
+from shipgym.files import shipped_toml
 from shipgym.tasks.source import kept_source
 
-#: Keywords of the variants by id, without the version.
-VARIANTS: dict[str, dict[str, Any]] = {
-    "": {}, "Discrete": {"action": "rudder-discrete"},
-    "Shaft": {"action": "rudder-shaft", "model": "kvlcc2"},
-    "Roll": {"roll": True, "roll_weight": 1.0, "model": "container"},
-}  # fmt: skip
+#: Keywords of the variants by id, without the version, and models that are the defaults of ids of version 1.
+VARIANTS, IDENTIFIED = shipped_toml("shipgym.envs", "variants.toml").values()
 #: Tasks by their names, a version in them where it is not the first.
 TASKS = ("CourseKeeping", "PathFollowing", "PathFollowing-v1")
-#: Identified models that are the defaults of ids of version 1, most by a method or of a ship of their own.
-#: Ids of version 0 keep the ships that they have; that of course keeping is identified anyway.
-IDENTIFIED = {
-    "shipgym/CourseKeepingShaft-v1": "kvlcc2-mmg",
-    "shipgym/CourseKeepingRoll-v1": "container-4dof-output-error",
-    "shipgym/PathFollowing-v1": "container-abc-lssvr",
-    "shipgym/PathFollowingDiscrete-v1": "kvlcc2-tanker-rm-svm",
-    "shipgym/PathFollowingShaft-v1": "tanker-tls-svm",
-    "shipgym/PathFollowingRoll-v1": "container-4dof-output-error",
-}
 
 
 def env_id(task: str, variant: str = "") -> str:

@@ -6,18 +6,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shipgym.errors import InputError
+from shipgym.files import shipped_toml
 from shipgym.plots.style import Figure, Panel, axis, line, line_styles, panels
 from shipgym.trials.trial import Trial
 
 #: Axis title and factor from SI of each channel and of what u and v give; m/s and degrees.
 AXES: dict[str, tuple[str, float]] = {
-    "x": ("north, m", 1.0), "y": ("east, m", 1.0), "psi": ("heading, deg", 180.0 / np.pi),
-    "u": ("surge, m/s", 1.0), "v": ("sway, m/s", 1.0), "r": ("yaw rate, deg/s", 180.0 / np.pi),
-    "p": ("roll rate, deg/s", 180.0 / np.pi), "phi": ("heel, deg", 180.0 / np.pi),
-    "delta": ("rudder, deg", 180.0 / np.pi), "delta_command": ("rudder order, deg", 180.0 / np.pi),
-    "n": ("shaft, rev/s", 1.0), "n_command": ("shaft order, rev/s", 1.0), "speed": ("speed, m/s", 1.0),
-    "drift": ("drift angle, deg", 180.0 / np.pi), "wind_speed": ("wind, m/s", 1.0),
-}  # fmt: skip
+    name: (title, 180.0 / np.pi if "deg" in title else 1.0)
+    for name, title in shipped_toml("shipgym.plots", "axes.toml").items()
+}
 
 ROW_HEIGHT = 150  # of one channel's time history, pixels
 MOST_SAMPLES = 1500  # drawn of one line, more than a page has pixels; spirals have many more
