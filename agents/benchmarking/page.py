@@ -82,15 +82,12 @@ def _task(result: BenchmarkResult, again: Rerun, task: str) -> dict[str, Any]:
     """What the page shows of a task."""
     found = result.summary["tasks"][task]
     return {
-        "name": task,
-        **result.summary["suite"]["tasks"][task],
-        "found": found,
+        "name": task, **result.summary["suite"]["tasks"][task], "found": found,
         "best": bests_of(result, task),
         "metrics": [(name, *METRICS[name]) for name in METRICS if _is_shown(name, found)],
-        "costs": figures.costs_figure(result, task),
-        "seed": hardest_of(result, task),
+        "costs": figures.costs_figure(result, task), "seed": hardest_of(result, task),
         "hardest": _hardest(result, again, task),
-    }
+    }  # fmt: skip
 
 
 def _is_shown(metric: str, found: Mapping[str, Any]) -> bool:

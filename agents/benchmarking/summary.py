@@ -67,18 +67,15 @@ class _Summary:
             usual = statistics.interquartile_cost(cost, self.draws, number, who)
             seconds = float(np.mean([run["seconds_per_action"] for run in runs]))
             found[self.names[who]] = {
-                "cost": mean.to_dict(),
-                "cost_iqm": usual.to_dict(),
+                "cost": mean.to_dict(), "cost_iqm": usual.to_dict(),
                 "score": (NOTHING if reference is None else _score(mean, reference)).to_dict(),
-                "relative_cost": finite(mean.value / lowest),
-                "runs": len(runs),
-                "lost": _count(runs, "terminated"),
-                "failed": _count(runs, "failed"),
+                "relative_cost": finite(mean.value / lowest), "runs": len(runs),
+                "lost": _count(runs, "terminated"), "failed": _count(runs, "failed"),
                 "failure": next((run["failure"] for run in runs if run["failure"]), ""),
                 "policy_sha256": [run["policy_sha256"] for run in runs],
                 "microseconds_per_action": finite(1e6 * seconds),
                 "metrics": _figures([run["episodes"] for run in runs]),
-            }
+            }  # fmt: skip
         return found
 
     def ranking(self, by_task: Mapping[str, Mapping[str, Any]]) -> list[dict[str, Any]]:

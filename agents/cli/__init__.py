@@ -35,11 +35,9 @@ if TYPE_CHECKING:
 app = typer.Typer(
     cls=command.Commands,
     epilog="Example: shipgym new-ship zigzag.csv, then shipgym autopilot ship.toml --out report/",
-    no_args_is_help=True,
-    pretty_exceptions_enable=False,
-    rich_markup_mode=None,
+    no_args_is_help=True, pretty_exceptions_enable=False, rich_markup_mode=None,
     context_settings={"help_option_names": ["-h", "--help"]},
-)
+)  # fmt: skip
 
 
 def _version(wanted: bool) -> None:

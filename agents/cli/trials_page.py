@@ -20,13 +20,10 @@ UNITS = {"_deg_s": "deg/s", "_deg": "deg", "_lengths": "ship lengths", "_s": "s"
 def write_page(model: ShipModel, found: StandardTrials, path: Path) -> None:
     """Write indices, criteria and figures as one self-contained page."""
     page = render(
-        "agents.cli/trials.html",
-        model=model,
-        water=found.water,
-        draws=found.draws,
+        "agents.cli/trials.html", model=model, water=found.water, draws=found.draws,
         criteria={criterion_name(name, one): one for name, one in found.criteria.items()},
         sections=[_section(name, family, found) for name, family in found.families.items() if family],
-    )
+    )  # fmt: skip
     write_text(page, path)
 
 
@@ -35,13 +32,11 @@ def _section(name: str, family: dict[str, Manoeuvre], found: StandardTrials) -> 
     keys = list(family)
     indices = dict.fromkeys(index for key in keys for index in found.indices[key])
     return {
-        "name": name,
-        "title": FAMILIES[name].title,
-        "manoeuvres": keys,
+        "name": name, "title": FAMILIES[name].title, "manoeuvres": keys,
         "indices": {_readable(index): [found.indices[key].get(index) for key in keys] for index in indices},
         "refused": {key: found.refused[key] for key in keys if key in found.refused},
         "figures": _figures(name, family, {key: found.sailed[key] for key in keys if key in found.sailed}),
-    }
+    }  # fmt: skip
 
 
 def _figures(

@@ -53,12 +53,10 @@ def read_controller(content: Mapping[str, Any], where: str) -> Controller:
             neutral_sway=_number(content["neutral_sway"], NUMBERS, "neutral_sway"),
             margins=_margins(content["margins"]),
             observation_scales=read_scales(content["observation_scales"], observes),
-            design=_numbers(content["design"], needed, "design"),
-            observation_names=observes,
-            **read_model(content["model"]),
-            **_arrays(content.get("arrays", {}), design.arrays),
+            design=_numbers(content["design"], needed, "design"), observation_names=observes,
+            **read_model(content["model"]), **_arrays(content.get("arrays", {}), design.arrays),
             **_parts(content, design),
-        )
+        )  # fmt: skip
 
 
 def _parts(content: Mapping[str, Any], design: type[Controller]) -> dict[str, Any]:

@@ -55,11 +55,9 @@ class LQG(Controller):
     kind: ClassVar[str] = "lqg"
     feedback: ClassVar[Mapping[str, tuple[str, float]]] = LQ.feedback
     arrays: ClassVar[Mapping[str, tuple[str | int, ...]]] = {
-        "transition": ("states", "states"),
-        "input": ("states",),
-        "kalman": ("states", len(OUTPUTS)),
+        "transition": ("states", "states"), "input": ("states",), "kalman": ("states", len(OUTPUTS)),
         "output": (len(OUTPUTS), "states"),
-    }
+    }  # fmt: skip
     reads: ClassVar[tuple[str, ...]] = ("yaw_rate", "rudder")
     ranges: ClassVar[Mapping[str, Range]] = {**Controller.ranges, "new_course_rad": Range(1e-6, 1e6)}
 

@@ -87,16 +87,14 @@ class PreviewMPC(WheelOver):
         guide = super().from_model(model, autopilot=autopilot, task=asked, **settings)
         steps = horizon_lengths * length / model.particulars["speed"] / (COARSE * guide.design["dt"])
         costs = {
-            "corridor": asked.corridor * length,
-            "horizon_steps": float(max(1, round(steps))),
+            "corridor": asked.corridor * length, "horizon_steps": float(max(1, round(steps))),
             "deviation": float(np.radians(deviation_deg)),
             "acceptance": length * float(getattr(asked.settings, "acceptance", 0.0)),
-            "water_depth": min(asked.water_depth, DEEP),
-            "rudder": asked.rudder_weight / HEADING_SCALE**2,
+            "water_depth": min(asked.water_depth, DEEP), "rudder": asked.rudder_weight / HEADING_SCALE**2,
             "rudder_rate": asked.rudder_rate_weight / HEADING_SCALE**2,
             "rudder_travel": getattr(asked.settings, "rudder_travel_weight", 0.0) / HEADING_SCALE,
             "roll": asked.roll_weight / float(np.radians(asked.roll_scale_deg)) ** 2,
-        }
+        }  # fmt: skip
         return replace(guide, design={**guide.design, **costs})
 
     def to_dict(self) -> dict[str, Any]:

@@ -41,10 +41,8 @@ class ScheduledLQ(Controller):
     kind: ClassVar[str] = "lq-scheduled"
     feedback: ClassVar[Mapping[str, tuple[str, float]]] = LQ.feedback
     arrays: ClassVar[Mapping[str, tuple[str | int, ...]]] = {
-        "speeds": ("speeds",),
-        "schedule": ("speeds", len(SIGNALS)),
-        "neutral": ("speeds", 2),
-    }
+        "speeds": ("speeds",), "schedule": ("speeds", len(SIGNALS)), "neutral": ("speeds", 2),
+    }  # fmt: skip
 
     speeds: Floats
     schedule: Floats

@@ -95,10 +95,8 @@ class TurnRate(Controller):
             rate = np.radians(check_number(rate_deg_min, "rate_deg_min", above=0.0, at_most=most)) / 60.0
         gains = {
             "proportional": max(2.0 * DAMPING * wanted - 1.0 / form.T, wanted) / form.rudder_effect,
-            "integral": wanted**2 / form.rudder_effect,
-            "heading_time": SLOWER / wanted,
-            "rate": float(rate),
-        }
+            "integral": wanted**2 / form.rudder_effect, "heading_time": SLOWER / wanted, "rate": float(rate),
+        }  # fmt: skip
         design = {"frequency": wanted, "nomoto_K": form.K, "nomoto_T": form.T}
         return cls.designed(model, ship, gains, design, rates=rates, rudders=rudders)
 

@@ -75,16 +75,14 @@ def _learned(content: Mapping[str, Any], tensors: Tensors, prefix: str) -> Learn
     names = _names(content["observation_names"])
     place = check_table(content["environment"], "environment", ("id", "options"))
     return LearnedPolicy(
-        network=_network(content["network"], tensors, prefix),
-        observation_names=names,
+        network=_network(content["network"], tensors, prefix), observation_names=names,
         observation_scales=read_scales(content["observation_scales"], names),
         **{name: content[name] for name in ("action", "frame_stack", "authority", *LATER["learned"])},
         base=None if content["base"] is None else _controller(content, "base"),
         env_id=check_text(place.get("id"), "environment.id"),
         env_options=dict(check_table(place.get("options"), "environment.options")),
-        **read_model(content["model"]),
-        training=dict(check_table(content["training"], "training")),
-    )
+        **read_model(content["model"]), training=dict(check_table(content["training"], "training")),
+    )  # fmt: skip
 
 
 def _shielded(content: Mapping[str, Any], tensors: Tensors, prefix: str) -> Shielded:

@@ -59,12 +59,9 @@ def series(episode: Episode) -> dict[str, Floats]:
     heading = np.unwrap(states["psi"])
     heading -= 2.0 * np.pi * np.floor(heading[0] / (2.0 * np.pi))
     found: dict[str, Floats] = {
-        "x": states["x"],
-        "y": states["y"],
-        "psi": np.degrees(heading),
-        "delta": np.degrees(states["delta"]),
+        "x": states["x"], "y": states["y"], "psi": np.degrees(heading), "delta": np.degrees(states["delta"]),
         "reward_so_far": np.append(0.0, np.cumsum(episode.rewards)),
-    }
+    }  # fmt: skip
     if "u" in states:
         found["speed"] = np.hypot(states["u"], states["v"]) if "v" in states else np.abs(states["u"])
     for shown, name in (("yaw_rate", "r"), ("heel", "phi")):

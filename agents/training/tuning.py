@@ -189,13 +189,11 @@ def _frozen(trial: Trial, space: Mapping[str, Any]) -> optuna.trial.FrozenTrial:
     """A trial as Optuna knows it."""
     states = optuna.trial.TrialState
     return optuna.trial.create_trial(
-        state=states.PRUNED if trial.cost is None else states.COMPLETE,
-        value=trial.cost,
-        params=dict(trial.parameters),
-        distributions={name: space[name] for name in trial.parameters},
+        state=states.PRUNED if trial.cost is None else states.COMPLETE, value=trial.cost,
+        params=dict(trial.parameters), distributions={name: space[name] for name in trial.parameters},
         user_attrs={"number": trial.number, "ended": trial.ended, "settings": dict(trial.settings)},
         intermediate_values=dict(trial.curve),
-    )
+    )  # fmt: skip
 
 
 def _opened(folder: Path, plan: Plan, fixed: Sequence[str]) -> optuna.Study:

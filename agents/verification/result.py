@@ -94,12 +94,9 @@ class AutopilotResult:
         """The contents of metrics.json."""
         result = self.identification
         metrics: dict[str, Any] = {
-            **result.metrics,
-            "stable": self.stable,
-            "instability": self.instability,
-            "refusal": self.refusal,
+            **result.metrics, "stable": self.stable, "instability": self.instability, "refusal": self.refusal,
             "diagnostics": {name: found.to_dict() for name, found in result.diagnostics.items()},
-        }
+        }  # fmt: skip
         if self.verification is not None:
             metrics |= verification_metrics(self.verification)
         return metrics
@@ -129,12 +126,10 @@ def track_metrics(track: Track) -> dict[str, Any]:
     drawn = track.largest[1:] if len(track.largest) > 1 else track.largest
     return {
         "gains": {name: float(value) for name, value in track.controller.gains.items()},
-        "cross_track_largest_m": float(track.largest[0]),
-        "cross_track_rmse_m": float(track.rms[0]),
+        "cross_track_largest_m": float(track.largest[0]), "cross_track_rmse_m": float(track.rms[0]),
         "cross_track_largest_m_quantile_95": float(np.quantile(drawn, 0.95)),
-        "arrived": bool(track.arrived[0]),
-        "not_arrived": int(np.sum(~track.arrived[1:])),
-    }
+        "arrived": bool(track.arrived[0]), "not_arrived": int(np.sum(~track.arrived[1:])),
+    }  # fmt: skip
 
 
 def pilot_metrics(pilot: Pilot) -> dict[str, Any]:

@@ -111,11 +111,9 @@ def build_samples(
     return Samples(
         {q: np.concatenate([part.features[q] for part in parts]) for q in structure.regressed},
         {q: np.concatenate([part.targets[q] for part in parts]) for q in structure.regressed},
-        np.concatenate([part.start for part in parts]),
-        np.concatenate([part.duration for part in parts]),
-        np.concatenate([part.trial for part in parts]),
-        max(part.window for part in parts),
-    )
+        np.concatenate([part.start for part in parts]), np.concatenate([part.duration for part in parts]),
+        np.concatenate([part.trial for part in parts]), max(part.window for part in parts),
+    )  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)

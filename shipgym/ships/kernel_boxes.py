@@ -214,12 +214,9 @@ def kernel_accelerations(
 
 
 SUMMED = {
-    "sail_lanes": Part(stages.sail_lanes, inline=False),
-    "term_accelerations": Part(accelerations),
-    "point_of": Part(coordinates),
-    "row_sums": Part(add_centre),
-    "sum_accelerations": Part(sum_accelerations),
-}
+    "sail_lanes": Part(stages.sail_lanes, inline=False), "term_accelerations": Part(accelerations),
+    "point_of": Part(coordinates), "row_sums": Part(add_centre), "sum_accelerations": Part(sum_accelerations),
+}  # fmt: skip
 
 
 @cache

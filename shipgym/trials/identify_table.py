@@ -145,15 +145,12 @@ def _is(value: Any, *kinds: type) -> bool:
 
 #: How each kind of value is recognised in a file; the words stand in messages.
 KINDS: dict[str, Callable[[Any], bool]] = {
-    TEXT: lambda value: _is(value, str),
-    FLAG: lambda value: _is(value, bool),
-    NUMBER: lambda value: _is(value, Real),
-    WHOLE: lambda value: _is(value, int),
+    TEXT: lambda value: _is(value, str), FLAG: lambda value: _is(value, bool),
+    NUMBER: lambda value: _is(value, Real), WHOLE: lambda value: _is(value, int),
     TEXTS: lambda value: isinstance(value, list) and all(_is(one, str) for one in value),
     TWO_NUMBERS: lambda value: isinstance(value, list) and [_is(one, Real) for one in value] == [True] * 2,
-    WHOLE_OR_TEXT: lambda value: _is(value, int, str),
-    TEXT_OR_TABLE: lambda value: _is(value, str, Mapping),
-}
+    WHOLE_OR_TEXT: lambda value: _is(value, int, str), TEXT_OR_TABLE: lambda value: _is(value, str, Mapping),
+}  # fmt: skip
 
 
 def check_options(table: Any, where: str) -> dict[str, Any]:
