@@ -10,7 +10,12 @@ from agents.controllers.controller import model_hash
 from agents.policies.weights_file import as_json
 from agents.suites.suite import ENVIRONMENTS, BenchmarkTask, find_task
 from agents.training.settings import (
-    Settings, changed, load_settings, make_settings, read_settings_file, settings_of,
+    Settings,
+    changed,
+    load_settings,
+    make_settings,
+    read_settings_file,
+    settings_of,
 )  # fmt: skip
 from shipgym.checks import check_choice, check_keys, check_whole
 from shipgym.envs.registration import environments

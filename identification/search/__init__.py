@@ -6,7 +6,10 @@ from typing import Any, cast
 from numpy.typing import ArrayLike
 
 from identification.search.optimisers import (
-    ArtificialBeeColony, DifferentialEvolution, GridSearch, ParticleSwarm,
+    ArtificialBeeColony,
+    DifferentialEvolution,
+    GridSearch,
+    ParticleSwarm,
 )  # fmt: skip
 from identification.search.search import Objective, Optimiser, SearchResult
 from shipgym import InputError

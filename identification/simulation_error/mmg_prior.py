@@ -17,7 +17,12 @@ import numpy as np
 
 from identification.simulation_error.formulas import FORMULAS, main_dimensions
 from identification.simulation_error.similarity import (
-    AUTO, LEAST_SIMILARITY, check_alike, correlations, select_reference, similarity_vector,
+    AUTO,
+    LEAST_SIMILARITY,
+    check_alike,
+    correlations,
+    select_reference,
+    similarity_vector,
 )  # fmt: skip
 from shipgym import InputError, Particulars, ShipModel, load_model
 from shipgym.arrays import Floats

@@ -5,7 +5,11 @@ A new manoeuvre is a file and a call of `register_manoeuvre`: here, or in the fi
 
 from shipgym.manoeuvres.pull_outs import standard_pull_outs
 from shipgym.manoeuvres.registry import (
-    FAMILIES, Manoeuvre, families_of, register_manoeuvre, standard_manoeuvres,
+    FAMILIES,
+    Manoeuvre,
+    families_of,
+    register_manoeuvre,
+    standard_manoeuvres,
 )  # fmt: skip
 from shipgym.manoeuvres.spirals import standard_spirals
 from shipgym.manoeuvres.stopping import standard_stops

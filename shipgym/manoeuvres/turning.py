@@ -7,7 +7,12 @@ import numpy as np
 
 from shipgym.arrays import Floats
 from shipgym.manoeuvres.execution import (
-    execute_time, number_of_steps, reached, require, ship_length, turning_rudder,
+    execute_time,
+    number_of_steps,
+    reached,
+    require,
+    ship_length,
+    turning_rudder,
 )  # fmt: skip
 from shipgym.manoeuvres.registry import SIDES, Manoeuvre, standard_time
 from shipgym.sea.conditions import Weather
