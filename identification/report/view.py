@@ -11,7 +11,7 @@ from identification.report.predictions import overview_figure, prediction_figure
 from identification.report.sea import sea_sentences, track_figure
 from identification.report.summary import PRIME, are_derivatives, kernel_text
 from identification.validation.warnings import EQUATIONS, heading_errors_deg, model_warnings
-from shipgym import Particulars, Trial
+from shipgym import Trial
 from shipgym.files import shipped_toml
 from shipgym.ships.particulars import ADDED_MASSES
 from shipgym.trials.units import KNOT
@@ -22,19 +22,15 @@ WORDS: dict[str, dict[str, Any]] = shipped_toml("identification.report", "words.
 
 def fit_view(fit: Fit) -> dict[str, Any]:
     """What the macros in `sections.html` show of a fit but for its figures."""
-    short, provenance, ship = short_names(fit.trials), fit.model.provenance or {}, fit.model.particulars
+    short, provenance = short_names(fit.trials), fit.model.provenance or {}
     return {
         "model": fit.model, "provenance": provenance, "warnings": model_warnings(fit),
         "sea": sea_sentences(provenance),
         "equations": {EQUATIONS.get(name, name): found for name, found in fit.diagnostics.items()},
         "trials": [_trial(trial, short[trial.name]) for trial in fit.trials],
-        "uses": [trial.use for trial in fit.trials],
-        "errors": {short[name]: _errors(found) for name, found in fit.metrics["trials"].items()},
-        "heading": _heading(fit), "reference": _reference(fit, short), "particulars": _particulars(ship),
-        "added_masses": [
-            (name, name in ship.estimated, ship[name] / PRIME)
-            for name in ADDED_MASSES if ship[name] is not None
-        ],
+        "errors": {short[name]: found | {"trial": name} for name, found in fit.metrics["trials"].items()},
+        "heading": _heading(fit), "reference": fit.metrics.get("reference"), "words": WORDS,
+        "added_masses": [name for name in ADDED_MASSES if fit.model.particulars[name] is not None],
         "derivatives": are_derivatives(fit.model), "coefficients": _coefficients(fit),
         "kernel": kernel_text(provenance["kernel"]) if provenance.get("kernel") else None,
     }  # fmt: skip
@@ -68,16 +64,6 @@ def _trial(trial: Trial, name: str) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _errors(metrics: dict[str, Any]) -> dict[str, Any]:
-    """A row of the table of errors, with the manoeuvre's indices by name and unit."""
-    indices = [
-        (text, metrics[name]["measured"], metrics[name]["predicted"], metrics[name].get("closed_loop"), unit)
-        for name, (text, unit) in WORDS["indices"].items()
-        if metrics.get(name) is not None
-    ]
-    return {**metrics, "indices": indices}
-
-
 def _heading(fit: Fit) -> dict[str, Any] | None:
     """Heading error on the trials that were not fitted, else on those that were, degrees."""
     unseen = any(metrics["use"] == "validate" for metrics in fit.metrics["trials"].values())
@@ -86,26 +72,6 @@ def _heading(fit: Fit) -> dict[str, Any] | None:
     worst = max(errors, key=lambda name: errors[name])
     median, largest = float(np.median(list(errors.values()))), errors[worst]
     return {"unseen": unseen, "median": median, "largest": largest, "trial": PurePath(worst).name}
-
-
-def _reference(fit: Fit, short: dict[str, str]) -> dict[str, Any] | None:
-    """Heading errors of a grey box and of its bare reference ship, rad; None for other structures."""
-    if (reference := fit.metrics.get("reference")) is None:
-        return None
-    errors = {
-        short[name]: (metrics["rmse"]["psi"], reference["trials"][name]["rmse"]["psi"])
-        for name, metrics in fit.metrics["trials"].items()
-    }
-    return {"name": reference["name"], "errors": errors}
-
-
-def _particulars(ship: Particulars) -> list[tuple[str, bool, str, str]]:
-    """Name, whether estimated, value and unit of the particulars that are known."""
-    return [
-        (text, name in ship.estimated, f"{factor * float(ship[name]):.5g}", unit)
-        for name, (text, unit, factor) in WORDS["particulars"].items()
-        if ship[name] is not None
-    ]
 
 
 def _coefficients(fit: Fit) -> dict[str, list[dict[str, Any]]]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -27,12 +28,13 @@ from identification.report.figures import truncated as with_a_rank
 from identification.report.page import _shown, report_page
 from identification.report.predictions import overview_figure, prediction_figure
 from identification.report.summary import _coefficients as coefficients_table
-from identification.report.view import _coefficients, _errors, _heading, _trial, fit_view, short_names
+from identification.report.view import WORDS, _coefficients, _heading, _trial, fit_view, short_names
 from identification.result import FILES
 from identification.search import SearchResult
 from identification.search.search import BAND, LOG_C
 from identification.validation.diagnostics import cross_correlation
 from shipgym import ShipFile, ShipModel, Trial
+from shipgym.pages import NONE, environment, fixed
 from shipgym.ships.particulars import ADDED_MASSES
 from tests.golden.texts import same_page, same_text
 
@@ -195,6 +197,12 @@ def test_the_summary_prints_each_coefficient_with_its_error(truncated: Identific
     assert rows["Y_vdot"][:2] == [f"{1e5 * truncated.model.particulars['Y_vdot']:.6g}", "1e-5"]
 
 
+def section(macro: str, **data: Any) -> str:
+    """What a macro of the sections on a fit shows."""
+    imported = '{% import "identification.report/sections.html" as sections with context %}'
+    return environment().from_string(f"{imported}{{{{ sections.{macro} }}}}").render(contents=[], **data)
+
+
 def test_the_page_shows_trials_in_degrees_and_knots(truncated: IdentificationResult) -> None:
     view = fit_view(truncated)
     for row, trial in zip(view["trials"], truncated.trials, strict=True):
@@ -202,10 +210,12 @@ def test_the_page_shows_trials_in_degrees_and_knots(truncated: IdentificationRes
         assert row["speeds"][1] == pytest.approx(np.hypot(trial["u"], trial["v"]).max() / 0.514444, rel=1e-5)
         assert (row["samples"], row["duration"]) == (len(trial), trial.duration)
         assert row["interval"] == pytest.approx(trial.duration / (len(trial) - 1), rel=1e-6)
-    particulars = {text: (value, unit) for text, _, value, unit in view["particulars"]}
-    ship = truncated.model.particulars
-    assert particulars["length between perpendiculars"] == (f"{ship['length']:.5g}", "m")
-    assert particulars["mass"] == (f"{ship['mass'] / 1000.0:.5g}", "t")
+    ship, tables = truncated.model.particulars, section("ship_tables(fit)", fit=view)
+    for text, told in (
+        ("length between perpendiculars", f"{ship['length']:.5g} m"), ("mass", f"{ship['mass'] / 1e3:.5g} t"),
+        ("N_rdot", fixed(1e5 * ship["N_rdot"], 1)),
+    ):  # fmt: skip
+        assert re.search(f"<td>{text}</td>.*<td>{re.escape(told)}</td>", tables)
     trials = truncated.metrics["trials"].values()
     unseen = [metrics["rmse"]["psi"] for metrics in trials if metrics["use"] == "validate"]
     errors = np.degrees(unseen)
@@ -216,8 +226,7 @@ def test_the_page_shows_trials_in_degrees_and_knots(truncated: IdentificationRes
         for row in rows:
             assert row["value"] == pytest.approx(1e5 * truncated.coefficients[row["name"]])
             assert row["significant"] == (abs(row["t"]) >= 2.0)
-    assert {name for name, _, _ in view["added_masses"]} == {n for n in ADDED_MASSES if ship[n] is not None}
-    assert {n: v for n, _, v in view["added_masses"]}["N_rdot"] == pytest.approx(1e5 * ship["N_rdot"])
+    assert set(view["added_masses"]) == {n for n in ADDED_MASSES if ship[n] is not None}
     assert view["derivatives"]
 
 
@@ -440,9 +449,23 @@ def test_headings_of_trials_that_were_fitted_are_told_where_none_is_held_out() -
 
 
 def test_an_index_is_told_where_the_trial_has_it() -> None:
-    pair = {"measured": 8.0, "predicted": 7.0, "closed_loop": 7.5}
-    told = _errors({"overshoot_1_deg": pair, "advance_lengths": None, "transfer_lengths": pair})["indices"]
-    assert told == [("1st overshoot", 8.0, 7.0, 7.5, "deg"), ("transfer", 8.0, 7.0, 7.5, "L")]
+    pair = {"measured": 8.0, "predicted": 7.0}
+    found = {
+        "overshoot_1_deg": pair | {"closed_loop": 7.5},
+        "advance_lengths": None,
+        "transfer_lengths": pair,
+    }
+    told = section("indices(found, words)", found=found, words=WORDS["indices"])
+    assert "1st overshoot 8.00 → 7.00 (7.50) deg<br>transfer 8.00 → 7.00 L<" in told
+
+
+def test_a_bare_reference_ship_stands_beside_the_fit_by_the_names_of_trials() -> None:
+    errors = {name: {"trial": f"a/{name}", "rmse": {"psi": np.pi / 36.0}} for name in ("one", "two")}
+    bare = {"a/one": {"rmse": {"psi": np.pi / 18.0}}, "a/two": {"rmse": {"psi": None}}}
+    view = {"errors": errors, "reference": {"name": "tanker", "trials": bare}}
+    told = section("reference_table(fit)", fit=view)
+    assert "<td>one</td><td>5.00</td><td>10.00</td>" in told
+    assert f"<td>two</td><td>5.00</td><td>{NONE}</td>" in told
 
 
 def test_coefficients_without_errors_are_significant_unless_they_are_zero() -> None:
