@@ -8,8 +8,6 @@ from identification.report.view import fit_view, trial_figures
 from identification.validation.warnings import held_out_error, undetermined, why_unstable
 from shipgym.pages import render
 
-TOLD_ELSEWHERE = ("trials", "particulars", "steering")  # settings that have tables of their own
-
 
 def report_page(fit: Fit) -> str:
     """The page, as text; the same fit gives the same text.
@@ -21,20 +19,8 @@ def report_page(fit: Fit) -> str:
     figures: dict[str, Any] = {"regression": regression_figures(fit)}
     if instability is None:
         figures |= {"coefficients": coefficients_figure(fit), **trial_figures(fit)}
-    settings = [
-        (name.replace("_", " "), _shown(value))
-        for name, value in fit.settings.items()
-        if value is not None and name not in TOLD_ELSEWHERE
-    ]
     return render(
         "identification.report/report.html", name=fit.model.particulars.name or fit.model.name,
         fit=fit_view(fit), figures=figures, instability=instability, held_out=held_out_error(fit),
-        undetermined=undetermined(fit), settings=settings, hashes=fit.settings["trials"],
+        undetermined=undetermined(fit), settings=fit.settings,
     )  # fmt: skip
-
-
-def _shown(value: Any) -> Any:
-    """A setting in words; None where it is an empty list."""
-    if isinstance(value, bool):
-        return "yes" if value else "no"
-    return ", ".join(map(str, value)) or None if isinstance(value, list) else value

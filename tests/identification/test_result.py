@@ -25,7 +25,7 @@ from identification.report.figures import (
     search_figure,
 )
 from identification.report.figures import truncated as with_a_rank
-from identification.report.page import _shown, report_page
+from identification.report.page import report_page
 from identification.report.predictions import overview_figure, prediction_figure
 from identification.report.summary import _coefficients as coefficients_table
 from identification.report.view import WORDS, _coefficients, _heading, _trial, fit_view, short_names
@@ -412,8 +412,9 @@ def test_trials_are_shown_together_where_all_have_heading_and_rudder() -> None:
 
 
 def test_settings_are_told_in_words() -> None:
-    given = (True, False, ["a.csv", 3], [], 2.5, "gcv")
-    assert [_shown(value) for value in given] == ["yes", "no", "a.csv, 3", None, 2.5, "gcv"]
+    given = (True, False, ["a.csv", 3], [], 2.5, "gcv", {1: 2})
+    told = [section("setting(value)", value=value) for value in given]
+    assert told == ["yes", "no", "a.csv, 3", NONE, "2.5", "gcv", "{1: 2}"]
 
 
 def test_what_a_trial_did_not_record_is_left_out() -> None:
