@@ -1,7 +1,6 @@
 """The table of episodes as columns, and its Parquet file."""
 
 from collections.abc import Mapping, Sequence
-from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +9,7 @@ from numpy.typing import NDArray
 
 from shipgym.checks import quoted
 from shipgym.errors import InputError
+from shipgym.extras import library
 from shipgym.files import LARGEST_TENSORS, atomic_path, read_bytes
 
 Columns = dict[str, NDArray[Any]]
@@ -39,20 +39,15 @@ def joined(
     return columns
 
 
-def library() -> tuple[Any, Any]:
+def pyarrow() -> tuple[Any, Any]:
     """Pyarrow and its part for Parquet; an InputError saying how it is installed if it is not there."""
-    try:
-        return import_module("pyarrow"), import_module("pyarrow.parquet")
-    except ModuleNotFoundError:
-        raise InputError(
-            "benchmark: pyarrow, which writes the table of episodes, is not installed; install it with: "
-            "pip install 'shipgym[benchmark]'"
-        ) from None
+    extra = "benchmark", "the table of episodes needs it"
+    return library("pyarrow", *extra), library("pyarrow.parquet", *extra)
 
 
 def write_episodes(columns: Columns, path: Path) -> None:
     """Write a table as Parquet, whole or not at all; raises InputError if it cannot be written."""
-    arrow, parquet = library()
+    arrow, parquet = pyarrow()
     arrays = {name: _array(arrow, name, values) for name, values in columns.items()}
     with atomic_path(path) as draft:
         parquet.write_table(arrow.table(arrays), draft, compression="zstd")
@@ -63,7 +58,7 @@ def read_episodes(path: Path, rows: int) -> Columns:
 
     Raises InputError if it is missing or no such file.
     """
-    arrow, parquet = library()
+    arrow, parquet = pyarrow()
     content = read_bytes(path, "file of episodes", LARGEST_TENSORS)
     try:
         file = parquet.ParquetFile(arrow.BufferReader(content))

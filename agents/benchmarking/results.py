@@ -17,7 +17,7 @@ from typing import Any, Self
 import numpy as np
 
 from agents.benchmarking.contestants import Contestant, file_hash, names_code
-from agents.benchmarking.episode_table import Columns, joined, library, read_episodes, write_episodes
+from agents.benchmarking.episode_table import Columns, joined, pyarrow, read_episodes, write_episodes
 from agents.benchmarking.results_shape import SHAPE, check_summary
 from agents.benchmarking.summary import Done, summary_of
 from agents.controllers.controller import model_hash
@@ -97,7 +97,7 @@ class BenchmarkResult:
         if folder is None:
             return self
         target = Path(folder)
-        library()
+        pyarrow()
         make_folder(target)
         write_episodes(self.episodes, target / EPISODES)
         about = {**self.summary["episodes"], "sha256": file_hash(target / EPISODES)}
@@ -111,7 +111,7 @@ def check_new(folder: Path, resume: bool, suite: str) -> Path:
 
     Raises InputError saying what to do.
     """
-    library()  # a missing extra is reported now, not after the work
+    pyarrow()  # a missing extra is reported now, not after the work
     if folder.exists() and not folder.is_dir():
         raise InputError(f"{folder}: is not a folder, expected one to write the results to; choose another")
     check_writable(folder)

@@ -13,7 +13,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from agents.controllers.controller import Controller, Range
-from agents.controllers.linear_loop import SIGNALS, length_time, sampled_ships
+from agents.controllers.linear_loop import SIGNALS, sampled_ships
 from agents.controllers.lq import LQ, lq_rows
 from agents.controllers.memory import Flags, Floats, Records, deviations, records
 from identification.estimators.recursive_kernels import least_squares
@@ -111,7 +111,7 @@ class AdaptiveLQ(Controller):
             raise InputError(f"model: {model.name!r} has no sway, expected one with surge, sway and yaw")
         weights = {"integral_lengths": integral_lengths, "rudder_weight": rudder_weight}
         start = LQ.from_model(model, dt=dt, rate_weight_s2=rate_weight_s2, **weights)
-        interval, time = start.design["dt"], length_time(model)
+        interval, time = start.design["dt"], model.travel_time
         length, speed = model.particulars["length"], straight_running(model).surge
         deviation = np.sqrt(2.0) * noise / interval * np.array([SEA_TRIAL["v"].noise, SEA_TRIAL["r"].noise])
         errors = np.hypot(UNEXPLAINED, deviation / units(length, speed)[:, 3])

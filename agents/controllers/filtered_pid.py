@@ -12,7 +12,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from agents.controllers.controller import Controller, Range
-from agents.controllers.linear_loop import ERROR, SIGNALS, YAW_RATE, Compensator, length_time, sample_ship
+from agents.controllers.linear_loop import ERROR, SIGNALS, YAW_RATE, Compensator, sample_ship
 from agents.controllers.memory import Flags, Floats, Records, heading_error, records
 from agents.controllers.pid import PID
 from shipgym import ShipModel
@@ -79,7 +79,7 @@ class FilteredPID(Controller):
         )
         interval = plain.design["dt"]
         frequency_share = _rate(reference_share, "reference_share")
-        tracking = _rate(tracking_lengths, "tracking_lengths") * length_time(model)
+        tracking = _rate(tracking_lengths, "tracking_lengths") * model.travel_time
         turn_rate = 0.0  # no limit
         if largest_turn_rate_deg_s is not None:
             turn_rate = check_number(largest_turn_rate_deg_s, "largest_turn_rate_deg_s", above=0.0)

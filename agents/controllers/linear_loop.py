@@ -53,11 +53,6 @@ class SampledShip:
     about: StraightRunning  # the state about which motions are small
 
 
-def length_time(model: ShipModel) -> float:
-    """Time to travel one ship length at service speed, s."""
-    return float(model.particulars["length"] / model.particulars["speed"])
-
-
 def rate_weight(model: ShipModel) -> float:
     """Weight of the rudder rate for linear designs, s^2, beside the squares of heading error and rudder.
 
@@ -66,7 +61,7 @@ def rate_weight(model: ShipModel) -> float:
     far more and swing. The figure is measured: with it both designs cost at most 1.06 times the best gains
     of a direct search on stable and unstable ships whose gears need 0.3 to 6 ship lengths for 35 degrees.
     """
-    return float(RATE_WEIGHT * length_time(model) ** 2 + (FULL_RATE_ERROR / model.steering.rate) ** 2)
+    return float(RATE_WEIGHT * model.travel_time**2 + (FULL_RATE_ERROR / model.steering.rate) ** 2)
 
 
 def sample_ship(
@@ -83,7 +78,7 @@ def sample_ship(
     steering, rudder = linearise(model, about)
     if first_order:
         form = nomoto_of(steering, rudder)
-        steering = np.diag([-1.0 / length_time(model), -1.0 / form.T])
+        steering = np.diag([-1.0 / model.travel_time, -1.0 / form.T])
         rudder = np.array([[0.0], [form.rudder_effect]])
     linear = np.column_stack([steering, rudder])[None]
     A, B = sampled_ships(linear, model.steering.time_constant, dt)

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from agents.controllers.controller import NUMBERS, Action, Controller, Policy, Range
-from agents.controllers.linear_loop import Compensator, Margins, length_time
+from agents.controllers.linear_loop import Compensator, Margins
 from agents.controllers.lq import LQ
 from agents.controllers.memory import Floats, begun, checked_observation, gathered, heading_error, on_course
 from shipgym import InputError, ShipModel
@@ -172,7 +172,7 @@ class LineOfSight(Guided):
         check_number(ahead, "lookahead_lengths", above=0.0)
         integral = CRITICAL * ahead if integral_lengths is None else integral_lengths
         check_number(integral, "integral_lengths", above=0.0)
-        gains = {"lookahead": ahead * length, "integral": 1.0 / (integral * length_time(model))}
+        gains = {"lookahead": ahead * length, "integral": 1.0 / (integral * model.travel_time)}
         return cls.leading(model, autopilot, asked, gains, {"integral_lengths": float(integral)})
 
     def course(self, seen: Mapping[str, Floats], memory: Floats) -> tuple[Floats, Floats]:

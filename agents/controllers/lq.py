@@ -15,7 +15,7 @@ import numpy as np
 
 from agents.controllers.controller import Controller
 from agents.controllers.linear_loop import (
-    ERROR, INTEGRAL, RUDDER, SIGNALS, SampledShip, length_time, rate_weight, sample_ship,
+    ERROR, INTEGRAL, RUDDER, SIGNALS, SampledShip, rate_weight, sample_ship,
 )  # fmt: skip
 from shipgym.arrays import Floats
 from shipgym.checks import check_number
@@ -66,7 +66,7 @@ class LQ(Controller):
             Weight of the squared rudder rate, s^2; by default `rate_weight`.
         """
         weights = Weights.of(model, dt, integral_lengths, rudder_weight, rate_weight_s2)
-        gains = weights.gains(without_yaw_memory(model, weights.dt), length_time(model))
+        gains = weights.gains(without_yaw_memory(model, weights.dt), model.travel_time)
         return cls.designed(model, sample_ship(model, weights.dt), gains, weights.design)
 
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from agents.controllers.controller import Controller, Range
 from agents.controllers.linear_loop import (
-    ERROR, RUDDER, SIGNALS, YAW_RATE, Compensator, check_stable, length_time, sample_ship, sampled_ships,
+    ERROR, RUDDER, SIGNALS, YAW_RATE, Compensator, check_stable, sample_ship, sampled_ships,
 )  # fmt: skip
 from agents.controllers.lq import LQ, Weights
 from agents.controllers.memory import Flags, Floats, heading_error
@@ -121,7 +121,7 @@ class LQG(Controller):
             **({} if wave_period is None else {"wave_period": float(wave_period)}),
         }
         filters = {"transition": transition, "input": effect, "kalman": kalman, "output": output}
-        return cls.designed(model, ship, weights.gains(ship, length_time(model)), design, **filters)
+        return cls.designed(model, ship, weights.gains(ship, model.travel_time), design, **filters)
 
     @property
     def memory_size(self) -> int:

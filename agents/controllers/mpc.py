@@ -18,7 +18,7 @@ from typing import Any, ClassVar, NamedTuple, Self
 import numpy as np
 
 from agents.controllers.controller import Controller, Range
-from agents.controllers.linear_loop import RUDDER, SIGNALS, check_stable, length_time, sample_ship
+from agents.controllers.linear_loop import RUDDER, SIGNALS, check_stable, sample_ship
 from agents.controllers.lq import LQ, Weights, without_yaw_memory
 from agents.controllers.memory import Flags, Floats, deviations
 from shipgym import ShipModel
@@ -97,9 +97,9 @@ class MPC(Controller):
         """
         library("osqp", "mpc", "MPC needs it")
         check_number(horizon_lengths, "horizon_lengths", above=0.0, at_most=20.0)
-        weight = RATE_WEIGHT * length_time(model) ** 2 if rate_weight_s2 is None else rate_weight_s2
+        weight = RATE_WEIGHT * model.travel_time**2 if rate_weight_s2 is None else rate_weight_s2
         weights = Weights.of(model, dt, integral_lengths, rudder_weight, weight)
-        interval, time = weights.dt, length_time(model)
+        interval, time = weights.dt, model.travel_time
         reduced = without_yaw_memory(model, interval)
         limits = {
             "horizon_steps": float(max(2, round(horizon_lengths * time / interval))),

@@ -11,7 +11,7 @@ from typing import ClassVar, Self
 import numpy as np
 
 from agents.controllers.controller import Controller
-from agents.controllers.linear_loop import length_time, rate_weight, sample_ship
+from agents.controllers.linear_loop import rate_weight, sample_ship
 from shipgym import ShipModel
 from shipgym.checks import check_number
 from shipgym.ships.linear import Nomoto, linearise, nomoto_of
@@ -69,7 +69,7 @@ class PID(Controller):
         ship = sample_ship(model, interval)
         response = nomoto_of(*linearise(model, ship.about))
         lag = LAG_SHARE * model.steering.time_constant + 0.5 * interval
-        slow = 1.0 / (integral_lengths * length_time(model))
+        slow = 1.0 / (integral_lengths * model.travel_time)
         wanted, ratio = optimal_poles(response, rate_weight(model))
         if damping is not None:
             ratio = check_number(damping, "damping", above=0.0)

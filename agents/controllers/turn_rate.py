@@ -14,7 +14,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from agents.controllers.controller import NUMBERS, Controller, Range
-from agents.controllers.linear_loop import Compensator, length_time, sample_ship
+from agents.controllers.linear_loop import Compensator, sample_ship
 from agents.controllers.memory import Flags, Floats, heading_error, records
 from agents.controllers.scheduled_lq import rising
 from shipgym import InputError, ShipModel
@@ -81,7 +81,7 @@ class TurnRate(Controller):
             tenths of the rudder's limit.
         """
         interval = control_interval(model) if dt is None else check_number(dt, "dt", above=0.0)
-        ship, time = sample_ship(model, interval), length_time(model)
+        ship, time = sample_ship(model, interval), model.travel_time
         form = nomoto_of(*linearise(model, ship.about))
         lag = model.steering.time_constant + 0.5 * interval
         wanted = min(PER_LAG / lag, PER_LENGTH / time)
@@ -133,7 +133,7 @@ def steady_turns(model: ShipModel, neutral: float) -> tuple[Floats, Floats]:
     for slowed in (True, False):  # some models know no loss of speed
         found = {0.0: neutral}
         for side in (-1.0, 1.0):
-            for rate in side * GRID / length_time(model):
+            for rate in side * GRID / model.travel_time:
                 rudder = steady_turn_rudder(model, float(rate), slowed)
                 if rudder is None or abs(rudder) > LARGEST_RUDDER * model.steering.limit:
                     break

@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from agents.controllers.controller import Policy
-from agents.controllers.linear_loop import length_time
 from agents.controllers.memory import gathered, on_course
 from agents.rollouts.metrics import costs, mean, steering
 from agents.rollouts.rollout import Rollout, check_fits, rollout
@@ -167,7 +166,7 @@ def step_response(
     check_number(step_deg, "step_deg", at_least=-LARGEST_STEP_DEG, at_most=LARGEST_STEP_DEG)
     asked = task or course_keeping_task()
     check_fits(controller, asked, fleet[0], f"model '{fleet[0].name}'")
-    lasts = STEP_LENGTHS * length_time(fleet[0]) if duration is None else duration
+    lasts = STEP_LENGTHS * fleet[0].travel_time if duration is None else duration
     steps = int(np.ceil(check_number(lasts, "duration", above=0.0) / asked.interval(fleet[0])))
     straight = asked.changed(course_change_deg=0.0, episode_steps=steps)
     engine = Engine(fleet, len(fleet), straight, allow_unstable=allow_unstable)

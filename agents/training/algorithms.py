@@ -19,7 +19,7 @@ from agents.training.settings import (
     LEARNED, RUNNING, OffPolicySettings, PPOSettings, Settings, TD3Settings, TQCSettings,
 )  # fmt: skip
 from shipgym.envs.sb3 import ShipVecEnv
-from shipgym.errors import InputError
+from shipgym.extras import library
 
 ACTIVATIONS = {"relu": torch.nn.ReLU, "tanh": torch.nn.Tanh}
 #: Settings that do not go to the algorithms' classes as keywords of the same name.
@@ -136,8 +136,4 @@ def algorithm_class(name: str) -> Any:
     """The class of an algorithm by its name; InputError if its package is not installed."""
     if name != "tqc":
         return {"ppo": PPO, "sac": SAC, "td3": TD3}[name]
-    try:
-        from sb3_contrib import TQC
-    except ModuleNotFoundError:
-        raise InputError("sb3-contrib is not installed, tqc needs it: pip install 'shipgym[rl]'") from None
-    return TQC
+    return library("sb3_contrib", "rl", "tqc needs it").TQC

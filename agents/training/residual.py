@@ -12,13 +12,9 @@ from agents.policies.network import Numbers
 from agents.policies.policy import NO_LIMIT, check_part, toward
 from shipgym.arrays import Flags
 from shipgym.errors import InputError
+from shipgym.extras import library
 
-try:
-    from stable_baselines3.common.vec_env import VecEnv, VecEnvWrapper
-except ImportError:
-    raise InputError(
-        "stable-baselines3 is not installed, learning needs it: pip install 'shipgym[rl]'"
-    ) from None
+VecEnvWrapper: Any = library("stable_baselines3.common.vec_env", "rl", "learning needs it").VecEnvWrapper
 
 
 class ResidualVecEnv(VecEnvWrapper):  # type: ignore[misc]  # stable-baselines3 is not type-checked here
@@ -40,7 +36,7 @@ class ResidualVecEnv(VecEnvWrapper):  # type: ignore[misc]  # stable-baselines3 
     """
 
     def __init__(
-        self, venv: VecEnv, base: Policy | None = None, *, authority: float = 1.0, frame_stack: int = 1,
+        self, venv: Any, base: Policy | None = None, *, authority: float = 1.0, frame_stack: int = 1,
         action_repeat: int = 1, rate_limit: float = NO_LIMIT,
     ) -> None:  # fmt: skip
         self.base, self.authority, self.frame_stack = base, authority, frame_stack
@@ -140,7 +136,7 @@ class ResidualVecEnv(VecEnvWrapper):  # type: ignore[misc]  # stable-baselines3 
         return np.concatenate([seen, self._proposed], axis=1)
 
 
-def _check_base(venv: VecEnv, base: Policy) -> None:
+def _check_base(venv: Any, base: Policy) -> None:
     """Refuse commands that cannot be added to, and a controller of another ship."""
     space = venv.action_space
     if not isinstance(space, spaces.Box) or not (np.all(space.low >= -1.0) and np.all(space.high <= 1.0)):

@@ -14,7 +14,6 @@ import numpy as np
 
 from agents.controllers.controller import Controller
 from agents.controllers.filtered_pid import FilteredPID
-from agents.controllers.linear_loop import length_time
 from agents.controllers.turn_rate import TurnRate
 from agents.deployment.nmea import Reading
 from agents.deployment.route import Route
@@ -109,7 +108,7 @@ def kept(model: ShipModel, pilot: Controller, sea: str = "calm", heading: float 
     lost, step = more.pop("lost", ()), pilot.design["dt"] / PER_INTERVAL
     ship, limits = SimulatedShip(model, weather=sea, seed=1, step=step), more.pop("limits", Limits())
     helm = Helm(pilot, None if "rate" in more else radians(heading), limits, **more)
-    return run(helm, ship, LENGTHS * length_time(model), lost)
+    return run(helm, ship, LENGTHS * model.travel_time, lost)
 
 
 def heading_control(model: ShipModel, pilot: Controller) -> dict[str, float]:
@@ -185,7 +184,7 @@ def _on_track(model: ShipModel, track: Track, limits: Limits, aside: float = 0.0
     step = track.controller.design["dt"] / PER_INTERVAL
     ship = SimulatedShip(model, weather=track_task(model).weather, step=step)
     ship.states[0, model.state_names.index("y")] = aside
-    seconds = 3.0 * LENGTHS * length_time(model)
+    seconds = 3.0 * LENGTHS * model.travel_time
     return run(Helm(track.controller, None, limits, route), ship, seconds, **more)
 
 

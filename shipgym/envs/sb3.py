@@ -12,14 +12,10 @@ from numpy.typing import NDArray
 from shipgym.checks import check_choice
 from shipgym.envs.ship_vector_env import Infos, ShipVectorEnv
 from shipgym.errors import InputError
+from shipgym.extras import library
 
-try:
-    from stable_baselines3.common.monitor import Monitor
-    from stable_baselines3.common.vec_env import VecEnv
-except ImportError:
-    raise InputError(
-        "stable-baselines3 is not installed, ShipVecEnv needs it: pip install 'shipgym[rl]'"
-    ) from None
+Monitor = library("stable_baselines3.common.monitor", "rl", "ShipVecEnv needs it").Monitor
+VecEnv: Any = library("stable_baselines3.common.vec_env", "rl", "ShipVecEnv needs it").VecEnv
 
 Indices = None | int | Sequence[int]
 Vectors = VectorEnv[Any, Any, Any]

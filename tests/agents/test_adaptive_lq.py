@@ -9,7 +9,7 @@ import pytest
 
 from agents import LQ, AdaptiveLQ, check_controller, load_agent, sail
 from agents.controllers.adaptive_lq import SIZES, _stable
-from agents.controllers.linear_loop import SIGNALS, length_time, rate_weight, sample_ship, sampled_ships
+from agents.controllers.linear_loop import SIGNALS, rate_weight, sample_ship, sampled_ships
 from agents.controllers.lq import lq_rows
 from agents.controllers.memory import records
 from shipgym.envs.engine import Engine
@@ -27,7 +27,7 @@ GENTLE = course_keeping_task(course_change_deg=10.0, episode_steps=2000)
 @pytest.mark.parametrize("name", ["mariner", "container", "tanker", "kvlcc2", "kvlcc2-l7"])
 def test_many_designs_at_once_are_those_of_python_control(name):
     model = load_model(name)
-    dt, time = control_interval(model), 20.0 * length_time(model)
+    dt, time = control_interval(model), 20.0 * model.travel_time
     ship = sample_ship(model, dt)
     linear = np.concatenate(linearise(model, straight_running(model)), axis=1)
     A, B = sampled_ships(np.stack([linear, 0.5 * linear]), model.steering.time_constant, dt)

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from agents import LQ, PID, WheelOver
-from agents.controllers.linear_loop import length_time
 from agents.deployment.steering import Limits
 from agents.verification import standards as module
 from agents.verification.standards import REQUIREMENTS, Row, heading_control, kept, standards, track_control
@@ -53,8 +52,8 @@ def test_a_heading_that_falls_silent_is_handed_over_and_the_rest_is_steered():
 def test_a_course_is_kept_for_forty_ship_lengths_of_which_the_first_ten_do_not_count():
     found = kept(MARINER, PID.from_model(MARINER))
     assert (found.alarm, found.alarm_at) == ("", np.inf)
-    assert found.t[-1] == pytest.approx(40.0 * length_time(MARINER), abs=1.0)
-    assert module._settled(found.t)[0] == pytest.approx(10.0 * length_time(MARINER), abs=1.0)
+    assert found.t[-1] == pytest.approx(40.0 * MARINER.travel_time, abs=1.0)
+    assert module._settled(found.t)[0] == pytest.approx(10.0 * MARINER.travel_time, abs=1.0)
 
 
 def test_what_no_simulation_shows_of_a_ship_has_no_value(monkeypatch):

@@ -201,7 +201,7 @@ def test_noise_of_exploration_is_of_one_command_where_none_is_said():
 def test_an_algorithm_that_is_not_installed_is_reported_with_its_extra(monkeypatch):
     monkeypatch.setitem(sys.modules, "sb3_contrib", None)
     assert algorithm_class("sac").__name__ == "SAC"
-    with pytest.raises(InputError, match=r"sb3-contrib is not installed, tqc needs it: pip install 'shipgym"):
+    with pytest.raises(InputError, match=r"sb3_contrib is not installed, tqc needs it: pip install 'shipgym"):
         algorithm_class("tqc")
 
 

@@ -268,7 +268,7 @@ def record_functions() -> dict[str, Floats]:
         "prior": vector(adaptive_lq.prime_steering(load_model("kvlcc2"))),
         "units": vector(adaptive_lq.units(161.0, 7.7)),
         "steady turns": vector(turn_rate.steady_turns(model, 0.01)),
-        "rate weight": vector([linear_loop.rate_weight(model), linear_loop.length_time(model)]),
+        "rate weight": vector([linear_loop.rate_weight(model), model.travel_time]),
     }
 
 
