@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from agents.training.training import TrainingResult
     from agents.training.tuning import Tuning
 
+EXAMPLE = "gamma=0.98"
 Algorithm = Annotated[str, Argument(metavar="ALGORITHM", help="ppo, sac, td3 or tqc.")]
 Environment = Annotated[
     str | None, Option(help="course-keeping (default), path-following-v1, or an environment id.")
@@ -72,13 +73,14 @@ def train_command(
     as if it had never stopped. With --resume, options not given keep their values; others must be the same.
     """
     from agents.training.plan import Given
-    from agents.training.settings import parsed_settings
+    from shipgym.files import named_values
 
-    own = parsed_settings(set_ or ()) | ({} if total_steps is None else {"total_steps": total_steps})
+    own = named_values(set_ or (), "--set", EXAMPLE)
+    own |= {} if total_steps is None else {"total_steps": total_steps}
     own |= {"base": "none"} if from_nothing else {}
     given = Given(
-        algorithm, env, model, sea, task, parsed_settings(environment_options or (), "--option"), settings,
-        own, seed, randomise, threads,
+        algorithm, env, model, sea, task, named_values(environment_options or (), "--option", EXAMPLE),
+        settings, own, seed, randomise, threads,
     )  # fmt: skip
     _print_result(_train(given, out, resume, max_seconds), out)
 
@@ -163,12 +165,12 @@ def tune_command(
     from agents.cli.terminal import progress_bars
     from agents.engines.jobs import JobEngine
     from agents.training.plan import Given, make_plan
-    from agents.training.settings import parsed_settings
     from agents.training.tuning import evaluated_evenly, tune
+    from shipgym.files import named_values
 
-    fixed = parsed_settings(set_ or ())
+    fixed = named_values(set_ or (), "--set", EXAMPLE)
     own = fixed | ({} if total_steps is None else {"total_steps": total_steps})
-    options = parsed_settings(environment_options or (), "--option")
+    options = named_values(environment_options or (), "--option", EXAMPLE)
     where = JobEngine(engine, workers, address)
     where.check()
     given = Given(algorithm, env, model, sea, task, options, settings, own, seed, randomise, threads=1)

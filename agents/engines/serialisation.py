@@ -104,8 +104,7 @@ class KeptResults:
             unpack(content["result"]["value"])
         except (InputError, LookupError, TypeError, ValueError, OverflowError):
             return None
-        result: dict[str, Any] = content["result"]
-        return result if self._key(text).items() <= content.items() else None
+        return dict(content["result"]) if self._key(text).items() <= content.items() else None
 
     def save(self, text: str, packed: dict[str, Any]) -> None:
         """Keep the packed result of a job, whole or not at all; InputError if it cannot be written."""

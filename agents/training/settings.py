@@ -15,7 +15,7 @@ from agents.policies.weights_file import as_json, present_names
 from agents.suites.suite import ENVIRONMENTS, suite_of
 from shipgym.checks import check_choice, check_keys, check_number, check_table, check_text, check_whole
 from shipgym.errors import InputError
-from shipgym.files import named_values, read_toml, shipped_toml
+from shipgym.files import read_toml, shipped_toml
 from shipgym.tasks.task import ACTIONS
 
 RUNNING, LEARNED = "running", "learned"  # words in the place of numbers
@@ -262,14 +262,6 @@ def changed(settings: Settings, given: Mapping[str, Any]) -> Settings:
 def read_settings_file(path: Path, algorithm: str) -> dict[str, Any]:
     """Settings in a user's own TOML file; InputError if it cannot be read, or names an unknown setting."""
     return _settings(read_toml(path, "settings file"), settings_of(algorithm), str(path))
-
-
-def parsed_settings(texts: Sequence[str], where: str = "--set") -> dict[str, Any]:
-    """Settings of the command line, `name=value` with a value as in TOML; anything else is text.
-
-    Raises InputError for one that is written otherwise.
-    """
-    return named_values(texts, where, "gamma=0.98")
 
 
 #: What settings mean that older runs do not have.

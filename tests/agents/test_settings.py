@@ -27,11 +27,11 @@ from agents.training.settings import (
     changed,
     load_settings,
     make_settings,
-    parsed_settings,
     present_names,
     read_settings_file,
 )
 from shipgym import InputError
+from shipgym.files import named_values
 from shipgym.sea import Current, Weather
 from shipgym.ships.conversions import nomoto1_ship
 from tests.golden.texts import flat, same_text
@@ -177,11 +177,12 @@ def test_tuned_settings_are_the_golden_ones(algorithm):
 
 
 def test_settings_of_the_command_line_and_of_files(tmp_path):
-    found = parsed_settings(["gamma=0.9", "net_arch = [8, 8]", "base=lq", 'schedule="linear"', "note=a=b"])
+    texts = "gamma=0.9", "net_arch = [8, 8]", "base=lq", 'schedule="linear"', "note=a=b"
+    found = named_values(texts, "--set", "gamma=0.98")
     assert found == {"gamma": 0.9, "net_arch": [8, 8], "base": "lq", "schedule": "linear", "note": "a=b"}
     for wrong in ("gamma", "=0.9"):
         with pytest.raises(InputError, match=r"expected name=value, such as --set gamma=0\.98"):
-            parsed_settings([wrong])
+            named_values([wrong], "--set", "gamma=0.98")
     assert present_names({"history": 2, "hold": 3, "gamma": 1}) == {
         "frame_stack": 2,
         "action_repeat": 3,
