@@ -110,6 +110,6 @@ class IdentifyCommand(TyperCommand):
         from agents.cli.identify_options import takes_identify_options
 
         app = typer.Typer(add_completion=False, rich_markup_mode=None, pretty_exceptions_enable=False)
-        whole = takes_identify_options(self.callback.__wrapped__)  # type: ignore[union-attr]
+        whole = takes_identify_options(inspect.unwrap(self.callback))  # type: ignore[arg-type]
         app.command(self.name, epilog=self.epilog)(answered(whole))
         return typer.main.get_command(app).make_context(*args, **kwargs)
