@@ -37,7 +37,6 @@ def answered(command: Callable[..., None]) -> Callable[..., None]:
     It prints to the terminal's `out`, which is silent with `--json` and `--quiet`, and gives its result as
     fields to `answer`.
     """
-    own = typed_parameters(command)
 
     @functools.wraps(command)
     def wrapped(*args: Any, **kwargs: Any) -> None:
@@ -45,9 +44,8 @@ def answered(command: Callable[..., None]) -> Callable[..., None]:
         from agents.engines.jobs import WorkerDiedError
         from shipgym.errors import InputError, ManoeuvreError, UnstableModelError
 
-        shared = [kwargs.get(name, False) if name in own else kwargs.pop(name, False) for name in SHARED]
         try:
-            with printing(*shared):
+            with printing(*(kwargs.pop(name, False) for name in SHARED)):
                 command(*args, **kwargs)
             sys.stdout.flush()
         except InputError as error:
@@ -62,9 +60,8 @@ def answered(command: Callable[..., None]) -> Callable[..., None]:
     shared = {
         name: inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=False, annotation=kind)
         for name, kind in SHARED.items()
-        if name not in own
     }
-    return take_parameters(wrapped, own | shared)
+    return take_parameters(wrapped, typed_parameters(command) | shared)
 
 
 def told_failure(error: OSError) -> int:

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 from typer import Argument, Option
 
-from agents.cli.command import WRONG_INPUT, Json, answered, fail
+from agents.cli.command import WRONG_INPUT, answered, fail
 
 SCRIPT = Path(__file__).resolve().parents[2] / "scripts" / "reproduce.py"
 
@@ -23,19 +23,18 @@ def reproduce_command(
         ),
     ],
     markdown: Annotated[Path | None, Option(metavar="PAGE.MD", help="Write the tables to this file.")] = None,
-    as_json: Json = False,
 ) -> None:
     """Reproduce the papers' tables.
 
     Shows the printed numbers, ours by the paper's method and at best, and whether the aim is met. Needs a
     checkout of the project. Exits with 1 if an aim is missed.
     """
-    from agents.cli.terminal import out
+    from agents.cli.terminal import AS_JSON, out
 
     if not SCRIPT.is_file():
         told = "the papers' tables are not part of the installed package: in a checkout of the project run"
         fail(f"{told} python scripts/reproduce.py {paper}", WRONG_INPUT)
-    options = [*(["--markdown", str(markdown)] if markdown else []), *(["--json"] if as_json else [])]
+    options = [*(["--markdown", str(markdown)] if markdown else []), *(["--json"] if AS_JSON.get() else [])]
     command = [sys.executable, str(SCRIPT), paper, *options]
-    printed = subprocess.DEVNULL if out.quiet and not as_json else None
+    printed = subprocess.DEVNULL if out.quiet and not AS_JSON.get() else None
     raise typer.Exit(subprocess.run(command, stdout=printed, check=False).returncode)

@@ -73,14 +73,9 @@ def printing(as_json: bool, quiet: bool) -> Iterator[None]:
 
 
 def answer(fields: Mapping[str, Any]) -> None:
-    """The result of a command, printed where `--json` asks for it."""
+    """The result of a command, printed where `--json` asks for it: one JSON object, for programs to read."""
     if AS_JSON.get():
-        print_json(fields)
-
-
-def print_json(fields: Mapping[str, Any]) -> None:
-    """One JSON object, for programs to read."""
-    print(json.dumps(fields, indent=1, allow_nan=False))
+        print(json.dumps(fields, indent=1, allow_nan=False))
 
 
 def say(*lines: str | Text) -> None:
