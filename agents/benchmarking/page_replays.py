@@ -11,15 +11,12 @@ from agents.benchmarking.replays import SAME_COST, EpisodeId, Rerun, cost_of
 from agents.benchmarking.results import BenchmarkResult
 from agents.rollouts.replay_page import PLAYER
 from agents.rollouts.replay_series import quantities, run
+from shipgym.files import shipped_toml
 from shipgym.pages import render
 
 MOST_RUNS = 300  # in a page, 5 kB each
 MARK = "@episodes@"  # what the page's script puts its runs in the place of
-DECIMALS = {
-    "x": 1, "y": 1, "psi": 1, "delta": 1, "heading_error": 1, "course_order": 1, "rudder_order": 1,
-    "cross_track_error": 1, "speed": 2, "yaw_rate": 3, "heel": 2, "shaft_speed": 1, "reward_so_far": 3,
-    "wind_speed": 1, "wind_from": 0, "current_speed": 2, "current_towards": 0,
-}  # fmt: skip
+DECIMALS: dict[str, int] = shipped_toml("agents.benchmarking", "decimals.toml")
 REWARD_DECIMALS = 4
 
 

@@ -21,7 +21,10 @@ Ship = Annotated[
     str | None, Option("--model", help="Ship of the environments and tasks, by default their own.")
 ]
 All = Annotated[bool, Option("--all", help="All environments, calm and in a sea, and all shipped models.")]
-SEAS = (None, "rough")  # every sea but the calm one shares what is compiled
+SEAS: dict[str, Any] = {
+    "calm water": {},
+    "a sea": {"sea": "rough"},
+}  # every sea but the calm one shares what is compiled
 
 
 @answered
@@ -77,17 +80,13 @@ def _jobs(name: str, ship: str | None = None) -> Iterator[tuple[str, Callable[[]
     from shipgym.errors import InputError
     from shipgym.python_files import load_file
 
-    path = Path(name)
-    task = path.suffix == ".py" and not hasattr(
-        load_file(path, "the Python file of a task or a ship"), "SHIP"
-    )
+    path, expected = Path(name), "the Python file of a task or a ship"
+    task = path.suffix == ".py" and not hasattr(load_file(path, expected), "SHIP")
     if task or name in environments():
         given: dict[str, Any] = {"model": ship} if ship else {}
         given |= {"task": name} if task else {}
-        for sea in SEAS:
-            options = given if sea is None else {**given, "sea": sea}
-            make = partial(_make, env_id(DEFAULT_TASK) if task else name, options)
-            yield f"{name} in {'calm water' if sea is None else 'a sea'}", make
+        for water, sea in SEAS.items():
+            yield f"{name} in {water}", partial(_make, env_id(DEFAULT_TASK) if task else name, given | sea)
         return
     try:
         model = shipgym.load_model(name)
@@ -100,7 +99,5 @@ def _jobs(name: str, ship: str | None = None) -> Iterator[tuple[str, Callable[[]
 def _make(env_id: str, options: dict[str, Any]) -> None:
     import gymnasium
 
-    with warnings.catch_warnings(
-        action="ignore", category=DeprecationWarning
-    ):  # of ids that have a newer version
+    with warnings.catch_warnings(action="ignore", category=DeprecationWarning):  # of older ids
         gymnasium.make(env_id, **options).close()

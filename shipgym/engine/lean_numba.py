@@ -32,15 +32,11 @@ IDLE = (
 # What is replaced of Numba's inside; of a version without it loops are compiled in Numba's own way
 INSIDE = {
     codegen.JITCodeLibrary: (
-        "_optimize_functions",
-        "_optimize_final_module",
-        "finalize",
-        "_finalize_dynamic_globals",
+        "_optimize_functions", "_optimize_final_module", "finalize", "_finalize_dynamic_globals",
     ),
-    codegen.JITCPUCodegen: ("set_env",),
-    codegen.CPUCodeLibrary: ("add_ir_module",),
+    codegen.JITCPUCodegen: ("set_env",), codegen.CPUCodeLibrary: ("add_ir_module",),
     BaseFunction: ("get_call_type",),
-}
+}  # fmt: skip
 # Signatures of operators on numbers, by Numba's types of operator and numbers
 OPERATORS: dict[Any, Any] = {}
 # LLVM halves the vectors of processors that slow down when a few long ones are used; loops use nothing else

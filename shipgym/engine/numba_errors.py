@@ -23,7 +23,9 @@ def explanation(error: Exception, what: str) -> str:
     written = re.search(r"^def (\w+)\(", own, re.MULTILINE)
     function = written[1] if written else callee[2] if callee else ""
     place = re.search(r"at (\S+) \((\d+)\)", own) or re.search(r'File "([^"]+)", line (\d+)', own)
-    if code := _code_of(callee[1] if callee else None):
+    functions = (one.py_func for one in SHARED.values() if callee and hasattr(one, "py_func"))
+    code = next((one.__code__ for one in functions if one.__qualname__ == callee[1]), None)  # type: ignore[index]
+    if code is not None:
         file, line = code.co_filename, place[2] if place else _line_of(code, reason)
     elif place:
         file, line = place.groups()
@@ -31,12 +33,6 @@ def explanation(error: Exception, what: str) -> str:
         file, line = _looked_at(error)
     where = f" in {function}" * bool(function) + f" ({file}, line {line})" * bool(file)
     return f"{what}: cannot be compiled{where}: {reason}"
-
-
-def _code_of(name: str | None) -> CodeType | None:
-    """The code of a function that others call, by its name as it is compiled."""
-    functions = (one.py_func for one in SHARED.values() if hasattr(one, "py_func"))
-    return next((one.__code__ for one in functions if one.__qualname__ == name), None)
 
 
 def _line_of(code: CodeType, reason: str) -> int:

@@ -11,17 +11,15 @@ from numpy.typing import NDArray
 
 from shipgym.errors import InputError
 
+Make = Callable[[], VectorEnv[Any, Any, Any]]
+MakeSingle = Callable[[], gymnasium.Env[Any, Any]]
 Episode = list[tuple[Any, Any, Any, Any]]
 SEED = 1234
 STEPS = 200
 STAGGER = 5  # step at which a row is begun anew by hand
 
 
-def check_vector_env(
-    make: Callable[[], VectorEnv[Any, Any, Any]],
-    make_single: Callable[[], gymnasium.Env[Any, Any]] | None = None,
-    n_steps: int = STEPS,
-) -> None:
+def check_vector_env(make: Make, make_single: MakeSingle | None = None, n_steps: int = STEPS) -> None:
     """Check that a vector environment meets the requirements of Gymnasium's interface.
 
     Spaces and shapes, seeds that hold, arrays that are not changed later, the autoreset that its metadata
@@ -208,18 +206,12 @@ def _check_partial_reset(env: VectorEnv[Any, Any, Any], before: Any, done: NDArr
     return after
 
 
-def _check_rows(
-    make: Callable[[], VectorEnv[Any, Any, Any]],
-    make_single: Callable[[], gymnasium.Env[Any, Any]],
-    n_steps: int,
-) -> None:
+def _check_rows(make: Make, make_single: MakeSingle, n_steps: int) -> None:
     with closing(make()) as env:
         singles = [make_single] * env.num_envs
         with closing(SyncVectorEnv(singles, autoreset_mode=autoreset_mode(env))) as reference:
             steps = zip(_rollout(env, SEED, n_steps), _rollout(reference, SEED, n_steps), strict=False)
     for found, expected in ((one[i], other[i]) for one, other in steps for i in range(len(one))):
         for row, (shown, due) in enumerate(zip(found, expected, strict=True)):
-            alone = (
-                f"row {row} shows {shown}, expected {due} of the single environment with seed {SEED + row}"
-            )
-            _expect(bool(np.array_equal(shown, due)), alone)
+            alone = f"expected {due} of the single environment with seed {SEED + row}"
+            _expect(bool(np.array_equal(shown, due)), f"row {row} shows {shown}, {alone}")

@@ -24,8 +24,6 @@ from shipgym.tasks.task import RUDDER_ORDERS, Task
 Space = gymnasium.spaces.Box | gymnasium.spaces.Discrete
 DEFAULT_MODEL = "mariner-tls-svm"
 DEFAULT_TASK = "CourseKeeping"
-ENV_OPTIONS = ("model", "task", "reward", "render_mode", "allow_unstable")
-VECTOR_OPTIONS = ("num_envs", *ENV_OPTIONS, "autoreset_mode", "threads", "max_episode_steps")
 ORDERS = np.array(RUDDER_ORDERS, dtype=np.float32)
 
 

@@ -59,7 +59,8 @@ def register_task(env_id: str, task: str | Path | Any, **options: Any) -> None:
         Keywords of the environment that differ from their defaults.
     """
     from shipgym.envs.engine import fault_in_python
-    from shipgym.envs.environment import DEFAULT_MODEL, ENV_OPTIONS, read_options
+    from shipgym.envs.environment import DEFAULT_MODEL, read_options
+    from shipgym.tasks.task import ENV_OPTIONS
 
     given = {"task": kept_source(task), **options}
     given |= {name: kept_source(options[name]) for name in ("reward", "sensors") if name in options}

@@ -11,10 +11,11 @@ from numpy.typing import NDArray
 from shipgym.arrays import Floats
 from shipgym.engine.episodes import REFUSED
 from shipgym.envs.engine import Engine, as_numbers
-from shipgym.envs.environment import DEFAULT_MODEL, DEFAULT_TASK, ENV_OPTIONS, ShipsEnv, rudder_orders
+from shipgym.envs.environment import DEFAULT_MODEL, DEFAULT_TASK, ShipsEnv, rudder_orders
 from shipgym.envs.outputs import STEP_OUTCOME
 from shipgym.errors import InputError
 from shipgym.ships import ShipModel
+from shipgym.tasks.task import ENV_OPTIONS
 
 Observation = NDArray[np.float32]
 FLOAT32 = np.dtype(np.float32)

@@ -13,10 +13,11 @@ from numpy.typing import NDArray
 from shipgym.arrays import Floats
 from shipgym.checks import check_keys, quoted
 from shipgym.envs.engine import episode_keys
-from shipgym.envs.environment import DEFAULT_MODEL, DEFAULT_TASK, VECTOR_OPTIONS, ShipsEnv, rudder_orders
+from shipgym.envs.environment import DEFAULT_MODEL, DEFAULT_TASK, ShipsEnv, rudder_orders
 from shipgym.envs.outputs import named_rows
 from shipgym.errors import InputError
 from shipgym.ships import ShipModel
+from shipgym.tasks.task import VECTOR_OPTIONS
 
 Flags = NDArray[np.bool_]
 Observation = NDArray[np.float32]
@@ -235,9 +236,7 @@ class ShipVectorEnv(ShipsEnv, VectorEnv[Observation, Any, Floats]):
 
 
 def _mode(given: AutoresetMode | str) -> AutoresetMode:
-    if isinstance(given, AutoresetMode):
-        return given
-    by_name = {mode.value: mode for mode in AutoresetMode} | {mode.name: mode for mode in AutoresetMode}
+    by_name = {name: mode for mode in AutoresetMode for name in (mode, mode.value, mode.name)}
     if given not in by_name:
         raise InputError(
             f"autoreset_mode: {given!r} found, expected one of {quoted(m.value for m in AutoresetMode)}"

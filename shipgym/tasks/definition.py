@@ -55,15 +55,6 @@ def no_worst_cost(settings: Any) -> float:
     return 0.0
 
 
-def no_plan(settings: Any) -> int:
-    """Of a task that remembers its state alone."""
-    return 0
-
-
-def any_settings(settings: Any, model: Any) -> None:
-    """Of a task whose settings fit in any combination."""
-
-
 @dataclass(frozen=True)
 class TaskDefinition(Configurable):
     """Records and functions of a task, by their names in its file (`shipgym.tasks.contract`).
@@ -93,8 +84,8 @@ class TaskDefinition(Configurable):
     due: Callable[..., Any] = never_due
     on_event: Callable[..., Any] = no_event
     worst_cost: Callable[..., Any] = no_worst_cost
-    plan_length: Callable[[Any], int] = no_plan
-    check: Callable[[Any, Any], None] = any_settings
+    plan_length: Callable[[Any], int] = lambda settings: 0
+    check: Callable[[Any, Any], None] = lambda settings, model: None
     listed: Callable[[Any], Any] = np.asarray
     reported: tuple[str, ...] = ()
     episode_steps: int = 600

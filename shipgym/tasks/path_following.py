@@ -77,9 +77,7 @@ class Settings(NamedTuple):
     lookahead: Lookahead = 2.5
     corridor: Corridor = 1.0
     ground: Ground = 4.0
-    rudder_travel_weight: Annotated[
-        float, Setting("Cost of rudder travel of one heading scale.", at_least=0.0)
-    ] = 0.1
+    rudder_travel_weight: Annotated[float, Setting("Cost of rudder travel of one heading scale.", 0.0)] = 0.1
     reversal_weight: Annotated[float, Setting("Cost of each reversal of the rudder.", at_least=0.0)] = 0.05
     reversal_deg: Annotated[
         float, Setting("Return of the rudder that counts as a reversal, degrees.", above=0.0)

@@ -18,19 +18,13 @@ class Weights(NamedTuple):
     heading_scale_deg: Annotated[
         float, Setting("Heading error or rudder angle whose cost equals its weight, degrees.", above=0.0)
     ] = 30.0
-    rudder_weight: Annotated[float, Setting("Cost of a rudder angle of one heading scale.", at_least=0.0)] = (
-        0.1
-    )
+    rudder_weight: Annotated[float, Setting("Cost of a rudder angle of one heading scale.", 0.0)] = 0.1
     rudder_rate_weight: Annotated[
         float, Setting("Cost of a rudder rate of one heading scale per ship length sailed.", at_least=0.0)
     ] = 0.01
-    roll_weight: Annotated[float, Setting("Cost of a step with a heel of one roll scale.", at_least=0.0)] = (
-        0.0
-    )
+    roll_weight: Annotated[float, Setting("Cost of a step with a heel of one roll scale.", 0.0)] = 0.0
     roll_scale_deg: Annotated[float, Setting("Heel whose cost equals its weight, degrees.", above=0.0)] = 30.0
-    envelope_weight: Annotated[
-        float, Setting("Cost of a step in which the model extrapolates.", at_least=0.0)
-    ] = 0.0
+    envelope_weight: Annotated[float, Setting("Cost of a step in which the model extrapolates.", 0.0)] = 0.0
     integral_zone_deg: Annotated[
         float, Setting("Largest heading error that is integrated, degrees.", above=0.0)
     ] = 10.0

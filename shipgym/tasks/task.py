@@ -23,10 +23,9 @@ from shipgym.tasks.steering import Helm
 Sea = str | Weather
 
 LONGEST_INTERVAL = 5.0  # ship lengths at service speed
-ENVIRONMENT_KEYWORDS = (
-    "model", "task", "reward", "render_mode", "allow_unstable", "num_envs", "threads", "autoreset_mode",
-    "max_episode_steps",
-)  # fmt: skip
+#: Keywords of environments of one ship, and of many.
+ENV_OPTIONS = ("model", "task", "reward", "render_mode", "allow_unstable")
+VECTOR_OPTIONS = ("num_envs", *ENV_OPTIONS, "autoreset_mode", "threads", "max_episode_steps")
 STEPS_PER_LENGTH = 20.0  # control intervals in the time to travel one ship length, about
 
 ACTIONS = ("rudder", "rudder-discrete", "rudder-shaft")
@@ -148,7 +147,7 @@ class Task:
         if sensors is not None:
             names = (*names, *sensors.settings)
         for name in names:
-            if names.count(name) > 1 or name in ENVIRONMENT_KEYWORDS:
+            if names.count(name) > 1 or name in VECTOR_OPTIONS:
                 where = definition.source if name in definition.settings else sensors.source  # type: ignore[union-attr]
                 raise InputError(f"{where}: Settings.{name} found, which is a keyword already; rename it")
         return names
