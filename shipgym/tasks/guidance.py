@@ -109,7 +109,7 @@ class Path:
         legs = np.arange(self.n_legs)
         where = self.position(north[..., None], east[..., None], legs)
         beyond = np.maximum(np.maximum(-where.along, where.to_go * -1.0), 0.0)
-        return np.asarray(np.hypot(where.cross_track, beyond).min(axis=-1))
+        return np.hypot(where.cross_track, beyond).min(axis=-1)  # type: ignore[no-any-return]
 
 
 def line_of_sight(where: PathPosition, lookahead: ArrayLike) -> Floats:
@@ -133,7 +133,7 @@ def integral_line_of_sight(
 
 def wrapped(angle: ArrayLike) -> Floats:
     """The same angle in [-pi, pi)."""
-    return np.asarray((np.asarray(angle, dtype=float) + np.pi) % (2.0 * np.pi) - np.pi)
+    return (np.asarray(angle, dtype=float) + np.pi) % (2.0 * np.pi) - np.pi  # type: ignore[no-any-return]
 
 
 def random_path(
