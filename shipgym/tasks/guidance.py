@@ -133,7 +133,7 @@ def integral_line_of_sight(
 
 def wrapped(angle: ArrayLike) -> Floats:
     """The same angle in [-pi, pi)."""
-    return (np.asarray(angle, dtype=float) + np.pi) % (2.0 * np.pi) - np.pi  # type: ignore[no-any-return]
+    return (np.asarray(angle, dtype=float) + np.pi) % (2.0 * np.pi) - np.pi
 
 
 def random_path(
