@@ -132,7 +132,7 @@ def test_policies_are_not_added_to_slow_controllers_unless_asked_for(
     write_json({"tasks": {"calm": found}}, path)
     base = design_base("tuned", CALM)
     assert getattr(base, "kind", None) == "lq"
-    monkeypatch.setattr("agents.controllers.mpc._solver_library", lambda: None)
+    monkeypatch.setattr("agents.controllers.mpc.library", lambda *asked: None)
     assert tuned("best", CALM, "any").kind == "mpc"
     del found["lq"], found["pid"]
     write_json({"tasks": {"calm": found}}, path)
