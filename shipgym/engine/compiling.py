@@ -47,9 +47,8 @@ def compiled(loop: Any, signature: str, parts: Parts, what: str) -> Any:
     else:
         dispatcher._cache = disk = DiskCache(folder, tag, signature)
         if not disk.ready():
-            with locked(
-                disk.path, partial(_say, f"shipgym: another process compiles {what}; waiting for it")
-            ):
+            told = f"shipgym: another process compiles {what}; waiting for it"
+            with locked(disk.path, partial(_say, told)):
                 if not disk.ready():  # another process may have been first
                     _announce(what, folder)
                     _compile(dispatcher, signature, what)
@@ -93,11 +92,9 @@ def _compile(dispatcher: Any, signature: str, what: str) -> None:
     try:
         with global_compiler_lock, _uncollected(), lean(name):
             dispatcher.compile(signature)
-            for code in dispatcher.overloads.values():
-                for (
-                    found
-                ) in code._find_referenced_environments():  # of what the loop calls, and what it prints
-                    code.library.codegen.set_env(found.env_name, found)
+            for code in dispatcher.overloads.values():  # what loops call has an environment, too, for `print`
+                for one in code._find_referenced_environments():
+                    code.library.codegen.set_env(one.env_name, one)
     except (NumbaError, TypeError) as error:  # TypeError: a record made of other fields
         raise InputError(explanation(error, what)) from None
 

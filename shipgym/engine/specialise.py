@@ -142,14 +142,8 @@ def _is_plain(value: Any) -> bool:
 @cache
 def _loaded_names(code: CodeType) -> tuple[str, ...]:
     """Names that a function and those within it take from its globals; attributes are none of them."""
-    return tuple(
-        dict.fromkeys(
-            i.argval
-            for one in _nested(code)
-            for i in dis.get_instructions(one)
-            if i.opname in ("LOAD_GLOBAL", "LOAD_NAME")
-        )
-    )
+    loads = (i for one in _nested(code) for i in dis.get_instructions(one))
+    return tuple(dict.fromkeys(i.argval for i in loads if i.opname in ("LOAD_GLOBAL", "LOAD_NAME")))
 
 
 def _nested(code: CodeType) -> Iterator[CodeType]:
@@ -183,7 +177,7 @@ class Trace:
     def __init__(self, parts: Parts) -> None:
         self.parts = parts
         self.digest = hashlib.sha256()
-        self.seen: set[Any] = set()
+        self.seen: dict[Any, int] = {}  # functions and modules, with their numbers
         self.records: list[Any] = []
 
     def add(self, value: object) -> None:
@@ -200,8 +194,7 @@ class Trace:
             self.add((value.dtype, value.shape, value.strides, value.tobytes()))
         elif isinstance(value, ModuleType):
             self.add(value.__name__)
-            if (value, attributes) not in self.seen:
-                self.seen.add((value, attributes))
+            if self._is_new((value, attributes)):
                 for name in attributes:
                     self.visit(vars(value).get(name), attributes)
         elif isinstance(value, tuple | list):
@@ -209,7 +202,8 @@ class Trace:
             for one in value:
                 self.visit(one, attributes)
         elif is_record(value):
-            self.add((value.__name__, value._fields, value._field_defaults))
+            self.add((value.__name__, value._fields))
+            self.visit(tuple(value._field_defaults.items()))
             self.records.append(value)
         elif isinstance(value, EnumType):
             self.add((value.__qualname__, dict(value.__members__)))
@@ -217,6 +211,12 @@ class Trace:
             self._visit_callable(value)
         else:
             self.add(value)
+
+    def _is_new(self, value: Any) -> bool:
+        """Whether something was not seen before; which one it is, is taken too."""
+        new = value not in self.seen
+        self.add(self.seen.setdefault(value, len(self.seen)))
+        return new
 
     def _visit_callable(self, value: Any) -> None:
         value = getattr(value, "_dispatcher", value)  # of what Numba vectorises
@@ -237,9 +237,8 @@ class Trace:
             self.add(getattr(value, "__qualname__", str(type(value))))
 
     def _visit_function(self, function: Any) -> None:
-        if function in self.seen:
+        if not self._is_new(function):
             return
-        self.seen.add(function)
         self._visit_code(function.__code__, function.__doc__)
         self.visit((function.__defaults__, *(function.__kwdefaults__ or {}).items()))
         names = tuple(name for code in _nested(function.__code__) for name in code.co_names)

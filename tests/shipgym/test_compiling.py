@@ -413,6 +413,14 @@ class Tripler:
         self.k = 3 * k
 
 
+def uses_both(k):
+    return one(k) - other(k)  # noqa: F821
+
+
+def uses_all(k):
+    return one(k) + other(k) + inner(k)  # noqa: F821
+
+
 def looks_up(k):
     return TABLE[k] * helper(k) + tools.share(k)  # noqa: F821
 
@@ -463,6 +471,15 @@ def test_tables_compiled_helpers_and_modules_of_a_user_are_in_the_name_too():
         "what another has from around it": named(njit(times(3.0))),
     }
     assert len({named(), *others.values()}) == 1 + len(others)
+
+
+def test_which_of_two_functions_a_name_means_is_in_the_name():
+    def named(first, second):
+        inner = FunctionType(uses_both.__code__, {"__name__": "my_ship", "one": first, "other": second})
+        names = {"__name__": "my_ship", "one": double, "other": triple, "inner": inner}
+        return fingerprint(FunctionType(uses_all.__code__, names), {})
+
+    assert named(double, triple) == named(double, triple) != named(triple, double)
 
 
 def test_what_a_module_within_a_module_holds_is_in_the_name():
