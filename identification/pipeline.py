@@ -198,7 +198,8 @@ def _scaled_covariance(
     covariance = _covariance(fit, problem.samples, problem.blank, refined, options.uncertainty)
     if not options.model_error:
         return covariance
-    error = model_error(_left_out(fit, problem, refined, covariance), problem.used)
+    own = replace(fit.model, covariance=covariance)
+    error = model_error(own, _left_out(fit, problem, refined, covariance), problem.used)
     provenance["model_error"] = error
     factor: float = error["factor"]
     return factor**2 * covariance

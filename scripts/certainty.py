@@ -5,10 +5,11 @@
 prints the table of docs/certainty.md.
 
 Every reference ship, and two ships by the MMG standard method (tests/ships/mmg.py), is put through sea
-trials with the noise of sensors: zigzags 10/10 and 20/20 to both sides, and for half of the cases a 35
-degree turn to starboard too. She is identified by structures that are not hers. The indices of models drawn
-are compared with her own: advance and tactical diameter to both sides, overshoots and initial turning of
-the zigzags.
+trials with the noise of sensors: zigzags 10/10 and 20/20 to both sides, without turns, with a 35 degree turn
+to starboard, and with one to each side. She is identified by structures that are not hers. The indices of
+models drawn are compared with her own: advance and tactical diameter to both sides, overshoots and initial
+turning of the zigzags; and those of manoeuvres that are not among the trials, turns with 20 degrees and
+zigzags 15/15 besides.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ import sys
 import warnings
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TypeVar
 
@@ -31,9 +33,18 @@ if str(ROOT) not in sys.path:
 import shipgym  # noqa: E402 - the folder above has to be found first
 from identification import IdentificationResult, identify  # noqa: E402
 from shipgym import ShipModel, Trial  # noqa: E402
-from shipgym.manoeuvres import Manoeuvre, turning_circle, zigzag  # noqa: E402
+from shipgym.manoeuvres import (  # noqa: E402
+    Manoeuvre,
+    TurningIndices,
+    ZigzagIndices,
+    turning_circle,
+    turning_indices,
+    zigzag,
+    zigzag_indices,
+)
 from shipgym.manoeuvres.imo import imo_manoeuvres  # noqa: E402
 from shipgym.manoeuvres.intervals import IndexInterval, attempt, intervals_of  # noqa: E402
+from shipgym.manoeuvres.registry import standard_time  # noqa: E402
 from shipgym.trials.sensors import Sensors  # noqa: E402
 from tests.ships.mmg import MMG_SHIPS, mmg_ship  # noqa: E402
 
@@ -42,8 +53,10 @@ Key = dict[tuple[str, str], Value]  # by manoeuvre and name of the index
 
 SHIPS = ("mariner", "container", "tanker", "kvlcc2", *MMG_SHIPS)
 STRUCTURES = ("abkowitz", "cubic")
+OTHER = "other "  # begins the names of manoeuvres that are not among the standard ones
 OWN = {"mariner": "abkowitz"}  # the structure that a ship is made of
-TRIALS = ("zigzags", "zigzags and turn")
+TRIALS = ("zigzags", "zigzags and turn", "zigzags and turns")
+TURNS = (("starboard", 35.0), ("port", -35.0))  # none, the first or both of them are sailed
 INDICES = (
     "advance_lengths", "tactical_diameter_lengths", "overshoot_1_deg", "overshoot_2_deg",
     "initial_turning_lengths",
@@ -66,8 +79,8 @@ def sea_trials(ship: ShipModel, kind: str, seed: int) -> list[Trial]:
         for angle in (10.0, 20.0)
         for port in (False, True)
     ]
-    if kind == TRIALS[1]:
-        runs.append(turning_circle(ship, 35.0, 25.0 * travel, dt).with_(name="turn to starboard"))
+    for side, angle in TURNS[: TRIALS.index(kind)]:
+        runs.append(turning_circle(ship, angle, 25.0 * travel, dt).with_(name=f"turn to {side}"))
     sensors = Sensors(sampling_s=max(min(1.0, travel / 20.0), dt))
     steady = np.full(len(runs[0].t), 1.0)
     return [
@@ -83,14 +96,34 @@ def sea_trials(ship: ShipModel, kind: str, seed: int) -> list[Trial]:
     ]
 
 
-def standard_tests(ship: ShipModel) -> dict[str, Manoeuvre]:
-    """The manoeuvres whose indices are compared."""
-    return {name: one for name, one in imo_manoeuvres(ship).items() if "stop" not in name}
+def compared(ship: ShipModel) -> dict[str, Manoeuvre]:
+    """The manoeuvres whose indices are compared: the standard ones, and others within the same envelope."""
+    duration, dt = standard_time(ship)
+    turn, weave = partial(turning_circle, duration=duration, dt=dt), partial(zigzag, duration=duration, dt=dt)
+    others = {
+        f"{OTHER}turning circle to {side}": Manoeuvre(
+            partial(turn, rudder_deg=np.sign(angle) * 20.0), turning_indices, TurningIndices
+        )
+        for side, angle in TURNS
+    } | {
+        f"{OTHER}zigzag, {side} first": Manoeuvre(
+            partial(weave, rudder_deg=15.0, heading_deg=15.0, port_first=angle < 0.0, must_reverse=False),
+            zigzag_indices, ZigzagIndices,
+        )
+        for side, angle in TURNS
+    }  # fmt: skip
+    return {name: one for name, one in imo_manoeuvres(ship).items() if "stop" not in name} | others
+
+
+def was_sailed(manoeuvre: str, kind: str) -> bool:
+    """Whether a manoeuvre is one of the trials of a kind."""
+    turns = tuple(f"to {side}" for side, _ in TURNS[: TRIALS.index(kind)])
+    return not manoeuvre.startswith(OTHER) and (manoeuvre.startswith("zigzag") or manoeuvre.endswith(turns))
 
 
 def true_indices(ship: ShipModel) -> Key[float]:
     """Indices of a ship, by manoeuvre and name."""
-    found = {run: attempt(one.evaluate, ship)[0] for run, one in standard_tests(ship).items()}
+    found = {run: attempt(one.evaluate, ship)[0] for run, one in compared(ship).items()}
     return {
         (run, name): indices[name] for run, indices in found.items() for name in INDICES if name in indices
     }
@@ -98,7 +131,7 @@ def true_indices(ship: ShipModel) -> Key[float]:
 
 def index_intervals(model: ShipModel, draws: int, seed: int = 1) -> Key[IndexInterval]:
     """The same indices of a model, with their intervals over models drawn from its covariance."""
-    tests = standard_tests(model)
+    tests = compared(model)
     own = {run: one.no_indices for run, one in tests.items()}
     found = intervals_of(own, model.sample(draws, seed), {run: one.evaluate for run, one in tests.items()})
     return {
@@ -144,9 +177,18 @@ def case(name: str, structure: str, kind: str, seed: int, draws: int) -> dict[st
 
 
 def share(rows: Sequence[dict[str, object]], label: str, part: str = "") -> str:
-    """Per cent of the intervals that hold the truth, of manoeuvres whose name begins so."""
-    held = [one for row in rows for key, one in row[label].items() if key[0].startswith(part)]
+    """Per cent of the intervals that hold the truth, of standard manoeuvres whose name begins so."""
+    held = [
+        one for row in rows for (run, _), one in row[label].items()
+        if run.startswith(part) and not run.startswith(OTHER)
+    ]  # fmt: skip
     return f"{100.0 * np.mean(held):.0f}" if held else "-"
+
+
+def share_not_sailed(rows: Sequence[dict[str, object]]) -> str:
+    """Per cent likewise, with model error, of the manoeuvres that are not among the trials."""
+    held = [one for row in rows for (run, _), one in row["all"].items() if not was_sailed(run, row["trials"])]
+    return f"{100.0 * np.mean(held):.0f}"
 
 
 def table(rows: Sequence[dict[str, object]]) -> str:
@@ -158,8 +200,8 @@ def table(rows: Sequence[dict[str, object]]) -> str:
     groups["**all**"] = list(rows)
     lines = [
         "| ship, trials | models | factor | noise only, % | with model error, % | "
-        "of which zigzags, turns, % | half-width, % | draws that run away, % |",
-        "| --- | --- | --- | --- | --- | --- | --- | --- |",
+        "of which zigzags, turns, % | not sailed, % | half-width, % | draws that run away, % |",
+        "| --- | --- | --- | --- | --- | --- | --- | --- | --- |",
     ]
     for name, group in groups.items():
         known = [row for row in group if "factor" in row]
@@ -172,7 +214,7 @@ def table(rows: Sequence[dict[str, object]]) -> str:
             f"| {name} | {len(known)}{unstable} | {min(factors):.1f} to {max(factors):.1f} | "
             f"{share(known, 'noise')} | {share(known, 'all')} | "
             f"{share(known, 'all', 'zigzag')}, {share(known, 'all', 'turning')} | "
-            f"{width:.0f} | {lost:.0f} |"
+            f"{share_not_sailed(known)} | {width:.0f} | {lost:.0f} |"
         )
     return "\n".join(lines)
 

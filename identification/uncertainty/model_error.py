@@ -57,17 +57,38 @@ def without_trial(estimators: Estimators, samples: Samples, trial: int) -> tuple
     return found, samples.select(kept)
 
 
-def model_error(models: Sequence[ShipModel], trials: Sequence[Trial]) -> dict[str, Any]:
-    """The factor on the standard errors at which trials left out have errors of size one, never below 1.
+def model_error(own: ShipModel, left_out: Sequence[ShipModel], trials: Sequence[Trial]) -> dict[str, Any]:
+    """The factor on the standard errors at which errors of prediction are of size one, never below 1.
 
-    `models`: each identified without the trial of the same place, with its covariance. The root mean square
-    of the factors that motion and indices ask for, times Student's t with as many degrees of freedom as
-    trials over the normal's: of few trials the scatter itself is uncertain. `DEFAULT` for fewer than three
-    trials, whose models are not looked at, or where fewer can be predicted. Returns `factor`, `how` it was
-    found, and what it is made of, for the provenance.
+    `own`: the model of all trials; `left_out`: each identified without the trial of the same place; all with
+    covariance. Trials left out ask for a factor, and so do, where it is larger, the errors of the own model
+    on the trials that it was fitted to: a trial left out is known from its mirror image, and the covariance
+    shrinks with each trial while the error of the equations does not. Returns `factor`, `how` it was found,
+    and what it is made of, for the provenance.
+    """
+    least, fitted, _ = _sizes([own] * len(trials), trials)
+    error = _generalisation(left_out, trials)
+    if least > error["factor"]:
+        error |= {"factor": least, "how": "errors on the fitted trials"}
+    return {**error, "fitted": fitted}
+
+
+def _generalisation(left_out: Sequence[ShipModel], trials: Sequence[Trial]) -> dict[str, Any]:
+    """The factor of trials left out, times Student's t with as many degrees of freedom over the normal's.
+
+    Of few trials the scatter itself is uncertain. `DEFAULT` where fewer than three can be predicted.
     """
     if len(trials) < FEWEST_TRIALS:
         return _assumed(f"too few trials to leave one out ({len(trials)})")
+    factor, sizes, predicted = _sizes(left_out, trials)
+    if predicted < FEWEST_TRIALS:
+        return _assumed(f"only {predicted} of {len(trials)} trials can be predicted when they are left out")
+    few, how = float(student.ppf(0.975, predicted)) / NORMAL, "trials left out in turn"
+    return {"factor": max(1.0, few * factor), "how": how, "trials": predicted, "for_few_trials": few, **sizes}
+
+
+def _sizes(models: Sequence[ShipModel], trials: Sequence[Trial]) -> tuple[float, dict[str, float], int]:
+    """The root mean square of the factors by motion and by indices, these, and how many are predicted."""
     motion, indices, predicted = list[Error](), list[Error](), 0
     for model, trial in zip(models, trials, strict=True):
         own, drawn = replace(model, covariance=None), model.sample(DRAWS, 0)
@@ -77,13 +98,8 @@ def model_error(models: Sequence[ShipModel], trials: Sequence[Trial]) -> dict[st
             predicted += 1
             motion += found
             indices += _index_errors(own, drawn, trial, clean)
-    if predicted < FEWEST_TRIALS:
-        return _assumed(f"only {predicted} of {len(models)} trials can be predicted when they are left out")
     sizes = {name: scale_of(of) for name, of in (("motion", motion), ("indices", indices)) if of}
-    few = float(student.ppf(0.975, predicted)) / NORMAL
-    factor = max(1.0, few * float(np.sqrt(np.mean(np.square(list(sizes.values()))))))
-    how = "trials left out in turn"
-    return {"factor": factor, "how": how, "trials": predicted, "for_few_trials": few, **sizes}
+    return float(np.sqrt(np.mean(np.square([*sizes.values()] or [0.0])))), sizes, predicted
 
 
 def _assumed(why: str) -> dict[str, Any]:
@@ -119,7 +135,8 @@ def _motion_errors(own: ShipModel, drawn: Sequence[ShipModel], trial: Trial, cle
         square = float(np.mean((predicted[name] - trial[name]) ** 2))
         starts = [float(np.mean((run[name] - predicted[name]) ** 2)) for run in started if run is not None]
         if variance > 0.0:
-            found.append((square, variance, level**2 + sum(starts)))
+            timing = float(np.mean((_timing(trial) * np.gradient(clean[name], trial.t)) ** 2))
+            found.append((square, variance, level**2 + timing + sum(starts)))
     return found
 
 
@@ -142,9 +159,14 @@ def _index_errors(own: ShipModel, drawn: Sequence[ShipModel], trial: Trial, clea
     return found
 
 
+def _timing(trial: Trial) -> float:
+    """Standard deviation of a time that is known to a step, such as that of a rudder's corner, s."""
+    return float(np.median(np.diff(trial.t)) / np.sqrt(12.0))
+
+
 def _reading_noise(trial: Trial, index: str, model: ShipModel) -> float:
     """Variance of an index as it is read from samples: noise, and a time that is known to a step."""
-    timing = float(np.median(np.diff(trial.t))) / np.sqrt(12.0)
+    timing = _timing(trial)
     if index.endswith("_deg"):
         rate = float(np.abs(trial["r"]).max())
         return float(np.degrees(np.hypot(noise_level(trial.t, trial["psi"]), timing * rate))) ** 2

@@ -60,7 +60,7 @@ def _legs(trial: Trial) -> tuple[Leg, ...]:
     delta, edges = rudder(trial), [float(trial.t[0]), start, *turns, float(trial.t[-1])]
     found = []
     for leg, (begin, end) in enumerate(pairwise(edges)):
-        held = (trial.t >= 0.5 * (begin + end)) & (trial.t <= end)
+        held = (trial.t >= 0.25 * begin + 0.75 * end) & (trial.t <= end)
         if end > begin and held.any():
             target = float(np.interp(end, trial.t, trial["psi"])) if 1 <= leg <= len(turns) else None
             found.append(Leg(float(np.median(delta[held])), end - begin, target))

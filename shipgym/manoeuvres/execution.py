@@ -1,6 +1,7 @@
 """When a manoeuvre was executed, found from the rudder, ordered or measured; and other things all share."""
 
 from collections.abc import Sequence
+from itertools import pairwise
 
 import numpy as np
 
@@ -33,42 +34,49 @@ def execute_time(trial: Trial) -> float:
     if "delta_command" in trial.channels:
         usual = np.percentile(np.abs(delta), 75)  # a little helm on the approach is no order yet
         return float(trial.t[np.argmax(np.abs(delta) > 0.5 * usual)])
-    return departure(trial.t, delta)
+    move = np.abs(delta - delta[0])
+    return max(departure(trial.t, move, float(np.percentile(move, 75)), _fastest(trial)), float(trial.t[0]))
 
 
 def reversals(trial: Trial) -> tuple[float, list[float]]:
     """Times of the first order and of each reversal of the rudder in a zigzag, s.
 
     An ordered rudder reverses at the first sample that has the new order; a measured one when it left
-    its angle (`departure`).
+    the angle at which it was held (`departure`).
     """
     delta, t = rudder(trial), trial.t
     start = execute_time(trial)
     usual = ARRIVED * np.percentile(np.abs(delta), 75)
     side = np.where(delta > usual, 1, np.where(delta < -usual, -1, 0))
     arrived = np.flatnonzero((side != 0) & (t >= start))
-    changes = np.flatnonzero(np.diff(side[arrived]))
+    holds = np.split(arrived, np.flatnonzero(np.diff(side[arrived])) + 1)
+    if "delta_command" in trial.channels:
+        return start, [float(t[hold[0]]) for hold in holds[1:]]
     turns = []
-    for before, after in zip(arrived[changes], arrived[changes + 1], strict=True):
-        moving = slice(before, after + 1)
-        ordered = "delta_command" in trial.channels
-        turns.append(float(t[after]) if ordered else departure(t[moving], delta[moving]))
+    for hold, after in pairwise(holds):
+        moving = slice(hold[-1], after[0] + 1)
+        move = np.abs(delta[moving] - np.median(delta[hold]))
+        turns.append(departure(t[moving], move, move.max(), _fastest(trial)))
     return start, turns
 
 
-def departure(t: Floats, delta: Floats) -> float:
-    """Time at which a measured rudder left its first angle, s.
+def departure(t: Floats, move: Floats, reach: float, fastest: float) -> float:
+    """Time at which a measured rudder left the angle at which it was held, s.
 
-    Its move is traced back along the slope between a tenth and half of the way to where it mostly is.
+    Its `move` from there, rad, is traced back along the slope between the first samples beyond a tenth and
+    beyond half of its way of `reach`; where these are less than three samples apart, at least at the
+    `fastest` rate of the trial, rad/s.
     """
-    move = np.abs(delta - delta[0])
-    reach = np.percentile(move, 75) if len(move) > 8 else move.max()
     if reach == 0.0:
         return float(t[0])
-    upper = int(np.argmax(move >= 0.5 * reach))
-    lower = int(np.flatnonzero(move[: upper + 1] <= 0.1 * reach)[-1])
-    slope = (move[upper] - move[lower]) / (t[upper] - t[lower])
-    return float(max(t[lower] - move[lower] / slope, t[0]))
+    lower, upper = int(np.argmax(move > 0.1 * reach)), int(np.argmax(move >= 0.5 * reach))
+    between = (move[upper] - move[lower]) / (t[upper] - t[lower]) if upper > lower else 0.0
+    slope = between if upper - lower > 2 else max(between, fastest)
+    return float(t[upper] - move[upper] / slope)
+
+
+def _fastest(trial: Trial) -> float:
+    return float(np.abs(np.diff(rudder(trial)) / np.diff(trial.t)).max())
 
 
 def distance_sailed(trial: Trial) -> Floats:

@@ -158,12 +158,13 @@ def zigzagged() -> Answers:
         "port refused": lambda: zigzag(ship, 5.0, 60.0, True, 40.0, 2.0),
         "shallow": lambda: zigzag(ship, water_depth=20.0),
         "departure": [
-            lambda d=d: execution.departure(np.arange(float(len(d))), np.array(d, dtype=float))
-            for d in (
-                [0.0] * 5,
-                [0.1, 0.1, 0.5, 1.1, 1.1],
-                [0.0] * 7 + [0.3, 1.0, 2.0, 2.0, 2.0, 2.0, 2.0, 2.0],
-                [1.0, 0.9, 0.2, -1.0, -1.0, -1.0, -1.0, -1.0, -1.0, -1.0],
+            lambda d=d, f=f: execution.departure(np.arange(float(len(d))), np.array(d), max(d), f)
+            for d, f in (
+                ([0.0] * 5, 0.0),
+                ([0.0, 0.0, 0.4, 1.0, 1.0], 0.0),
+                ([0.0, 0.0, 0.4, 1.0, 1.0], 0.7),
+                ([0.0] * 7 + [0.1, 0.3, 0.6, 1.0, 2.0, 2.0, 2.0, 2.0, 2.0, 2.0], 2.0),
+                ([0.0, 0.1, 0.8, 2.0, 2.0, 2.0, 2.0, 2.0, 2.0, 2.0], 1.2),
             )
         ],
         "reached": [

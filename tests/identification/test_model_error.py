@@ -97,18 +97,40 @@ def test_the_factor_is_the_mean_of_motion_and_indices_never_below_one_and_larger
     monkeypatch.setattr(errors_of, "_index_errors", lambda *_: indices)
 
     def found() -> dict[str, object]:
-        return model_error([noisy_fit.model] * 3, noisy_trials[:3])
+        return model_error(noisy_fit.model, [noisy_fit.model] * 3, noisy_trials[:3])
 
     few = 3.1824463 / 1.96
     told = {"how": "trials left out in turn", "trials": 3, "for_few_trials": pytest.approx(few)}
     both = {"motion": pytest.approx(2.0), "indices": pytest.approx(4.0)}
-    assert found() == {"factor": pytest.approx(few * np.sqrt(10.0)), **told, **both}
+    assert found() == {"factor": pytest.approx(few * np.sqrt(10.0)), **told, **both, "fitted": both}
     motion, indices = [(0.01, 1.0, 0.0)], []
-    assert found() == {"factor": 1.0, **told, "motion": pytest.approx(0.1)}
-    seen = iter([[], motion, motion])
+    small = {"motion": pytest.approx(0.1)}
+    assert found() == {"factor": 1.0, **told, **small, "fitted": small}
+    seen = iter([*[motion] * 3, [], motion, motion])
     monkeypatch.setattr(errors_of, "_motion_errors", lambda *_: next(seen))
     why = "assumed: only 2 of 3 trials can be predicted when they are left out"
-    assert found() == {"factor": 2.5, "how": why}
+    assert found() == {"factor": 2.5, "how": why, "fitted": small}
+
+
+@pytest.mark.parametrize("count", [1, 3])
+def test_the_factor_is_at_least_what_the_models_errors_on_its_own_trials_ask_for(
+    count: int, noisy_fit: IdentificationResult, noisy_trials: list[Trial], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Errors of size 9 on the trials that were fitted, of 0.1 on those left out; 2.5 is assumed of one."""
+    left_out, size = replace(noisy_fit.model, name="left out"), {noisy_fit.model.name: 81.0, "left out": 0.01}
+    monkeypatch.setattr(errors_of, "_motion_errors", lambda own, *_: [(size[own.name], 1.0, 0.0)])
+    monkeypatch.setattr(errors_of, "_index_errors", lambda *_: [])
+
+    def found() -> dict[str, object]:
+        return model_error(noisy_fit.model, [left_out] * count, noisy_trials[:count])
+
+    told = {"factor": pytest.approx(9.0), "how": "errors on the fitted trials"}
+    assert found() | told == found()
+    assert found()["fitted"] == {"motion": pytest.approx(9.0)}
+    size[noisy_fit.model.name] = 4.0
+    assert found()["factor"] == (2.5 if count == 1 else pytest.approx(2.0))
+    monkeypatch.setattr(errors_of, "_motion_errors", lambda *_: [])
+    assert found()["factor"] == 2.5  # the model runs away on its own trials
 
 
 @pytest.mark.parametrize(("lost", "known"), [(10, True), (11, False)])
@@ -179,8 +201,10 @@ def test_the_covariance_in_the_model_is_the_scaled_one(mariner: ShipModel, noisy
 
 
 def test_too_few_trials_have_the_documented_factor(cao_fit: IdentificationResult) -> None:
+    """And its own errors, those of an exact record, ask for less."""
     error = cao_fit.model.provenance["model_error"]
-    assert error == {"factor": DEFAULT, "how": "assumed: too few trials to leave one out (1)"}
+    assumed = {"factor": DEFAULT, "how": "assumed: too few trials to leave one out (1)"}
+    assert error == {**assumed, "fitted": {"motion": 1e-3, "indices": 1e-3}}
 
 
 def test_closed_loop_overshoots_do_not_depend_on_the_neutral_helm(mariner: ShipModel) -> None:

@@ -87,14 +87,32 @@ def test_orders_count_by_the_rudder_that_is_exceeded_a_quarter_of_the_time():
 
 def test_a_measured_rudder_is_traced_back_along_its_slope_between_a_tenth_and_half_of_its_way():
     way = np.array([0.0, 0.0, 1.0, 1.05, 4.0, 5.2, *[10.0] * 10, *[30.0] * 4])
-    begun = 2.0 - 1.0 * 3.0 / 4.2
-    for delta in (way, 3.0 - way):
-        assert departure(np.arange(20.0), delta) == pytest.approx(begun)
-    assert execute_time(Trial(np.arange(20.0), {"delta": np.radians(way)})) == pytest.approx(begun)
-    few = np.array([0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 6.0, 40.0])  # of few samples the furthest counts
-    assert departure(np.arange(9.0), few) == 0.0
-    assert departure(np.arange(8.0), few[1:] - 1.0) == pytest.approx(3.0 - 3.0 * 4.0 / 36.0)
-    assert departure(np.arange(5.0, 9.0), np.full(4, 0.1)) == 5.0
+    t = np.arange(20.0)
+    way[4] = 3.0  # a tenth is exceeded at 3 s, half at 5 s, by 4.15 degrees within 2 s
+    assert departure(t, way, 10.0, 0.0) == pytest.approx(5.0 - 5.2 * 2.0 / 4.15)
+    fine = np.interp(0.5 * np.arange(80.0), [0.0, 3.0, 8.0, 30.0, 31.0], [0.0, 0.0, 10.0, 10.0, 20.0])
+    assert departure(0.5 * np.arange(80.0), fine, 10.0, 99.0) == pytest.approx(3.0)
+    for delta in (fine, 3.0 - fine):  # it mostly is 10 degrees from where it began
+        assert execute_time(Trial(0.5 * np.arange(80.0), {"delta": np.radians(delta)})) == pytest.approx(3.0)
+    assert departure(t[5:9], np.zeros(4), 0.0, 0.0) == 5.0
+
+
+def test_between_few_samples_a_measured_rudder_moves_at_the_fastest_rate_of_the_trial_at_least():
+    """A rudder of 2.5 deg/s, ordered at 4 s, then from 20 to -20 degrees at 28 s, and back at 63 s."""
+    t, way = np.arange(0.0, 100.0, 5.0), np.array([0.0, 0.0, 5.0, 17.5, 30.0, 40.0])
+    assert departure(t[:6], way, 40.0, 0.0) == pytest.approx(8.0)
+    assert departure(t[:4], np.array([0.0, 0.0, 30.0, 40.0]), 40.0, 2.5) == pytest.approx(10.0 - 12.0)
+    corners, angles = [4.0, 12.0, 28.0, 44.0, 63.0, 79.0], np.radians([0.0, 20.0, 20.0, -20.0, -20.0, 20.0])
+    start, turns = reversals(Trial(t, {"delta": np.interp(t, corners, angles)}))
+    assert [start, *turns] == pytest.approx([4.0, 28.0, 63.0])
+
+
+@pytest.mark.parametrize("name", ["mariner", "container", "kvlcc2", "tanker"])
+def test_a_measured_rudder_reverses_when_it_was_ordered_to(name):
+    """It is traced back to the angle at which it was held, not to where it passed nine tenths of it."""
+    ordered = manoeuvres.zigzag(load_model(name), 10, 10, dt=0.1)
+    measured = Trial(ordered.t, {"psi": ordered["psi"], "delta": ordered["delta"]})
+    assert np.max(np.abs(np.subtract(reversals(measured)[1], reversals(ordered)[1]))) <= 0.1 + 1e-9
 
 
 def test_a_threshold_is_reached_between_two_samples_at_the_first_or_never():
