@@ -22,7 +22,7 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
-from certainty import holds, index_intervals, true_indices
+from certainty import OTHER, holds, index_intervals, true_indices
 
 import shipgym
 from identification import IdentificationResult, identify
@@ -256,6 +256,7 @@ def coverage(model: ShipModel) -> tuple[str, str, str]:
         if alike and name in ship.coefficients and deviation > 0.0
     ]
     intervals = index_intervals(model, DRAWS)
+    intervals = {key: one for key, one in intervals.items() if not key[0].startswith(OTHER)}
     held, lost = holds(intervals, true_indices(ship)), np.mean([one.ran_away for one in intervals.values()])
     known = f"{sum(inside)} of {len(inside)}" if inside else "-"
     return known, f"{sum(held.values())} of {len(held)}", f"{100.0 * lost:.0f}"

@@ -2,7 +2,9 @@
 
     python scripts/certainty.py [--seeds 3] [--draws 40] [--ships kcs,tanker]
 
-prints the table of docs/certainty.md.
+prints the tables of docs/certainty.md. Ships that it knows besides: `--ships stable-light,stable-heavy,
+lively-light,lively-heavy` (tests/ships/square_drag.py) and `--ships ferry,product-tanker,training-vessel`
+(tests/ships/inoue.py).
 
 Every reference ship, and two ships by the MMG standard method (tests/ships/mmg.py), is put through sea
 trials with the noise of sensors: zigzags 10/10 and 20/20 to both sides, without turns, with a 35 degree turn
@@ -46,7 +48,9 @@ from shipgym.manoeuvres.imo import imo_manoeuvres  # noqa: E402
 from shipgym.manoeuvres.intervals import IndexInterval, attempt, intervals_of  # noqa: E402
 from shipgym.manoeuvres.registry import standard_time  # noqa: E402
 from shipgym.trials.sensors import Sensors  # noqa: E402
+from tests.ships.inoue import INOUE_SHIPS  # noqa: E402
 from tests.ships.mmg import MMG_SHIPS, mmg_ship  # noqa: E402
+from tests.ships.square_drag import SQUARE_DRAG  # noqa: E402
 
 Value = TypeVar("Value")
 Key = dict[tuple[str, str], Value]  # by manoeuvre and name of the index
@@ -65,7 +69,8 @@ INDICES = (
 
 def ship_of(name: str) -> ShipModel:
     """A ship by name, the truth behind the trials."""
-    return mmg_ship(name) if name in MMG_SHIPS else shipgym.load_model(name)
+    made = {**SQUARE_DRAG, **INOUE_SHIPS, **{one: partial(mmg_ship, one) for one in MMG_SHIPS}}
+    return made[name]() if name in made else shipgym.load_model(name)
 
 
 def sea_trials(ship: ShipModel, kind: str, seed: int) -> list[Trial]:

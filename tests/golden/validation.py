@@ -232,11 +232,14 @@ def record_diagnostics() -> dict[str, Any]:
     left, kept = without_trial(estimators, samples, 1)
     found["without"] = {q: [m.coef_, m.inverse_moment_] for q, m in left.items()} | {"rows": len(kept)}
     model = fitted("uncertainty", "three").model
-    found["model error"] = [model_error([model] * 3, [one, two, held]), model_error([model], [one])]
+    found["model error"] = [
+        model_error(model, [model] * 3, [one, two, held]),
+        model_error(model, [model], [one]),
+    ]
     bare = [
         Trial(t.t, {k: t[k] for k in ("psi", "u", "v", "r", "delta")}, name=t.name) for t in (one, two, held)
     ]
-    found["model error, bare"] = model_error([model] * 3, bare)
+    found["model error, bare"] = model_error(model, [model] * 3, bare)
     for name, (lengths, staggered, interval) in {
         "short": (2.3, True, 0.0),
         "long": (99.0, False, 0.2),

@@ -26,15 +26,20 @@ def off_in_standard_errors(model, shipped):
 
 
 def test_mariner_tls_svm_is_what_its_trials_give():
-    """As `scripts/build_models.py` does; coefficients to the last digits of the linear algebra."""
+    """As `scripts/build_models.py` does; coefficients to the last digits of the linear algebra.
+
+    The file, which the agents' files name by its hash, has a model error of before measured rudders were
+    traced back to the angle that was held. The trials are those of her own equations.
+    """
     ship = shipgym.ShipFile.load(MARINER_TRIALS)
     result = identify(ship.trials(), particulars=ship.particulars, steering=ship.steering)
     shipped = shipgym.load_model("mariner-tls-svm")
     assert off_in_standard_errors(result.model, shipped) < 1e-3
     assert result.model.provenance["trials"] == shipped.provenance["trials"]
     factors = [one.provenance["model_error"]["factor"] for one in (result.model, shipped)]
-    assert factors[0] == pytest.approx(factors[1], rel=0.02)
-    np.testing.assert_allclose(result.model.covariance, shipped.covariance, rtol=0.05)
+    assert factors == pytest.approx([1.0, 1.4898], rel=0.02)
+    scaled = (factors[0] / factors[1]) ** 2 * shipped.covariance
+    np.testing.assert_allclose(result.model.covariance, scaled, rtol=0.05)
 
 
 @pytest.mark.parametrize("angle", [10, 15, 20, 30])
