@@ -63,9 +63,7 @@ def trials_command(
     out: Annotated[Path | None, Option(metavar="PLOTS.HTML", help="Write figures to this file.")] = None,
     draws: Annotated[int, Option(min=0, help="Models drawn from an identified model's covariance.")] = 100,
     seed: Annotated[int, Option(min=0, help="Random seed of the draws.")] = 0,
-    depth: Annotated[
-        float | None, Option(metavar="M", help="Depth of water, m; default: deep water.")
-    ] = None,
+    depth: Annotated[float | None, Option(metavar="M", help="Water depth, m; default: deep.")] = None,
 ) -> None:
     """Simulate the standard manoeuvres of a model. Assesses them by the IMO criteria.
 
@@ -119,11 +117,7 @@ def autopilot_command(
     options: command.IdentifyOptions,
     agents: Annotated[
         list[str] | None,
-        Option(
-            "--agent",
-            metavar="AGENT",
-            help="Also run this autopilot: a file, or the name of a pretrained one; repeatable.",
-        ),
+        Option("--agent", metavar="AGENT", help="Also run this autopilot, a file or a name; repeatable."),
     ] = None,
     autopilots: Annotated[
         str | None,

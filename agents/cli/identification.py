@@ -122,9 +122,7 @@ def advise_command(
     criterion: Annotated[
         str, Option(help="What to reduce: c (one coefficient), D (volume) or E (longest axis).")
     ] = "c",
-    coefficient: Annotated[
-        str | None, Option(help="Coefficient for criterion c; default: the least certain.")
-    ] = None,
+    coefficient: Annotated[str | None, Option(help="For criterion c; default: the least certain.")] = None,
     number: Annotated[int, Option(min=1, help="Number of manoeuvres.")] = 3,
     *,
     options: IdentifyOptions,
@@ -153,12 +151,8 @@ def advise_command(
 def reduce_command(
     ship: ShipFileArgument,
     out: Out,
-    direction: Annotated[
-        str, Option(help="backward (drop terms one by one) or forward (add them).")
-    ] = "backward",
-    tolerance: Annotated[
-        float, Option(min=0.0, help="By how much R2 on held-out stretches may fall.")
-    ] = 1e-3,
+    direction: Annotated[str, Option(help="backward (drop terms) or forward (add them).")] = "backward",
+    tolerance: Annotated[float, Option(min=0.0, help="How far R2 on held-out stretches may fall.")] = 1e-3,
     *,
     options: IdentifyOptions,
 ) -> None:

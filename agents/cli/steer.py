@@ -27,11 +27,7 @@ def steer_command(
     ] = None,
     rate: Annotated[
         float | None,
-        Option(
-            "--rate-of-turn",
-            metavar="DEG",
-            help="Degrees per minute, for turn-rate; with --heading the limit.",
-        ),
+        Option("--rate-of-turn", metavar="DEG", help="deg/min, for turn-rate; with --heading the limit."),
     ] = None,
     route: Annotated[
         Path | None, Option(metavar="CSV", help="Route for wheel-over: columns latitude, longitude, degrees.")
@@ -78,17 +74,12 @@ def steer_command(
 def simulate_command(
     model: Annotated[str, Argument(metavar="MODEL", help="A model file, or the name of a shipped model.")],
     nmea: Address,
-    leg: Annotated[
-        float, Option(metavar="DEG", min=0.0, max=360.0, help="Leg that her plotter sends.")
-    ] = 0.0,
+    leg: Annotated[float, Option(metavar="DEG", min=0.0, max=360.0, help="Leg on her plotter.")] = 0.0,
     sea: Annotated[str, Option(help="calm, slight, moderate or rough.")] = "calm",
     seed: Annotated[int, Option(min=0, help="Seed of the sea.")] = 0,
     drop: Annotated[
         list[str] | None,
-        Option(
-            metavar="HDT=60",
-            help="Sentence that falls silent after this many seconds (HDT=60: HDT after 60 s); repeatable.",
-        ),
+        Option(metavar="HDT=60", help="Sentence that falls silent, HDT after 60 s, say; repeatable."),
     ] = None,
     duration: Duration = inf,
     speed_up: SpeedUp = 1.0,

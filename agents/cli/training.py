@@ -29,6 +29,14 @@ EnvironmentOptions = Annotated[
     list[str] | None,
     Option("--option", metavar="NAME=VALUE", help="Any other argument of the environment; repeatable."),
 ]
+TotalSteps = Annotated[
+    int | None, Option(min=1, help="Decisions that an agent learns from; default: as in the settings.")
+]
+Settings = Annotated[Path | None, Option(metavar="FILE.TOML", help="Settings that override the tuned ones.")]
+Setting = Annotated[
+    list[str] | None,
+    Option("--set", metavar="SETTING=VALUE", help="A setting, never varied by `tune`; repeatable."),
+]
 Randomise = Annotated[
     bool | None,
     Option(
@@ -46,25 +54,14 @@ def train_command(
     sea: Sea = None,
     task: TaskName = None,
     environment_options: EnvironmentOptions = None,
-    total_steps: Annotated[
-        int | None, Option(min=1, help="Decisions to learn from; default: as in the settings.")
-    ] = None,
-    settings: Annotated[
-        Path | None, Option(metavar="FILE.TOML", help="Settings that override the tuned ones.")
-    ] = None,
-    set_: Annotated[
-        list[str] | None,
-        Option("--set", metavar="SETTING=VALUE", help="Any setting of the algorithm; repeatable."),
-    ] = None,
-    from_nothing: Annotated[
-        bool, Option("--from-nothing", help="Learn without a base: --set base=none.")
-    ] = False,
+    total_steps: TotalSteps = None,
+    settings: Settings = None,
+    set_: Setting = None,
+    from_nothing: Annotated[bool, Option("--from-nothing", help="Without a base: --set base=none.")] = False,
     seed: Annotated[int | None, Option(min=0, max=799, help="Random seed; default: 0.")] = None,
     randomise: Randomise = None,
     threads: Annotated[int | None, Option(min=1, help="Threads for torch and the ships; default: 1.")] = None,
-    max_seconds: Annotated[
-        float | None, Option(min=0.0, help="Stop after this time; --resume continues.")
-    ] = None,
+    max_seconds: Annotated[float | None, Option(min=0.0, help="Time limit; --resume continues.")] = None,
     resume: Annotated[bool, Option("--resume", help="Continue the run in the folder.")] = False,
 ) -> None:
     """Train an autopilot by reinforcement learning. Writes policy, learning curve and checkpoints.
@@ -141,16 +138,9 @@ def tune_command(
     task: TaskName = None,
     environment_options: EnvironmentOptions = None,
     trials: Annotated[int, Option(min=1, help="Trials in all, with those already done.")] = 20,
-    total_steps: Annotated[
-        int | None, Option(min=1, help="For each trial; default: as in the settings.")
-    ] = None,
-    settings: Annotated[
-        Path | None, Option(metavar="FILE.TOML", help="Settings to start from; they are varied too.")
-    ] = None,
-    set_: Annotated[
-        list[str] | None,
-        Option("--set", metavar="SETTING=VALUE", help="A setting that is not varied; repeatable."),
-    ] = None,
+    total_steps: TotalSteps = None,
+    settings: Settings = None,
+    set_: Setting = None,
     seed: Annotated[int, Option(min=0, max=799, help="Random seed of trainings and search.")] = 0,
     randomise: Randomise = False,
     engine: EngineName = "local",

@@ -34,8 +34,8 @@ def execute_time(trial: Trial) -> float:
     if "delta_command" in trial.channels:
         usual = np.percentile(np.abs(delta), 75)  # a little helm on the approach is no order yet
         return float(trial.t[np.argmax(np.abs(delta) > 0.5 * usual)])
-    move = np.abs(delta - delta[0])
-    return max(departure(trial.t, move, float(np.percentile(move, 75)), _fastest(trial)), float(trial.t[0]))
+    move, fastest = np.abs(delta - delta[0]), np.abs(np.diff(delta) / np.diff(trial.t)).max()
+    return max(departure(trial.t, move, np.percentile(move, 75), fastest), float(trial.t[0]))
 
 
 def reversals(trial: Trial) -> tuple[float, list[float]]:
@@ -52,15 +52,15 @@ def reversals(trial: Trial) -> tuple[float, list[float]]:
     holds = np.split(arrived, np.flatnonzero(np.diff(side[arrived])) + 1)
     if "delta_command" in trial.channels:
         return start, [float(t[hold[0]]) for hold in holds[1:]]
-    turns = []
+    turns, fastest = [], np.abs(np.diff(delta) / np.diff(t)).max()
     for hold, after in pairwise(holds):
         moving = slice(hold[-1], after[0] + 1)
         move = np.abs(delta[moving] - np.median(delta[hold]))
-        turns.append(departure(t[moving], move, move.max(), _fastest(trial)))
+        turns.append(departure(t[moving], move, move.max(), fastest))
     return start, turns
 
 
-def departure(t: Floats, move: Floats, reach: float, fastest: float) -> float:
+def departure(t: Floats, move: Floats, reach: np.floating, fastest: np.floating) -> float:
     """Time at which a measured rudder left the angle at which it was held, s.
 
     Its `move` from there, rad, is traced back along the slope between the first samples beyond a tenth and
@@ -73,10 +73,6 @@ def departure(t: Floats, move: Floats, reach: float, fastest: float) -> float:
     between = (move[upper] - move[lower]) / (t[upper] - t[lower]) if upper > lower else 0.0
     slope = between if upper - lower > 2 else max(between, fastest)
     return float(t[upper] - move[upper] / slope)
-
-
-def _fastest(trial: Trial) -> float:
-    return float(np.abs(np.diff(rudder(trial)) / np.diff(trial.t)).max())
 
 
 def distance_sailed(trial: Trial) -> Floats:
