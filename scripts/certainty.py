@@ -34,6 +34,7 @@ if str(ROOT) not in sys.path:
 
 import shipgym  # noqa: E402 - the folder above has to be found first
 from identification import IdentificationResult, identify  # noqa: E402
+from identification.uncertainty.model_error import DEFAULT  # noqa: E402
 from shipgym import ShipModel, Trial  # noqa: E402
 from shipgym.manoeuvres import (  # noqa: E402
     Manoeuvre,
@@ -159,11 +160,24 @@ def fitted(ship: ShipModel, structure: str, trials: list[Trial]) -> Identificati
     return identify(trials, table, particulars=ship.particulars, steering=ship.steering, **grey)
 
 
+def without_fitted(error: dict[str, object]) -> float:
+    """The factor that a model would have if errors on the trials that it was fitted to did not count."""
+    if "fitted" not in error:
+        return float(error["factor"])
+    sizes = [error[name] for name in ("motion", "indices") if name in error]
+    return max(1.0, error["for_few_trials"] * np.sqrt(np.mean(np.square(sizes)))) if sizes else DEFAULT
+
+
 def coverage(ship: ShipModel, model: ShipModel, draws: int) -> dict[str, object]:
-    """Whether the intervals of a model hold a ship's indices, without and with model error."""
-    row: dict[str, object] = {"factor": (factor := model.provenance["model_error"]["factor"])}
+    """Whether the intervals of a model hold a ship's indices: by noise, by trials left out, and by all."""
+    error = model.provenance["model_error"]
+    row: dict[str, object] = {"factor": (factor := error["factor"])}
     truth = true_indices(ship)
-    for label, size in (("noise", factor**-2), ("all", 1.0)):
+    for label, size in (
+        ("noise", factor**-2),
+        ("left out", (without_fitted(error) / factor) ** 2),
+        ("all", 1.0),
+    ):
         found = index_intervals(replace(model, covariance=size * model.covariance), draws)
         row[label] = holds(found, truth)
         row[f"{label} ran away"] = float(np.mean([one.ran_away.mean() for one in found.values()]))
@@ -190,9 +204,9 @@ def share(rows: Sequence[dict[str, object]], label: str, part: str = "") -> str:
     return f"{100.0 * np.mean(held):.0f}" if held else "-"
 
 
-def share_not_sailed(rows: Sequence[dict[str, object]]) -> str:
-    """Per cent likewise, with model error, of the manoeuvres that are not among the trials."""
-    held = [one for row in rows for (run, _), one in row["all"].items() if not was_sailed(run, row["trials"])]
+def share_not_sailed(rows: Sequence[dict[str, object]], label: str) -> str:
+    """Per cent likewise, of the manoeuvres that are not among the trials."""
+    held = [one for row in rows for (run, _), one in row[label].items() if not was_sailed(run, row["trials"])]
     return f"{100.0 * np.mean(held):.0f}"
 
 
@@ -205,8 +219,9 @@ def table(rows: Sequence[dict[str, object]]) -> str:
     groups["**all**"] = list(rows)
     lines = [
         "| ship, trials | models | factor | noise only, % | with model error, % | "
-        "of which zigzags, turns, % | not sailed, % | half-width, % | draws that run away, % |",
-        "| --- | --- | --- | --- | --- | --- | --- | --- | --- |",
+        "of which zigzags, turns, % | not sailed, % | the same by trials left out alone, % | half-width, % | "
+        "draws that run away, % |",
+        "| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |",
     ]
     for name, group in groups.items():
         known = [row for row in group if "factor" in row]
@@ -219,7 +234,8 @@ def table(rows: Sequence[dict[str, object]]) -> str:
             f"| {name} | {len(known)}{unstable} | {min(factors):.1f} to {max(factors):.1f} | "
             f"{share(known, 'noise')} | {share(known, 'all')} | "
             f"{share(known, 'all', 'zigzag')}, {share(known, 'all', 'turning')} | "
-            f"{share_not_sailed(known)} | {width:.0f} | {lost:.0f} |"
+            f"{share_not_sailed(known, 'all')} | {share_not_sailed(known, 'left out')} | "
+            f"{width:.0f} | {lost:.0f} |"
         )
     return "\n".join(lines)
 
