@@ -24,12 +24,16 @@ import pandas as pd
 import typer
 from gallery import DPI, SIZE, STYLE
 
-import shipgym
-from agents.identifying import identification_settings, identify_ship
-from shipgym import Current, Trial, Weather, manoeuvres
-from tests.ships.mmg import mmg_ship
+ROOT = Path(__file__).parents[1]
+if str(ROOT) not in sys.path:
+    sys.path.insert(0, str(ROOT))
 
-PAGE = Path(__file__).parents[1] / "docs" / "tutorial.md"
+import shipgym  # noqa: E402 - the folder above has to be found first
+from agents.identifying import identification_settings, identify_ship  # noqa: E402
+from shipgym import Current, Trial, Weather, manoeuvres  # noqa: E402
+from tests.ships.mmg import mmg_ship  # noqa: E402
+
+PAGE = ROOT / "docs" / "tutorial.md"
 IMAGES = PAGE.parent / "images" / "tutorial"
 SEA = Weather(current=Current(0.39, towards_deg=120.0))
 ANTENNA = 30.0  # m forward of midship

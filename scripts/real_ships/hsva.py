@@ -189,10 +189,10 @@ By run, `abkowitz12` with the pull:
 
 **Limits.** Repeats of the 10/10 agree within 0.2 to 0.5 degrees of first overshoot: the aim of 0.4 is
 within the repeatability of the experiment itself. Z_10_05 is the worst in second overshoot: even least
-squares with the full Abkowitz table on all six runs misses it by 2.9 degrees. Z_30_05 is an extrapolation
-from runs of at most 20 degrees of rudder. Zigzags that switch at 1 degree are not counted: KVLCC2 is
-unstable on course, and in open loop the smallest error of the neutral helm grows into a heading drift; the
-model of the first triple gives
+squares with the full Abkowitz table on all six runs misses it by 2.9 degrees. Z_30_05 is an
+extrapolation from runs of at most 20 degrees of rudder. Zigzags that switch at 1 degree are not
+counted: KVLCC2 is neutral to unstable on course ([measurements](measurements.md)), and in open loop the
+smallest error of the neutral helm grows into a heading drift; the model of the first triple gives
 
 {slight}
 

@@ -5,11 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from textwrap import fill
 from typing import Any
 
 import numpy as np
 
 from shipgym import Trial
+
+WIDTH = 112  # of a line of prose
 
 
 @dataclass(frozen=True)
@@ -50,6 +53,18 @@ def headings(axis: Any, trial: Trial, predictions: Mapping[str, Trial | None], t
     axis.set(title=title, xlabel="t, s", ylabel="heading, deg")
 
 
+def wrapped(text: str) -> str:
+    """Markdown whose paragraphs, unlike its tables and images, have lines of one width."""
+    blocks = text.strip().split("\n\n")
+    prose = [
+        block
+        if block.lstrip().startswith(("|", "!", "#"))
+        else fill(" ".join(block.split()), WIDTH, break_long_words=False, break_on_hyphens=False)
+        for block in blocks
+    ]
+    return "\n\n".join(prose)
+
+
 def marks(case: str) -> tuple[str, str]:
     """The comments between which the section of a case stands."""
     return f"<!-- case {case} -->", f"<!-- end of case {case} -->"
@@ -67,7 +82,7 @@ def put(document: str, case: str, section: Section) -> str:
     before, rest = document.split(first)
     _, after = rest.split(last)
     command = f"`python scripts/predict_real_ships.py {case}`"
-    body = f"{first}\n## ({case}) {section.title}\n\nCommand: {command}\n\n{section.text.strip()}\n{last}"
+    body = f"{first}\n## ({case}) {section.title}\n\nCommand: {command}\n\n{wrapped(section.text)}\n{last}"
     return before + body + after
 
 
