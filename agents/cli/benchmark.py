@@ -62,7 +62,7 @@ def benchmark_command(
     page: Page = True,
     submit: Submit = None,
     verify: Results = None,
-    sample: Annotated[int, Option(min=1, help="Contestant-task pairs that --verify runs.")] = 8,
+    sample: Annotated[int | None, Option(min=1, help="Contestant-task pairs that --verify runs; 8.")] = None,
     tolerance: Tolerance = None,
     allow_code: AllowCode = None,
 ) -> None:
@@ -74,10 +74,10 @@ def benchmark_command(
         _refuse(
             "--verify", {"--controllers": controllers, "--out": out, "--tasks": tasks, "--submit": submit}
         )
-        _verify(verify, sample, tolerance, workers, allow_code or [])
+        _verify(verify, sample or 8, tolerance, workers, allow_code or [])
         return
-    if allow_code or tolerance is not None:
-        fail("--allow-code and --tolerance are for --verify alone, leave them out", WRONG_INPUT)
+    if allow_code or tolerance is not None or sample is not None:
+        fail("--allow-code, --sample and --tolerance are for --verify alone, leave them out", WRONG_INPUT)
     from agents.benchmarking.page import PAGE, write_page
     from agents.benchmarking.run import benchmark
     from agents.benchmarking.submission import submit as write_submission
