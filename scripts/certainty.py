@@ -218,10 +218,9 @@ def table(rows: Sequence[dict[str, object]]) -> str:
         groups[f"**all, {kind}**"] = [row for row in rows if row["trials"] == kind]
     groups["**all**"] = list(rows)
     lines = [
-        "| ship, trials | models | factor | noise only, % | with model error, % | "
-        "of which zigzags, turns, % | not sailed, % | the same by trials left out alone, % | half-width, % | "
-        "draws that run away, % |",
-        "| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |",
+        "| ship, trials | factor | noise only, % | with model error, % | of which zigzags, turns, % | "
+        "not sailed (by trials left out alone), % | half-width, % | draws that run away, % |",
+        "| --- | --- | --- | --- | --- | --- | --- | --- |",
     ]
     for name, group in groups.items():
         known = [row for row in group if "factor" in row]
@@ -229,12 +228,12 @@ def table(rows: Sequence[dict[str, object]]) -> str:
             continue
         factors = [float(row["factor"]) for row in known]
         width, lost = (100.0 * np.mean([row[f"all {one}"] for row in known]) for one in ("width", "ran away"))
-        unstable = f" ({len(group) - len(known)} unstable)" if len(known) < len(group) else ""
+        unstable = f" ({len(group) - len(known)} of {len(group)} unstable)" if len(known) < len(group) else ""
         lines.append(
-            f"| {name} | {len(known)}{unstable} | {min(factors):.1f} to {max(factors):.1f} | "
+            f"| {name}{unstable} | {min(factors):.1f} to {max(factors):.1f} | "
             f"{share(known, 'noise')} | {share(known, 'all')} | "
             f"{share(known, 'all', 'zigzag')}, {share(known, 'all', 'turning')} | "
-            f"{share_not_sailed(known, 'all')} | {share_not_sailed(known, 'left out')} | "
+            f"{share_not_sailed(known, 'all')} ({share_not_sailed(known, 'left out')}) | "
             f"{width:.0f} | {lost:.0f} |"
         )
     return "\n".join(lines)
