@@ -73,7 +73,8 @@ def _sail(passage: Passage, trial: Trial, state: Floats, leg: Leg, begin: float)
     count = max(int(np.ceil(leg.duration * (1.0 if target is None else LONGEST_LEG) / dt)), 2)
     t = begin + dt * np.arange(count + 1, dtype=float)
     commands = np.tile(model.service_command, (count, 1))
-    commands[:, 0] = leg.order
+    approach = target is None and begin == trial.t[0]  # with whatever helm there was
+    commands[:, 0] = np.interp(t[:-1], trial.t, rudder(trial)) if approach else leg.order
     if "n" in model.command_names and "n" in trial.channels:
         commands[:, 1] = np.interp(t[:-1], trial.t, trial["n"])
     sailed = passage.states(state, count)

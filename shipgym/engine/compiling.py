@@ -84,7 +84,7 @@ def _lean_jit() -> Any:
 def _compile(dispatcher: Any, signature: str, what: str) -> None:
     """Compile, or take from the cache."""
     from numba.core.compiler_lock import global_compiler_lock
-    from numba.core.errors import NumbaError
+    from numba.core.errors import NumbaError, UnsupportedBytecodeError
 
     from shipgym.engine.lean_numba import lean
 
@@ -95,7 +95,8 @@ def _compile(dispatcher: Any, signature: str, what: str) -> None:
             for code in dispatcher.overloads.values():  # what loops call has an environment, too, for `print`
                 for one in code._find_referenced_environments():
                     code.library.codegen.set_env(one.env_name, one)
-    except (NumbaError, TypeError) as error:  # TypeError: a record made of other fields
+    # the latter three: another record than is due, none at all, one whose field is set
+    except (NumbaError, UnsupportedBytecodeError, TypeError, AttributeError, NotImplementedError) as error:
         raise InputError(explanation(error, what)) from None
 
 

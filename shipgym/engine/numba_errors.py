@@ -22,7 +22,7 @@ def explanation(error: Exception, what: str) -> str:
     own = text[: callee.start()] if callee else text  # behind it stands who calls it
     written = re.search(r"^def (\w+)\(", own, re.MULTILINE)
     function = written[1] if written else callee[2] if callee else ""
-    place = re.search(r"at (\S+) \((\d+)\)", own) or re.search(r'File "([^"]+)", line (\d+)', own)
+    place = re.search(r"(?:at|from) (\S+) \((\d+)\)", own) or re.search(r'File "([^"]+)", line (\d+)', own)
     functions = (one.py_func for one in SHARED.values() if callee and hasattr(one, "py_func"))
     code = next((one.__code__ for one in functions if one.__qualname__ == callee[1]), None)  # type: ignore[index]
     if code is not None:
@@ -32,7 +32,7 @@ def explanation(error: Exception, what: str) -> str:
     else:
         file, line = _looked_at(error)
     where = f" in {function}" * bool(function) + f" ({file}, line {line})" * bool(file)
-    return f"{what}: cannot be compiled{where}: {reason}"
+    return f"{what}: cannot be compiled{where}: {reason.partition(' Raised from ')[0]}"
 
 
 def _line_of(code: CodeType, reason: str) -> int:

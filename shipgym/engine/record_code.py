@@ -180,7 +180,15 @@ def _part(
     rows = (of.first, of.present) if isinstance(of, Rows) else ()
     key = (name, _shape(record), rows, more)
     arity = function.__code__.co_argcount
-    return Part(function, code=partial(intrinsic, generate, arity, answer), key=key)
+
+    def checked(context: Any, builder: Any, kinds: Any, values: Any) -> Any:
+        for kind in (one for one in kinds if isinstance(one, _types().BaseTuple)):  # a plain one does as well
+            given, fields = getattr(kind, "instance_class", record), field_types(record)
+            if (given.__name__, field_types(given)) != (record.__name__, fields) or len(kind) != len(fields):
+                raise TypeError(f"{kind} found, expected {record.__name__}")
+        return generate(context, builder, kinds, values)
+
+    return Part(function, code=partial(intrinsic, checked, arity, answer), key=key)
 
 
 def intrinsic(generate: Generate, arity: int, answer: Answer = None) -> Any:

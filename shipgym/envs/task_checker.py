@@ -100,12 +100,13 @@ def _sail_in_python(plain: Engine) -> None:
 
 def _not_finite(engine: Engine) -> Iterator[str]:
     """Parts of the reward, of the state and observations that are no finite numbers, each once."""
-    engine.reset(np.arange(engine.num_envs))
+    seen = engine.reset(np.arange(engine.num_envs))
     definition = engine.task.definition
     names = [path for path in leaves(definition.State) if path in engine._voyages.state["state"].present]
     found: set[str] = set()
-    for step in range(min(STEPS, engine.task.episode_steps)):
-        seen, *_ = engine.step(_orders(engine, step))
+    for step in range(min(STEPS, engine.task.episode_steps) + 1):
+        if step > 0:
+            seen, *_ = engine.step(_orders(engine, step - 1))
         numbers: dict[str, NDArray[Any]] = {f"State.{name}": engine.read(name) for name in names}
         numbers |= {name: engine.info(name) for name in engine.task.reward_parts}
         observed = engine.task.observed(engine.model)
@@ -114,13 +115,10 @@ def _not_finite(engine: Engine) -> Iterator[str]:
             if name not in found and not np.isfinite(values).all():
                 found.add(name)
                 lane = int(np.argmax(~np.isfinite(values)))
-                own = definition.reward_source if name.startswith("reward_") else definition.source
+                by = definition.reward_source if name.startswith("reward_") else definition.source
                 if name.startswith("Observation.") and engine.task.sensors is not None:
-                    own = f"{own}, or the sensors of {engine.task.sensors.source}"
-                yield (
-                    f"{own}: {name} is {values[lane]} in lane {lane} at step "
-                    f"{step + 1}, expected finite numbers"
-                )
+                    by = f"{by}, or the sensors of {engine.task.sensors.source}"
+                yield f"{by}: {name} is {values[lane]} in lane {lane} at step {step}, expected finite numbers"
 
 
 def _differ(

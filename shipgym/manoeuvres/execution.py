@@ -63,13 +63,14 @@ def reversals(trial: Trial) -> tuple[float, list[float]]:
 def departure(t: Floats, move: Floats, reach: np.floating, fastest: np.floating) -> float:
     """Time at which a measured rudder left the angle at which it was held, s.
 
-    Its `move` from there, rad, is traced back along the slope between the first samples beyond a tenth and
-    beyond half of its way of `reach`; where these are less than three samples apart, at least at the
-    `fastest` rate of the trial, rad/s.
+    Its `move` from there, rad, is traced back along the slope between the first sample beyond half of its way
+    of `reach` and the last stretch beyond a tenth before it; where these are less than three samples apart,
+    at least at the `fastest` rate of the trial, rad/s.
     """
     if reach == 0.0:
         return float(t[0])
-    lower, upper = int(np.argmax(move > 0.1 * reach)), int(np.argmax(move >= 0.5 * reach))
+    upper = int(np.argmax(move >= 0.5 * reach))
+    lower = int(np.max(np.flatnonzero(move[:upper] <= 0.1 * reach) + 1, initial=0))
     between = (move[upper] - move[lower]) / (t[upper] - t[lower]) if upper > lower else 0.0
     slope = between if upper - lower > 2 else max(between, fastest)
     return float(t[upper] - move[upper] / slope)

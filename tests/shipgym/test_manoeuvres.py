@@ -97,6 +97,15 @@ def test_a_measured_rudder_is_traced_back_along_its_slope_between_a_tenth_and_ha
     assert departure(t[5:9], np.zeros(4), 0.0, 0.0) == 5.0
 
 
+def test_a_little_helm_or_noise_on_the_approach_is_not_the_execution():
+    t = np.arange(200.0)
+    order = np.where(t < 60.0, 0.0, np.where(t < 100.0, 10.0, -10.0))
+    helm = np.where(t < 60.0, 1.5 * np.sin(t / 3.0), order)
+    noisy = order + 0.5 * np.random.default_rng(0).standard_normal(len(t))
+    for delta in (helm, noisy):
+        assert 59.0 <= execute_time(Trial(t, {"delta": np.radians(delta)})) <= 60.0
+
+
 def test_between_few_samples_a_measured_rudder_moves_at_the_fastest_rate_of_the_trial_at_least():
     """A rudder of 2.5 deg/s, ordered at 4 s, then from 20 to -20 degrees at 28 s, and back at 63 s."""
     t, way = np.arange(0.0, 100.0, 5.0), np.array([0.0, 0.0, 5.0, 17.5, 30.0, 40.0])

@@ -189,6 +189,11 @@ WRONG = [
     ("max(motion.u", "mox(motion.u", "line 52, in step: NameError: name 'mox'"),
     ("Reward(-off * off, ", "Reward(", "line 54, in step: TypeError: .*'over_speed'"),
     ("Reward(-off", "(-off", r"in step: result 2 is \(a number, a number, a number\), expected Reward"),
+    ("Reward(-off", "(0.0, -off", r"in step: result 2 is \(a number, a number, a number, a number\), "),
+    ("after, reward", "after, after", "line 48, in step: result 2 is State, expected Reward.*"),
+    ("    return Observation(", "    return readings\n    (", "in observe: what it returns is Readings, "),
+    ("    return Observation(", "    return [sine]\n    (", "line 63, in observe: what it returns is list, "),
+    ("delay = 1.0", "state.limit = delay = 1.0", "line 53, in step: AttributeError: can't set attribute"),
     ("fabs(off) > 1.0, ", "", r"line 48, in step: what it returns is \(State, Reward, true or false\), "),
     ("fabs(off) > 1.0", "off", "in step: result 3 is a number, expected true or false"),
     ("motion.y, limit", "motion.y, (limit, 1.0)", r"State.limit is \(a number, a number\), exp"),
@@ -230,6 +235,7 @@ def test_what_is_wrong_is_named_and_nothing_is_registered(tmp_path, old, new, me
     [
         ("    if x > 3.0:\n        fathom\n", r"in step \(.*fairway.py, line 51\): NameError: name 'fathom'"),
         ("    if x > 3.0:\n        return 1.0, 2.0\n", r"in step \(.*fairway.py, line 5[18]\): Can't unify"),
+        ("    global N\n    N = 1\n", r"\(.*fairway.py, line 51\): .*STORE_GLOBAL. found.$"),
         ("    if x > 3.0:\n        Reward(1.0)\n", r"compiled \(.*fairway.py, line 51\): .*'delay'"),
     ],
 )
@@ -239,6 +245,12 @@ def test_what_only_numba_finds_is_told_with_function_and_line(tmp_path, new, mes
     path = written(tmp_path, "fairway.py", text)
     with pytest.raises(InputError, match=message):
         gymnasium.make(COURSE, task=path, **SHIP)
+
+
+def test_an_observation_that_is_no_number_before_the_first_step_is_a_problem(tmp_path):
+    text = FAIRWAY.replace("to_zone = max(", "to_zone = readings.x / interval.steps + max(")
+    found = check_task(written(tmp_path, "fairway.py", text), **SHIP)
+    assert any("Observation.to_zone is nan in lane 0 at step 0" in problem for problem in found.problems)
 
 
 def test_what_is_interrupted_while_it_is_read_is_read_anew(tmp_path):
