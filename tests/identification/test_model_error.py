@@ -28,6 +28,7 @@ from identification.validation.warnings import (
 )
 from shipgym import InputError, ShipModel, Trial, load_model
 from shipgym.manoeuvres import zigzag, zigzag_indices
+from shipgym.ships.simulate import simulate
 from tests.ships.mmg import mmg_ship
 
 
@@ -219,6 +220,20 @@ def test_closed_loop_overshoots_do_not_depend_on_the_neutral_helm(mariner: ShipM
     assert found.overshoot_1_deg == pytest.approx(truth.overshoot_1_deg, abs=0.25)
     assert error < 0.4
     assert error < 0.5 * abs(open_loop.overshoot_2_deg - truth.overshoot_2_deg)
+
+
+def test_a_ship_that_was_steered_on_the_approach_predicts_her_own_zigzag(mariner: ShipModel) -> None:
+    """A minute of helm to and fro, 1.2 degrees, before the order: her own model has the overshoots measured."""
+    helm = np.radians(1.2) * np.sin(np.arange(60.0) / 6.0)
+    ordered = np.r_[helm, zigzag(mariner, 10, 10, duration=500, dt=1.0)["delta_command"][:-1]]
+    run = simulate(mariner, ordered[:, None], 1.0, None, np.inf, "zigzag")
+    trial = Trial(
+        run.t, {name: run[name] for name in ("x", "y", "psi", "u", "v", "r", "delta")}, kind="zigzag"
+    )
+    again = closed_loop(mariner, trial)
+    truth, found = (zigzag_indices(one, 160.93, 10.0) for one in (trial, again))
+    assert found.overshoot_1_deg == pytest.approx(truth.overshoot_1_deg, abs=0.15)
+    assert found.overshoot_2_deg == pytest.approx(truth.overshoot_2_deg, abs=0.15)
 
 
 def test_a_leg_ends_where_its_heading_is_reached_within_twice_the_measured_time() -> None:
