@@ -223,7 +223,7 @@ def test_closed_loop_overshoots_do_not_depend_on_the_neutral_helm(mariner: ShipM
 
 
 def test_a_ship_that_was_steered_on_the_approach_predicts_her_own_zigzag(mariner: ShipModel) -> None:
-    """A minute of helm to and fro, 1.2 degrees, before the order: her own model has the overshoots measured."""
+    """A minute of helm to and fro, 1.2 degrees, before the order: her model has the overshoots measured."""
     helm = np.radians(1.2) * np.sin(np.arange(60.0) / 6.0)
     ordered = np.r_[helm, zigzag(mariner, 10, 10, duration=500, dt=1.0)["delta_command"][:-1]]
     run = simulate(mariner, ordered[:, None], 1.0, None, np.inf, "zigzag")
