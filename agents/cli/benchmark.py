@@ -62,7 +62,7 @@ def benchmark_command(
     page: Page = True,
     submit: Submit = None,
     verify: Results = None,
-    sample: Annotated[int | None, Option(min=1, help="Contestant-task pairs that --verify runs; 8.")] = None,
+    sample: Annotated[int | None, Option(min=1, help="Pairs that --verify runs; default: 8.")] = None,
     tolerance: Tolerance = None,
     allow_code: AllowCode = None,
 ) -> None:
@@ -74,7 +74,7 @@ def benchmark_command(
         _refuse(
             "--verify", {"--controllers": controllers, "--out": out, "--tasks": tasks, "--submit": submit}
         )
-        _verify(verify, sample or 8, tolerance, workers, allow_code or [])
+        _verify(verify, sample, tolerance, workers, allow_code or [])
         return
     if allow_code or tolerance is not None or sample is not None:
         fail("--allow-code, --sample and --tolerance are for --verify alone, leave them out", WRONG_INPUT)
@@ -134,15 +134,16 @@ def _print_result(result: BenchmarkResult, out: Path) -> None:
 
 
 def _verify(
-    path: Path, sample: int, tolerance: float | None, workers: int | None, allow_code: list[str]
+    path: Path, sample: int | None, tolerance: float | None, workers: int | None, allow_code: list[str]
 ) -> None:  # fmt: skip
     """Print what was compared; fail where it differs."""
-    from agents.benchmarking.verification import verify
+    from agents.benchmarking.verification import N_SAMPLED, verify
     from agents.cli.benchmark_tables import verification_table
     from agents.cli.terminal import answer, console, err
 
     with err.status("running a sample again"):
-        checks = verify(path, sample=sample, tolerance=tolerance, workers=workers, allow_code=allow_code)
+        count = sample or N_SAMPLED
+        checks = verify(path, sample=count, tolerance=tolerance, workers=workers, allow_code=allow_code)
     answer({"checks": [check.to_dict() for check in checks]})
     console.print(verification_table(checks))
     wrong = [f"{check.contestant} on {check.task}" for check in checks if not check.passed]

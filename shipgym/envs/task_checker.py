@@ -115,10 +115,11 @@ def _not_finite(engine: Engine) -> Iterator[str]:
             if name not in found and not np.isfinite(values).all():
                 found.add(name)
                 lane = int(np.argmax(~np.isfinite(values)))
-                by = definition.reward_source if name.startswith("reward_") else definition.source
+                source = definition.reward_source if name.startswith("reward_") else definition.source
                 if name.startswith("Observation.") and engine.task.sensors is not None:
-                    by = f"{by}, or the sensors of {engine.task.sensors.source}"
-                yield f"{by}: {name} is {values[lane]} in lane {lane} at step {step}, expected finite numbers"
+                    source = f"{source}, or the sensors of {engine.task.sensors.source}"
+                where = f"in lane {lane} at step {step}"
+                yield f"{source}: {name} is {values[lane]} {where}, expected finite numbers"
 
 
 def _differ(

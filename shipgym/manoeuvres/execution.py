@@ -63,9 +63,8 @@ def reversals(trial: Trial) -> tuple[float, list[float]]:
 def departure(t: Floats, move: Floats, reach: np.floating, fastest: np.floating) -> float:
     """Time at which a measured rudder left the angle at which it was held, s.
 
-    Its `move` from there, rad, is traced back along the slope between the first sample beyond half of its way
-    of `reach` and the last stretch beyond a tenth before it; where these are less than three samples apart,
-    at least at the `fastest` rate of the trial, rad/s.
+    Its `move` from there, rad, is traced back from half of its `reach` along the slope since it last passed a
+    tenth; where these are less than three samples apart, at least at the `fastest` rate of the trial, rad/s.
     """
     if reach == 0.0:
         return float(t[0])
