@@ -43,10 +43,14 @@ def load_file(path: Path, expected: str = "a Python file") -> ModuleType:
             raise InputError(f"{path}: {error}") from None
         if not isinstance(error, Exception | SystemExit):  # Ctrl-C
             raise
-        passed = (one.lineno for one in extract_tb(error.__traceback__) if one.filename == str(resolved))
+        frames = extract_tb(error.__traceback__)
+        passed = (one.lineno for one in frames if one.filename == str(resolved))
         line = [getattr(error, "lineno", None), *passed][-1]  # the last one in the file
         place = f"{path}, line {line}" if line else path
-        raise InputError(f"{place}: cannot be executed: {type(error).__name__}: {error}") from error
+        others = (one for one in frames if not one.filename.startswith(("<", str(resolved), *LIBRARIES)))
+        within = [f" ({one.filename}, line {one.lineno})" for one in others][-1:]  # of what it imports
+        why = f"{type(error).__name__}: {error}{''.join(within)}"
+        raise InputError(f"{place}: cannot be executed: {why}") from error
     return module
 
 
@@ -58,6 +62,15 @@ def check_function(value: Any, count: int, where: str, what: str) -> None:
     if code.co_flags & NOT_PLAIN or code.co_argcount != count:
         more = " or more, a generator or a coroutine" if code.co_flags & NOT_PLAIN else ""
         raise InputError(f"{where}: {code.co_argcount} arguments{more} found, expected {what}")
+
+
+def refuse_closure(function: Any) -> None:
+    """Refuse a function made within another, as decorators make them: it cannot be compiled."""
+    if getattr(function, "__closure__", None):
+        raise InputError(
+            f"{place_of(function)}: uses variables of the function around it "
+            f"({', '.join(function.__code__.co_freevars)}), expected a function at the top of a file"
+        )
 
 
 def asked(function: Callable[..., Any], *arguments: Any) -> Any:

@@ -27,7 +27,7 @@ DIGEST = 32  # bytes of a SHA-256, at the beginning of a file
 def cache_folder() -> Path:
     """Where compiled loops are kept; below ``~`` if nobody knows where the user's home is."""
     try:
-        return Path(os.environ.get(CACHE_VARIABLE) or user_cache_path("shipgym"))
+        return Path(os.environ.get(CACHE_VARIABLE) or user_cache_path("shipgym")).expanduser()
     except RuntimeError:  # of a user without an entry in the list of users, in a container
         return Path("~", ".cache", "shipgym")
 

@@ -21,7 +21,7 @@ import numpy as np
 
 from shipgym.engine.records import is_record
 from shipgym.errors import InputError
-from shipgym.python_files import place_of
+from shipgym.python_files import place_of, refuse_closure
 
 Parts = Mapping[str, Any]
 
@@ -96,14 +96,20 @@ class Specialisation:
     def copy(self, function: Any) -> FunctionType:
         """A function with its globals replaced: parts by their place, plain functions by their copies."""
         namespace: dict[str, Any] = {"__name__": function.__module__, "__builtins__": __builtins__}
+        if function.__code__.co_kwonlyargcount:
+            raise InputError(
+                f"{place_of(function)}: arguments by keyword alone found, which cannot be compiled"
+            )
         for name, value in named_globals(function, self.parts):
+            if isinstance(value, list | dict | set):
+                kind, expected = type(value).__name__, "expected a tuple or an array of numbers"
+                raise InputError(f"{place_of(function)}: the global {name!r} is a {kind}, {expected}")
             if isinstance(value, Part):
                 value = self.inner(value)
             elif _is_plain(value):
                 value = self.inner(Part(value))
             namespace[name] = value
         copy = FunctionType(function.__code__, namespace, function.__name__, function.__defaults__)
-        copy.__kwdefaults__ = function.__kwdefaults__
         copy.__qualname__ = f"{function.__name__}_{self.tag}"  # symbols of all that is compiled differ
         copy.__module__ = __name__  # the cache imports it, and could not import a user's file
         return copy
@@ -111,11 +117,7 @@ class Specialisation:
 
 def named_globals(function: Any, parts: Parts) -> Iterator[tuple[str, Any]]:
     """Globals that a function names, those of `parts` in place of its own."""
-    if function.__closure__:
-        raise InputError(
-            f"{place_of(function)}: uses variables of the function around it "
-            f"({', '.join(function.__code__.co_freevars)}), expected a function at the top of a file"
-        )
+    refuse_closure(function)
     return _named(function, parts)
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from shipgym.arrays import Floats
-from shipgym.checks import check_whole
+from shipgym.checks import check_number, check_whole
 from shipgym.engine import episodes
 from shipgym.engine.addresses import addresses
 from shipgym.engine.records import LANES
@@ -92,9 +92,12 @@ class Engine(Lanes):
 
     def _compiled(self, made: Voyages) -> Any:
         try:
-            return made.run
+            run = made.run
         except InputError as error:
             raise InputError(fault_in_python(self.model, self.task) or str(error)) from None
+        cost, where = asked(made.task.worst_cost, self.task.settings), made.task.reward_source
+        check_number(cost, f"{where}: worst_cost", at_least=0.0)
+        return run
 
     def _connect(self, threads: int) -> None:
         """Tell the loops where the arrays are: a world for each thread, with its share of the tiles."""

@@ -41,6 +41,8 @@ def _looked_at(made: Voyages, name: str, form: Any) -> Part:
     def look(*arguments: Any) -> Any:
         given = asked(function, *arguments)
         if fault := _fault(given, form, "what it returns"):
+            of_reward = own is not function  # the second result of its step
+            fault = fault.replace("result 2", "what it returns") if of_reward else fault
             raise InputError(f"{place_of(own)}: {fault}")
         return given
 

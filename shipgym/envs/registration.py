@@ -39,15 +39,15 @@ def environments() -> dict[str, dict[str, Any]]:
 def register_environments() -> None:
     """Register the environments with Gymnasium; a second call changes nothing."""
     for name, options in environments().items():
-        if name not in gymnasium.registry:
-            _register(name, options)
+        _register(name, options)
 
 
 def register_task(env_id: str, task: str | Path | Any, **options: Any) -> None:
     """Register a task of your own, so that `gym.make` and `gym.make_vec` know it.
 
-    Its first step is tried in plain Python. Raises InputError if the task is not what the contract asks or
-    does not fit the ship, or the id belongs to another; nothing is registered then.
+    It is tried in plain Python and compiled, which takes some seconds, once. Raises InputError if the task is
+    not what the contract asks, cannot be compiled or does not fit the ship, or the id belongs to another;
+    nothing is registered then.
 
     Parameters
     ----------
@@ -60,31 +60,33 @@ def register_task(env_id: str, task: str | Path | Any, **options: Any) -> None:
     """
     from shipgym.envs.engine import fault_in_python
     from shipgym.envs.environment import DEFAULT_MODEL, read_options
+    from shipgym.envs.ship_env import ShipEnv
     from shipgym.tasks.task import ENV_OPTIONS
 
     given = {"task": kept_source(task), **options}
     given |= {name: kept_source(options[name]) for name in ("reward", "sensors") if name in options}
     own = {name: value for name, value in options.items() if name == "reward" or name not in ENV_OPTIONS}
     ship, asked, _ = read_options(task, options.get("model", DEFAULT_MODEL), own)
-    if check_text(env_id, "env_id") in gymnasium.registry:
-        if gymnasium.registry[env_id].kwargs == given:
-            return
+    known = gymnasium.registry.get(check_text(env_id, "env_id"))
+    if known is not None and known.kwargs != given:
         raise InputError(
-            f"{env_id}: registered already, for {gymnasium.registry[env_id].kwargs.get('task')!r}, expected "
-            "an id of its own; give another name or version"
+            f"{env_id}: registered already, for {known.kwargs.get('task')!r}, expected an id of its own; "
+            "give another name or version"
         )
+    if fault := fault_in_python(ship, asked):
+        raise InputError(fault)
+    ShipEnv(**given).close()
     try:
-        gymnasium.envs.registration.parse_env_id(env_id)
+        _register(env_id, given)
     except gymnasium.error.Error as error:
         raise InputError(
             f"{env_id!r} found, expected an id such as 'harbour/{asked.name}-v0': {error}"
         ) from None
-    if fault := fault_in_python(ship, asked):
-        raise InputError(fault)
-    _register(env_id, given)
 
 
 def _register(env_id: str, options: dict[str, Any]) -> None:
+    if env_id in gymnasium.registry:
+        return
     gymnasium.register(
         id=env_id,
         entry_point="shipgym.envs.ship_env:ShipEnv",

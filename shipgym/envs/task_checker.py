@@ -151,7 +151,7 @@ def _often_clipped(task: Task, seen: dict[str, list[float]]) -> Iterator[str]:
     """Observations that are often beyond their bounds."""
     for path, values in seen.items():
         low, high = task.definition.seen[path].low, task.definition.seen[path].high
-        beyond = [value for value in values if not low - BEYOND <= value <= high + BEYOND]
+        beyond = [value for value in values if value < low - BEYOND or value > high + BEYOND]
         part = len(beyond) / len(values)
         if part > OFTEN:
             furthest = max(beyond, key=abs)

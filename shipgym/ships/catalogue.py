@@ -89,8 +89,8 @@ def register_ship_equations(ship: ShipEquations | str | Path) -> ShipEquations:
     again = registered is not None and registered.path == found.path and name not in SHIPPED_EQUATIONS
     if not again and name in (*list_models(), *list_structures()):
         raise InputError(
-            f"register_ship_equations: name {name!r} found, which is another ship's or structure's; expected "
-            "a new name"
+            f"{found.path or 'register_ship_equations'}: name {name!r} found, which is another ship's or "
+            "structure's; expected a new name"
         )
     EQUATIONS[name] = found
     return found

@@ -8,9 +8,12 @@ import numpy as np
 
 from shipgym.arrays import Floats
 from shipgym.checks import Findings
+from shipgym.engine.motion import Motion
 from shipgym.errors import InputError, UnstableModelError
 from shipgym.ships.catalogue import load_model
+from shipgym.ships.equations import ShipEquations
 from shipgym.ships.grey_boxes import GreyBox
+from shipgym.ships.manoeuvring_model import ship_of
 from shipgym.ships.ship_model import ShipModel
 from shipgym.ships.simulate import orders
 from shipgym.ships.term_table import ANGULAR, EQUATION_NAMES, Structure
@@ -106,9 +109,15 @@ def _wrong_accelerations(model: ShipModel) -> Iterator[str]:
         row, axis = np.argwhere(~np.isfinite(found))[0]
         known = [name for name in (*EQUATION_NAMES, "phi", "delta") if name in model.state_names]
         state = ", ".join(f"{name} = {channels[name][row]:.4g}" for name in known)
+        look = "for coefficients that are far too large"
+        if isinstance(model.dynamics, ShipEquations):
+            motion = Motion(
+                *[float(channels[name][row]) if name in channels else 0.0 for name in Motion._fields]
+            )
+            look = f"at {model.dynamics.fault(motion, model.coefficients, ship_of(model))}"
         yield (
             f"derivatives: {found[row, axis]} found for the acceleration of '{_rates(model)[axis]}' at "
-            f"{state} (SI units), expected a number; look for coefficients that are far too large"
+            f"{state} (SI units), expected a number; look {look}"
         )
         return
     if isinstance(model.dynamics, Structure):

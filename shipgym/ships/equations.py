@@ -22,7 +22,7 @@ from shipgym.engine.records import Record, field_types, is_record
 from shipgym.engine.specialise import Part
 from shipgym.engine.vessel import Vessel, vessel_of
 from shipgym.errors import InputError
-from shipgym.python_files import asked, check_function, load_file
+from shipgym.python_files import asked, check_function, load_file, place_of, refuse_closure
 from shipgym.ships.particulars import Particulars
 from shipgym.ships.steering import SteeringGear
 
@@ -118,6 +118,14 @@ class ShipEquations:
                 if not isinstance(value, (int, float)):
                     raise InputError(f"{name} is {value!r}, expected a number, int or float")
 
+    def fault(self, motion: Motion, coefficients: Mapping[str, float], ship: Ship) -> str:
+        """Where plain Python fails at a motion, and why; the place of the accelerations if it does not."""
+        try:
+            asked(self.accelerations, motion, self.coefficients_record(**coefficients), ship)
+        except InputError as error:
+            return str(error)
+        return place_of(self.accelerations)
+
     def __reduce__(self) -> Any:
         """Another process finds a ship of this package by her name, another by her file."""
         if self.path is not None:
@@ -176,6 +184,7 @@ def read_ship_equations(path: str | Path) -> ShipEquations:
     ship = getattr(load_file(path, f"a Python file that defines {written}"), "SHIP", None)
     if not isinstance(ship, ShipEquations):
         raise InputError(f"{path}: SHIP = {ship!r} found, expected {written}")
+    refuse_closure(ship.accelerations)
     object.__setattr__(ship, "path", path)
     return ship
 

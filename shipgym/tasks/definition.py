@@ -194,6 +194,7 @@ def _check_seen(seen: Seen | None, where: str) -> None:
     check_number(seen.low, f"{where}: lower bound")
     check_number(seen.high, f"{where}: upper bound", above=seen.low)
     check_choice(seen.option, OPTIONS, f"{where}: option")
+    check_text(seen.unit, f"{where}: unit")
     if callable(seen.scale):
         check_function(seen.scale, 2, f"{where}: scale", "a function of ship and settings")
     else:

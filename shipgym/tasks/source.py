@@ -11,8 +11,10 @@ import numpy as np
 from shipgym.checks import check_keys, check_number, check_whole
 from shipgym.engine.records import Record, field_types, is_list, is_record, leaves
 from shipgym.errors import InputError
-from shipgym.python_files import asked, check_function, load_file
+from shipgym.python_files import asked, check_function, load_file, refuse_closure
 from shipgym.tasks.contract import Setting
+
+NO_NUMBER = (str, list, tuple, dict, np.ndarray)
 
 
 def read_source(source: Any) -> tuple[Any, str]:
@@ -51,6 +53,7 @@ def check_namespace(
                 raise InputError(f"{where}: {name} is no NamedTuple, expected {what}")
             _check_record(value, name, where)
         else:
+            refuse_closure(value)
             check_function(value, len(functions[name]), f"{where}: {name}", what)
     return found
 
@@ -61,7 +64,7 @@ def _check_record(record: Any, name: str, where: str) -> None:
     except (NameError, TypeError) as error:
         raise InputError(f"{where}: {name}: an annotation cannot be read: {error}") from None
     if not leaves(record):
-        raise InputError(f"{where}: {name}: no fields found, expected one number at least")
+        raise InputError(f"{where}: {name}: no annotated fields found, expected one number at least")
     if name == "Settings":
         for field, setting, default in keywords(record):
             if isinstance(default, float | int):
@@ -74,7 +77,9 @@ def _check_record(record: Any, name: str, where: str) -> None:
             _check_record(kind, f"{name}.{field}", where)
         elif is_list(kind) and not name.startswith("Settings"):
             raise InputError(f"{where}: {name}.{field}: {kind!r} found, expected a float")
-        elif isinstance(default, str) or (is_list(kind) and field != list(kinds)[-1]):
+        elif isinstance(default, str if is_list(kind) else NO_NUMBER) or (
+            is_list(kind) and field != list(kinds)[-1]
+        ):
             raise InputError(
                 f"{where}: {name}.{field}: {default!r} found, expected a number, or a list as the last field"
             )

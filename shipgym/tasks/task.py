@@ -148,7 +148,7 @@ class Task:
             names = (*names, *sensors.settings)
         for name in names:
             if names.count(name) > 1 or name in VECTOR_OPTIONS:
-                where = definition.source if name in definition.settings else sensors.source  # type: ignore[union-attr]
+                where = sensors.source if sensors and name in sensors.settings else definition.source
                 raise InputError(f"{where}: Settings.{name} found, which is a keyword already; rename it")
         return names
 

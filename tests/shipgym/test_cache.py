@@ -362,7 +362,7 @@ def test_a_user_whom_the_list_of_users_lacks_has_no_home(monkeypatch):
 
 def test_a_user_without_a_home_has_no_folder_of_that_name_made(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("SHIPGYM_CACHE", "~/.cache/shipgym")
+    monkeypatch.setenv("SHIPGYM_CACHE", "~nobody-of-this-name/shipgym")
     with pytest.raises(OSError, match="the user has no home"):
         cache_folder.open_folder()
     assert list(tmp_path.iterdir()) == []
@@ -371,6 +371,10 @@ def test_a_user_without_a_home_has_no_folder_of_that_name_made(tmp_path, monkeyp
 def test_the_cache_is_where_the_user_says_or_where_caches_are(monkeypatch, tmp_path):
     monkeypatch.setenv("SHIPGYM_CACHE", str(tmp_path))
     assert cache_folder.cache_folder() == tmp_path
+    monkeypatch.setenv("HOME", str(tmp_path))
+    monkeypatch.setenv("SHIPGYM_CACHE", "~/ships")  # as a container's settings have it, without a shell
+    assert cache_folder.cache_folder() == tmp_path / "ships"
+    monkeypatch.undo()
     monkeypatch.setenv("SHIPGYM_CACHE", "")
     assert cache_folder.cache_folder() == user_cache_path("shipgym")
 

@@ -16,6 +16,7 @@ import pytest
 import shipgym
 from shipgym import InputError, check_ship_model, load_model, manoeuvres, register_ship_equations
 from shipgym.engine.motion import Motion, Ship
+from shipgym.errors import UnstableModelError
 from shipgym.ships.linear import nomoto
 from shipgym.ships.structures import EQUATIONS, SHIPPED_EQUATIONS
 
@@ -96,7 +97,15 @@ def test_changed_coefficients_compile_nothing_anew(tug: Path) -> None:
         ),
         ("= 5.0  # s", "= 'slow'", "coefficient 'T_shaft'.*'slow'"),
         ("T_shaft: float = 5.0", "T_shaft: str = '5'", "expected a NamedTuple of floats"),
-        ('"tug",\n', '"mariner",\n', "'mariner' found, which is another ship's"),
+        ("= 5.0  # s", "= [5.0]", r"coefficient 'T_shaft'.*\[5\.0\]"),
+        pytest.param(
+            "fabs(u) * u",
+            "fabs(u) * u / (fabs(motion.delta) < 0.5)",
+            r"-inf found for the acceleration of 'u' .*look at .*tug\.py, line 25, in accelerations: ZeroDiv",
+            marks=pytest.mark.compiled,
+        ),
+        ("    accelerations,\n", "    (lambda k: lambda m, c, s: 5 * (k,))(1.0),\n", r"around it \(k\)"),
+        ('"tug",\n', '"mariner",\n', "tug.py: name 'mariner' found, which is another ship's"),
         ('"tug",\n', '"container",\n', "'container' found, which is another ship's"),
         ("service_shaft_speed=2.357", "service_shaft_speed=0.0", "service_shaft_speed: 0"),
         ("speed=6.0)", "speed=None)", "speed is needed"),
@@ -130,6 +139,14 @@ def test_what_is_wrong_with_her_is_said(tug: Path, wrong: str, right: str, messa
     assert not found.ok
     assert re.search(message, found.problems[0], re.DOTALL), found.problems[0]
     print(found.problems[0])
+
+
+@pytest.mark.compiled
+def test_a_ship_that_runs_away_may_have_equations_without_a_result(tug: Path) -> None:
+    tug.write_text(TUG.replace("fabs(u) * u", "fabs(u) * u / (fabs(motion.delta) < 0.2)"), encoding="utf-8")
+    model = load_model(tug)
+    with pytest.raises(UnstableModelError, match=r"or her equations give no number .check_ship_model says"):
+        model.simulate([[0.5, 2.3]] * 40, 0.5)
 
 
 def test_a_file_that_is_not_there(tmp_path: Path) -> None:

@@ -156,6 +156,9 @@ def test_sensors_of_ones_own_show_the_same_voyage_otherwise(tmp_path):
         gymnasium.make(COURSE, sensors=path, noise=1.0)
     with pytest.raises(InputError, match="log_time_constant: 0 found"):
         gymnasium.make(COURSE, sensors=path, log_time_constant=0.0)
+    path = written(tmp_path, "my_sensors.py", SENSORS.replace("log_time_constant", "rudder_weight"))
+    with pytest.raises(InputError, match=r"my_sensors.py: Settings.rudder_weight found, which is a keyword"):
+        gymnasium.make(COURSE, sensors=path)
 
 
 def test_a_file_that_was_changed_is_read_and_compiled_anew(tmp_path):
@@ -186,6 +189,9 @@ WRONG = [
     ("drawn(random, 1,", "drwn(random, 1,", "in begin.*drwn"),
     ("return 2.0 + settings", "return settings.weight + settings", "in worst_cost.*weight"),
     ("return 2.0 + settings.over_speed_weight", "pass", "in worst_cost: .*nothing, expected a number"),
+    ("return 2.0 + ", "return -2.0 - ", "fairway.py: worst_cost: -52 found, expected a number >= 0"),
+    ("] = 50.0", "] = [50.0]", r"Settings.over_speed_weight: \[50.0\] found, expected a number, or"),
+    ('5.0, "rad/s"', "5.0, 3", "Observation.yaw_rate: unit: 3 found, expected a text"),
     ("max(motion.u", "mox(motion.u", "line 52, in step: NameError: name 'mox'"),
     ("Reward(-off * off, ", "Reward(", "line 54, in step: TypeError: .*'over_speed'"),
     ("Reward(-off", "(-off", r"in step: result 2 is \(a number, a number, a number\), expected Reward"),
@@ -237,20 +243,56 @@ def test_what_is_wrong_is_named_and_nothing_is_registered(tmp_path, old, new, me
         ("    if x > 3.0:\n        return 1.0, 2.0\n", r"in step \(.*fairway.py, line 5[18]\): Can't unify"),
         ("    global N\n    N = 1\n", r"\(.*fairway.py, line 51\): .*STORE_GLOBAL. found.$"),
         ("    if x > 3.0:\n        Reward(1.0)\n", r"compiled \(.*fairway.py, line 51\): .*'delay'"),
+        ("    assert x < 1e9, f'{x}'\n", r"line 50\): the text of an error is put together"),
     ],
 )
 def test_what_only_numba_finds_is_told_with_function_and_line(tmp_path, new, message):
     assert FAIRWAY.splitlines()[49].startswith("    inside =")
     text = FAIRWAY.replace("    inside =", f"{new}    inside =")
-    path = written(tmp_path, "fairway.py", text)
+    assert_refused(written(tmp_path, "fairway.py", text), message)
+
+
+def assert_refused(path, message):
     with pytest.raises(InputError, match=message):
         gymnasium.make(COURSE, task=path, **SHIP)
+    with pytest.raises(InputError, match=message):
+        register_task("harbour/Wrong-v0", path, **SHIP)
+    assert "harbour/Wrong-v0" not in gymnasium.registry
+
+
+@pytest.mark.compiled
+@pytest.mark.parametrize(
+    ("head", "new", "message"),
+    [
+        ("W = [1.0]", "W[0]", "in step: the global 'W' is a list, expected a tuple or an array of numbers"),
+        ("W = {'a': 1.0}", "W['a']", "in step: the global 'W' is a dict, expected a tuple or an array"),
+        ("import numpy as np", "np.clip(x, 0.0, 9.0)", r"fairway.py, line 51\): No implementation .*clip"),
+        ("from numpy import ones\nW = ones(3)", "W[0]; W[0] = x", r"line 52\): a global array is written"),
+        ("import calendar", "calendar.isleap(x)", "by name: from calendar import isleap"),
+        ("def k(x, *, n=1.0):\n    return x", "k(x)", "in k: arguments by keyword alone found"),
+    ],
+)
+def test_what_a_function_takes_from_its_file_is_fit_for_the_compiler(tmp_path, head, new, message):
+    text = FAIRWAY.replace("from math import fabs\n", f"from math import fabs\n{head}\n")
+    text = text.replace("    inside =", f"    x += {new}\n    inside =")
+    assert_refused(written(tmp_path, "fairway.py", text), message)
 
 
 def test_an_observation_that_is_no_number_before_the_first_step_is_a_problem(tmp_path):
     text = FAIRWAY.replace("to_zone = max(", "to_zone = readings.x / interval.steps + max(")
     found = check_task(written(tmp_path, "fairway.py", text), **SHIP)
     assert any("Observation.to_zone is nan in lane 0 at step 0" in problem for problem in found.problems)
+    assert not any("nan found" in remark for remark in found.remarks)  # of what is clipped
+
+
+def test_what_fails_in_a_file_that_is_imported_is_told_with_both_places(tmp_path, monkeypatch):
+    monkeypatch.syspath_prepend(tmp_path)
+    written(tmp_path, "harbour_tools.py", "depth = 7\n1 / 0\n")
+    path = written(tmp_path, "own.py", "import math\nimport harbour_tools\n")
+    with pytest.raises(
+        InputError, match=r"own.py, line 2: .*ZeroDivisionError.* \(.*harbour_tools.py, line 2\)$"
+    ):
+        load_file(path)
 
 
 def test_what_is_interrupted_while_it_is_read_is_read_anew(tmp_path):
@@ -271,7 +313,10 @@ RECORD = "from typing import NamedTuple\n\n\nclass Settings(NamedTuple):\n    we
         ("Settings = 3\n", "Settings is no NamedTuple, expected a NamedTuple 'Settings' of floats"),
         (RECORD.replace("float", "flaot"), "own.py, line 5: cannot be executed: NameError: name 'flaot'"),
         (AS_TEXT + RECORD.replace("float", "flaot"), "Settings: an annotation cannot be read: name 'flaot'"),
-        ("from collections import namedtuple\nSettings = namedtuple('Settings', '')\n", "no fields found"),
+        (
+            "from collections import namedtuple\nSettings = namedtuple('Settings', '')\n",
+            "no annotated fields found",
+        ),
         (RECORD.replace(" = 1.0", ""), "Settings.weight: no default found, expected one"),
         (
             RECORD.replace("1.0", "'1'"),
@@ -303,6 +348,14 @@ def test_a_file_lacks_nothing_that_is_asked_of_it(text, message, tmp_path):
 def test_annotations_are_texts_only_where_a_file_asks_for_it(tmp_path, before, annotation):
     file, _ = read_source(written(tmp_path, "own.py", f"{before}def scale(x: float): ...\n"))
     assert file.scale.__annotations__ == {"x": annotation}
+
+
+def test_a_reward_of_another_form_is_told_as_what_its_function_returns(tmp_path):
+    path = written(tmp_path, "my_reward.py", re.sub(r"return Reward\((.*)\)", r"return [\1]", REWARD))
+    with pytest.raises(
+        InputError, match=r"my_reward.py, line \d+, in reward: what it returns is list, expected"
+    ):
+        register_task("harbour/Wrong-v0", "CourseKeeping", reward=path)
 
 
 def test_annotations_of_a_reward_may_be_texts(tmp_path):
@@ -392,6 +445,15 @@ def test_ids_are_taken_once(fairway, tmp_path):
     with pytest.raises(InputError, match="Did you mean 'speed_limit'"):
         register_task("harbour/Other-v0", tmp_path / "fairway.py", speed_limt=0.5, **SHIP)
     assert "harbour/Other-v0" not in gymnasium.registry
+    with pytest.raises(
+        InputError, match="'harbour/Fairway' found, expected an id such as 'harbour/fairway-v0'"
+    ):
+        register_task("harbour/Fairway", tmp_path / "fairway.py", **SHIP)
+    with pytest.raises(InputError, match="render_mode: 'film' found"):
+        register_task("harbour/Film-v0", tmp_path / "fairway.py", render_mode="film", **SHIP)
+    written(tmp_path, "fairway.py", FAIRWAY.replace("max(motion.u", "mox(motion.u"))
+    with pytest.raises(InputError, match="name 'mox' is not defined"):
+        register_task(fairway, tmp_path / "fairway.py", **SHIP)
 
 
 def test_lanes_of_a_task_are_equal_bit_for_bit(tmp_path):
