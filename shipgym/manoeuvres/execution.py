@@ -10,7 +10,8 @@ from shipgym.checks import check_number
 from shipgym.errors import InputError
 from shipgym.trials.trial import Trial
 
-ARRIVED = 0.9  # a rudder beyond this part of its usual angle has arrived there
+# Beyond these parts of its usual angle an ordered rudder, and a measured one whose zero may be off, is held.
+ORDERED, MEASURED = 0.9, 0.75
 
 
 def rudder(trial: Trial) -> Floats:
@@ -46,7 +47,8 @@ def reversals(trial: Trial) -> tuple[float, list[float]]:
     """
     delta, t = rudder(trial), trial.t
     start = execute_time(trial)
-    usual = ARRIVED * np.percentile(np.abs(delta), 75)
+    part = ORDERED if "delta_command" in trial.channels else MEASURED
+    usual = part * np.percentile(np.abs(delta), 75)
     side = np.where(delta > usual, 1, np.where(delta < -usual, -1, 0))
     arrived = np.flatnonzero((side != 0) & (t >= start))
     holds = np.split(arrived, np.flatnonzero(np.diff(side[arrived])) + 1)
@@ -63,8 +65,9 @@ def reversals(trial: Trial) -> tuple[float, list[float]]:
 def departure(t: Floats, move: Floats, reach: np.floating, fastest: np.floating) -> float:
     """Time at which a measured rudder left the angle at which it was held, s.
 
-    Its `move` from there, rad, is traced back from half of its `reach` along the slope since it last passed a
-    tenth; where these are less than three samples apart, at least at the `fastest` rate of the trial, rad/s.
+    Its `move` from there, rad, is traced back from where it last passed a tenth of its `reach`, by the slope
+    up to half of it. Where these are less than three samples apart, the slope is at least the `fastest` rate,
+    rad/s, and a first sample within 0.15 of the reach, which may be noise, is left out.
     """
     if reach == 0.0:
         return float(t[0])
@@ -72,7 +75,8 @@ def departure(t: Floats, move: Floats, reach: np.floating, fastest: np.floating)
     lower = int(np.max(np.flatnonzero(move[:upper] <= 0.1 * reach) + 1, initial=0))
     between = (move[upper] - move[lower]) / (t[upper] - t[lower]) if upper > lower else 0.0
     slope = between if upper - lower > 2 else max(between, fastest)
-    return float(t[upper] - move[upper] / slope)
+    first = lower if move[lower] > 0.15 * reach else upper
+    return float(t[first] - move[first] / slope)
 
 
 def distance_sailed(trial: Trial) -> Floats:

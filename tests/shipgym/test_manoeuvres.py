@@ -116,6 +116,23 @@ def test_between_few_samples_a_measured_rudder_moves_at_the_fastest_rate_of_the_
     assert [start, *turns] == pytest.approx([4.0, 28.0, 63.0])
 
 
+def test_a_sample_that_shows_a_measured_rudder_moving_is_not_before_it_moves():
+    """At 3 deg/s from 4 s on to 10 degrees; at 6 s it is at 6 of them, and where it is held at 9 s."""
+    t, way = np.array([0.0, 3.0, 6.0, 9.0]), np.array([0.0, 0.0, 4.0, 10.0])
+    assert departure(t, way, 10.0, 3.0) == pytest.approx(6.0 - 4.0 / 3.0)
+    helm = np.array([0.0, 0.0, 1.4, 10.0])  # little beyond a tenth: noise, or helm on the approach
+    assert departure(t, helm, 10.0, 3.0) == pytest.approx(9.0 - 10.0 / 3.0)
+
+
+@pytest.mark.parametrize("offset", [-1.2, 1.2])
+def test_a_measured_rudder_whose_zero_is_off_reverses_as_often_and_when_it_was_ordered_to(offset):
+    run = manoeuvres.zigzag(load_model("mariner"), 10, 10, dt=1.0)
+    start, turns = reversals(Trial(run.t, {"delta": run["delta"]}))
+    assert len(turns) == len(reversals(run)[1])
+    found, moved = reversals(Trial(run.t, {"delta": run["delta"] + np.radians(offset)}))
+    assert [found, *moved] == pytest.approx([start, *turns], abs=0.01)
+
+
 @pytest.mark.parametrize("name", ["mariner", "container", "kvlcc2", "tanker"])
 def test_a_measured_rudder_reverses_when_it_was_ordered_to(name):
     """It is traced back to the angle at which it was held, not to where it passed nine tenths of it."""
