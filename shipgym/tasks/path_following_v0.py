@@ -11,7 +11,7 @@ speed. Running aground costs as much as the rest of the episode there.
 Guidance by line of sight: Fossen 2011, Handbook of Marine Craft Hydrodynamics and Motion Control, 10.3.
 """
 
-from math import fabs, pi, sqrt
+from math import fabs, pi
 from typing import Annotated, NamedTuple
 
 from shipgym.engine.mathematics import arctan2, clip, pick, wrap
@@ -19,7 +19,7 @@ from shipgym.engine.motion import Motion, Ship
 from shipgym.tasks.contract import NO_NUMBERS, Flag, Interval, Numbers, Random, Readings, Seen, Setting
 from shipgym.tasks.path_following import (  # noqa: F401 - some are names of the contract
     EPISODE_STEPS, WORST_PROGRESS, Corridor, Ground, LegLengths, Legs, Lookahead, MaxTurn, Paths, Range,
-    lay_path, listed, over_ground, plan_length, start, worst_cost,
+    between, change_of_course, lay_path, listed, over_ground, plan_length, start, worst_cost,
 )  # fmt: skip
 from shipgym.tasks.path_following import check_path as check  # noqa: F401
 from shipgym.tasks.steering import (
@@ -105,17 +105,11 @@ class Fix(NamedTuple):
 
 def leg_from(number: int, before: float, plan: Numbers) -> State:
     """A leg of the path, with nothing sailed on it."""
-    north, east = plan[2 * number], plan[2 * number + 1]
-    to_north, to_east = plan[2 * number + 2], plan[2 * number + 3]
-    length = sqrt((to_north - north) ** 2 + (to_east - east) ** 2)
-    course = arctan2(to_east - east, to_north - north)
-    turn = 0.0
-    if 2 * number + 5 < len(plan):
-        turn = wrap(arctan2(plan[2 * number + 5] - to_east, plan[2 * number + 4] - to_north) - course)
-    cosine, sine = (to_north - north) / length, (to_east - east) / length
+    north, east, (length, course) = plan[2 * number], plan[2 * number + 1], between(number, number + 1, plan)
+    cosine, sine = (plan[2 * number + 2] - north) / length, (plan[2 * number + 3] - east) / length
     return State(
-        float(number), north, east, cosine, sine, length, course, turn, before, 0.0, length, course,
-        0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, float(len(plan) // 2 - 2),
+        float(number), north, east, cosine, sine, length, course, change_of_course(number + 1, plan), before,
+        0.0, length, course, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, float(len(plan) // 2 - 2),
     )  # fmt: skip
 
 
@@ -137,11 +131,10 @@ def begin(ship: Ship, settings: Settings, random: Random, plan: Numbers) -> tupl
 def on_leg(motion: Motion, leg: State, so_far: State, sailed: float, ship: Ship, settings: Settings) -> State:
     """A leg with the ship on it, and what is reported as it was so far."""
     at = fix(motion.x, motion.y, leg, ship, settings)
-    first = so_far.leg == leg.leg
     return State(
         leg.leg, leg.north, leg.east, leg.cosine, leg.sine, leg.length, leg.leg_course, leg.turn, leg.before,
         sailed, leg.length - at.along, at.course, so_far.integral,
-        wrap(at.course - motion.psi) if first else so_far.heading_error,
+        wrap(at.course - motion.psi) if so_far.leg == leg.leg else so_far.heading_error,
         at.cross, so_far.distance_made_good, so_far.success, so_far.in_corridor, so_far.grounded,
         leg.last,
     )  # fmt: skip
@@ -149,8 +142,7 @@ def on_leg(motion: Motion, leg: State, so_far: State, sailed: float, ship: Ship,
 
 def due(motion: Motion, state: State, interval: Interval, ship: Ship, settings: Settings) -> bool:
     """Whether the next leg begins."""
-    near = state.to_go <= settings.acceptance * ship.length
-    return near & (state.leg < state.last)
+    return (state.to_go <= settings.acceptance * ship.length) & (state.leg < state.last)
 
 
 def on_event(
