@@ -97,9 +97,7 @@ class Specialisation:
         """A function with its globals replaced: parts by their place, plain functions by their copies."""
         namespace: dict[str, Any] = {"__name__": function.__module__, "__builtins__": __builtins__}
         if function.__code__.co_kwonlyargcount:
-            raise InputError(
-                f"{place_of(function)}: arguments by keyword alone found, which cannot be compiled"
-            )
+            raise InputError(f"{place_of(function)}: keyword-only arguments found, which cannot be compiled")
         for name, value in named_globals(function, self.parts):
             if isinstance(value, list | dict | set):
                 kind, expected = type(value).__name__, "expected a tuple or an array of numbers"

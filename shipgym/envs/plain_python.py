@@ -41,8 +41,7 @@ def _looked_at(made: Voyages, name: str, form: Any) -> Part:
     def look(*arguments: Any) -> Any:
         given = asked(function, *arguments)
         if fault := _fault(given, form, "what it returns"):
-            of_reward = own is not function  # the second result of its step
-            fault = fault.replace("result 2", "what it returns") if of_reward else fault
+            fault = fault if own is function else fault.replace("result 2", "what it returns")  # of a reward
             raise InputError(f"{place_of(own)}: {fault}")
         return given
 
@@ -59,10 +58,9 @@ def _fault(given: Any, form: Any, name: str) -> str:
     elif is_record(form):
         if type(given) is form:
             record: Record = form
-            kinds = field_types(record).items()
             faults = (
                 _fault(one, kind if is_record(kind) else float, f"{form.__name__}.{field}")
-                for one, (field, kind) in zip(given, kinds, strict=True)
+                for one, (field, kind) in zip(given, field_types(record).items(), strict=True)
             )
             return next(filter(None, faults), "")
     elif isinstance(given, np.bool_ | (Integral if form is bool else Real)):

@@ -47,8 +47,7 @@ def reversals(trial: Trial) -> tuple[float, list[float]]:
     """
     delta, t = rudder(trial), trial.t
     start = execute_time(trial)
-    part = ORDERED if "delta_command" in trial.channels else MEASURED
-    usual = part * np.percentile(np.abs(delta), 75)
+    usual = (ORDERED if "delta_command" in trial.channels else MEASURED) * np.percentile(np.abs(delta), 75)
     side = np.where(delta > usual, 1, np.where(delta < -usual, -1, 0))
     arrived = np.flatnonzero((side != 0) & (t >= start))
     holds = np.split(arrived, np.flatnonzero(np.diff(side[arrived])) + 1)

@@ -8,7 +8,6 @@ import numpy as np
 
 from shipgym.arrays import Floats
 from shipgym.checks import Findings
-from shipgym.engine.motion import Motion
 from shipgym.errors import InputError, UnstableModelError
 from shipgym.ships.catalogue import load_model
 from shipgym.ships.equations import ShipEquations
@@ -111,10 +110,8 @@ def _wrong_accelerations(model: ShipModel) -> Iterator[str]:
         state = ", ".join(f"{name} = {channels[name][row]:.4g}" for name in known)
         look = "for coefficients that are far too large"
         if isinstance(model.dynamics, ShipEquations):
-            motion = Motion(
-                *[float(channels[name][row]) if name in channels else 0.0 for name in Motion._fields]
-            )
-            look = f"at {model.dynamics.fault(motion, model.coefficients, ship_of(model))}"
+            there = {name: float(values[row]) for name, values in channels.items()}
+            look = f"at {model.dynamics.fault(there, model.coefficients, ship_of(model))}"
         yield (
             f"derivatives: {found[row, axis]} found for the acceleration of '{_rates(model)[axis]}' at "
             f"{state} (SI units), expected a number; look {look}"
@@ -166,8 +163,7 @@ def _asymmetry(model: ShipModel) -> float:
 
 def _run(model: ShipModel, rudder: float, lengths: float) -> Trial:
     """From service with the rudder held, over so many ship lengths at service speed."""
-    commands = orders(model, np.full(round(lengths / STEP), rudder))
-    return model.simulate(commands, STEP * model.travel_time)
+    return model.simulate(orders(model, np.full(round(lengths / STEP), rudder)), STEP * model.travel_time)
 
 
 def _wrong_courses(model: ShipModel) -> Iterator[str]:

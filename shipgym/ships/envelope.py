@@ -35,8 +35,7 @@ class Envelope:
         samples = np.stack([np.asarray(channel, dtype=float) for channel in (u, v, r, delta)], axis=-1)
         low, high = samples.min(axis=0), samples.max(axis=0)
         width = np.maximum(high - low, 1e-6)
-        unit = (samples - low) / width
-        centre, quadratic = smallest_ellipsoid(unit)
+        centre, quadratic = smallest_ellipsoid((samples - low) / width)
         factor = np.linalg.cholesky(quadratic).T / width
         shape = np.linalg.qr(factor).R
         middle = low + centre * width

@@ -118,8 +118,9 @@ class ShipEquations:
                 if not isinstance(value, (int, float)):
                     raise InputError(f"{name} is {value!r}, expected a number, int or float")
 
-    def fault(self, motion: Motion, coefficients: Mapping[str, float], ship: Ship) -> str:
-        """Where plain Python fails at a motion, and why; the place of the accelerations if it does not."""
+    def fault(self, state: Mapping[str, float], coefficients: Mapping[str, float], ship: Ship) -> str:
+        """Where plain Python fails at a state, and why; the place of the accelerations if it does not."""
+        motion = Motion(*[state.get(name, 0.0) for name in Motion._fields])
         try:
             asked(self.accelerations, motion, self.coefficients_record(**coefficients), ship)
         except InputError as error:

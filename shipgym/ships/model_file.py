@@ -102,8 +102,7 @@ def read_model(fields: Mapping[str, Any], where: str, make: Callable[..., Model]
 def numbers_hash(model: ManoeuvringModel) -> str:
     """SHA-256 of a model's coefficients and covariance, in the order of its structure."""
     covariance = None if model.covariance is None else model.covariance.tolist()
-    content = json.dumps([model.coefficients, covariance])
-    return hashlib.sha256(content.encode()).hexdigest()
+    return hashlib.sha256(json.dumps([model.coefficients, covariance]).encode()).hexdigest()
 
 
 def _dynamics(value: Any, where: str, make: Callable[..., ManoeuvringModel]) -> Structure | ShipEquations:

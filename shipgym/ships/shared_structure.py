@@ -71,8 +71,7 @@ class SharedStructure(Structure):
             raise InputError(f"{where}: shares of {tuple(self.shares)} found, expected of 'u', 'v', 'r'")
         for axis, shares in self.shares.items():
             for share in shares:
-                across = (axis == "u") != (share.acceleration == "udot")
-                if share.acceleration is not None and across:
+                if share.acceleration is not None and (axis == "u") != (share.acceleration == "udot"):
                     raise InputError(
                         f"{where}: '{share.acceleration}' found in the equation of '{axis}', expected 'udot' "
                         "in that of surge, 'vdot' and 'rdot' in those of sway and yaw"
@@ -123,8 +122,7 @@ class SharedStructure(Structure):
         force = np.zeros(len(terms))
         for share in self.shares[axis]:
             if share.acceleration is None:
-                place = row[frozenset(share.term.powers)]
-                force[place] += share.sign * coefficients[share.coefficient]
+                force[row[frozenset(share.term.powers)]] += share.sign * coefficients[share.coefficient]
         m, static = p.mass_prime, p.mass_prime * p.xg_prime
         own = {"u": ((VR, m), (RR, static)), "v": ((UR, -m),), "r": ((UR, -static),)}
         for term, value in own[axis]:

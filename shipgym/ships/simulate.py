@@ -184,12 +184,10 @@ def unstable(model: ManoeuvringModel, time_s: float, state: Floats, step: float 
     heel = f", phi = {np.degrees(last['phi']):.3g} deg" if "phi" in last else ""
     longest = LONGEST_STEP * model.travel_time
     long = f", or steps of {step:g} s are too long: try {longest:.1g} s" if step > longest else ""
-    own = ", or her equations give no number (check_ship_model says where)" * bool(
-        getattr(model.dynamics, "path", None)
-    )
+    own = ", or her equations give no number (check_ship_model says where)"
     return UnstableModelError(
         f"model {model.name!r} runs away after {time_s:.1f} s (u = {last['u']:.3g} m/s, "
         f"v = {last['v']:.3g} m/s, r = {np.degrees(last['r']):.3g} deg/s{heel}): it is unstable "
-        f"there{long}{own}",
+        f"there{long}{own if getattr(model.dynamics, 'path', None) else ''}",
         time_s, last,
     )  # fmt: skip

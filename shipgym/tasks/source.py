@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from numbers import Real
 from pathlib import Path
 from typing import Any
 
@@ -13,8 +14,6 @@ from shipgym.engine.records import Record, field_types, is_list, is_record, leav
 from shipgym.errors import InputError
 from shipgym.python_files import asked, check_function, load_file, refuse_closure
 from shipgym.tasks.contract import Setting
-
-NO_NUMBER = (str, list, tuple, dict, np.ndarray)
 
 
 def read_source(source: Any) -> tuple[Any, str]:
@@ -69,6 +68,7 @@ def _check_record(record: Any, name: str, where: str) -> None:
         for field, setting, default in keywords(record):
             if isinstance(default, float | int):
                 _number(default, f"{where}: Settings.{field}: default", setting)
+    last = list(kinds)[-1]
     for field, kind in kinds.items():
         default = record._field_defaults.get(field)
         if name == "Settings" and field not in record._field_defaults:
@@ -77,8 +77,8 @@ def _check_record(record: Any, name: str, where: str) -> None:
             _check_record(kind, f"{name}.{field}", where)
         elif is_list(kind) and not name.startswith("Settings"):
             raise InputError(f"{where}: {name}.{field}: {kind!r} found, expected a float")
-        elif isinstance(default, str if is_list(kind) else NO_NUMBER) or (
-            is_list(kind) and field != list(kinds)[-1]
+        elif isinstance(default, str) or (
+            field != last if is_list(kind) else not isinstance(default, Real | None)
         ):
             raise InputError(
                 f"{where}: {name}.{field}: {default!r} found, expected a number, or a list as the last field"

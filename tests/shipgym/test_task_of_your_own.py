@@ -269,7 +269,7 @@ def assert_refused(path, message):
         ("import numpy as np", "np.clip(x, 0.0, 9.0)", r"fairway.py, line 51\): No implementation .*clip"),
         ("from numpy import ones\nW = ones(3)", "W[0]; W[0] = x", r"line 52\): a global array is written"),
         ("import calendar", "calendar.isleap(x)", "by name: from calendar import isleap"),
-        ("def k(x, *, n=1.0):\n    return x", "k(x)", "in k: arguments by keyword alone found"),
+        ("def k(x, *, n=1.0):\n    return x", "k(x)", "in k: keyword-only arguments found"),
     ],
 )
 def test_what_a_function_takes_from_its_file_is_fit_for_the_compiler(tmp_path, head, new, message):
