@@ -148,8 +148,7 @@ def check_agents(one: Contestant, tasks: Sequence[BenchmarkTask]) -> None:
     refusals: list[str] = []
     for path, task in pairs:
         try:
-            policy = _policy(agents[path], task)
-            check_fits(policy, task.task, task.ship, f"'{path}' on task '{task.name}'")
+            check_fits(_policy(agents[path], task), task.task, task.ship, f"'{path}' on task '{task.name}'")
         except InputError as error:
             refusals.append(str(error))
     if pairs and len(refusals) == len(pairs):

@@ -164,5 +164,4 @@ def improvement(
 def performance_profile(scores: ArrayLike, thresholds: ArrayLike) -> Floats:
     """Share of the scores, of any shape, above each threshold, shape (n_thresholds,)."""
     ordered = np.sort(np.ravel(scores))
-    below = np.searchsorted(ordered, np.asarray(thresholds), side="right")
-    return np.asarray(1.0 - below / len(ordered))
+    return np.asarray(1.0 - np.searchsorted(ordered, np.asarray(thresholds), side="right") / len(ordered))

@@ -108,10 +108,9 @@ def _cache() -> tuple[str, str]:
 def left_findings() -> list[Finding]:
     """Folders in use, and what dead processes left: here, one level below, and in the cache."""
     here = Path.cwd()
-    folders = [here, *(path for path in sorted(here.iterdir()) if path.is_dir()), cache_folder()]
     return [
         Finding("left over" if dead else "in use", "left" if dead else "fine", told)
-        for folder in folders
+        for folder in [here, *(path for path in sorted(here.iterdir()) if path.is_dir()), cache_folder()]
         for told, dead in locks_and_drafts(folder)
     ]
 

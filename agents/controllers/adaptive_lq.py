@@ -160,8 +160,7 @@ class AdaptiveLQ(Controller):
 
     def _doubt(self) -> Floats:
         """Variance of the model's scaled coefficients, shape (2, 4): each may be as wrong as it is large."""
-        size = np.abs(self.prior * SIZES / self.error_size[:, None])
-        return np.asarray(np.maximum(size, 0.01) ** 2)
+        return np.asarray(np.maximum(np.abs(self.prior * SIZES / self.error_size[:, None]), 0.01) ** 2)
 
     def _at_rest(self, kept: Records, now: Floats, begins: Flags) -> Flags:
         """Whether the yaw rate's second difference, over the last ship lengths, is what noise explains."""

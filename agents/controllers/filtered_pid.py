@@ -162,8 +162,7 @@ class FilteredPID(Controller):
         A = np.zeros((n + 1, n + 1))
         A[:n, :n], A[n, n], A[n, :n] = a, 1.0, dt * c[0]
         B = np.vstack([b @ measure, dt * d[:1] @ measure])
-        C = np.append(row @ c, gains["integral"])[None]
-        return Compensator(A, B, C, (row @ d @ measure)[None])
+        return Compensator(A, B, np.append(row @ c, gains["integral"])[None], (row @ d @ measure)[None])
 
 
 def _rate(value: float, name: str) -> float:

@@ -80,8 +80,7 @@ def sample_ship(
         form = nomoto_of(steering, rudder)
         steering = np.diag([-1.0 / model.travel_time, -1.0 / form.T])
         rudder = np.array([[0.0], [form.rudder_effect]])
-    linear = np.column_stack([steering, rudder])[None]
-    A, B = sampled_ships(linear, model.steering.time_constant, dt)
+    A, B = sampled_ships(np.column_stack([steering, rudder])[None], model.steering.time_constant, dt)
     return SampledShip(A[0], B[0][:, None], dt, about)
 
 
@@ -126,8 +125,7 @@ class Compensator:
     @classmethod
     def static(cls, row: Floats) -> Self:
         """Feedback without a memory, of a row of shape (1, 5)."""
-        n = len(SIGNALS)
-        return cls(np.zeros((0, 0)), np.zeros((0, n)), np.zeros((1, 0)), row)
+        return cls(np.zeros((0, 0)), np.zeros((0, len(SIGNALS))), np.zeros((1, 0)), row)
 
     def closed_loop(self, ship: SampledShip) -> Floats:
         """Matrix of ship and memory from one control interval to the next, without an integral not used."""

@@ -27,8 +27,7 @@ def in_processes(function: JobFunction, texts: list[str], workers: int, retries:
         while waiting or alone:
             doing: set[str] = set()
             try:
-                batch = waiting or deque([alone.popleft()])
-                yield from _until_broken(function, batch, doing, workers)
+                yield from _until_broken(function, waiting or deque([alone.popleft()]), doing, workers)
             except BrokenProcessPool:
                 for text in doing:
                     if died[text] == retries:

@@ -56,8 +56,7 @@ class Settings:
 
     def __post_init__(self) -> None:
         for one in fields(self):
-            value = _checked(getattr(self, one.name), one, self.allowed(one.name))
-            object.__setattr__(self, one.name, value)
+            object.__setattr__(self, one.name, _checked(getattr(self, one.name), one, self.allowed(one.name)))
         if not check_text(self.base, "base").endswith(".json"):
             check_choice(self.base, ("none", "tuned", *controller_kinds()), "base")
         if self.base == "none" and self.authority != 1.0:

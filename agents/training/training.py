@@ -256,8 +256,7 @@ class _Training(BaseCallback):  # type: ignore[misc]  # stable-baselines3 is not
         if self.folder is not None:
             for name in [run_folder.LAST] + [run_folder.AGENT] * best:
                 policy.save(self.folder / name)
-            progress = {"lq_cost": self.held_out.lq_cost, **self.found}
-            write_json(progress, self.folder / run_folder.PROGRESS)
+            write_json({"lq_cost": self.held_out.lq_cost, **self.found}, self.folder / run_folder.PROGRESS)
 
     def _record(self) -> dict[str, Any]:
         """How a policy was made; without times, so that the same run writes the same file."""

@@ -201,8 +201,7 @@ def _opened(folder: Path, plan: Plan, fixed: Sequence[str]) -> optuna.Study:
     expected = {"configuration": plan.configuration(), "fixed": sorted(fixed)}
     note = folder / CONFIGURATION
     if note.is_file():
-        found = read_json(note, "study", "name another folder")
-        check_same(expected, found, str(note))
+        check_same(expected, read_json(note, "study", "name another folder"), str(note))
     elif folder.exists() and (not folder.is_dir() or present(folder)):
         raise InputError(f"{folder}: exists and is not a tuning study; name another folder")
     else:

@@ -184,8 +184,7 @@ def _on_track(model: ShipModel, track: Track, limits: Limits, aside: float = 0.0
     step = track.controller.design["dt"] / PER_INTERVAL
     ship = SimulatedShip(model, weather=track_task(model).weather, step=step)
     ship.states[0, model.state_names.index("y")] = aside
-    seconds = 3.0 * LENGTHS * model.travel_time
-    return run(Helm(track.controller, None, limits, route), ship, seconds, **more)
+    return run(Helm(track.controller, None, limits, route), ship, 3.0 * LENGTHS * model.travel_time, **more)
 
 
 def _unwarned(found: Run, size: Floats, text: str) -> float:

@@ -24,8 +24,7 @@ def l_curve(singular_values: Floats, projections: Floats, filters: Floats, outsi
     missed = projections**2
     explained_miss = (projections * (1.0 - singular_values * filters)) ** 2
     total = missed.sum() - np.cumsum(missed) + np.cumsum(explained_miss) + max(outside, 0.0)
-    solution = np.cumsum((filters * projections) ** 2)
-    return LCurve(np.sqrt(np.maximum(total, 0.0)), np.sqrt(solution))
+    return LCurve(np.sqrt(np.maximum(total, 0.0)), np.sqrt(np.cumsum((filters * projections) ** 2)))
 
 
 def corner_rank(curve: LCurve, n_samples: int) -> int:

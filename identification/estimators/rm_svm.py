@@ -103,8 +103,7 @@ class RMSVM(LinearRegressor):
         self._fit(features, target, weight or WEIGHTS[1])
         if weight == NO_CORRECTION:  # its uncertainty is that of the weakest correction
             self.coef_ = np.zeros(features.shape[1])
-        residual = target - features @ self.coef_
-        self.covariance_ = float(np.mean(residual**2)) * self.inverse_moment_
+        self.covariance_ = float(np.mean((target - features @ self.coef_) ** 2)) * self.inverse_moment_
         return self
 
     def _fit(self, X: Floats, y: Floats, weight: float) -> None:

@@ -82,8 +82,7 @@ class TunedLSSVM(LinearRegressor):
         optimiser, bounds = get_optimiser(self.optimiser), self.log_bounds()
         X, y = validated(self, X, y)
         objective = self._objective(X, y, groups, self._estimator(10.0 ** bounds[1]))
-        search = optimiser.minimise(objective, [bounds], self.seed)
-        return self.fit_with(X, y, search)
+        return self.fit_with(X, y, optimiser.minimise(objective, [bounds], self.seed))
 
     def log_bounds(self) -> tuple[float, float]:
         """Bounds of log10 C, checked."""

@@ -115,8 +115,7 @@ class _Runs:
         self.columns = COEFFICIENTS + 2 * len(trials) + np.arange(2 * len(trials)).reshape(-1, 2)
         self.columns = np.repeat(self.columns[:1], len(trials), axis=0) if shared else self.columns
         of_current = np.full(2 if shared else 2 * len(trials), CURRENT)
-        deviations = [np.ones(COEFFICIENTS), np.tile(START, len(trials)), of_current]
-        self.weights = 1.0 / np.concatenate(deviations)
+        self.weights = 1.0 / np.concatenate([np.ones(COEFFICIENTS), np.tile(START, len(trials)), of_current])
         self.centre = np.zeros(len(self.weights))
         if known is not None:
             self.weights[:COEFFICIENTS], self.centre[:COEFFICIENTS] = 1.0 / KNOWN, known

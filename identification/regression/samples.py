@@ -148,8 +148,7 @@ class _Sampling:
             rudder = straight(t, trial["delta"]) if noisy else rebuild(t, trial["delta"], self.gear)
             integrals, moments = spline_integrals(t, channels, equations, self._terms, rudder)
         else:
-            by_euler = self.samples == "euler"
-            integrals, moments = step_integrals(t, channels, equations, self._terms, by_euler)
+            integrals, moments = step_integrals(t, channels, equations, self._terms, self.samples == "euler")
         if "q" in integrals:
             memory = twice_integrated(t, integrals.pop("q"), moments["q"])
             integrals["r"] = np.hstack([integrals["r"], memory])
@@ -192,8 +191,7 @@ def between_gaps(trial: Trial, particulars: Particulars, fewest: int = FEWEST_SA
     if not gaps.size:
         return [trial]
     fewest = max(fewest, FEWEST_SAMPLES)
-    edges = [0, *gaps.tolist(), len(trial)]
-    if not (rows := [slice(i, j) for i, j in pairwise(edges) if j - i >= fewest]):
+    if not (rows := [slice(i, j) for i, j in pairwise([0, *gaps.tolist(), len(trial)]) if j - i >= fewest]):
         longest = int(np.argmax(steps))
         raise InputError(
             f"trial {trial.name!r}: {gaps.size} gaps in time found (the longest from {trial.t[longest]:g} to "

@@ -62,12 +62,10 @@ def fit_figure(fit: Fit) -> Figure:
             points(explained, measured, "", translucent(MODEL, 0.35), 4, showlegend=False, hoverinfo="skip"),
             line(ends, ends, "equal", MUTED, 1.0, showlegend=False),
         ]
-        accelerations = axis(f"{EQUATIONS[q]}, {UNITS[q]}", nticks=5)
-        shown.append(Panel(lines, "window, trial after trial", accelerations))
+        shown.append(Panel(lines, "window, trial after trial", axis(f"{EQUATIONS[q]}, {UNITS[q]}", nticks=5)))
         shown.append(Panel(cloud, axis("regression", nticks=4), axis(nticks=5)))
     grid = {"column_widths": [0.7, 0.3], "horizontal_spacing": 0.1, "vertical_spacing": 0.48 / len(shown)}
-    height = 95 * len(shown) + 80
-    return panels(shown, height, 2, outer=True, grid=grid, hovermode="closest")
+    return panels(shown, 95 * len(shown) + 80, 2, outer=True, grid=grid, hovermode="closest")
 
 
 def residual_figure(fit: Fit) -> Figure:

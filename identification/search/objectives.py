@@ -35,8 +35,7 @@ def training_error(
     Its minimum is the upper bound of C: use it to reproduce the paper, not to choose.
     """
     whole = triangle(X, y, fit_intercept, weights)
-    fit = decompose_triangle(whole, len(y), scale, fit_intercept)
-    return _errors([fit], [whole], len(y), fit_intercept)
+    return _errors([decompose_triangle(whole, len(y), scale, fit_intercept)], [whole], len(y), fit_intercept)
 
 
 def held_out_error(

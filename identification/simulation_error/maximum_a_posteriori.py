@@ -186,8 +186,7 @@ class _Problem:
                 method="trf", ftol=tolerance, xtol=tolerance, max_nfev=30,
             )  # fmt: skip
             z, evaluations = found.x, evaluations + found.nfev
-        covariance = _covariance(self.rows(z, *given)[1][: -len(z)])
-        return Estimate(z, scales, strength, covariance, evaluations)
+        return Estimate(z, scales, strength, _covariance(self.rows(z, *given)[1][: -len(z)]), evaluations)
 
     def held_out(self, whole: Estimate, scales: Floats) -> tuple[float, float]:
         """Error of each group of segments by a fit of the others, and the factor on the standard errors.

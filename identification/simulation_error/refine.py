@@ -183,8 +183,7 @@ class _Problem:
     def _scales(self, shooting: Shooting, scales: Floats) -> Floats:
         """Root mean square of the residuals of each channel in the trials, per sample."""
         errors = shooting.residuals[: self.rows].reshape(-1, len(scales)) * scales
-        samples = sum(len(segment.measured) for segment in self.own)
-        rms = np.sqrt(np.sum(errors**2, axis=0) / samples)
+        rms = np.sqrt(np.sum(errors**2, axis=0) / sum(len(segment.measured) for segment in self.own))
         return np.asarray(np.maximum(rms, 1e-9 * self.shooter.units))
 
     def solve(self, prior: float) -> _Solution:

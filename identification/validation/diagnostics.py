@@ -183,8 +183,7 @@ def variance_inflation(scaled: Floats) -> Floats:
 
 def without_overlap(samples: Samples) -> Integers:
     """Rows whose windows do not overlap."""
-    step = int(np.ceil(samples.window / max(samples.window // 2, 1)))
-    return np.arange(0, len(samples), step)
+    return np.arange(0, len(samples), int(np.ceil(samples.window / max(samples.window // 2, 1))))
 
 
 def _collinear_pairs(scaled: Floats, names: Sequence[str]) -> tuple[tuple[str, str, float], ...]:

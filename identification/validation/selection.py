@@ -69,8 +69,7 @@ def select(
     best = _simplest(found)
     method = options.method if best.structure == MMG else best.method
     reference = reference_of(best.structure, options.reference_model)
-    chosen = replace(options, structure=best.structure, method=method, reference_model=reference)
-    return chosen, {
+    return replace(options, structure=best.structure, method=method, reference_model=reference), {
         "held_out": "each trial in turn" if len(trials) > 1 else "each third of the only trial",
         "ranking": [asdict(one) for one in (best, *(one for one in found if one is not best))],
         "refused": refused,

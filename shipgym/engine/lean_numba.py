@@ -174,8 +174,7 @@ def _use_long_vectors(replace: Replace, loop: str) -> None:
 
 def _lengthen(function: Any, lanes: int) -> None:
     """Ask LLVM to take this many lanes of the function's loops at once."""
-    number = ir.Constant(ir.IntType(32), lanes)
-    width = function.module.add_metadata(["llvm.loop.vectorize.width", number])
+    width = function.module.add_metadata(["llvm.loop.vectorize.width", ir.Constant(ir.IntType(32), lanes)])
     for block in _turning_back(function.entry_basic_block, (), set()):
         loop = function.module.add_metadata([width, block.name])
         loop.operands = loop, width  # its first entry tells it from other loops

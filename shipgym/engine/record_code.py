@@ -65,8 +65,7 @@ def row_reader(lanes: int = LANES) -> Part:
         return table[row]
 
     def generate(context: Any, builder: Any, kinds: Any, values: Any) -> Any:
-        word = context.get_value_type(kinds[1])
-        index = builder.mul(values[1], word(lanes), flags=("nsw",))
+        index = builder.mul(values[1], context.get_value_type(kinds[1])(lanes), flags=("nsw",))
         return builder.load(builder.gep(values[0], [index], inbounds=True))
 
     return Part(row_of, code=partial(intrinsic, generate, 2, _double), key=("row", lanes))

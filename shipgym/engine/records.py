@@ -41,8 +41,7 @@ def is_table(kind: Any) -> bool:
 @cache
 def field_types(record: Record, notes: bool = False) -> dict[str, Any]:
     """Types of a record's fields, with or without what they are annotated with."""
-    namespace = vars(sys.modules[record.__module__])
-    return get_type_hints(record, globalns=namespace, include_extras=notes)
+    return get_type_hints(record, globalns=vars(sys.modules[record.__module__]), include_extras=notes)
 
 
 @cache

@@ -83,8 +83,7 @@ def follow(out: Any, row: int, motion: Motion, h: float, sea: Any, words: Any, p
 def meet(out: Any, sea: Any, words: Any, parameters: Any) -> None:
     """Begin the sea for the ship in row 0, with `words[0]` as the seed of its random numbers."""
     if HAS_SEA:
-        begun = begin_sea(load_motion(out[0], 0), words[0], load_sea_parameters(parameters, 0))
-        store_sea(sea, 0, begun)
+        store_sea(sea, 0, begin_sea(load_motion(out[0], 0), words[0], load_sea_parameters(parameters, 0)))
         words[0] += BEGIN_WORDS
         record(out, 0, out.shape[1], sea, parameters)
 

@@ -119,8 +119,7 @@ class Voyages:
 
     def _functions(self) -> dict[str, Any]:
         task, sensors = self.task, self.sensors
-        called = {name: Part(getattr(episodes, name), inline=False) for name in CALLED}
-        return called | {
+        return {name: Part(getattr(episodes, name), inline=False) for name in CALLED} | {
             **open_sea.sea_functions(self.windy),
             "GROUP": 1 if plain_python() else episodes.GROUP,
             "HAS_NOISE": self.sensors.noise,

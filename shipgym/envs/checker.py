@@ -123,8 +123,7 @@ def _check_infos(env: VectorEnv[Any, Any, Any], infos: Any, where: str) -> None:
 
 
 def _check_seeds(env: VectorEnv[Any, Any, Any], n_steps: int) -> None:
-    listed = [SEED + i for i in range(env.num_envs)]
-    seeds = (SEED, SEED, listed, SEED + 10_000)
+    seeds = (SEED, SEED, [SEED + i for i in range(env.num_envs)], SEED + 10_000)
     first, again, of_list, other = (_rollout(env, seed, n_steps) for seed in seeds)
     _expect(_same(first, again), "reset with the same seed and the same actions gave another episode")
     _expect(_same(first, of_list), "reset(seed=s) gave another episode than reset(seed=[s, s + 1, ...])")

@@ -207,8 +207,7 @@ class ShipsEnv:
         Raises InputError for other options, or a value that does not fit.
         """
         given = {name: value for name, value in (options or {}).items() if value is not None}
-        known = (*["waypoints"] * self.task.follows_path, "model_index", "state", *more)
-        check_keys(given, known, "options")
+        check_keys(given, (*["waypoints"] * self.task.follows_path, "model_index", "state", *more), "options")
         if "state" in given and len(given) > 1:
             raise InputError(
                 f"options: 'state' found together with {sorted({*given} - {'state'})}, expected it alone"

@@ -125,8 +125,7 @@ class Episode:
             )
         self._set("rewards", rewards)
         self._set("actions", actions)
-        counts = {"states": 1, "info": 1, "commands": 0, "reward_parts": 0}
-        for group, more in counts.items():
+        for group, more in {"states": 1, "info": 1, "commands": 0, "reward_parts": 0}.items():
             table = check_table(getattr(self, group), group)
             arrays = {
                 name: series(values, f"{group}.{name}", len(rewards) + more) for name, values in table.items()

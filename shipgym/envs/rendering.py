@@ -171,8 +171,7 @@ class Renderer:
         blade = stern - 0.22 * scene.length * _direction(scene.heading - scene.rudder)
         brush.line(RUDDER, chart.pixels(stern), chart.pixels(blade), 3)
         turned = np.array([ahead, [-ahead[1], ahead[0]]])  # forward and to starboard as north and east
-        outline = HULL_OUTLINE * [scene.length, scene.beam] @ turned
-        brush.polygon(HULL, chart.pixels(centre + outline))
+        brush.polygon(HULL, chart.pixels(centre + HULL_OUTLINE * [scene.length, scene.beam] @ turned))
 
     def _draw_scale(self, chart: _Chart) -> None:
         pixels = chart.spacing / chart.metres

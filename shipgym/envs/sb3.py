@@ -168,8 +168,7 @@ class ShipVecEnv(VecEnv):  # type: ignore[misc]  # stable-baselines3 is not type
 
     def memory(self) -> dict[str, NDArray[Any]]:
         """All that the steps to come depend on beside their actions, copies by name; after a `reset`."""
-        own = {"returns": self._returns.copy(), "lengths": self._lengths.copy()}
-        return own | self._ships.memory()
+        return {"returns": self._returns.copy(), "lengths": self._lengths.copy()} | self._ships.memory()
 
     def remember(self, memory: Mapping[str, NDArray[Any]]) -> None:
         """Go on from the `memory` of an environment made with the same arguments, in place of a `reset`."""

@@ -109,8 +109,7 @@ def index_intervals(
     else:
         evaluate = manoeuvre
     check_number(n_draws, "n_draws", at_least=2)
-    own = {"": asdict(evaluate(model))}
-    return intervals_of(own, model.sample(int(n_draws), seed), {"": evaluate})[""]
+    return intervals_of({"": asdict(evaluate(model))}, model.sample(int(n_draws), seed), {"": evaluate})[""]
 
 
 def intervals_of(

@@ -53,11 +53,10 @@ def _check_physical(model: ShipModel, trial: Trial) -> None:
     for name, most in (("u", FASTEST * speed), ("v", speed), ("r", QUICKEST_TURN * speed / length)):
         if name in trial and np.abs(trial[name]).max() > most:
             k = int(np.argmax(np.abs(trial[name]) > most))
-            last = {channel: float(values[k]) for channel, values in trial.channels.items()}
             raise UnstableModelError(
                 f"model {model.name!r} runs away after {trial.t[k]:.1f} s ({name} = {trial[name][k]:.3g})",
                 float(trial.t[k]),
-                last,
+                {channel: float(values[k]) for channel, values in trial.channels.items()},
             )
 
 

@@ -16,8 +16,7 @@ def number(value: float | None, digits: int = 3) -> str:
     if not 1e-4 <= abs(value) < 1e7:
         mantissa, exponent = f"{value:.{digits - 1}e}".split("e")
         return f"{mantissa.replace('-', MINUS)} · 10{str(int(exponent)).translate(SUPERSCRIPTS)}"
-    decimals = max(digits - 1 - int(np.floor(np.log10(abs(value)))), 0)
-    return fixed(value, decimals)
+    return fixed(value, max(digits - 1 - int(np.floor(np.log10(abs(value)))), 0))
 
 
 def fixed(value: float | None, decimals: int = 2) -> str:

@@ -106,8 +106,7 @@ class Path:
     def distance(self, x: ArrayLike, y: ArrayLike) -> Floats:
         """Distance of points from the path, m, of the shape of the points."""
         north, east = np.asarray(x, dtype=float), np.asarray(y, dtype=float)
-        legs = np.arange(self.n_legs)
-        where = self.position(north[..., None], east[..., None], legs)
+        where = self.position(north[..., None], east[..., None], np.arange(self.n_legs))
         beyond = np.maximum(np.maximum(-where.along, where.to_go * -1.0), 0.0)
         return np.hypot(where.cross_track, beyond).min(axis=-1)  # type: ignore[no-any-return]
 

@@ -329,8 +329,7 @@ def on_event(
     for _ in range(len(plan) // 2):
         if turned_off(leg, way, ship, settings):
             number = min(max(0, int(leg.number)), len(plan) // 2 - 2)  # whatever a checkpoint holds
-            end = leg.turn_at + radius * fabs(leg.turn)
-            leg = leg_from(next_turn(number, plan), end, radius, plan)
+            leg = leg_from(next_turn(number, plan), leg.turn_at + radius * fabs(leg.turn), radius, plan)
             way = fix(motion.x, motion.y, leg, ship, settings).way
     at = fix(motion.x, motion.y, leg, ship, settings)
     return State(

@@ -101,8 +101,7 @@ def read_table(path: str | Path) -> Table:
     delimiter = max(",;\t", key=re.sub('"[^"]*"', "", lines[first]).count)
     header = tuple(name.strip() for name in _cells(lines[first], delimiter))
     _check_header(path, header, first + 1)
-    blank = delimiter + " \t"
-    kept = [k for k, line in enumerate(lines) if k > first and line.strip(blank)]
+    kept = [k for k, line in enumerate(lines) if k > first and line.strip(delimiter + " \t")]
     rows = [lines[k] for k in kept]
 
     def cells(name: str) -> list[str]:

@@ -140,8 +140,7 @@ def _assembled(path: Path, readings: Readings, notes: list[str]) -> Table:
         source = max(sorted(sources), key=lambda s: (_BETTER.get(s[2:], 0), *_rank(s, sources[s])))
         line, clock, value = np.array(sources[source]).T
         at = np.interp(line, stamps[first, 0], times)
-        told = np.isfinite(clock)
-        clock = np.where(told, clock + DAY * np.round((at - clock) / DAY), at)
+        clock = np.where(np.isfinite(clock), clock + DAY * np.round((at - clock) / DAY), at)
         clock, kept = np.unique(np.round(clock, 3), return_index=True)
         chosen[channel] = clock, line[kept], value[kept]
         if others := sorted(sources.keys() - {source}):

@@ -282,19 +282,15 @@ def _earth_to_body(log: Log) -> None:
 def _cg_to_midship(log: Log, xg: float) -> None:
     """Move position, sway and yaw moment from the centre of gravity, `xg` forward of midship, to midship."""
     channels = log.channels
-    for name, other in (("v", "r"), ("x", "psi"), ("y", "psi"), ("N", "Y")):
+    needed = {"v": "r", "x": "psi", "y": "psi", "N": "Y"}
+    for name, other in needed.items():
         if name in channels and other not in channels:
             raise InputError(
                 f'{log.where}: origin = "cg" needs {other} to move {name} to midship; name its column'
             )
-    if "v" in channels:
-        channels["v"] = channels["v"] - xg * channels["r"]
-    if "x" in channels:
-        channels["x"] = channels["x"] - xg * np.cos(channels["psi"])
-    if "y" in channels:
-        channels["y"] = channels["y"] - xg * np.sin(channels["psi"])
-    if "N" in channels:
-        channels["N"] = channels["N"] + xg * channels["Y"]
+    arms: Any = {"v": lambda r: -r, "x": lambda h: -np.cos(h), "y": lambda h: -np.sin(h), "N": lambda Y: Y}
+    for name in arms.keys() & channels.keys():
+        channels[name] = channels[name] + xg * arms[name](channels[needed[name]])
 
 
 def _repaired(values: Floats, source: Source, repair: str | None) -> tuple[Floats, Source]:

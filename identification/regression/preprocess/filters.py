@@ -76,8 +76,7 @@ def smooth(t: ArrayLike, values: ArrayLike) -> Floats:
         freedom = float(signs @ rest)
         return float(left_out @ left_out) / max(freedom, 1.0) ** 2
 
-    best = min(STIFFNESSES, key=criterion)
-    return spline.smoothed(values, 10.0**best)
+    return spline.smoothed(values, 10.0 ** min(STIFFNESSES, key=criterion))
 
 
 class Reinsch:

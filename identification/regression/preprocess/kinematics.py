@@ -57,8 +57,7 @@ def _smooth_plane(trial: Trial, psi: Floats) -> dict[str, Floats]:
         axes = np.array([first, first + 2])
         process[:, axes[:, None], axes] = walk[:, 1:, 1:]
     given = (*PLANE, "udot", "vdot"), _plane_transitions(h, psi), process, (1e4, 1e4, 1e2, 1e2, 1.0, 1.0)
-    guessed_by = next(name for name in ("u", "x", "v") if name in trial)
-    return _smooth_states(trial, names, guessed_by, *given)
+    return _smooth_states(trial, names, next(name for name in ("u", "x", "v") if name in trial), *given)
 
 
 def _smooth_states(
