@@ -21,6 +21,7 @@ from speed.measure import Row
 
 from shipgym.checks import check_choice
 from shipgym.envs.registration import TASKS
+from shipgym.errors import InputError
 
 #: What is measured, by group; each is called when it is its turn.
 GROUPS: dict[str, list[Callable[[], Row | list[Row]]]] = {
@@ -70,10 +71,14 @@ def main(
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON instead of a table.")] = False,
 ) -> None:
     """Measure and print."""
+    try:
+        chosen = [check_choice(group, GROUPS, "group") for group in groups or GROUPS]
+    except InputError as error:
+        raise typer.BadParameter(str(error)) from None
     table = Table("", "shipgym", "against", "ratio", "aim")
     rows: list[Row] = []
-    for group in groups or GROUPS:
-        for measure in GROUPS[check_choice(group, GROUPS, "group")]:
+    for group in chosen:
+        for measure in GROUPS[group]:
             measured = measure()
             for row in measured if isinstance(measured, list) else [measured]:
                 rows.append(row)
