@@ -108,9 +108,8 @@ def _take_out_current(
         else:
             found[trial.name] = through_water(trial, *current)
         rows[trial.name] = row
-    remarks += [
-        f"{', '.join(who)}: no current is removed: {doubt}; {REMEDY}" for doubt, who in doubts.items()
-    ]
+    for doubt, names in doubts.items():
+        remarks.append(f"{', '.join(names)}: no current is removed: {doubt}; {REMEDY}")
     return rows
 
 

@@ -185,7 +185,8 @@ def read_ship_equations(path: str | Path) -> ShipEquations:
     ship = getattr(load_file(path, f"a Python file that defines {written}"), "SHIP", None)
     if not isinstance(ship, ShipEquations):
         raise InputError(f"{path}: SHIP = {ship!r} found, expected {written}")
-    refuse_closure(ship.accelerations)
+    for one in (ship.accelerations, ship.shaft_acceleration):
+        refuse_closure(one)
     object.__setattr__(ship, "path", path)
     return ship
 

@@ -105,6 +105,7 @@ def test_changed_coefficients_compile_nothing_anew(tug: Path) -> None:
             marks=pytest.mark.compiled,
         ),
         ("    accelerations,\n", "    (lambda k: lambda m, c, s: 5 * (k,))(1.0),\n", r"around it \(k\)"),
+        ("=shaft_acceleration", "=(lambda k: lambda n, m, c, s: k * (m - n))(0.2)", r"around it \(k\)"),
         ('"tug",\n', '"mariner",\n', "tug.py: name 'mariner' found, which is another ship's"),
         ('"tug",\n', '"container",\n', "'container' found, which is another ship's"),
         ("service_shaft_speed=2.357", "service_shaft_speed=0.0", "service_shaft_speed: 0"),
