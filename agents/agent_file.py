@@ -25,22 +25,24 @@ PRETRAINED = Path(__file__).parent / "pretrained"
 def load_agent(path: str | Path, model: ShipModel | None = None) -> Agent:
     """Read the file of a controller, a learned policy or a shielded one; none needs torch.
 
-    Returns a Controller, LearnedPolicy or Shielded, as it was saved. Raises InputError naming the file and
-    the field at fault, or the difference to the model.
+    Returns a Controller, LearnedPolicy or Shielded, as it was saved. Raises InputError
+    naming the file and the field at fault, or the difference to the model.
 
     Parameters
     ----------
     path : str or Path
-        A file, or the name of a pretrained agent, `mariner-calm-ppo` (`list_pretrained`).
+        A file, or the name of a pretrained agent, `mariner-calm-ppo`
+        (`list_pretrained`).
     model : ShipModel, optional
-        The ship to steer; one with other observation scales is refused. A policy for all ships is made for
-        her (`OneForAll.for_ship`).
+        The ship to steer; one with other observation scales is refused. A policy for
+        all ships is made for her (`OneForAll.for_ship`).
     """
     agent = read_agent(path)
     if hasattr(agent, "for_ship"):
         if model is None:
             raise InputError(
-                f"{path}: made for each ship; give her model: load_agent(path, model).save(file)"
+                f"{path}: made for each ship; give her model: load_agent(path,"
+                " model).save(file)"
             )
         return agent.for_ship(model)
     if model is not None:
@@ -76,7 +78,7 @@ def find_agent(name: str | Path) -> Path:
     known = list_pretrained()
     if str(name) not in known:
         raise InputError(
-            f"agent: '{name}' found, expected a file, or one of {len(known)} pretrained agents, such as "
-            f"'{known[0]}'.{did_you_mean(str(name), known)}"
+            f"agent: '{name}' found, expected a file, or one of {len(known)} pretrained"
+            f" agents, such as '{known[0]}'.{did_you_mean(str(name), known)}"
         )
     return PRETRAINED / f"{name}.json"

@@ -3,17 +3,36 @@
 from math import fabs
 from typing import Annotated, NamedTuple
 
-from shipgym.tasks.contract import Flag, Seen, Setting, at_service_speed, clip, drawn, pick, sin_cos
+from shipgym.tasks.contract import (
+    Flag,
+    Seen,
+    Setting,
+    at_service_speed,
+    clip,
+    drawn,
+    pick,
+    sin_cos,
+)
 
 REPORTED = ("speeding", "cross_track")
 
 
 class Settings(NamedTuple):
-    half_width: Annotated[float, Setting("Of the fairway, ship lengths.", above=0.0)] = 2.0
-    zone_begins: Annotated[float, Setting("Of the limit, ship lengths north.", at_least=0.0)] = 8.0
-    zone_ends: Annotated[float, Setting("Of the limit, ship lengths north.", above=0.0)] = 16.0
-    speed_limit: Annotated[float, Setting("Part of service speed.", above=0.0, at_most=1.0)] = 0.7
-    over_speed_weight: Annotated[float, Setting("Cost of service speed over the limit.", at_least=0.0)] = 50.0
+    half_width: Annotated[
+        float, Setting("Of the fairway, ship lengths.", above=0.0)
+    ] = 2.0
+    zone_begins: Annotated[
+        float, Setting("Of the limit, ship lengths north.", at_least=0.0)
+    ] = 8.0
+    zone_ends: Annotated[
+        float, Setting("Of the limit, ship lengths north.", above=0.0)
+    ] = 16.0
+    speed_limit: Annotated[
+        float, Setting("Part of service speed.", above=0.0, at_most=1.0)
+    ] = 0.7
+    over_speed_weight: Annotated[
+        float, Setting("Cost of service speed over the limit.", at_least=0.0)
+    ] = 50.0
 
 
 class State(NamedTuple):
@@ -32,9 +51,13 @@ class Reward(NamedTuple):
 class Observation(NamedTuple):
     heading_sin: Annotated[float, Seen(-1.0, 1.0)]
     heading_cos: Annotated[float, Seen(-1.0, 1.0)]
-    yaw_rate: Annotated[float, Seen(-5.0, 5.0, "rad/s", lambda ship, _: ship.speed / ship.length)]
+    yaw_rate: Annotated[
+        float, Seen(-5.0, 5.0, "rad/s", lambda ship, _: ship.speed / ship.length)
+    ]
     surge: Annotated[float, Seen(-2.0, 3.0, "m/s", lambda ship, _: ship.speed)]
-    cross_track: Annotated[float, Seen(-2.0, 2.0, "m", lambda ship, s: s.half_width * ship.length)]
+    cross_track: Annotated[
+        float, Seen(-2.0, 2.0, "m", lambda ship, s: s.half_width * ship.length)
+    ]
     limit: Annotated[float, Seen(0.0, 1.0, "m/s", lambda ship, _: ship.speed)]
     to_zone: Annotated[float, Seen(0.0, 1.0, "m", lambda ship, _: 8.0 * ship.length)]
 
@@ -63,7 +86,9 @@ def worst_cost(settings):
 def observe(readings, state, interval, ship, settings):
     sine, cosine = sin_cos(readings.psi)
     to_zone = max(settings.zone_begins * ship.length - readings.x, 0.0)
-    return Observation(sine, cosine, readings.r, readings.u, readings.y, state.limit, to_zone)
+    return Observation(
+        sine, cosine, readings.r, readings.u, readings.y, state.limit, to_zone
+    )
 
 
 if __name__ == "__main__":
@@ -71,7 +96,9 @@ if __name__ == "__main__":
 
     import shipgym
 
-    shipgym.register_task("harbour/Fairway-v0", __file__, model="kvlcc2", action="rudder-shaft")
+    shipgym.register_task(
+        "harbour/Fairway-v0", __file__, model="kvlcc2", action="rudder-shaft"
+    )
     print(shipgym.check_task(__file__, model="kvlcc2", action="rudder-shaft"))
     ships = shipgym.ShipVecEnv("harbour/Fairway-v0", num_envs=64)
     PPO("MlpPolicy", ships, n_steps=256, verbose=1).learn(500_000)

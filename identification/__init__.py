@@ -1,6 +1,7 @@
 """Identification of manoeuvring models from recorded trials.
 
-The public names stand in `__init__.pyi` and are imported on first use: scikit-learn takes a second.
+The public names stand in `__init__.pyi` and are imported on first use: scikit-learn
+takes a second.
 """
 
 import lazy_loader

@@ -1,26 +1,45 @@
-from .design.experiment import Advice as Advice, advise as advise
+from .design.experiment import Advice as Advice
+from .design.experiment import advise as advise
 from .design.reduced import (
     ReducedIdentification as ReducedIdentification,
+)
+from .design.reduced import (
     identify_reduced as identify_reduced,
 )
 from .design.reduction import (
     Reduction as Reduction,
+)
+from .design.reduction import (
     backward_elimination as backward_elimination,
+)
+from .design.reduction import (
     forward_selection as forward_selection,
+)
+from .design.reduction import (
     sensitivity as sensitivity,
 )
 from .estimators.coefficient_history import (
     CoefficientHistory as CoefficientHistory,
+)
+from .estimators.coefficient_history import (
     coefficient_history as coefficient_history,
 )
 from .estimators.lssvm import (
     LSSVM as LSSVM,
+)
+from .estimators.lssvm import (
     TruncatedLSSVM as TruncatedLSSVM,
+)
+from .estimators.lssvm import (
     polynomial_coefficients as polynomial_coefficients,
 )
 from .estimators.recursive import (
     MultiInnovationLeastSquares as MultiInnovationLeastSquares,
+)
+from .estimators.recursive import (
     RecursiveLeastSquares as RecursiveLeastSquares,
+)
+from .estimators.recursive import (
     StochasticGradient as StochasticGradient,
 )
 from .estimators.rm_svm import RMSVM as RMSVM
@@ -29,21 +48,40 @@ from .options import Options as Options
 from .pipeline import identify as identify
 from .regression.forces import (
     ForceRegression as ForceRegression,
+)
+from .regression.forces import (
     force_regression as force_regression,
+)
+from .regression.forces import (
     identify_forces as identify_forces,
 )
-from .regression.samples import Samples as Samples, build_samples as build_samples
+from .regression.samples import Samples as Samples
+from .regression.samples import build_samples as build_samples
 from .result import IdentificationResult as IdentificationResult
 from .search import (
     ArtificialBeeColony as ArtificialBeeColony,
+)
+from .search import (
     DifferentialEvolution as DifferentialEvolution,
+)
+from .search import (
     GridSearch as GridSearch,
+)
+from .search import (
     ParticleSwarm as ParticleSwarm,
+)
+from .search import (
     SearchResult as SearchResult,
+)
+from .search import (
     minimise as minimise,
 )
 from .validation.comparison import (
     Comparison as Comparison,
+)
+from .validation.comparison import (
     compare_methods as compare_methods,
+)
+from .validation.comparison import (
     cross_validate as cross_validate,
 )

@@ -16,23 +16,41 @@ Given = Particulars | Mapping[str, Any] | None  # particulars, as `identify` tak
 __all__ = ["Given", "Options", "name_of", "provenance_settings", "whole_call"]
 
 
-def provenance_settings(options: Options, of_method: Mapping[str, Any]) -> dict[str, Any]:
+def provenance_settings(
+    options: Options, of_method: Mapping[str, Any]
+) -> dict[str, Any]:
     """Settings for the provenance: those of the samples and of the method."""
-    found = {"window": options.window, "smooth": options.smooth, "guarded": options.guarded, **of_method}
+    found = {
+        "window": options.window,
+        "smooth": options.smooth,
+        "guarded": options.guarded,
+        **of_method,
+    }
     if options.preprocessing is not None:
         found["preprocessing"] = options.preprocessing
     return {key: _plain(value) for key, value in found.items()}
 
 
 def whole_call(
-    options: Options, trials: Sequence[Trial], particulars: Given, steering: SteeringGear | None
+    options: Options,
+    trials: Sequence[Trial],
+    particulars: Given,
+    steering: SteeringGear | None,
 ) -> dict[str, Any]:
     """The whole call for settings.json, trials by name, use and hash."""
-    given = {**options.own(), **options.settings(), "particulars": particulars, "steering": steering}
+    given = {
+        **options.own(),
+        **options.settings(),
+        "particulars": particulars,
+        "steering": steering,
+    }
     return {
         "software": f"shipgym {shipgym.__version__}",
         **{key: _plain(value) for key, value in given.items()},
-        "trials": [{"name": trial.name, "use": trial.use, "sha256": trial.raw.sha256} for trial in trials],
+        "trials": [
+            {"name": trial.name, "use": trial.use, "sha256": trial.raw.sha256}
+            for trial in trials
+        ],
     }
 
 
@@ -40,7 +58,9 @@ def name_of(value: Any) -> str:
     """The name of a model or of a method, of an estimator that of its class."""
     if isinstance(value, str):
         return value
-    return value.name if isinstance(value, ShipModel | Structure) else type(value).__name__
+    return (
+        value.name if isinstance(value, ShipModel | Structure) else type(value).__name__
+    )
 
 
 def _plain(value: Any) -> Any:

@@ -21,8 +21,8 @@ class IdentificationResult(Fit):
     def summary(self) -> str:
         """Table of all coefficients and of the inertia they are based on.
 
-        Name, value and standard error (of forces in the prime system 1e-5) and t; inertia that was not given
-        is marked as estimated.
+        Name, value and standard error (of forces in the prime system 1e-5) and t;
+        inertia that was not given is marked as estimated.
         """
         return summary_table(self)
 
@@ -34,17 +34,17 @@ class IdentificationResult(Fit):
         Returns
         -------
         dict of str to plotly.graph_objects.Figure
-            "fit", "residuals" (autocorrelation, and cross-correlation with the rudder), "l-curve" and
-            "search" for methods that have one, "coefficients", "trials", and "prediction: NAME" for each
-            trial held out.
+            "fit", "residuals" (autocorrelation, and cross-correlation with the rudder),
+            "l-curve" and "search" for methods that have one, "coefficients", "trials",
+            and "prediction: NAME" for each trial held out.
         """
         return all_figures(self)
 
     def save(self, folder: str | Path) -> None:
         """Write `model.json`, `metrics.json`, `settings.json` and `report.html`, all or none.
 
-        The same call on the same data gives the same files, byte for byte. Without plotly there is no
-        report, and a warning says so.
+        The same call on the same data gives the same files, byte for byte. Without
+        plotly there is no report, and a warning says so.
 
         Raises InputError where it cannot be written.
 
@@ -64,7 +64,9 @@ class IdentificationResult(Fit):
                     else:  # an earlier one would describe another model
                         (folder / name).unlink(missing_ok=True)
         except OSError as error:
-            told = f"{folder}: cannot be written ({error.strerror}); choose another folder"
+            told = (
+                f"{folder}: cannot be written ({error.strerror}); choose another folder"
+            )
             raise InputError(told) from error
 
     def _write(self, folder: Path) -> None:
@@ -75,6 +77,9 @@ class IdentificationResult(Fit):
             import plotly  # noqa: F401
         except ModuleNotFoundError:
             remedy = "pip install 'shipgym[report]'"
-            warnings.warn(f"plotly is not installed, so report.html was not written: {remedy}", stacklevel=3)
+            warnings.warn(
+                f"plotly is not installed, so report.html was not written: {remedy}",
+                stacklevel=3,
+            )
             return
         write_text(report_page(self), folder / "report.html")

@@ -21,5 +21,7 @@ def lined_table(title: str, *headings: str) -> Table:
     """A table with its title to the left; a heading that begins with > is aligned right."""
     table = Table(title=title, title_justify="left")
     for heading in headings:
-        table.add_column(heading.removeprefix(">"), justify="right" if heading[0] == ">" else "left")
+        table.add_column(
+            heading.removeprefix(">"), justify="right" if heading[0] == ">" else "left"
+        )
     return table

@@ -16,16 +16,34 @@ def gentle(task: BenchmarkTask) -> Policy:
     return LQ.from_model(task.ship, integral_lengths=60.0)
 
 
-def main(out: Annotated[Path, typer.Argument(help="Folder of the results.")] = Path("results")) -> None:
+def main(
+    out: Annotated[Path, typer.Argument(help="Folder of the results.")] = Path(
+        "results"
+    ),
+) -> None:
     """Run them, then print the ranking and each task's best."""
-    contestants = {"pid": "pid", "lq": "lq", "lqg": "lqg", "ilos": "ilos", "gentle": gentle}
-    result = benchmark(contestants, suite="shipgym-v1", out=str(out), workers=2, resume=True)
+    contestants = {
+        "pid": "pid",
+        "lq": "lq",
+        "lqg": "lqg",
+        "ilos": "ilos",
+        "gentle": gentle,
+    }
+    result = benchmark(
+        contestants, suite="shipgym-v1", out=str(out), workers=2, resume=True
+    )
     for place, entry in enumerate(result.summary["ranking"], start=1):
-        print(f"{place}. {entry['name']:8} {entry['relative_cost']:.3f} times the lowest costs")
+        print(
+            f"{place}. {entry['name']:8} {entry['relative_cost']:.3f} times the lowest"
+            " costs"
+        )
     for task, by_name in result.summary["tasks"].items():
         best = min(by_name, key=lambda name: by_name[name]["cost"]["value"])
         cost = by_name[best]["cost"]
-        print(f"{task:22} {best:8} {cost['value']:8.1f} ({cost['low']:.1f} to {cost['high']:.1f})")
+        print(
+            f"{task:22} {best:8} {cost['value']:8.1f} ({cost['low']:.1f} to"
+            f" {cost['high']:.1f})"
+        )
 
 
 if __name__ == "__main__":

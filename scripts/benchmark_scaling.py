@@ -2,9 +2,10 @@
 
     python scripts/benchmark_scaling.py [monte-carlo] [environments] [benchmark] [tasks]
 
-Times are of the processor, of this process and of its workers: what others do on the machine lengthens the
-clock's time but not these. `idle` is what the clock would at best show on a machine with a free core for each
-worker: the time of this process and that of one worker.
+Times are of the processor, of this process and of its workers: what others do on the
+machine lengthens the clock's time but not these. `idle` is what the clock would at best
+show on a machine with a free core for each worker: the time of this process and that of
+one worker.
 """
 
 from __future__ import annotations
@@ -28,23 +29,39 @@ WORKERS = (1, 2)
 
 def used() -> tuple[float, float, float]:
     """Processor time of this process and of the workers that have ended, and the clock's, s."""
-    own, others = resource.getrusage(resource.RUSAGE_SELF), resource.getrusage(resource.RUSAGE_CHILDREN)
-    return own.ru_utime + own.ru_stime, others.ru_utime + others.ru_stime, time.perf_counter()
+    own, others = (
+        resource.getrusage(resource.RUSAGE_SELF),
+        resource.getrusage(resource.RUSAGE_CHILDREN),
+    )
+    return (
+        own.ru_utime + own.ru_stime,
+        others.ru_utime + others.ru_stime,
+        time.perf_counter(),
+    )
 
 
 def row(label: str, workers: int, work: Callable[[], Any]) -> float:
     """Print what some work took; return what the clock would at best show."""
     before = used()
     work()
-    own, others, clock = (after - start for after, start in zip(used(), before, strict=True))
+    own, others, clock = (
+        after - start for after, start in zip(used(), before, strict=True)
+    )
     idle = own + others / workers
-    print(f"| {label} | {workers} | {own:.2f} | {others:.2f} | {idle:.2f} | {clock:.1f} |", flush=True)
+    print(
+        f"| {label} | {workers} | {own:.2f} | {others:.2f} | {idle:.2f} |"
+        f" {clock:.1f} |",
+        flush=True,
+    )
     return idle
 
 
 def head(title: str) -> None:
     """Begin a table."""
-    print(f"\n{title}\n\n| work | workers | this process, s | workers, s | idle, s | clock, s |")
+    print(
+        f"\n{title}\n\n| work | workers | this process, s | workers, s | idle, s |"
+        " clock, s |"
+    )
     print("| --- | ---: | ---: | ---: | ---: | ---: |", flush=True)
 
 
@@ -62,7 +79,11 @@ def monte_carlo_table() -> None:
     for draws in (100, 400, 1600):
         for workers in WORKERS:
             where = JobEngine(workers=workers)
-            row(f"{draws} draws", workers, lambda d=draws, w=where: monte_carlo(pilots, ship, d, where=w))
+            row(
+                f"{draws} draws",
+                workers,
+                lambda d=draws, w=where: monte_carlo(pilots, ship, d, where=w),
+            )
 
 
 def environments_table() -> None:
@@ -72,7 +93,8 @@ def environments_table() -> None:
     task = load_suite().tasks[0]
     print(f"\nSteps of the environment, task {task.name}\n")
     print(
-        "| ships | threads | steps each | million steps/s of processor | million steps/s by the clock, best |"
+        "| ships | threads | steps each | million steps/s of processor | million"
+        " steps/s by the clock, best |"
     )
     print("| ---: | ---: | ---: | ---: | ---: |")
     for ships in (64, 256, 1024, 4096):
@@ -87,10 +109,15 @@ def environments_table() -> None:
                 for _ in range(steps):
                     engine.step(action)
                 found = time.process_time() - cpu, time.perf_counter() - clock
-                best[threads] = [min(pair) for pair in zip(best[threads], found, strict=True)]
+                best[threads] = [
+                    min(pair) for pair in zip(best[threads], found, strict=True)
+                ]
         for threads, (cpu, clock) in best.items():
             rates = [f"{ships * steps / seconds / 1e6:.1f}" for seconds in (cpu, clock)]
-            print(f"| {ships} | {threads} | {steps} | {rates[0]} | {rates[1]} |", flush=True)
+            print(
+                f"| {ships} | {threads} | {steps} | {rates[0]} | {rates[1]} |",
+                flush=True,
+            )
 
 
 def benchmark_table() -> None:
@@ -102,13 +129,22 @@ def benchmark_table() -> None:
 
     def run(episodes: int, workers: int) -> None:
         with tempfile.TemporaryDirectory() as folder:
-            benchmark("pid,lq", "shipgym-v1", tasks, f"{folder}/results", workers, episodes=episodes)
+            benchmark(
+                "pid,lq",
+                "shipgym-v1",
+                tasks,
+                f"{folder}/results",
+                workers,
+                episodes=episodes,
+            )
 
     run(1, 1)  # compiles
     head("shipgym benchmark --controllers pid,lq, four tasks")
     for episodes in (10, 100):
         for workers in WORKERS:
-            row(f"{episodes} episodes", workers, lambda e=episodes, w=workers: run(e, w))
+            row(
+                f"{episodes} episodes", workers, lambda e=episodes, w=workers: run(e, w)
+            )
 
 
 def tasks_table() -> None:
@@ -120,7 +156,9 @@ def tasks_table() -> None:
         row(
             "100 jobs",
             workers,
-            lambda w=workers: run_jobs(nothing, [{"k": k} for k in range(100)], workers=w),
+            lambda w=workers: run_jobs(
+                nothing, [{"k": k} for k in range(100)], workers=w
+            ),
         )
 
 

@@ -30,7 +30,11 @@ GROUPS: dict[str, list[Callable[[], Row | list[Row]]]] = {
         *(
             partial(environments.vector_environment, task, n, aim)
             for task in ("CourseKeeping", "PathFollowing")
-            for n, aim in ((64, "15 M steps/s"), (1024, "35 M steps/s"), (4096, "40 M steps/s"))
+            for n, aim in (
+                (64, "15 M steps/s"),
+                (1024, "35 M steps/s"),
+                (4096, "40 M steps/s"),
+            )
         ),
         *(partial(environments.weather, n) for n in (1024, 4096)),
         environments.kernel_ship,
@@ -51,7 +55,10 @@ GROUPS: dict[str, list[Callable[[], Row | list[Row]]]] = {
     "identification": [
         partial(identification.truncated_fit, 1800, "500 times"),
         partial(identification.truncated_fit, 6000, "5000 times"),
-        *(partial(identification.bee_colony_search, objective) for objective in ("training", "k-fold")),
+        *(
+            partial(identification.bee_colony_search, objective)
+            for objective in ("training", "k-fold")
+        ),
         identification.recursive_updates,
         identification.refinement,
     ],
@@ -66,9 +73,12 @@ GROUPS: dict[str, list[Callable[[], Row | list[Row]]]] = {
 
 def main(
     groups: Annotated[
-        list[str] | None, typer.Argument(help=f"Some of {', '.join(GROUPS)}; by default all.")
+        list[str] | None,
+        typer.Argument(help=f"Some of {', '.join(GROUPS)}; by default all."),
     ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON instead of a table.")] = False,
+    as_json: Annotated[
+        bool, typer.Option("--json", help="Print JSON instead of a table.")
+    ] = False,
 ) -> None:
     """Measure and print."""
     try:
@@ -82,7 +92,11 @@ def main(
             measured = measure()
             for row in measured if isinstance(measured, list) else [measured]:
                 rows.append(row)
-                ratio = "" if row.ratio is None else f"{row.ratio:,.{1 if row.ratio >= 2.0 else 2}f}"
+                ratio = (
+                    ""
+                    if row.ratio is None
+                    else f"{row.ratio:,.{1 if row.ratio >= 2.0 else 2}f}"
+                )
                 table.add_row(row.what, row.ours, row.alternative, ratio, row.aim)
         table.add_section()
     if as_json:

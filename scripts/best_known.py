@@ -1,13 +1,15 @@
 """Keep the lowest cost that anything reached in each scored episode of a suite.
 
-    shipgym benchmark --suite shipgym-v2 --controllers wheel-over,tuned-wheel-over --out results
-    python scripts/best_known.py --suite shipgym-v2 results            # of these results, and what is kept
-    python scripts/best_known.py --suite shipgym-v2 results --search lq,tuned-wheel-over --tasks roll-limit
-    python scripts/best_known.py --suite shipgym-v2 results --rule --episodes 6    # for docs/benchmark.md
+    shipgym benchmark --suite shipgym-v2 --controllers wheel-over,tuned-wheel-over --out
+    results python scripts/best_known.py --suite shipgym-v2 results            # of
+    these results, and what is kept python scripts/best_known.py --suite shipgym-v2
+    results --search lq,tuned-wheel-over --tasks roll-limit python scripts/best_known.py
+    --suite shipgym-v2 results --rule --episodes 6    # for docs/benchmark.md
 
-`zero` is the mean cost of the contestant `wheel-over`, designed on the model without search. The search
-(`scripts/oracle.py`) goes on, in each episode, from what the best of the contestants named does, on the ship
-herself with the state known: what it finds no autopilot may reach, and it stands in the file as `search`.
+`zero` is the mean cost of the contestant `wheel-over`, designed on the model without
+search. The search (`scripts/oracle.py`) goes on, in each episode, from what the best of
+the contestants named does, on the ship herself with the state known: what it finds no
+autopilot may reach, and it stands in the file as `search`.
 """
 
 from __future__ import annotations
@@ -26,27 +28,60 @@ from oracle import OracleSettings, run_oracle
 from agents.benchmarking.contestants import LEARNED, Contestant
 from agents.benchmarking.results import BenchmarkResult, load_results
 from agents.suites.reference import best_known
-from agents.suites.suite import N_EPISODES, BenchmarkTask, load_suite, suite_file, suite_hash
+from agents.suites.suite import (
+    N_EPISODES,
+    BenchmarkTask,
+    load_suite,
+    suite_file,
+    suite_hash,
+)
 from shipgym.files import write_json
 
 ZERO, SEARCH = "wheel-over", "search"
-ROOM = 0.08  # between the best baseline and the best known, of a task that is there for learning
+# between the best baseline and the best known, of a task that is there for learning
+ROOM = 0.08
 
 
 def main() -> None:
     """Write the file of best known costs anew."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
-    parser.add_argument("results", nargs="*", type=Path, help="folders of results, the first complete")
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawTextHelpFormatter
+    )
+    parser.add_argument(
+        "results", nargs="*", type=Path, help="folders of results, the first complete"
+    )
     parser.add_argument("--suite", default="shipgym-v2")
-    parser.add_argument("--tasks", default="", help="of the search, separated by commas; by default all")
-    parser.add_argument("--search", default="", help="contestants to search from, separated by commas")
-    parser.add_argument("--episodes", type=int, default=N_EPISODES, help="of search and rule, the first ones")
-    parser.add_argument("--passes", type=int, default=OracleSettings.passes, help="of the search")
-    parser.add_argument("--rule", action="store_true", help="only print whether the rule of choice holds")
+    parser.add_argument(
+        "--tasks", default="", help="of the search, separated by commas; by default all"
+    )
+    parser.add_argument(
+        "--search", default="", help="contestants to search from, separated by commas"
+    )
+    parser.add_argument(
+        "--episodes",
+        type=int,
+        default=N_EPISODES,
+        help="of search and rule, the first ones",
+    )
+    parser.add_argument(
+        "--passes", type=int, default=OracleSettings.passes, help="of the search"
+    )
+    parser.add_argument(
+        "--rule",
+        action="store_true",
+        help="only print whether the rule of choice holds",
+    )
     asked = parser.parse_args()
     known: dict[str, Any] = best_known(asked.suite)
     if asked.rule:
-        print(rule(known, asked.suite, [load_results(one) for one in asked.results], asked.episodes))
+        print(
+            rule(
+                known,
+                asked.suite,
+                [load_results(one) for one in asked.results],
+                asked.episodes,
+            )
+        )
         return
     for folder in asked.results:
         add_results(known, folder, asked.suite)
@@ -58,7 +93,10 @@ def main() -> None:
             write_json(known, suite_file(asked.suite, "best"))
     for name, one in known.items():
         by = {source: one["by"].count(source) for source in sorted(set(one["by"]))}
-        print(f"{name:28s} zero {one['zero']:9.2f}  best known {np.mean(one['costs']):9.2f}  {by}")
+        print(
+            f"{name:28s} zero {one['zero']:9.2f}  best known"
+            f" {np.mean(one['costs']):9.2f}  {by}"
+        )
 
 
 def add_results(known: dict[str, Any], folder: Path, suite: str) -> None:
@@ -70,17 +108,29 @@ def add_results(known: dict[str, Any], folder: Path, suite: str) -> None:
     whole = about["seeds"]["count"] == N_EPISODES
     for task, by_name in about["tasks"].items():
         if ZERO in by_name and whole:
-            known.setdefault(task, {"costs": [], "by": []})["zero"] = by_name[ZERO]["cost"]["value"]
+            known.setdefault(task, {"costs": [], "by": []})["zero"] = by_name[ZERO][
+                "cost"
+            ]["value"]
         for name, found in by_name.items():
             if task in known and not found["failed"] and name != "best-known":
                 costs = result.figures(name, task).min(axis=0)
-                keep(known, task, np.pad(costs, (0, N_EPISODES - len(costs)), constant_values=np.inf), name)
+                keep(
+                    known,
+                    task,
+                    np.pad(costs, (0, N_EPISODES - len(costs)), constant_values=np.inf),
+                    name,
+                )
 
 
-def search(known: dict[str, Any], task: BenchmarkTask, asked: argparse.Namespace) -> None:
+def search(
+    known: dict[str, Any], task: BenchmarkTask, asked: argparse.Namespace
+) -> None:
     """Go on from the contestants in some episodes of a task."""
     began, (ship, sailed, randomisation) = time.process_time(), task.sailed
-    starts = [Contestant(name, name).policies(task, asked.suite)[0] for name in asked.search.split(",")]
+    starts = [
+        Contestant(name, name).policies(task, asked.suite)[0]
+        for name in asked.search.split(",")
+    ]
     settings = replace(OracleSettings(), passes=asked.passes)
     seeds = task.seeds[: asked.episodes]
     found = run_oracle(ship, sailed, seeds, starts, settings, randomisation)
@@ -89,7 +139,9 @@ def search(known: dict[str, Any], task: BenchmarkTask, asked: argparse.Namespace
     keep(known, task.name, costs, SEARCH)
     spent = time.process_time() - began
     means = f"{found.start_costs.mean():9.2f} -> {found.costs.mean():9.2f}"
-    print(f"{task.name:28s} {means} in {len(seeds)} episodes, {spent:.0f} s", flush=True)
+    print(
+        f"{task.name:28s} {means} in {len(seeds)} episodes, {spent:.0f} s", flush=True
+    )
 
 
 def keep(known: dict[str, Any], task: str, costs: NDArray[np.float64], by: str) -> None:
@@ -98,10 +150,14 @@ def keep(known: dict[str, Any], task: str, costs: NDArray[np.float64], by: str) 
     before = np.array(one["costs"] or np.full(len(costs), np.inf))
     names = one["by"] or [by] * len(costs)
     one["costs"] = np.minimum(before, costs).tolist()
-    one["by"] = [by if less else name for less, name in zip(costs < before, names, strict=True)]
+    one["by"] = [
+        by if less else name for less, name in zip(costs < before, names, strict=True)
+    ]
 
 
-def rule(known: dict[str, Any], suite: str, results: Sequence[BenchmarkResult], episodes: int) -> str:
+def rule(
+    known: dict[str, Any], suite: str, results: Sequence[BenchmarkResult], episodes: int
+) -> str:
     """Which tasks leave as much room as the rule of choice asks, in the first so many episodes."""
     lines = ["| task | best baseline | its cost | best known | room | rule |"]
     lines.append("| --- | --- | --- | --- | --- | --- |")
@@ -117,7 +173,10 @@ def rule(known: dict[str, Any], suite: str, results: Sequence[BenchmarkResult], 
         room = 1.0 - least / costs[best]
         robust = "robustness" if task.why.startswith("robustness") else "fails"
         held = "holds" if room >= ROOM else robust
-        lines.append(f"| {task.name} | {best} | {costs[best]:.1f} | {least:.1f} | {room:.1%} | {held} |")
+        lines.append(
+            f"| {task.name} | {best} | {costs[best]:.1f} | {least:.1f} | {room:.1%} |"
+            f" {held} |"
+        )
     return "\n".join(lines)
 
 

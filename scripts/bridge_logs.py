@@ -5,12 +5,14 @@
 
 prints the tables of docs/logs.md; the second needs the data of docs/real_ships.md.
 
-Every reference ship, and two ships by the MMG standard method (tests/ships/mmg.py), sails zigzags 10/10 and
-20/20, a 35 degree turn to starboard and a 25 degree turn to port, each begun on another heading, in a current
-of 0.5 m/s and a gusty wind of 9 m/s of random directions. The log holds GNSS positions at 1 Hz with noise of
-0.3 m and drift of 0.8 m, the antenna 25 m forward of midship, heading at 2 Hz with noise of 0.1 degrees, the
-rudder in half degrees, the shaft speed, and wind with noise of 0.5 m/s and 5 degrees: no velocity and no yaw
-rate. The turn to port has no part in the fit. The ship is identified by structures that are not hers.
+Every reference ship, and two ships by the MMG standard method (tests/ships/mmg.py),
+sails zigzags 10/10 and 20/20, a 35 degree turn to starboard and a 25 degree turn to
+port, each begun on another heading, in a current of 0.5 m/s and a gusty wind of 9 m/s
+of random directions. The log holds GNSS positions at 1 Hz with noise of 0.3 m and drift
+of 0.8 m, the antenna 25 m forward of midship, heading at 2 Hz with noise of 0.1
+degrees, the rudder in half degrees, the shaft speed, and wind with noise of 0.5 m/s and
+5 degrees: no velocity and no yaw rate. The turn to port has no part in the fit. The
+ship is identified by structures that are not hers.
 """
 
 from __future__ import annotations
@@ -29,7 +31,10 @@ ROOT = Path(__file__).parents[1]
 if str(ROOT) not in sys.path:
     sys.path.insert(0, str(ROOT))
 
-from certainty import SHIPS, ship_of  # noqa: E402 - the folder above has to be found first
+from certainty import (  # noqa: E402
+    SHIPS,
+    ship_of,
+)
 from real_ships.section import table  # noqa: E402
 
 from agents.controllers.lq import LQ  # noqa: E402
@@ -48,7 +53,10 @@ from shipgym.trials.identify_table import Options  # noqa: E402
 from shipgym.trials.resampling import Log  # noqa: E402
 from shipgym.trials.sensors import GNSS, Sensor, Sensors  # noqa: E402
 from shipgym.trials.ship_file import ShipFile  # noqa: E402
-from shipgym.trials.trial_import import Conventions, to_project_conventions  # noqa: E402
+from shipgym.trials.trial_import import (  # noqa: E402
+    Conventions,
+    to_project_conventions,
+)
 
 CURRENT, WIND = 0.5, 9.0  # m/s
 UNSEEN = "turn 25 port"
@@ -60,33 +68,56 @@ LEFT_IN: dict[str, Any] = {"current": "none", "wind": "none"}
 ANTENNA = 25.0  # m forward of midship
 DEGREE = np.pi / 180.0
 LOG = Sensors(
-    {"x": GNSS, "y": GNSS, "psi": Sensor(noise=0.1 * DEGREE), "delta": Sensor(resolution=0.5 * DEGREE),
-     "n": Sensor(resolution=0.1 / 60.0)},
-)  # fmt: skip
+    {
+        "x": GNSS,
+        "y": GNSS,
+        "psi": Sensor(noise=0.1 * DEGREE),
+        "delta": Sensor(resolution=0.5 * DEGREE),
+        "n": Sensor(resolution=0.1 / 60.0),
+    },
+)
 
 
 def turned(run: Trial, angle: float) -> Trial:
     """A run as it would have been with north `angle` further to port, rad."""
     c, s = np.cos(angle), np.sin(angle)
     channels = dict(run.channels)
-    channels["x"], channels["y"] = c * run["x"] - s * run["y"], s * run["x"] + c * run["y"]
+    channels["x"], channels["y"] = (
+        c * run["x"] - s * run["y"],
+        s * run["x"] + c * run["y"],
+    )
     for name in {"psi", "wind_from"} & channels.keys():
         channels[name] = run[name] + angle
     if "current_north" in run:
         north, east = run["current_north"], run["current_east"]
-        channels |= {"current_north": c * north - s * east, "current_east": s * north + c * east}
-    return Trial(run.t, channels, name=run.name, kind=run.kind, use=run.use, length=run.length)
+        channels |= {
+            "current_north": c * north - s * east,
+            "current_east": s * north + c * east,
+        }
+    return Trial(
+        run.t, channels, name=run.name, kind=run.kind, use=run.use, length=run.length
+    )
 
 
 def sailed(
-    ship: ShipModel, current: float, towards: float, wind: float, wind_from: float, seed: int
+    ship: ShipModel,
+    current: float,
+    towards: float,
+    wind: float,
+    wind_from: float,
+    seed: int,
 ) -> list[Trial]:
     """Zigzags and a turn of a ship, each begun on another heading, and a turn to the other side."""
     travel = ship.particulars["length"] / ship.particulars["speed"]
     rng = np.random.default_rng(seed)
     runs = []
     for k, (kind, angle, side) in enumerate(
-        [("zigzag", 10.0, 1.0), ("zigzag", 20.0, -1.0), ("turn", 35.0, 1.0), ("turn", 25.0, -1.0)]
+        [
+            ("zigzag", 10.0, 1.0),
+            ("zigzag", 20.0, -1.0),
+            ("turn", 35.0, 1.0),
+            ("turn", 25.0, -1.0),
+        ]
     ):
         heading = rng.uniform(0.0, 360.0)
         weather = Weather(
@@ -94,9 +125,20 @@ def sailed(
             Wind(wind, (wind_from - heading) % 360.0) if wind else None,
         )
         if kind == "zigzag":
-            run = zigzag(ship, angle, angle, side < 0, 35.0 * travel, 0.5, weather=weather, seed=seed + k)
+            run = zigzag(
+                ship,
+                angle,
+                angle,
+                side < 0,
+                35.0 * travel,
+                0.5,
+                weather=weather,
+                seed=seed + k,
+            )
         else:
-            run = turning_circle(ship, side * angle, 25.0 * travel, 0.5, weather=weather, seed=seed + k)
+            run = turning_circle(
+                ship, side * angle, 25.0 * travel, 0.5, weather=weather, seed=seed + k
+            )
         name = f"{kind} {angle:.0f} {'starboard' if side > 0 else 'port'}"
         use = "validate" if k == 3 else "fit"
         runs.append(turned(run.with_(name=name, use=use), heading * DEGREE))
@@ -106,14 +148,23 @@ def sailed(
 def logged(run: Trial, seed: int) -> Trial:
     """What a bridge log holds of a run: GNSS positions at 1 Hz, gyro at 2 Hz, rudder in half degrees."""
     antenna = run.with_channels(
-        {"x": run["x"] + ANTENNA * np.cos(run["psi"]), "y": run["y"] + ANTENNA * np.sin(run["psi"])}
+        {
+            "x": run["x"] + ANTENNA * np.cos(run["psi"]),
+            "y": run["y"] + ANTENNA * np.sin(run["psi"]),
+        }
     )
     read = LOG.measure(antenna, seed)
     rng = np.random.default_rng([seed, 7])
-    channels = {name: read[name] for name in ("x", "y", "psi", "delta", "n") if name in read}
+    channels = {
+        name: read[name] for name in ("x", "y", "psi", "delta", "n") if name in read
+    }
     if "wind_speed" in run and np.ptp(run["wind_speed"]) > 0.0:
-        channels["wind_speed"] = np.maximum(run["wind_speed"] + rng.normal(0.0, 0.5, len(run)), 0.0)
-        channels["wind_from"] = run["wind_from"] + rng.normal(0.0, 5.0 * DEGREE, len(run))
+        channels["wind_speed"] = np.maximum(
+            run["wind_speed"] + rng.normal(0.0, 0.5, len(run)), 0.0
+        )
+        channels["wind_from"] = run["wind_from"] + rng.normal(
+            0.0, 5.0 * DEGREE, len(run)
+        )
     for name in ("x", "y"):  # at 1 Hz, between which the reader interpolates
         channels[name] = np.interp(read.t, read.t[::2], channels[name][::2])
     channels["x"] = channels["x"] - ANTENNA * np.cos(channels["psi"])
@@ -122,7 +173,12 @@ def logged(run: Trial, seed: int) -> Trial:
     channels = {name: values[every] for name, values in channels.items()}
     log = Log(read.t[every], channels, run.name, [])
     to_project_conventions(log, Conventions())
-    facts: dict[str, Any] = {"kind": run.kind, "use": run.use, "derived": log.derived, "length": run.length}
+    facts: dict[str, Any] = {
+        "kind": run.kind,
+        "use": run.use,
+        "derived": log.derived,
+        "length": run.length,
+    }
     return Trial(log.t, log.channels, name=run.name, **facts)
 
 
@@ -132,7 +188,10 @@ def logs_of(ship: ShipModel, seed: int) -> tuple[list[Trial], Weather]:
     runs = sailed(ship, CURRENT, towards, WIND, wind_from, 100 * seed)
     logs = [logged(run, 1000 * seed + k) for k, run in enumerate(runs)]
     weather = Weather(Current(CURRENT, towards), Wind(WIND, wind_from))
-    return [log if "n" in log else log.with_channels({"n": np.ones(len(log))}) for log in logs], weather
+    return [
+        log if "n" in log else log.with_channels({"n": np.ones(len(log))})
+        for log in logs
+    ], weather
 
 
 def current_case(ship: ShipModel, seed: int) -> tuple[np.ndarray, np.ndarray, bool]:
@@ -152,7 +211,9 @@ def heading_error(result: IdentificationResult) -> float:
     return float("inf") if error is None else float(np.degrees(error))
 
 
-def autopilots(result: IdentificationResult, ship: ShipModel, weather: Weather) -> dict[str, float | str]:
+def autopilots(
+    result: IdentificationResult, ship: ShipModel, weather: Weather
+) -> dict[str, float | str]:
     """Heading error, deg rms, of the autopilots that are written, on the ship herself in the same weather."""
     refused = why_unstable(result) or why_refused(result)
     if refused:
@@ -165,12 +226,18 @@ def autopilots(result: IdentificationResult, ship: ShipModel, weather: Weather) 
         except InputError:
             found[design.__name__] = "refused"
             continue
-        if lost_control(sail(pilot, draws, seeds=np.arange(40), allow_unstable=True).terminated):
+        if lost_control(
+            sail(pilot, draws, seeds=np.arange(40), allow_unstable=True).terminated
+        ):
             found[design.__name__] = "refused"
             continue
-        episodes = sail(pilot, ship, course_keeping_task(sea=weather), seeds=np.arange(4))
+        episodes = sail(
+            pilot, ship, course_keeping_task(sea=weather), seeds=np.arange(4)
+        )
         found[design.__name__] = (
-            "LOST" if episodes.terminated.any() else float(episodes.heading_rmse_deg.mean())
+            "LOST"
+            if episodes.terminated.any()
+            else float(episodes.heading_rmse_deg.mean())
         )
     return found
 
@@ -183,11 +250,22 @@ def current_table(names: Sequence[str], seeds: range) -> str:
         errors, deviations = (np.array([case[k] for case in found]) for k in (0, 1))
         every.append((errors, deviations))
         rows.append(
-            [name, *_current_cells(errors, deviations), f"{sum(case[2] for case in found)} of {len(found)}"]
+            [
+                name,
+                *_current_cells(errors, deviations),
+                f"{sum(case[2] for case in found)} of {len(found)}",
+            ]
         )
     together = [np.concatenate(part) for part in zip(*every, strict=True)]
     rows.append(["all", *_current_cells(*together), ""])
-    head = ["ship", "error, m/s rms", "largest", "below 0.05 m/s", "inside the 95 % interval", "removed"]
+    head = [
+        "ship",
+        "error, m/s rms",
+        "largest",
+        "below 0.05 m/s",
+        "inside the 95 % interval",
+        "removed",
+    ]
     return table(head, rows)
 
 
@@ -195,9 +273,11 @@ def _current_cells(errors: np.ndarray, deviations: np.ndarray) -> list[str]:
     sizes = np.hypot(*errors.T)
     inside = np.mean(np.abs(errors) < 1.96 * deviations)
     return [
-        f"{np.sqrt(np.mean(sizes**2)):.3f}", f"{sizes.max():.3f}", f"{100.0 * np.mean(sizes < 0.05):.0f} %",
+        f"{np.sqrt(np.mean(sizes**2)):.3f}",
+        f"{sizes.max():.3f}",
+        f"{100.0 * np.mean(sizes < 0.05):.0f} %",
         f"{100.0 * inside:.0f} %",
-    ]  # fmt: skip
+    ]
 
 
 def model_table(names: Sequence[str], seeds: range, recipes: Sequence[str]) -> str:
@@ -208,13 +288,27 @@ def model_table(names: Sequence[str], seeds: range, recipes: Sequence[str]) -> s
         for title in recipes:
             for seed in seeds:
                 logs, weather = logs_of(ship, seed)
-                known = {"particulars": ship.particulars, "steering": ship.steering, **RECIPES[title]}
+                known = {
+                    "particulars": ship.particulars,
+                    "steering": ship.steering,
+                    **RECIPES[title],
+                }
                 result = identify(logs, **known)
                 with_both = heading_error(identify(logs, **known, **LEFT_IN))
                 pilots = autopilots(result, ship, weather)
-                cells = [one if isinstance(one, str) else f"{one:.1f}" for one in pilots.values()]
+                cells = [
+                    one if isinstance(one, str) else f"{one:.1f}"
+                    for one in pilots.values()
+                ]
                 rows.append(
-                    [name, title, str(seed), f"{heading_error(result):.1f}", f"{with_both:.1f}", *cells]
+                    [
+                        name,
+                        title,
+                        str(seed),
+                        f"{heading_error(result):.1f}",
+                        f"{with_both:.1f}",
+                        *cells,
+                    ]
                 )
                 print("|", " | ".join(rows[-1]), "|", file=sys.stderr, flush=True)
     head = [
@@ -235,22 +329,38 @@ def wind_table(recipes: Sequence[str]) -> str:
     particulars = replace(ship.particulars, frontal_area=0.135, lateral_area=0.520)
     names = ("t", "u", "v", "r", "psi", "n", "delta")
     columns = dict(zip(names, names, strict=True)) | {
-        "x": "x0", "y": "y0", "wind_speed": "wind_true_speed", "wind_from": "wind_true_dir"
-    }  # fmt: skip
-    paths = [path for entry in ship.entries for path in entry.paths if "zigzag" in path.name]
-    runs = [under_way(Trial.from_csv(path, columns, name=path.stem, kind="zigzag")) for path in paths]
+        "x": "x0",
+        "y": "y0",
+        "wind_speed": "wind_true_speed",
+        "wind_from": "wind_true_dir",
+    }
+    paths = [
+        path for entry in ship.entries for path in entry.paths if "zigzag" in path.name
+    ]
+    runs = [
+        under_way(Trial.from_csv(path, columns, name=path.stem, kind="zigzag"))
+        for path in paths
+    ]
     known = {"particulars": particulars, "steering": ship.steering, "repair": True}
     rows = []
     for title in recipes:
         for wind in ("none", "auto", "constant")[: 2 if title == "mmg" else 3]:
             errors = []
             for held in runs:
-                trials = [run.with_(use="validate" if run is held else "fit") for run in runs]
+                trials = [
+                    run.with_(use="validate" if run is held else "fit") for run in runs
+                ]
                 result = identify(trials, wind=wind, **known, **ESSO_OSAKA[title])
                 error = result.metrics["trials"][held.name]["rmse"]["psi"]
-                errors.append(float("nan") if error is None else float(np.degrees(error)))
-            told = {"none": "left in", "auto": "from columns", "constant": "constant"}[wind]
-            rows.append([title, told, *(f"{e:.1f}" for e in errors), f"{np.mean(errors):.1f}"])
+                errors.append(
+                    float("nan") if error is None else float(np.degrees(error))
+                )
+            told = {"none": "left in", "auto": "from columns", "constant": "constant"}[
+                wind
+            ]
+            rows.append(
+                [title, told, *(f"{e:.1f}" for e in errors), f"{np.mean(errors):.1f}"]
+            )
     return table(["recipe", "wind", *(run.name[-8:] for run in runs), "mean"], rows)
 
 
@@ -259,7 +369,10 @@ def under_way(trial: Trial) -> Trial:
     first = int(np.argmax(np.hypot(trial["u"], trial["v"]) > 0.1))
     rows = slice(first, None, 2)
     return Trial(
-        trial.t[rows], {name: v[rows] for name, v in trial.channels.items()}, name=trial.name, kind=trial.kind
+        trial.t[rows],
+        {name: v[rows] for name, v in trial.channels.items()},
+        name=trial.name,
+        kind=trial.kind,
     )
 
 
@@ -274,8 +387,15 @@ def main() -> None:
     """Print the tables."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--seeds", type=int, default=8, help="for the current")
-    parser.add_argument("--models", type=int, default=2, help="seeds of models and autopilots")
-    parser.add_argument("--first", type=int, default=100, help="first seed; below 10 the recipes were chosen")
+    parser.add_argument(
+        "--models", type=int, default=2, help="seeds of models and autopilots"
+    )
+    parser.add_argument(
+        "--first",
+        type=int,
+        default=100,
+        help="first seed; below 10 the recipes were chosen",
+    )
     parser.add_argument("--ships", default=",".join(SHIPS))
     parser.add_argument("--recipes", help="with semicolons between; by default all")
     parser.add_argument("--wind", action="store_true", help="Esso Osaka only")
@@ -288,7 +408,11 @@ def main() -> None:
         return
     names = given.ships.split(",")
     if given.seeds:
-        print(current_table(names, range(given.first, given.first + given.seeds)), end="\n\n", flush=True)
+        print(
+            current_table(names, range(given.first, given.first + given.seeds)),
+            end="\n\n",
+            flush=True,
+        )
     print(model_table(names, range(given.first, given.first + given.models), recipes))
 
 

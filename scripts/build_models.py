@@ -1,13 +1,15 @@
 """Identify the models in the box again, from trials in the repository or simulated with sensor noise.
 
-    python scripts/build_models.py [name ...]      by default all but those kept, into shipgym/ships/library
-    python scripts/build_models.py --check         compare with what is there; writes nothing
-    python scripts/build_models.py --tables        only print the tables of docs/identified_models.md
-    python scripts/build_models.py --candidates    what was looked at to choose, of models rejected too
+    python scripts/build_models.py [name ...]      by default all but those kept, into
+    shipgym/ships/library python scripts/build_models.py --check         compare with
+    what is there; writes nothing python scripts/build_models.py --tables        only
+    print the tables of docs/identified_models.md python scripts/build_models.py
+    --candidates    what was looked at to choose, of models rejected too
 
-What the models are compared with in these tables, turning circles at 35 degrees and zigzags 15/15 and 25/25,
-is in no model's trials. Trials, structures and methods of the models from `kvlcc2-mmg` on were chosen by
-turning circles at 28 degrees and zigzags 5/5, 12/12, 17/17 and 22/22.
+What the models are compared with in these tables, turning circles at 35 degrees and
+zigzags 15/15 and 25/25, is in no model's trials. Trials, structures and methods of the
+models from `kvlcc2-mmg` on were chosen by turning circles at 28 degrees and zigzags
+5/5, 12/12, 17/17 and 22/22.
 """
 
 from __future__ import annotations
@@ -27,7 +29,13 @@ from certainty import OTHER, holds, index_intervals, true_indices
 import shipgym
 from identification import IdentificationResult, identify
 from shipgym import ShipModel, Trial
-from shipgym.manoeuvres import shaft_speed_steps, turning_circle, turning_indices, zigzag, zigzag_indices
+from shipgym.manoeuvres import (
+    shaft_speed_steps,
+    turning_circle,
+    turning_indices,
+    zigzag,
+    zigzag_indices,
+)
 from shipgym.manoeuvres.registry import standard_time
 from shipgym.ships.catalogue import LIBRARY
 from shipgym.trials.sensors import Sensors
@@ -37,18 +45,29 @@ EXAMPLES = Path(__file__).parents[1] / "examples"
 STEP = 0.25  # simulation, s
 SAMPLING = 1.0  # the logger, s
 DURATION = 900.0  # of the zigzags of the first models, s
-ZIGZAG_LENGTHS, TURN_LENGTHS = 35.0, 25.0  # of the others, in times to travel one ship length
-MOST_APART = 0.1  # standard errors: a search may end a step off where another processor rounds otherwise
-KEPT = {"kvlcc2-mmg": 1.2}  # the same of models from before a prior of theirs was widened
+ZIGZAG_LENGTHS, TURN_LENGTHS = (
+    35.0,
+    25.0,
+)  # of the others, in times to travel one ship length
+# standard errors: a search may end a step off where another processor rounds otherwise
+MOST_APART = 0.1
+KEPT = {
+    "kvlcc2-mmg": 1.2
+}  # the same of models from before a prior of theirs was widened
 DRAWS, NORMAL = 100, 1.96  # models drawn from each; standard errors of a 95 % interval
 #: Rudder and heading, degrees, and whether port first.
 IMO_ZIGZAGS = ((10, 10, False), (10, 10, True), (20, 20, False), (20, 20, True))
 CONTAINER_ZIGZAGS = ((10, 10, False), (20, 20, False), (20, 10, True), (35, 30, True))
-#: Zigzags with the rudder hard over, of the ships whose other trials left hard turns open.
+#: Zigzags with the rudder hard over, of the ships whose other trials left hard turns
+#: open.
 HARD = {"container": ((35, 30, True),), "tanker": ((35, 30, True),)}
 TURNS_DEG = (20, -20)
-SHAFT_STEPS_DEG = (5, -15)  # rudder held while the shaft speed changes, half to 1.1 of that of service
-#: What the models are compared with, and what was looked at to choose between candidates.
+SHAFT_STEPS_DEG = (
+    5,
+    -15,
+)  # rudder held while the shaft speed changes, half to 1.1 of that of service
+#: What the models are compared with, and what was looked at to choose between
+#: candidates.
 COMPARED_DEG: tuple[Sequence[float], ...] = ((35,), (15, 25), (10, 20))
 CHOSEN_BY_DEG: tuple[Sequence[float], ...] = ((28,), (5,), (12, 17, 22))
 
@@ -59,8 +78,11 @@ class Recipe:
 
     ship: str  # the reference ship behind the trials
     trials: Callable[[], Sequence[Trial]]
-    options: Mapping[str, Any] = field(default_factory=dict)  # of `identify`, where they are not its defaults
-    shaft: bool = False  # whether the shaft speed at service is told; else it is that at the trials' start
+    options: Mapping[str, Any] = field(
+        default_factory=dict
+    )  # of `identify`, where they are not its defaults
+    # whether the shaft speed at service is told; else it is that at the trials' start
+    shaft: bool = False
 
     def identify(self, name: str) -> IdentificationResult:
         """The model with how it came about, the ship behind its trials named in its provenance."""
@@ -69,10 +91,17 @@ class Recipe:
         if self.ship == "mariner":
             known = shipgym.ShipFile.load(EXAMPLES / "mariner" / "ship.toml")
         found = identify(
-            self.trials(), particulars=known.particulars, steering=known.steering, name=name, **shaft,
+            self.trials(),
+            particulars=known.particulars,
+            steering=known.steering,
+            name=name,
+            **shaft,
             **self.options,
-        )  # fmt: skip
-        named = replace(found.model, provenance={**(found.model.provenance or {}), "truth": self.ship})
+        )
+        named = replace(
+            found.model,
+            provenance={**(found.model.provenance or {}), "truth": self.ship},
+        )
         return replace(found, model=named)
 
 
@@ -113,7 +142,9 @@ def sea_trials(
     duration = ZIGZAG_LENGTHS * travel
     runs = _zigzags(name, (*IMO_ZIGZAGS, *(HARD.get(name, ()) if hard else ())))
     for k, rudder in enumerate(SHAFT_STEPS_DEG if shaft_steps else ()):
-        steps = shaft_speed_steps(ship, seed=7 + k, rudder_deg=rudder, duration=duration, dt=STEP)
+        steps = shaft_speed_steps(
+            ship, seed=7 + k, rudder_deg=rudder, duration=duration, dt=STEP
+        )
         runs.append(steps.with_(name=f"shaft speed steps at {rudder} deg"))
     for rudder in TURNS_DEG if turns else ():
         turn = turning_circle(ship, rudder, TURN_LENGTHS * travel, STEP)
@@ -121,12 +152,18 @@ def sea_trials(
     return _logged(runs, 100)
 
 
-def _zigzags(name: str, plan: Sequence[tuple[int, int, bool]], duration: float | None = None) -> list[Trial]:
+def _zigzags(
+    name: str, plan: Sequence[tuple[int, int, bool]], duration: float | None = None
+) -> list[Trial]:
     ship = shipgym.load_model(name)
     if duration is None:
-        duration = ZIGZAG_LENGTHS * ship.particulars["length"] / ship.particulars["speed"]
+        duration = (
+            ZIGZAG_LENGTHS * ship.particulars["length"] / ship.particulars["speed"]
+        )
     return [
-        zigzag(ship, rudder, heading, duration=duration, dt=STEP, port_first=port).with_(
+        zigzag(
+            ship, rudder, heading, duration=duration, dt=STEP, port_first=port
+        ).with_(
             name=f"zigzag {rudder}/{heading}, {'port' if port else 'starboard'} first"
         )
         for rudder, heading, port in plan
@@ -134,96 +171,139 @@ def _zigzags(name: str, plan: Sequence[tuple[int, int, bool]], duration: float |
 
 
 def _logged(runs: Sequence[Trial], seed: int) -> tuple[Trial, ...]:
-    return tuple(Sensors(sampling_s=SAMPLING).measure(run, seed + k) for k, run in enumerate(runs))
+    return tuple(
+        Sensors(sampling_s=SAMPLING).measure(run, seed + k)
+        for k, run in enumerate(runs)
+    )
 
 
-#: All by name. C of `abc-lssvr` is chosen by the error of stretches of time held out: the
-#: training error that Zhu 2018 minimises only drives it to its bound.
+#: All by name. C of `abc-lssvr` is chosen by the error of stretches of time held out:
+#: the training error that Zhu 2018 minimises only drives it to its bound.
 MODELS: dict[str, Recipe] = {
     "mariner-tls-svm": Recipe("mariner", mariner_trials),
     # Nomoto's form with Norrbin's cubic of the yaw rate
     "mariner-nomoto": Recipe("mariner", mariner_trials, {"structure": "norrbin"}),
     # the ship heels, the model does not
-    "container-abc-lssvr": Recipe("container", container_trials, {"method": "abc-lssvr"}),
+    "container-abc-lssvr": Recipe(
+        "container", container_trials, {"method": "abc-lssvr"}
+    ),
     "container-nomoto": Recipe(
         "container", container_trials, {"structure": "norrbin", "method": "abc-lssvr"}
     ),
-    # a tank's model corrected by sea trials: hull and rudder are the model's, wake and friction are not
+    # a tank's model corrected by sea trials: hull and rudder are the model's, wake and
+    # friction are not
     "kvlcc2-rm-svm": Recipe(
-        "kvlcc2", kvlcc2_trials,
-        {"structure": "grey-box", "method": "rm-svm", "reference_model": "kvlcc2-l7"}, shaft=True,
+        "kvlcc2",
+        kvlcc2_trials,
+        {"structure": "grey-box", "method": "rm-svm", "reference_model": "kvlcc2-l7"},
+        shaft=True,
     ),
-    # linearised about straight running the ship is stable to starboard and unstable to port, on the verge of
-    # both, so that K and T of the linear form mean nothing
+    # linearised about straight running the ship is stable to starboard and unstable to
+    # port, on the verge of both, so that K and T of the linear form mean nothing
     "kvlcc2-nomoto": Recipe("kvlcc2", kvlcc2_trials, {"structure": "norrbin"}),
-    "kvlcc2-mmg": Recipe("kvlcc2", lambda: sea_trials("kvlcc2"), {"structure": "mmg"}, shaft=True),
-    # another ship's equations, and 16 radial basis functions, so that the file stays small
-    "kvlcc2-tanker-rm-svm": Recipe(
-        "kvlcc2", lambda: sea_trials("kvlcc2", shaft_steps=False),
-        {"structure": "grey-box", "method": "rm-svm", "reference_model": "tanker", "kernel": "rbf",
-         "centres": 16}, shaft=True,
+    "kvlcc2-mmg": Recipe(
+        "kvlcc2", lambda: sea_trials("kvlcc2"), {"structure": "mmg"}, shaft=True
     ),
-    "tanker-tls-svm": Recipe("tanker", lambda: sea_trials("tanker"), {"structure": "cubic"}, shaft=True),
+    # another ship's equations, and 16 radial basis functions, so that the file stays
+    # small
+    "kvlcc2-tanker-rm-svm": Recipe(
+        "kvlcc2",
+        lambda: sea_trials("kvlcc2", shaft_steps=False),
+        {
+            "structure": "grey-box",
+            "method": "rm-svm",
+            "reference_model": "tanker",
+            "kernel": "rbf",
+            "centres": 16,
+        },
+        shaft=True,
+    ),
+    "tanker-tls-svm": Recipe(
+        "tanker", lambda: sea_trials("tanker"), {"structure": "cubic"}, shaft=True
+    ),
     # what a regression alone gives is unstable on her course, which the ship is not
     "container-4dof-output-error": Recipe(
-        "container", lambda: sea_trials("container"), {"structure": "mmg4dof", "method": "output-error"},
+        "container",
+        lambda: sea_trials("container"),
+        {"structure": "mmg4dof", "method": "output-error"},
         shaft=True,
     ),
     "container-two-zigzags": Recipe("container", two_zigzags),
-}  # fmt: skip
+}
 
 ON_TANKER = {"structure": "grey-box", "method": "rm-svm", "reference_model": "tanker"}
 ON_KVLCC2 = {**ON_TANKER, "reference_model": "kvlcc2"}
 #: What did not become a model, for the page.
 REJECTED: dict[str, Recipe] = {
     "tanker, zigzags": Recipe(
-        "tanker", lambda: sea_trials("tanker", turns=False, hard=False), {"structure": "cubic"}, shaft=True
+        "tanker",
+        lambda: sea_trials("tanker", turns=False, hard=False),
+        {"structure": "cubic"},
+        shaft=True,
     ),
     "tanker, zigzags and turns": Recipe(
-        "tanker", lambda: sea_trials("tanker", hard=False), {"structure": "cubic"}, shaft=True
+        "tanker",
+        lambda: sea_trials("tanker", hard=False),
+        {"structure": "cubic"},
+        shaft=True,
     ),
-    "mariner on tanker": Recipe("mariner", lambda: sea_trials("mariner", shaft_steps=False), ON_TANKER),
+    "mariner on tanker": Recipe(
+        "mariner", lambda: sea_trials("mariner", shaft_steps=False), ON_TANKER
+    ),
     "mariner on tanker, kernel": Recipe(
-        "mariner", lambda: sea_trials("mariner", shaft_steps=False), {**ON_TANKER, "kernel": "rbf"}
+        "mariner",
+        lambda: sea_trials("mariner", shaft_steps=False),
+        {**ON_TANKER, "kernel": "rbf"},
     ),
     "mariner on kvlcc2": Recipe(
         "mariner", lambda: sea_trials("mariner", shaft_steps=False), ON_KVLCC2
     ),
     "mariner on kvlcc2, kernel": Recipe(
-        "mariner", lambda: sea_trials("mariner", shaft_steps=False),
+        "mariner",
+        lambda: sea_trials("mariner", shaft_steps=False),
         {**ON_KVLCC2, "kernel": "rbf"},
     ),
     "kvlcc2 on tanker, linear": Recipe(
         "kvlcc2", lambda: sea_trials("kvlcc2", shaft_steps=False), ON_TANKER, shaft=True
     ),
     "container, mmg4dof, regression alone": Recipe(
-        "container", lambda: sea_trials("container"), {"structure": "mmg4dof"}, shaft=True
+        "container",
+        lambda: sea_trials("container"),
+        {"structure": "mmg4dof"},
+        shaft=True,
     ),
-}  # fmt: skip
+}
 
 
 def standard_errors_apart(model: ShipModel, shipped: ShipModel) -> float:
     """Largest difference of a coefficient from the shipped one, in its standard errors."""
-    differences = [value - shipped.coefficients[name] for name, value in model.coefficients.items()]
+    differences = [
+        value - shipped.coefficients[name] for name, value in model.coefficients.items()
+    ]
     errors = np.sqrt(np.diag(shipped.covariance))
     return float(np.max(np.abs(differences) / np.where(errors > 0.0, errors, 1.0)))
 
 
-def errors(model: ShipModel, turns_deg: Sequence[float], *zigzags_deg: Sequence[float]) -> tuple[float, ...]:
+def errors(
+    model: ShipModel, turns_deg: Sequence[float], *zigzags_deg: Sequence[float]
+) -> tuple[float, ...]:
     """Largest errors of a model beside the ship behind it, in turning circles to both sides and in zigzags.
 
-    Of advance and tactical diameter in per cent; then, for each set of angles, of the first two overshoots in
-    degrees.
+    Of advance and tactical diameter in per cent; then, for each set of angles, of the
+    first two overshoots in degrees.
     """
     ship = shipgym.truth_of(model)
     turns = [
-        100.0 * np.abs(_turn(model, side * rudder) / _turn(ship, side * rudder) - 1.0).max()
+        100.0
+        * np.abs(_turn(model, side * rudder) / _turn(ship, side * rudder) - 1.0).max()
         for rudder in turns_deg
         for side in (1.0, -1.0)
     ]
     overshoots = [
         max(
-            np.abs(_overshoots(model, angle, port) - _overshoots(ship, angle, port)).max()
+            np.abs(
+                _overshoots(model, angle, port) - _overshoots(ship, angle, port)
+            ).max()
             for angle in angles
             for port in (False, True)
         )
@@ -235,7 +315,9 @@ def errors(model: ShipModel, turns_deg: Sequence[float], *zigzags_deg: Sequence[
 def _turn(model: ShipModel, rudder_deg: float) -> np.ndarray:
     """Advance and tactical diameter, ship lengths."""
     found = turning_indices(turning_circle(model, rudder_deg, *standard_time(model)))
-    return np.array([found.advance_lengths, found.tactical_diameter_lengths], dtype=float)
+    return np.array(
+        [found.advance_lengths, found.tactical_diameter_lengths], dtype=float
+    )
 
 
 def _overshoots(model: ShipModel, angle_deg: float, port: bool) -> np.ndarray:
@@ -249,53 +331,85 @@ def coverage(model: ShipModel) -> tuple[str, str, str]:
     """How many true derivatives and indices lie inside a model's 95 % intervals, and draws that run away."""
     ship = shipgym.truth_of(model)
     deviations = np.sqrt(np.diag(model.covariance))
-    alike = model.structure == ship.structure or (model.structure, ship.structure) == ("mmg", "kvlcc2")
+    alike = model.structure == ship.structure or (model.structure, ship.structure) == (
+        "mmg",
+        "kvlcc2",
+    )
     inside = [
         abs(value - ship.coefficients[name]) <= NORMAL * deviation
-        for (name, value), deviation in zip(model.coefficients.items(), deviations, strict=True)
+        for (name, value), deviation in zip(
+            model.coefficients.items(), deviations, strict=True
+        )
         if alike and name in ship.coefficients and deviation > 0.0
     ]
     intervals = index_intervals(model, DRAWS)
-    intervals = {key: one for key, one in intervals.items() if not key[0].startswith(OTHER)}
-    held, lost = holds(intervals, true_indices(ship)), np.mean([one.ran_away for one in intervals.values()])
+    intervals = {
+        key: one for key, one in intervals.items() if not key[0].startswith(OTHER)
+    }
+    held, lost = (
+        holds(intervals, true_indices(ship)),
+        np.mean([one.ran_away for one in intervals.values()]),
+    )
     known = f"{sum(inside)} of {len(inside)}" if inside else "-"
     return known, f"{sum(held.values())} of {len(held)}", f"{100.0 * lost:.0f}"
 
 
 def tables(names: Sequence[str]) -> None:
     """Print the rows of docs/identified_models.md: errors held out, and coverage."""
-    print("| name | turns, % | overshoots held out, deg | 10/10 and 20/20, deg | factor | derivatives | "
-          "indices | draws run away, % |\n| --- | --- | --- | --- | --- | --- | --- | --- |")  # fmt: skip
+    print(
+        "| name | turns, % | overshoots held out, deg | 10/10 and 20/20, deg | factor |"
+        " derivatives | indices | draws run away, % |\n| --- | --- | --- | --- | --- |"
+        " --- | --- | --- |"
+    )
     for name in names:
         model = shipgym.load_model(name)
         turn, *overshoots = errors(model, *COMPARED_DEG)
         factor = (model.provenance or {})["model_error"]["factor"]
         numbers = " | ".join(f"{value:.2f}" for value in (*overshoots, factor))
-        print(f"| `{name}` | {turn:.1f} | {numbers} | " + " | ".join(coverage(model)) + " |", flush=True)
+        print(
+            f"| `{name}` | {turn:.1f} | {numbers} | "
+            + " | ".join(coverage(model))
+            + " |",
+            flush=True,
+        )
 
 
 def candidates() -> None:
     """Print by what was chosen, and what the candidates that were not chosen are like."""
-    print("| candidate | turns at 28, at 35, % | 5/5, deg | 12/12 to 22/22, deg | holds her course |\n"
-          "| --- | --- | --- | --- | --- |")  # fmt: skip
-    models = {name: shipgym.load_model(name) for name in list(MODELS)[list(MODELS).index("kvlcc2-mmg") :]}
+    print(
+        "| candidate | turns at 28, at 35, % | 5/5, deg | 12/12 to 22/22, deg | holds"
+        " her course |\n| --- | --- | --- | --- | --- |"
+    )
+    models = {
+        name: shipgym.load_model(name)
+        for name in list(MODELS)[list(MODELS).index("kvlcc2-mmg") :]
+    }
     for name, recipe in REJECTED.items():
         models[f"{name} (rejected)"] = recipe.identify(name).model
     for name, model in models.items():
         turn, *overshoots = errors(model, *CHOSEN_BY_DEG)
         hard = errors(model, COMPARED_DEG[0])[0]
         stable = shipgym.straight_line_stability(model).stable
-        print(f"| {name} | {turn:.1f}, {hard:.1f} | {overshoots[0]:.2f} | {overshoots[1]:.2f} | "
-              f"{'yes' if stable else 'no'} |", flush=True)  # fmt: skip
+        print(
+            f"| {name} | {turn:.1f}, {hard:.1f} | {overshoots[0]:.2f} |"
+            f" {overshoots[1]:.2f} | {'yes' if stable else 'no'} |",
+            flush=True,
+        )
 
 
 def main() -> int:
     """Build, compare or tell; 1 where a comparison failed."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawTextHelpFormatter
+    )
     parser.add_argument("names", nargs="*", metavar="name", help=", ".join(MODELS))
-    parser.add_argument("--check", action="store_true", help="compare with the library, write nothing")
+    parser.add_argument(
+        "--check", action="store_true", help="compare with the library, write nothing"
+    )
     parser.add_argument("--tables", action="store_true", help="print the tables only")
-    parser.add_argument("--candidates", action="store_true", help="print what was chosen by")
+    parser.add_argument(
+        "--candidates", action="store_true", help="print what was chosen by"
+    )
     given = parser.parse_args()
     if given.candidates:
         candidates()
@@ -312,7 +426,11 @@ def main() -> int:
             result.model.save(again := Path(folder) / path.name)
             same = again.read_bytes() == path.read_bytes()
         apart = standard_errors_apart(result.model, shipgym.load_model(name))
-        print(f"{name}: {'the same bytes' if same else f'{apart:.1e} standard errors apart'}", flush=True)
+        print(
+            f"{name}:"
+            f" {'the same bytes' if same else f'{apart:.1e} standard errors apart'}",
+            flush=True,
+        )
         differ += [name] if apart > KEPT.get(name, MOST_APART) else []
     if not given.check:
         tables(names)

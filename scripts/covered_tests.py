@@ -1,10 +1,11 @@
 """Run tests in processes forked from one that has the libraries loaded, those that reach given lines first.
 
-A map tells which tests of a file reach which lines, and how long each takes. It is made once for each file of
-tests and kept until that file changes. It says what comes first; what these do not notice, all are asked for.
+A map tells which tests of a file reach which lines, and how long each takes. It is made
+once for each file of tests and kept until that file changes. It says what comes first;
+what these do not notice, all are asked for.
 
-Coverage does not see compiled functions. Lines of theirs are found by a second map, made with
-`NUMBA_DISABLE_JIT=1`, in which slow tests are given up.
+Coverage does not see compiled functions. Lines of theirs are found by a second map,
+made with `NUMBA_DISABLE_JIT=1`, in which slow tests are given up.
 """
 
 from __future__ import annotations
@@ -26,22 +27,44 @@ import coverage
 import pytest
 
 PRELOADED = [
-    "numpy", "scipy.optimize", "scipy.signal", "scipy.stats", "sklearn.svm", "sklearn.model_selection",
-    "numba.core.registry", "gymnasium", "pydantic", "jinja2", "plotly.graph_objects", "pyarrow.parquet",
-    "rich.console", "typer.testing", "control", "torch._dynamo", "stable_baselines3", "optuna.storages",
-    "hypothesis.core", "hypothesis.strategies", "hypothesis.internal.conjecture.providers",
-    "sklearn.utils.estimator_checks", "xdist.plugin",
-]  # fmt: skip
+    "numpy",
+    "scipy.optimize",
+    "scipy.signal",
+    "scipy.stats",
+    "sklearn.svm",
+    "sklearn.model_selection",
+    "numba.core.registry",
+    "gymnasium",
+    "pydantic",
+    "jinja2",
+    "plotly.graph_objects",
+    "pyarrow.parquet",
+    "rich.console",
+    "typer.testing",
+    "control",
+    "torch._dynamo",
+    "stable_baselines3",
+    "optuna.storages",
+    "hypothesis.core",
+    "hypothesis.strategies",
+    "hypothesis.internal.conjecture.providers",
+    "sklearn.utils.estimator_checks",
+    "xdist.plugin",
+]
 PACKAGES = ("shipgym", "identification", "agents")
-#: processor seconds: of a test in plain Python, of a file in plain Python; what a test may take with a fault,
-#: beside ten times what it takes without, which compiles loops anew
+#: processor seconds: of a test in plain Python, of a file in plain Python; what a test
+#: may take with a fault, beside ten times what it takes without, which compiles loops
+#: anew
 SLOW_S, SLOW_FILE_S, ALLOWED_S = 5.0, 60.0, 60.0
 NOTICED, MISSED, TIME_LIMIT = "noticed", "missed", "time limit"
 
 
 def processor_s() -> float:
     """Return the processor seconds of this process and of those that it has waited for."""
-    used = (resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
+    used = (
+        resource.getrusage(who)
+        for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)
+    )
     return sum(one.ru_utime + one.ru_stime for one in used)
 
 
@@ -56,8 +79,12 @@ class Recorder:
 
     def __post_init__(self) -> None:
         source = [str(Path(self.folder) / package) for package in PACKAGES]
-        self.coverage = coverage.Coverage(data_file=None, config_file=False, source=source, messages=False)
-        self.coverage.set_option("run:disable_warnings", ["module-not-imported", "no-data-collected"])
+        self.coverage = coverage.Coverage(
+            data_file=None, config_file=False, source=source, messages=False
+        )
+        self.coverage.set_option(
+            "run:disable_warnings", ["module-not-imported", "no-data-collected"]
+        )
         self.coverage.start()
 
     @pytest.hookimpl(hookwrapper=True, tryfirst=True)
@@ -68,7 +95,9 @@ class Recorder:
         if self.limited:
             if began > SLOW_FILE_S:
                 pytest.exit("slow", 0)
-            signal.signal(signal.SIGPROF, lambda *_: pytest.fail("slow in plain Python"))
+            signal.signal(
+                signal.SIGPROF, lambda *_: pytest.fail("slow in plain Python")
+            )
             signal.setitimer(signal.ITIMER_PROF, SLOW_S)
         yield
         signal.setitimer(signal.ITIMER_PROF, 0)
@@ -83,7 +112,10 @@ class Recorder:
     def written(self, path: Path) -> None:
         """Write the map, without tests that fail."""
         self.coverage.stop()
-        data, tests = self.coverage.get_data(), [t for t in self.seconds if t not in self.failed]
+        data, tests = (
+            self.coverage.get_data(),
+            [t for t in self.seconds if t not in self.failed],
+        )
         number = {test: k for k, test in enumerate(tests)}
         lines = {
             Path(file).relative_to(self.folder).as_posix(): {
@@ -93,7 +125,11 @@ class Recorder:
             }
             for file in data.measured_files()
         }
-        kept = {"tests": {t: self.seconds[t] for t in tests}, "failed": self.failed, "lines": lines}
+        kept = {
+            "tests": {t: self.seconds[t] for t in tests},
+            "failed": self.failed,
+            "lines": lines,
+        }
         draft = path.with_suffix(f".{os.getpid()}")
         draft.write_text(json.dumps(kept), "utf-8")
         draft.replace(path)
@@ -122,14 +158,20 @@ class Order:
         if self.plain:
             if processor_s() > SLOW_FILE_S:
                 pytest.exit("slow", 0)
-            signal.signal(signal.SIGPROF, lambda *_: pytest.skip("slow in plain Python"))
+            signal.signal(
+                signal.SIGPROF, lambda *_: pytest.skip("slow in plain Python")
+            )
             signal.setitimer(signal.ITIMER_PROF, SLOW_S)
             return
         signal.signal(signal.SIGPROF, signal.SIG_DFL)
-        signal.setitimer(signal.ITIMER_PROF, ALLOWED_S + 10 * self.seconds.get(nodeid, 0.0))
+        signal.setitimer(
+            signal.ITIMER_PROF, ALLOWED_S + 10 * self.seconds.get(nodeid, 0.0)
+        )
 
 
-def _run(folder: str, tests: list[str], log: str, plain: bool, plugin: Order | str) -> None:
+def _run(
+    folder: str, tests: list[str], log: str, plain: bool, plugin: Order | str
+) -> None:
     """Run tests in a copy of the tree, in a process of its own; its exit code is pytest's."""
     os.setsid()
     os.chdir(folder)
@@ -146,7 +188,10 @@ def _run(folder: str, tests: list[str], log: str, plain: bool, plugin: Order | s
         os.environ["NUMBA_DISABLE_JIT"] = "1"
         numba.config.DISABLE_JIT = True
     asked = ["-q", "-p", "no:cacheprovider", "--tb=line", "-rfE", *tests]
-    asked += ["-W", "ignore::pytest.PytestAssertRewriteWarning"]  # plugins that are preloaded
+    asked += [
+        "-W",
+        "ignore::pytest.PytestAssertRewriteWarning",
+    ]  # plugins that are preloaded
     if isinstance(plugin, Order):
         os._exit(int(pytest.main(["-x", *asked], plugins=[plugin])))
     recorder = Recorder(folder, plain)
@@ -168,7 +213,13 @@ class Result:
         return self.report.partition(" ")[2].partition(" - ")[0]
 
 
-def run(folder: Path, tests: list[str], limit_s: float, plugin: Order | str, plain: bool = False) -> Result:
+def run(
+    folder: Path,
+    tests: list[str],
+    limit_s: float,
+    plugin: Order | str,
+    plain: bool = False,
+) -> Result:
     """Run files of tests in a copy of the tree."""
     log = folder.parent / f"{folder.name}.log"
     process = multiprocessing.get_context("forkserver").Process(
@@ -183,7 +234,10 @@ def run(folder: Path, tests: list[str], limit_s: float, plugin: Order | str, pla
     if late or process.exitcode == -signal.SIGPROF:
         return Result(TIME_LIMIT)
     lines = log.read_text("utf-8", "replace").splitlines()
-    report = next((line for line in lines if line.startswith(("FAILED", "ERROR", "ImportError"))), "")
+    report = next(
+        (line for line in lines if line.startswith(("FAILED", "ERROR", "ImportError"))),
+        "",
+    )
     if (
         process.exitcode not in (0, pytest.ExitCode.NO_TESTS_COLLECTED)
         and not report
@@ -191,7 +245,12 @@ def run(folder: Path, tests: list[str], limit_s: float, plugin: Order | str, pla
     ):
         raise RuntimeError("\n".join(["pytest itself failed:", *lines[-20:]]))
     return Result(
-        MISSED if process.exitcode in (0, pytest.ExitCode.NO_TESTS_COLLECTED) else NOTICED, report[:160]
+        (
+            MISSED
+            if process.exitcode in (0, pytest.ExitCode.NO_TESTS_COLLECTED)
+            else NOTICED
+        ),
+        report[:160],
     )
 
 
@@ -206,7 +265,10 @@ class Maps:
     def read(self, folder: Path, test: str, plain: bool) -> dict[str, Any]:
         """Return the map of one file; ends where tests fail without any fault, for they would notice each."""
         digest = hashlib.sha256((folder / test).read_bytes()).hexdigest()[:12]
-        path = self.kept / f"{Path(test).parent.name}-{Path(test).stem}-{digest}{'-plain' * plain}.json"
+        path = (
+            self.kept
+            / f"{Path(test).parent.name}-{Path(test).stem}-{digest}{'-plain' * plain}.json"
+        )
         if not path.is_file():
             if not self.made:
                 return {"tests": {}, "failed": [], "lines": {}}
@@ -214,7 +276,9 @@ class Maps:
             run(folder, [test], self.limit_s, str(path), plain)
         found = json.loads(path.read_text("utf-8"))
         if found["failed"] and not plain:
-            raise SystemExit(f"without any fault these fail: {', '.join(found['failed'])}")
+            raise SystemExit(
+                f"without any fault these fail: {', '.join(found['failed'])}"
+            )
         return dict(found)
 
     def ordered(
@@ -222,7 +286,8 @@ class Maps:
     ) -> tuple[dict[str, float], dict[str, float]]:
         """Return the tests that reach lines of a module with their seconds, in order, and the seconds of all.
 
-        The tests of a file stay together, for they share fixtures; files with the least to run come first.
+        The tests of a file stay together, for they share fixtures; files with the least
+        to run come first.
         """
         groups, seconds = [], {}
         for test in tests:
@@ -236,12 +301,20 @@ class Maps:
         return {test: took for group in groups for took, test in group}, seconds
 
 
-def noticed(maps: Maps, folder: Path, tests: list[str], module: str, lines: range, limit_s: float) -> Any:
+def noticed(
+    maps: Maps,
+    folder: Path,
+    tests: list[str],
+    module: str,
+    lines: range,
+    limit_s: float,
+) -> Any:
     """Prepare in a copy without a fault, and return the function that runs the tests once the fault is in it.
 
-    Where no test reaches the fault, compiled code may have it: then the tests that reach it (or all, without
-    a map) run in plain Python first, and the one that notices runs compiled, as it does without `mutate.py`.
-    If it notices still, that is it; if not, all run.
+    Where no test reaches the fault, compiled code may have it: then the tests that
+    reach it (or all, without a map) run in plain Python first, and the one that notices
+    runs compiled, as it does without `mutate.py`. If it notices still, that is it; if
+    not, all run.
     """
     first, seconds = maps.ordered(folder, tests, module, lines, plain=False)
     plain: dict[str, float] = {}
@@ -253,8 +326,15 @@ def noticed(maps: Maps, folder: Path, tests: list[str], module: str, lines: rang
             order = Order(plain, bool(plain), seconds, plain=True)
             quick = run(folder, tests, limit_s, order, plain=True)
             if quick.outcome == NOTICED and "::" in quick.test:
-                again = run(folder, [quick.test], limit_s, Order({quick.test: 0.0}, True, seconds))
-                if again.outcome != MISSED and "not found" not in again.report:  # its name was cut
+                again = run(
+                    folder,
+                    [quick.test],
+                    limit_s,
+                    Order({quick.test: 0.0}, True, seconds),
+                )
+                if (
+                    again.outcome != MISSED and "not found" not in again.report
+                ):  # its name was cut
                     return again
         return run(folder, tests, limit_s, Order(first or plain, False, seconds))
 

@@ -1,6 +1,7 @@
 """Measure what docs/deployment.md publishes: C on this computer and on ARM, an FMU, the live loop.
 
-`python scripts/deployment_speed.py [--seconds 60]`; needs gcc and the extras fmu and nmea.
+`python scripts/deployment_speed.py [--seconds 60]`; needs gcc and the extras fmu and
+nmea.
 """
 
 from __future__ import annotations
@@ -56,7 +57,9 @@ def timed(source: Source, compiler: str, steps: int, runner: str | None = None) 
     call = f"{source.name}_step(&state, &input" + (
         f", 0.5 * {source.name.upper()}_LONGEST_STEP)" if source.ship else ")"
     )
-    text = MAIN.format(name=source.name, steps=steps, first=next(iter(source.inputs)), call=call)
+    text = MAIN.format(
+        name=source.name, steps=steps, first=next(iter(source.inputs)), call=call
+    )
     with tempfile.TemporaryDirectory() as folder:
         for file, content in {
             f"{source.name}.h": source.header,
@@ -64,12 +67,24 @@ def timed(source: Source, compiler: str, steps: int, runner: str | None = None) 
             "main.c": text,
         }.items():
             (Path(folder) / file).write_text(content, encoding="utf-8")
-        flags = ["-std=c99", "-O2", "-Wall", "-Wextra", "-Werror", "-pedantic", "-static"]
+        flags = [
+            "-std=c99",
+            "-O2",
+            "-Wall",
+            "-Wextra",
+            "-Werror",
+            "-pedantic",
+            "-static",
+        ]
         subprocess.run(
-            [compiler, *flags, "main.c", f"{source.name}.c", "-o", "main", "-lm"], cwd=folder, check=True
+            [compiler, *flags, "main.c", f"{source.name}.c", "-o", "main", "-lm"],
+            cwd=folder,
+            check=True,
         )
         command = [*([runner] if runner else []), "./main"]
-        return subprocess.run(command, cwd=folder, check=True, capture_output=True, text=True).stdout.strip()
+        return subprocess.run(
+            command, cwd=folder, check=True, capture_output=True, text=True
+        ).stdout.strip()
 
 
 def real_time_factor(source: Source, version: str) -> float:
@@ -86,7 +101,9 @@ def real_time_factor(source: Source, version: str) -> float:
             "stop_time": 20_000 * source.step,
         }
         begin = time.perf_counter()
-        fmpy.simulate_fmu(unzipped, validate=False, start_values={"rudder": 0.1}, **options)
+        fmpy.simulate_fmu(
+            unzipped, validate=False, start_values={"rudder": 0.1}, **options
+        )
         elapsed = time.perf_counter() - begin
         shutil.rmtree(unzipped)
     return options["stop_time"] / elapsed
@@ -102,20 +119,31 @@ def burn(elsewhere: bool) -> None:
 
 def sail(address: str, seconds: float) -> None:
     """The simulated ship, in a process of her own."""
-    asyncio.run(simulate_ship(SimulatedShip(load_model("mariner")), address, duration=seconds))
+    asyncio.run(
+        simulate_ship(SimulatedShip(load_model("mariner")), address, duration=seconds)
+    )
 
 
 def periods(seconds: float, real_time: bool) -> np.ndarray:
     """Periods of the live loop at 10 Hz, s, with the simulated ship in another process."""
     with socket.create_server(("127.0.0.1", 0)) as server:
         address = f"tcp:127.0.0.1:{server.getsockname()[1]}"
-    ship = multiprocessing.Process(target=sail, args=(address, seconds + 60.0), daemon=True)
+    ship = multiprocessing.Process(
+        target=sail, args=(address, seconds + 60.0), daemon=True
+    )
     ship.start()
     beats: list[float] = []
     inner, agent = steering.Helm.steer, LQ.from_model(load_model("mariner"), dt=0.1)
-    steering.Helm.steer = lambda self, now: (beats.append(time.perf_counter()), inner(self, now))[1]  # type: ignore[assignment,method-assign,func-returns-value]
+    steering.Helm.steer = lambda self, now: (
+        beats.append(time.perf_counter()),
+        inner(self, now),
+    )[1]  # type: ignore[assignment,method-assign,func-returns-value]
     time.sleep(20.0)  # until she is there
-    os.sched_setscheduler(0, os.SCHED_FIFO if real_time else os.SCHED_OTHER, os.sched_param(10 * real_time))
+    os.sched_setscheduler(
+        0,
+        os.SCHED_FIFO if real_time else os.SCHED_OTHER,
+        os.sched_param(10 * real_time),
+    )
     asyncio.run(steering.steer(agent, address, heading=0.1, duration=seconds))
     os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
     steering.Helm.steer = inner  # type: ignore[method-assign]
@@ -126,8 +154,12 @@ def periods(seconds: float, real_time: bool) -> np.ndarray:
 def main() -> None:
     """Print all figures."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--seconds", type=float, default=60.0, help="of the live loop, each time")
-    parser.add_argument("--loop", action="store_true", help="measure the live loop alone")
+    parser.add_argument(
+        "--seconds", type=float, default=60.0, help="of the live loop, each time"
+    )
+    parser.add_argument(
+        "--loop", action="store_true", help="measure the live loop alone"
+    )
     given = parser.parse_args()
     if not given.loop:
         measure_exports()
@@ -139,8 +171,9 @@ def measure_exports() -> None:
     mariner = load_model("mariner")
     exported = {
         "lq": autopilot_source(LQ.from_model(mariner), "lq"),
-        "ppo": autopilot_source(load_agent("mariner-calm-ppo"), "ppo"), "ship": ship_source(mariner, "ship"),
-    }  # fmt: skip
+        "ppo": autopilot_source(load_agent("mariner-calm-ppo"), "ppo"),
+        "ship": ship_source(mariner, "ship"),
+    }
     for name, source in exported.items():
         print(f"{name}: gcc: {timed(source, 'gcc', STEPS)}")
         for compiler in CROSS:
@@ -148,27 +181,39 @@ def measure_exports() -> None:
                 print(f"{name}: {compiler} is not installed", file=sys.stderr)
             else:
                 runner = shutil.which(QEMU[compiler])
-                found = timed(source, compiler, STEPS // 100, runner) if runner else "no emulator (qemu-user)"
+                found = (
+                    timed(source, compiler, STEPS // 100, runner)
+                    if runner
+                    else "no emulator (qemu-user)"
+                )
                 print(f"{name}: {compiler}, emulated: {found}")
     for version in ("2.0", "3.0"):
-        print(f"ship.fmu, FMI {version}: {real_time_factor(exported['ship'], version):.0f} times real time")
+        print(
+            f"ship.fmu, FMI {version}:"
+            f" {real_time_factor(exported['ship'], version):.0f} times real time"
+        )
 
 
 def measure_loop(seconds: float) -> None:
     """Print the period of the live loop under each load."""
     for load, where, real_time in LOADS:
         busy = [
-            multiprocessing.Process(target=burn, args=(where == "another",), daemon=True) for _ in range(load)
+            multiprocessing.Process(
+                target=burn, args=(where == "another",), daemon=True
+            )
+            for _ in range(load)
         ]
         for one in busy:
             one.start()
         try:
             off = np.abs(periods(seconds, real_time) - 0.1) * 1e3
             print(
-                f"live loop, {load} busy processes of {where} session on {os.cpu_count()} cores, "
-                f"{'real-time' if real_time else 'ordinary'} priority: {len(off)} periods, off 100 ms by "
-                f"{np.median(off):.2f} ms at the median, {np.quantile(off, 0.99):.2f} ms at the 99th "
-                f"percentile, {off.max():.2f} ms at most; load average {os.getloadavg()[0]:.0f}",
+                f"live loop, {load} busy processes of {where} session on"
+                f" {os.cpu_count()} cores, {'real-time' if real_time else 'ordinary'}"
+                f" priority: {len(off)} periods, off 100 ms by {np.median(off):.2f} ms"
+                f" at the median, {np.quantile(off, 0.99):.2f} ms at the 99th"
+                f" percentile, {off.max():.2f} ms at most; load average"
+                f" {os.getloadavg()[0]:.0f}",
                 flush=True,
             )
         except PermissionError:

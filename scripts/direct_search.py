@@ -1,11 +1,13 @@
 """Settings of the classical controllers, found for each task by direct search on its cost.
 
-Every controller has the same budget: `EVALUATIONS` settings, each tried on the same `EPISODES` episodes,
-whose seeds are never scored. The search is Nelder and Mead's, over logarithms of the settings of
-`from_model`, and begins with the design's own; so what is found is never worse on those episodes than the
-design. Settings whose loop is unstable or has too little margin are refused untried.
+Every controller has the same budget: `EVALUATIONS` settings, each tried on the same
+`EPISODES` episodes, whose seeds are never scored. The search is Nelder and Mead's, over
+logarithms of the settings of `from_model`, and begins with the design's own; so what is
+found is never worse on those episodes than the design. Settings whose loop is unstable
+or has too little margin are refused untried.
 
-Source: Nelder & Mead 1965, A simplex method for function minimization, Computer Journal 7 (scipy.optimize).
+Source: Nelder & Mead 1965, A simplex method for function minimization, Computer Journal
+7 (scipy.optimize).
 """
 
 from __future__ import annotations
@@ -59,11 +61,18 @@ class Tuned:
     evaluations: int  # settings that were tried, refused ones among them
 
 
-#: What is searched of controllers like LQ beside its weights. Not MPC's horizon: from an eighth to twice the
-#: design's it changes no cost by more than 2e-5, and a plan's time grows with its square.
+#: What is searched of controllers like LQ beside its weights. Not MPC's horizon: from
+#: an eighth to twice the design's it changes no cost by more than 2e-5, and a plan's
+#: time grows with its square.
 FURTHER_SETTINGS: dict[str, tuple[Setting, ...]] = {
-    "lqg": (Setting("noise", 1.0, 0.01, 100.0), Setting("disturbance_deg", 2.0, 0.01, 100.0)),
-    "lq-adaptive": (Setting("forgetting_lengths", 20.0, 0.1, 100.0), Setting("noise", 1.0, 0.01, 100.0)),
+    "lqg": (
+        Setting("noise", 1.0, 0.01, 100.0),
+        Setting("disturbance_deg", 2.0, 0.01, 100.0),
+    ),
+    "lq-adaptive": (
+        Setting("forgetting_lengths", 20.0, 0.1, 100.0),
+        Setting("noise", 1.0, 0.01, 100.0),
+    ),
 }
 
 
@@ -74,23 +83,28 @@ def search(
 ) -> Tuned:
     """Least cost over settings, within a budget.
 
-    `cost`: of settings by name; `REFUSED` where there is no such controller. `spaces`: alternatives, such as
-    without and with a filter: each is tried at its start, the best is searched. The first is the design's
-    own. `evaluations`: budget. The same arguments give the same result. Raises InputError if every start is
-    refused.
+    `cost`: of settings by name; `REFUSED` where there is no such controller. `spaces`:
+    alternatives, such as without and with a filter: each is tried at its start, the
+    best is searched. The first is the design's own. `evaluations`: budget. The same
+    arguments give the same result. Raises InputError if every start is refused.
     """
     check_whole(evaluations, "evaluations", at_least=len(spaces))
     starts = [cost({one.name: one.start for one in space}) for space in spaces]
     number = int(np.argmin(starts))
     if starts[number] >= REFUSED:
-        raise InputError("cost: every start is refused, expected settings that can be designed with")
+        raise InputError(
+            "cost: every start is refused, expected settings that can be designed with"
+        )
     space = spaces[number]
     best, least = {one.name: one.start for one in space}, starts[number]
     count = len(starts)
 
     def of_logarithms(x: Floats) -> float:
         nonlocal best, least, count
-        settings = {one.name: float(one.start * np.exp(z)) for one, z in zip(space, x, strict=True)}
+        settings = {
+            one.name: float(one.start * np.exp(z))
+            for one, z in zip(space, x, strict=True)
+        }
         found = min(cost(settings), REFUSED)
         count += 1
         if found < least:
@@ -102,9 +116,17 @@ def search(
     left = evaluations - count
     if left > len(space):
         minimize(
-            of_logarithms, np.zeros(len(space)), method="Nelder-Mead", bounds=bounds,
-            options={"initial_simplex": simplex, "maxfev": left, "xatol": 1e-3, "fatol": 1e-6},
-        )  # fmt: skip
+            of_logarithms,
+            np.zeros(len(space)),
+            method="Nelder-Mead",
+            bounds=bounds,
+            options={
+                "initial_simplex": simplex,
+                "maxfev": left,
+                "xatol": 1e-3,
+                "fatol": 1e-6,
+            },
+        )
     return Tuned(best, float(least), float(starts[0]), count)
 
 
@@ -130,8 +152,8 @@ def tune(
 ) -> Tuned:
     """Search the settings of a classical controller on a task.
 
-    `kind`: of those `tunable`; `settings`: those found for LQ, which guidance laws lead where they cost less
-    than its design's own; `evaluations`, `episodes`: budget.
+    `kind`: of those `tunable`; `settings`: those found for LQ, which guidance laws lead
+    where they cost less than its design's own; `evaluations`, `episodes`: budget.
     """
     check_choice(kind, CLASSICAL, "controller")
     seeds = FIRST_SEED + np.arange(episodes)
@@ -149,23 +171,36 @@ def tune(
     spaces = search_spaces(kind, task)
     found_for_lq = _prefixed({} if settings is None else settings.get("lq", {}), kind)
     start = {one.name: one.start for one in spaces[0]}
-    autopilot = min(({}, found_for_lq), key=lambda one: cost({**one, **start})) if found_for_lq else {}
+    autopilot = (
+        min(({}, found_for_lq), key=lambda one: cost({**one, **start}))
+        if found_for_lq
+        else {}
+    )
     left = evaluations - 2 * bool(found_for_lq)
     found = search(lambda asked: cost({**autopilot, **asked}), spaces, left)
     return replace(
-        found, settings={**autopilot, **found.settings}, evaluations=evaluations - left + found.evaluations
+        found,
+        settings={**autopilot, **found.settings},
+        evaluations=evaluations - left + found.evaluations,
     )
 
 
 def _prefixed(autopilot: Mapping[str, float], kind: str) -> dict[str, float]:
     """Settings of the autopilot that a guidance law leads, beside its own."""
-    return {INNER + name: value for name, value in autopilot.items()} if kind in LAWS else {}
+    return (
+        {INNER + name: value for name, value in autopilot.items()}
+        if kind in LAWS
+        else {}
+    )
 
 
 def is_sane(controller: Controller) -> bool:
     """Whether a loop has the least margins."""
     margins = controller.margins
-    return margins.gain_margin >= LEAST_GAIN_MARGIN and margins.phase_margin_deg >= LEAST_PHASE_MARGIN
+    return (
+        margins.gain_margin >= LEAST_GAIN_MARGIN
+        and margins.phase_margin_deg >= LEAST_PHASE_MARGIN
+    )
 
 
 def search_spaces(kind: str, task: BenchmarkTask) -> list[list[Setting]]:
@@ -176,11 +211,18 @@ def search_spaces(kind: str, task: BenchmarkTask) -> list[list[Setting]]:
         lookahead = task.task.lookahead
         own = [Setting("lookahead_lengths", lookahead)]
         if kind in ("wheel-over", "preview-mpc"):
-            if hasattr(task.task.settings, "turn_radius"):  # the path has arcs of its own
-                own.append(Setting("reach_lengths", own_lead(task.ship, None), 0.3, 3.0))
+            if hasattr(
+                task.task.settings, "turn_radius"
+            ):  # the path has arcs of its own
+                own.append(
+                    Setting("reach_lengths", own_lead(task.ship, None), 0.3, 3.0)
+                )
             else:
                 radius, reach = own_turn(task.ship)
-                own += [Setting("reach_lengths", reach), Setting("radius_lengths", radius)]
+                own += [
+                    Setting("reach_lengths", reach),
+                    Setting("radius_lengths", radius),
+                ]
                 own.append(Setting("turn_lookahead_lengths", lookahead))
             own.append(Setting("crab_share", 1.0, 0.3, 1.5))
             own += [Setting("deviation_deg", 3.0)] * (kind == "preview-mpc")
@@ -190,7 +232,11 @@ def search_spaces(kind: str, task: BenchmarkTask) -> list[list[Setting]]:
     plain = design(kind, task).design
     integral = Setting("integral_lengths", 20.0, 0.1, 100.0)
     if kind.startswith("pid"):
-        own = [Setting("frequency", plain["frequency"]), Setting("damping", plain["damping"]), integral]
+        own = [
+            Setting("frequency", plain["frequency"]),
+            Setting("damping", plain["damping"]),
+            integral,
+        ]
         if kind == "pid-filtered":
             own.append(Setting("reference_share", 3.0, 0.2, 100.0))
     else:

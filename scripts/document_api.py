@@ -1,7 +1,8 @@
 """Write `docs/api`: a page for each public package, with the names of its `__init__.pyi`.
 
-`python scripts/document_api.py`; a test compares the pages with what this writes. mkdocstrings puts the
-docstrings in. One page more has what the other pages, the README and the examples import from modules.
+`python scripts/document_api.py`; a test compares the pages with what this writes.
+mkdocstrings puts the docstrings in. One page more has what the other pages, the README
+and the examples import from modules.
 """
 
 from __future__ import annotations
@@ -21,14 +22,18 @@ PACKAGES = {
     "shipgym.sea": "Current, wind and waves.",
     "shipgym.tasks": "Tasks: what an autopilot has to do in an environment.",
     "shipgym.plots": "Figures, made with plotly.",
-    "shipgym.interchange": "To and from pandas, xarray, Minari, python-control, MSS and shipmmg.",
+    "shipgym.interchange": (
+        "To and from pandas, xarray, Minari, python-control, MSS and shipmmg."
+    ),
     "identification": "From trials to a ship model.",
     "agents": "Autopilots, and how they are run and compared.",
 }
 MODULES = "modules.md"
 #: `from MODULE import NAMES`, in brackets or on one line.
 IMPORT = re.compile(
-    r"^\s*from ((?:shipgym|identification|agents)[\w.]*) import (?:\(([^)]*)\)|([^\n#(]+))", re.MULTILINE
+    r"^\s*from ((?:shipgym|identification|agents)[\w.]*) import"
+    r" (?:\(([^)]*)\)|([^\n#(]+))",
+    re.MULTILINE,
 )
 
 
@@ -36,7 +41,9 @@ def names(package: str) -> list[str]:
     """The public names of a package, submodules and constants left out, in the order of its file."""
     stub = ROOT / package.replace(".", "/") / "__init__.pyi"
     imports = [
-        node for node in ast.parse(stub.read_text(encoding="utf-8")).body if isinstance(node, ast.ImportFrom)
+        node
+        for node in ast.parse(stub.read_text(encoding="utf-8")).body
+        if isinstance(node, ast.ImportFrom)
     ]
     found = [alias.name for node in imports if node.module for alias in node.names]
     modules = {path.stem for path in stub.parent.iterdir()}
@@ -49,7 +56,10 @@ def pages() -> dict[str, str]:
     written = {}
     for package, purpose in PACKAGES.items():
         blocks = [f"# {package}", purpose]
-        again = [f"[`{name}`]({said[name]}.md)" for name in sorted(set(names(package)) & set(said))]
+        again = [
+            f"[`{name}`]({said[name]}.md)"
+            for name in sorted(set(names(package)) & set(said))
+        ]
         if again:
             blocks.append(f"Also here: {', '.join(again)}.")
         for name in names(package):
@@ -57,8 +67,13 @@ def pages() -> dict[str, str]:
                 said[name] = package
                 blocks.append(f"::: {package}.{name}")
         written[f"{package}.md"] = "\n\n".join(blocks) + "\n"
-    further = [f"::: {module}.{name}" for module, name in imported() if module not in PACKAGES]
-    purpose = "What pages and examples import from modules, in addition to the names in the packages."
+    further = [
+        f"::: {module}.{name}" for module, name in imported() if module not in PACKAGES
+    ]
+    purpose = (
+        "What pages and examples import from modules, in addition to the names in the"
+        " packages."
+    )
     written[MODULES] = "\n\n".join(["# Modules", purpose, *further]) + "\n"
     return written
 
@@ -69,7 +84,10 @@ def imported() -> list[tuple[str, str]]:
     found = set[tuple[str, str]]()
     for path in (ROOT / "README.md", *pages, *(ROOT / "examples").rglob("*.py")):
         for module, inside, line in IMPORT.findall(path.read_text(encoding="utf-8")):
-            given = [one.split(" as ")[0].strip() for one in re.split(r"[,\n]", inside or line)]
+            given = [
+                one.split(" as ")[0].strip()
+                for one in re.split(r"[,\n]", inside or line)
+            ]
             found |= {(module, name) for name in given if name}
     return sorted(
         (module, name)

@@ -9,7 +9,13 @@ import re
 from dataclasses import fields
 from pathlib import Path
 
-from shipgym.trials.identify_table import OPTIONS, TEXT, TEXT_OR_TABLE, WHOLE_OR_TEXT, Options
+from shipgym.trials.identify_table import (
+    OPTIONS,
+    TEXT,
+    TEXT_OR_TABLE,
+    WHOLE_OR_TEXT,
+    Options,
+)
 
 PAGE = Path(__file__).parents[1] / "docs" / "identification.md"
 MARKS = re.compile(r"<!-- options: (\S+) -->\n.*?<!-- end of options -->", re.DOTALL)
@@ -24,8 +30,13 @@ def table(section: str) -> str:
         if option.section != section:
             continue
         meaning = option.meaning
-        meaning += "".join(f"<br>`{word}`: {told}" for word, told in option.choices.items())
-        lines.append(f"| `{item.name}` | {_value(item.name)} | {_default(item.default)} | {meaning} |")
+        meaning += "".join(
+            f"<br>`{word}`: {told}" for word, told in option.choices.items()
+        )
+        lines.append(
+            f"| `{item.name}` | {_value(item.name)} | {_default(item.default)} |"
+            f" {meaning} |"
+        )
     return "\n".join(lines)
 
 

@@ -15,8 +15,13 @@ from shipgym.tasks.definition import TASKS, read_definition
 from shipgym.tasks.source import keywords
 
 FOLDER = Path(__file__).parents[1] / "docs" / "environments"
-PAGES = tuple(FOLDER / f"{name}.md" for name in ("course_keeping", "path_following", "path_following_v0"))
-MARKS = re.compile(r"<!-- settings: ([\w-]+) -->\n.*?<!-- end of settings -->", re.DOTALL)
+PAGES = tuple(
+    FOLDER / f"{name}.md"
+    for name in ("course_keeping", "path_following", "path_following_v0")
+)
+MARKS = re.compile(
+    r"<!-- settings: ([\w-]+) -->\n.*?<!-- end of settings -->", re.DOTALL
+)
 SIGNS = {"above": "above", "at_least": "at least", "at_most": "at most"}
 
 
@@ -24,9 +29,14 @@ def table(task: str) -> str:
     """The settings of a task as Markdown."""
     lines = ["| argument | default | bounds | meaning |", "| --- | --- | --- | --- |"]
     for name, setting, default in keywords(read_definition(task).Settings):
-        bounds = [f"{sign} {getattr(setting, key):g}" for key, sign in SIGNS.items()
-                  if getattr(setting, key) is not None]  # fmt: skip
-        lines.append(f"| `{name}` | {_shown(default)} | {', '.join(bounds)} | {setting.about} |")
+        bounds = [
+            f"{sign} {getattr(setting, key):g}"
+            for key, sign in SIGNS.items()
+            if getattr(setting, key) is not None
+        ]
+        lines.append(
+            f"| `{name}` | {_shown(default)} | {', '.join(bounds)} | {setting.about} |"
+        )
     return "\n".join(lines)
 
 
@@ -40,7 +50,10 @@ def page(text: str) -> str:
     """A page with its tables made anew."""
 
     def written(found: re.Match[str]) -> str:
-        return f"<!-- settings: {found[1]} -->\n{table(found[1])}\n<!-- end of settings -->"
+        return (
+            f"<!-- settings: {found[1]} -->\n{table(found[1])}\n<!-- end of"
+            " settings -->"
+        )
 
     return MARKS.sub(written, text)
 

@@ -1,6 +1,7 @@
 """Draw the pictures of `docs/architecture.md` from the code: rooms with their imports, and a step.
 
-`python scripts/draw_architecture.py`; a test compares the pictures with what this draws.
+`python scripts/draw_architecture.py`; a test compares the pictures with what this
+draws.
 """
 
 from __future__ import annotations
@@ -16,8 +17,8 @@ ROOT = Path(__file__).parents[1]
 IMAGES = ROOT / "docs" / "images"
 PACKAGES = ("agents", "identification", "shipgym")
 
-#: Column, row and contents of each room, package by package: a room is expected to import those named
-#: behind it, and not those before it.
+#: Column, row and contents of each room, package by package: a room is expected to
+#: import those named behind it, and not those before it.
 ROOMS: dict[str, tuple[float, int, str]] = {
     "agents.cli": (2, 0, "the command shipgym"),
     "agents.benchmarking": (2, 1, "suites run, statistics, page"),
@@ -84,7 +85,11 @@ def modules() -> dict[str, Path]:
 def imports() -> Edges:
     """Which file imports which, imports within functions and for type checking counted."""
     files = modules()
-    return {(name, other) for name, path in files.items() for other in _imported(name, path, files)}
+    return {
+        (name, other)
+        for name, path in files.items()
+        for other in _imported(name, path, files)
+    }
 
 
 def _imported(name: str, path: Path, files: Mapping[str, Path]) -> set[str]:
@@ -94,7 +99,11 @@ def _imported(name: str, path: Path, files: Mapping[str, Path]) -> set[str]:
         if isinstance(node, ast.Import):
             found |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom):
-            above = package.split(".")[: len(package.split(".")) - node.level + 1] if node.level else []
+            above = (
+                package.split(".")[: len(package.split(".")) - node.level + 1]
+                if node.level
+                else []
+            )
             base = ".".join([*above, *([node.module] if node.module else [])])
             inner = {f"{base}.{alias.name}" for alias in node.names}
             found |= {one if one in files else base for one in inner}
@@ -141,7 +150,11 @@ def reached(edges: Edges, start: str) -> set[str]:
 def arrows(edges: Iterable[tuple[str, str]]) -> tuple[Edges, Edges]:
     """Arrows within packages: down, less those that follow from others, and up."""
     order = {name: i for i, name in enumerate(ROOMS)}
-    inside = {(a, b) for a, b in room_imports(edges) if a.partition(".")[0] == b.partition(".")[0]}
+    inside = {
+        (a, b)
+        for a, b in room_imports(edges)
+        if a.partition(".")[0] == b.partition(".")[0]
+    }
     down = {(a, b) for a, b in inside if order[a] < order[b]}
     short = {(a, b) for a, b in down if b not in reached(down - {(a, b)}, a)}
     return short, inside - down
@@ -155,7 +168,9 @@ def draw_rooms() -> str:
     tops, y = {}, 20
     for package in PACKAGES:
         tops[package] = y
-        rows = 1 + max(row for name, (_, row, _) in ROOMS.items() if name.startswith(package))
+        rows = 1 + max(
+            row for name, (_, row, _) in ROOMS.items() if name.startswith(package)
+        )
         y += rows * STEP + 26
     places = {
         name: (LEFT + column * PITCH, tops[name.partition(".")[0]] + 24 + row * STEP)
@@ -168,14 +183,24 @@ def draw_rooms() -> str:
     lines += [_arrow_up(a, b, places) for a, b in sorted(back) if (b, a) not in both]
     lines += [line for name in ROOMS for line in _box(name, places[name])]
     lines += _legend(y)
-    return picture(LEFT + 5 * PITCH + 4, y + 34, "Rooms of the three packages and their imports", lines)
+    return picture(
+        LEFT + 5 * PITCH + 4,
+        y + 34,
+        "Rooms of the three packages and their imports",
+        lines,
+    )
 
 
 def _band(package: str, tops: Mapping[str, int]) -> Iterator[str]:
-    rows = 1 + max(row for name, (_, row, _) in ROOMS.items() if name.startswith(package))
+    rows = 1 + max(
+        row for name, (_, row, _) in ROOMS.items() if name.startswith(package)
+    )
     height, top = rows * STEP + 4, tops[package]
     colour = BACK_GROUND[package]
-    yield f'<rect x="8" y="{top}" width="{LEFT + 5 * PITCH - 12}" height="{height}" rx="8" fill="{colour}"/>'
+    yield (
+        f'<rect x="8" y="{top}" width="{LEFT + 5 * PITCH - 12}" height="{height}"'
+        f' rx="8" fill="{colour}"/>'
+    )
     yield text(20, top + 24, package, size=15, weight="bold")
     if package != PACKAGES[0]:
         yield line_to(f"M64 {top - 60} L64 {top + 4}", width=2.5)
@@ -184,12 +209,17 @@ def _band(package: str, tops: Mapping[str, int]) -> Iterator[str]:
 def _box(name: str, place: tuple[float, float]) -> Iterator[str]:
     x, y = place
     title = TITLES.get(name, name.partition(".")[2])
-    yield f'<rect x="{x:g}" y="{y:g}" width="{WIDE}" height="{HIGH}" rx="5" fill="white" stroke="#456"/>'
+    yield (
+        f'<rect x="{x:g}" y="{y:g}" width="{WIDE}" height="{HIGH}" rx="5" fill="white"'
+        ' stroke="#456"/>'
+    )
     yield text(x + WIDE / 2, y + 19, title, anchor="middle", weight="bold")
     yield text(x + WIDE / 2, y + 36, ROOMS[name][2], size=11, anchor="middle")
 
 
-def _arrows_down(short: Edges, both: Edges, places: Mapping[str, tuple[float, float]]) -> Iterator[str]:
+def _arrows_down(
+    short: Edges, both: Edges, places: Mapping[str, tuple[float, float]]
+) -> Iterator[str]:
     """Arrows from the lower side of a box to the upper side of another, spread over the sides."""
     for a, b in sorted(short):
         (xa, ya), (xb, yb) = places[a], places[b]
@@ -198,12 +228,19 @@ def _arrows_down(short: Edges, both: Edges, places: Mapping[str, tuple[float, fl
             x1, x2 = (xa + WIDE, xb) if right else (xa, xb + WIDE)
             path = f"M{x1:g} {ya + HIGH / 2:g} L{x2:g} {yb + HIGH / 2:g}"
         else:
-            out = sorted((places[d][0], d) for c, d in short if c == a and places[d][1] > ya)
-            into = sorted((places[c][0], c) for c, d in short if d == b and places[c][1] < yb)
+            out = sorted(
+                (places[d][0], d) for c, d in short if c == a and places[d][1] > ya
+            )
+            into = sorted(
+                (places[c][0], c) for c, d in short if d == b and places[c][1] < yb
+            )
             x1 = xa + WIDE * (1 + [d for _, d in out].index(b)) / (1 + len(out))
             x2 = xb + WIDE * (1 + [c for _, c in into].index(a)) / (1 + len(into))
             middle = (ya + HIGH + yb) / 2
-            path = f"M{x1:g} {ya + HIGH:g} C{x1:g} {middle:g} {x2:g} {middle:g} {x2:g} {yb:g}"
+            path = (
+                f"M{x1:g} {ya + HIGH:g} C{x1:g} {middle:g} {x2:g} {middle:g} {x2:g}"
+                f" {yb:g}"
+            )
         yield line_to(path, both=(a, b) in both)
 
 
@@ -212,7 +249,9 @@ def _arrow_up(a: str, b: str, places: Mapping[str, tuple[float, float]]) -> str:
     (xa, ya), (xb, yb) = places[a], places[b]
     if ya == yb:
         x1, x2, y = xa + WIDE * 0.5, xb + WIDE * 0.2, ya - 22
-        return line_to(f"M{x1:g} {ya:g} C{x1:g} {y:g} {x2:g} {y:g} {x2:g} {yb:g}", dashed=True)
+        return line_to(
+            f"M{x1:g} {ya:g} C{x1:g} {y:g} {x2:g} {y:g} {x2:g} {yb:g}", dashed=True
+        )
     side = 0.85 if xb >= xa else 0.15
     x1, x2 = xa + WIDE * side, xb + WIDE * (0.9 if xb <= xa else 0.1)
     middle = (ya + yb + HIGH) / 2
@@ -222,21 +261,31 @@ def _arrow_up(a: str, b: str, places: Mapping[str, tuple[float, float]]) -> str:
 
 def _legend(y: float) -> Iterator[str]:
     yield line_to(f"M{LEFT} {y + 8} L{LEFT + 40} {y + 8}")
-    yield text(LEFT + 48, y + 12, "imports; left out where it follows from others", size=11)
+    yield text(
+        LEFT + 48, y + 12, "imports; left out where it follows from others", size=11
+    )
     yield line_to(f"M{LEFT + 340} {y + 8} L{LEFT + 380} {y + 8}", both=True)
     yield text(LEFT + 388, y + 12, "both ways, without a circle of files", size=11)
     yield line_to(f"M{LEFT + 640} {y + 8} L{LEFT + 680} {y + 8}", dashed=True)
     yield text(LEFT + 688, y + 12, "against the order, without a circle", size=11)
 
 
-GIVERS = {"the ship": "#cfe0f5", "the sea": "#cdeae4", "the sensor set": "#e3d8f2", "the task": "#f8e3b8"}
+GIVERS = {
+    "the ship": "#cfe0f5",
+    "the sea": "#cdeae4",
+    "the sensor set": "#e3d8f2",
+    "the task": "#f8e3b8",
+}
 FILES = {
     "the ship": "a file of shipgym/ships, or yours",
     "the sea": "shipgym/sea/open_sea.py",
     "the sensor set": "shipgym/instruments, or yours",
     "the task": "a file of shipgym/tasks, or yours",
 }
-SHIP_FUNCTIONS = ("accelerations", "shaft_acceleration")  # places of `shipgym.engine.motion`
+SHIP_FUNCTIONS = (
+    "accelerations",
+    "shaft_acceleration",
+)  # places of `shipgym.engine.motion`
 SELDOM = ("let_events_come", "begin_next")
 HOUSEKEEPING = ("are_finite", "tile_of")
 OFTEN = {"sail_lanes": ", in each substep"}
@@ -266,7 +315,9 @@ def _called(function: ast.FunctionDef) -> list[str]:
     return list(dict.fromkeys(name.id for name in names))
 
 
-def _given(name: str, functions: Mapping[str, ast.FunctionDef]) -> Iterator[tuple[str, str]]:
+def _given(
+    name: str, functions: Mapping[str, ast.FunctionDef]
+) -> Iterator[tuple[str, str]]:
     for called in _called(functions[name]):
         if called == "sail":
             yield from (("the ship", one) for one in SHIP_FUNCTIONS)
@@ -285,27 +336,50 @@ def draw_step() -> str:
     rows = stages()
     top = 212
     bottom = top + 44 + len(rows) * (TALL + 16)
-    lines = [line for i, giver in enumerate(GIVERS) for line in _source(giver, 20 + i * 236, rows)]
+    lines = [
+        line
+        for i, giver in enumerate(GIVERS)
+        for line in _source(giver, 20 + i * 236, rows)
+    ]
     lines += _compiler()
     lines.append(
-        f'<rect x="20" y="{top}" width="920" height="{bottom - top}" rx="8" fill="#f4f5f7" stroke="#456"/>'
+        f'<rect x="20" y="{top}" width="920" height="{bottom - top}" rx="8"'
+        ' fill="#f4f5f7" stroke="#456"/>'
     )
-    lines.append(text(34, top + 24, "step: for each tile of 64 ships (engine/episodes.py)", weight="bold"))
+    lines.append(
+        text(
+            34,
+            top + 24,
+            "step: for each tile of 64 ships (engine/episodes.py)",
+            weight="bold",
+        )
+    )
     for i, (name, (about, given)) in enumerate(rows.items()):
-        lines += _stage(name, about, given, top + 40 + i * (TALL + 16), last=i == len(rows) - 1)
+        lines += _stage(
+            name, about, given, top + 40 + i * (TALL + 16), last=i == len(rows) - 1
+        )
     lines.append(line_to(f"M140 {bottom} L140 {bottom + 30}"))
     answer = "observations, rewards, terminated, truncated, infos"
     lines.append(text(154, bottom + 24, answer, size=12))
     return picture(960, bottom + 44, "A step of the engine", lines)
 
 
-def _source(giver: str, x: float, rows: Mapping[str, tuple[str, list[tuple[str, str]]]]) -> Iterator[str]:
-    names = dict.fromkeys(one for _, given in rows.values() for who, one in given if who == giver)
-    yield f'<rect x="{x}" y="16" width="212" height="96" rx="5" fill="{GIVERS[giver]}" stroke="#456"/>'
+def _source(
+    giver: str, x: float, rows: Mapping[str, tuple[str, list[tuple[str, str]]]]
+) -> Iterator[str]:
+    names = dict.fromkeys(
+        one for _, given in rows.values() for who, one in given if who == giver
+    )
+    yield (
+        f'<rect x="{x}" y="16" width="212" height="96" rx="5" fill="{GIVERS[giver]}"'
+        ' stroke="#456"/>'
+    )
     yield text(x + 106, 36, giver, anchor="middle", weight="bold")
     yield text(x + 106, 53, FILES[giver], size=11, anchor="middle")
     for i, line in enumerate(_lines(list(names), 30)):
-        yield text(x + 106, 74 + 15 * i, line, size=11, anchor="middle", family="monospace")
+        yield text(
+            x + 106, 74 + 15 * i, line, size=11, anchor="middle", family="monospace"
+        )
     yield line_to(f"M{x + 106} 112 L{x + 106} 138")
 
 
@@ -319,7 +393,10 @@ def _lines(words: Iterable[str], width: int) -> list[str]:
 
 
 def _compiler() -> Iterator[str]:
-    yield '<rect x="20" y="138" width="920" height="44" rx="5" fill="white" stroke="#456"/>'
+    yield (
+        '<rect x="20" y="138" width="920" height="44" rx="5" fill="white"'
+        ' stroke="#456"/>'
+    )
     told = "specialise.py puts these plain functions in the places that the loop names"
     yield text(480, 157, told, anchor="middle", weight="bold", size=12)
     kept = "compiling.py makes machine code of the whole, or reads it from the cache"
@@ -327,11 +404,18 @@ def _compiler() -> Iterator[str]:
     yield line_to("M480 182 L480 212")
 
 
-def _stage(name: str, about: str, given: list[tuple[str, str]], y: float, last: bool) -> Iterator[str]:
+def _stage(
+    name: str, about: str, given: list[tuple[str, str]], y: float, last: bool
+) -> Iterator[str]:
     seldom = name in SELDOM
     dash = ' stroke-dasharray="5 3"' if seldom else ""
-    yield f'<rect x="34" y="{y}" width="212" height="{TALL}" rx="5" fill="white" stroke="#456"{dash}/>'
-    yield text(140, y + 19, name, anchor="middle", weight="bold", family="monospace", size=12)
+    yield (
+        f'<rect x="34" y="{y}" width="212" height="{TALL}" rx="5" fill="white"'
+        f' stroke="#456"{dash}/>'
+    )
+    yield text(
+        140, y + 19, name, anchor="middle", weight="bold", family="monospace", size=12
+    )
     how = "ship by ship, seldom" if seldom else "64 ships at once" + OFTEN.get(name, "")
     yield text(140, y + 35, how, anchor="middle", size=11)
     yield text(262, y + 15, about.replace("`", ""), size=12)
@@ -340,24 +424,34 @@ def _stage(name: str, about: str, given: list[tuple[str, str]], y: float, last: 
         width = 7.0 * len(one) + 18
         size = f'width="{width - 6:g}" height="20" rx="9"'
         yield f'<rect x="{x:g}" y="{y + 23}" {size} fill="{GIVERS[giver]}"/>'
-        yield text(x + width / 2 - 3, y + 37, one, size=11, anchor="middle", family="monospace")
+        yield text(
+            x + width / 2 - 3, y + 37, one, size=11, anchor="middle", family="monospace"
+        )
         x += width
     if not last:
         yield line_to(f"M140 {y + TALL} L140 {y + TALL + 16}")
 
 
 def text(
-    x: float, y: float, words: str, size: int = 13, anchor: str = "start", weight: str = "normal",
+    x: float,
+    y: float,
+    words: str,
+    size: int = 13,
+    anchor: str = "start",
+    weight: str = "normal",
     family: str = "sans-serif",
-) -> str:  # fmt: skip
+) -> str:
     """Words at a place."""
     return (
-        f'<text x="{x:g}" y="{y:g}" font-family="{family}" font-size="{size}" font-weight="{weight}" '
-        f'text-anchor="{anchor}" fill="#123">{escape(words)}</text>'
+        f'<text x="{x:g}" y="{y:g}" font-family="{family}" font-size="{size}"'
+        f' font-weight="{weight}" text-anchor="{anchor}"'
+        f' fill="#123">{escape(words)}</text>'
     )
 
 
-def line_to(path: str, width: float = 1.3, both: bool = False, dashed: bool = False) -> str:
+def line_to(
+    path: str, width: float = 1.3, both: bool = False, dashed: bool = False
+) -> str:
     """An arrow along a path."""
     colour, mark = ("#b4541a", "back") if dashed else ("#456", "ahead")
     more = ' stroke-dasharray="4 3"' if dashed else ""
@@ -371,8 +465,9 @@ def line_to(path: str, width: float = 1.3, both: bool = False, dashed: bool = Fa
 def picture(width: float, height: float, title: str, lines: Iterable[str]) -> str:
     """An SVG file."""
     marks = "".join(
-        f'<marker id="{name}" viewBox="0 0 8 8" refX="{at}" refY="4" markerWidth="8" markerHeight="8" '
-        f'markerUnits="userSpaceOnUse" orient="auto"><path d="{path}" fill="{colour}"/></marker>'
+        f'<marker id="{name}" viewBox="0 0 8 8" refX="{at}" refY="4" markerWidth="8"'
+        f' markerHeight="8" markerUnits="userSpaceOnUse" orient="auto"><path d="{path}"'
+        f' fill="{colour}"/></marker>'
         for name, at, path, colour in (
             ("ahead", 8, "M0 0 L8 4 L0 8 z", "#456"),
             ("back", 8, "M0 0 L8 4 L0 8 z", "#b4541a"),
@@ -381,7 +476,10 @@ def picture(width: float, height: float, title: str, lines: Iterable[str]) -> st
     )
     return "\n".join(
         [
-            f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width:g} {height:g}" role="img">',
+            (
+                f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width:g}'
+                f' {height:g}" role="img">'
+            ),
             f"<title>{escape(title)}</title>",
             f"<defs>{marks}</defs>",
             f'<rect width="{width:g}" height="{height:g}" fill="white"/>',

@@ -1,10 +1,12 @@
 """Reinforcement-learning libraries' own wrappers on shipgym's environments, and a turn in shipmmg.
 
-    make ecosystem                            in a virtual environment of its own; needs the network
-    python scripts/ecosystem.py torchrl skrl  only these, where they are installed
+    make ecosystem                            in a virtual environment of its own; needs
+    the network python scripts/ecosystem.py torchrl skrl  only these, where they are
+    installed
 
-Each takes some steps or a rollout and compares what it shows with the environment itself. Exits with 1 if one
-does not run; a library that is not installed is said and counts as failed too.
+Each takes some steps or a rollout and compares what it shows with the environment
+itself. Exits with 1 if one does not run; a library that is not installed is said and
+counts as failed too.
 """
 
 from __future__ import annotations
@@ -69,7 +71,10 @@ def torchrl_single() -> None:
     from torchrl.envs import GymEnv, GymWrapper
     from torchrl.envs.utils import check_env_specs
 
-    assert GymEnv(ID, frame_skip=3, **OPTIONS).rollout(8)["observation"].shape == (8, 15)
+    assert GymEnv(ID, frame_skip=3, **OPTIONS).rollout(8)["observation"].shape == (
+        8,
+        15,
+    )
     wrapped = GymWrapper(single())
     check_env_specs(wrapped)
     assert wrapped.rollout(STEPS)["next", "truncated"][-1].item()
@@ -79,7 +84,9 @@ def torchrl_native() -> None:
     """TorchRL's wrapper of a vector environment."""
     from torchrl.envs import GymWrapper
 
-    rollout = GymWrapper(many(autoreset_mode="Disabled")).rollout(STEPS, break_when_any_done=False)
+    rollout = GymWrapper(many(autoreset_mode="Disabled")).rollout(
+        STEPS, break_when_any_done=False
+    )
     assert rollout["observation"].shape == (4, STEPS, 15), rollout["observation"].shape
     assert rollout["next", "truncated"].sum().item() >= 8
 
@@ -112,20 +119,30 @@ def tianshou_native() -> None:
     envs = TianshouShips(many(autoreset_mode="Disabled"))
     spaces = envs.native.single_observation_space, envs.native.single_action_space
     net = Net(state_shape=spaces[0].shape, hidden_sizes=[16])
-    actor = ContinuousActorProbabilistic(preprocess_net=net, action_shape=spaces[1].shape, unbounded=True)
+    actor = ContinuousActorProbabilistic(
+        preprocess_net=net, action_shape=spaces[1].shape, unbounded=True
+    )
     policy = ProbabilisticActorPolicy(
         actor=actor,
-        dist_fn=lambda mean: torch.distributions.Independent(torch.distributions.Normal(*mean), 1),
+        dist_fn=lambda mean: torch.distributions.Independent(
+            torch.distributions.Normal(*mean), 1
+        ),
         action_space=spaces[1],
     )
     buffer = VectorReplayBuffer(4 * STEPS, 4)
-    collected = Collector(policy, envs, buffer).collect(n_step=4 * STEPS, reset_before_collect=True)
+    collected = Collector(policy, envs, buffer).collect(
+        n_step=4 * STEPS, reset_before_collect=True
+    )
     assert collected.n_collected_steps == 4 * STEPS, collected
     assert collected.n_collected_episodes == 8, collected
     kept, _ = buffer.sample(0)
     assert kept.obs.shape == (4 * STEPS, 15), kept.obs.shape
-    begun = (kept.obs[1:STEPS] == kept.obs_next[: STEPS - 1]).all(axis=1)  # of the first ship
-    assert list(np.flatnonzero(~begun)) == list(np.flatnonzero(kept.done[: STEPS - 1])), "episodes"
+    begun = (kept.obs[1:STEPS] == kept.obs_next[: STEPS - 1]).all(
+        axis=1
+    )  # of the first ship
+    assert list(np.flatnonzero(~begun)) == list(
+        np.flatnonzero(kept.done[: STEPS - 1])
+    ), "episodes"
 
 
 class TianshouShips:
@@ -154,7 +171,9 @@ class TianshouShips:
     def step(self, action: Any, id: Any = None) -> tuple[Any, ...]:
         """One step of all ships."""
         if id is not None and len(id) != self.env_num:
-            raise ValueError(f"{len(id)} ships found, expected all {self.env_num}: collect n_step")
+            raise ValueError(
+                f"{len(id)} ships found, expected all {self.env_num}: collect n_step"
+            )
         *found, _ = self.native.step(np.asarray(action, np.float32))
         return *found, np.array([{"env_id": one} for one in range(self.env_num)])
 
@@ -186,7 +205,9 @@ def pufferlib_native() -> None:
     expected, _ = ours.reset(seed=0)
     for _ in range(STEPS):
         np.testing.assert_array_equal(seen, expected)
-        seen, rewards, terminals, truncations, _ = envs.step(np.zeros((4, 1), np.float32))
+        seen, rewards, terminals, truncations, _ = envs.step(
+            np.zeros((4, 1), np.float32)
+        )
         expected, *_ = ours.step(np.zeros((4, 1), np.float32))
         ended += int((terminals | truncations).sum())
     assert np.isfinite(rewards).all()
@@ -236,9 +257,13 @@ def cleanrl_single() -> None:
     def make() -> Any:
         env = w.ClipAction(w.RecordEpisodeStatistics(w.FlattenObservation(single())))
         env = w.TransformObservation(
-            w.NormalizeObservation(env), lambda seen: np.clip(seen, -10.0, 10.0), env.observation_space
+            w.NormalizeObservation(env),
+            lambda seen: np.clip(seen, -10.0, 10.0),
+            env.observation_space,
         )
-        return w.TransformReward(w.NormalizeReward(env, gamma=0.99), lambda reward: np.clip(reward, -10, 10))
+        return w.TransformReward(
+            w.NormalizeReward(env, gamma=0.99), lambda reward: np.clip(reward, -10, 10)
+        )
 
     _cleanrl(gymnasium.vector.SyncVectorEnv([make for _ in range(4)]))
 
@@ -273,7 +298,11 @@ def sb3_wrapped() -> None:
 
 def shipmmg_turn() -> None:
     """A turn of KVLCC2 at 35 deg in shipmmg and here ends within a millimetre of the same place."""
-    from shipmmg.mmg_3dof import Mmg3DofBasicParams, Mmg3DofManeuveringParams, simulate_mmg_3dof
+    from shipmmg.mmg_3dof import (
+        Mmg3DofBasicParams,
+        Mmg3DofManeuveringParams,
+        simulate_mmg_3dof,
+    )
 
     from shipgym.ships.catalogue import kvlcc2_l7
 
@@ -285,8 +314,13 @@ def shipmmg_turn() -> None:
     theirs = simulate_mmg_3dof(
         Mmg3DofBasicParams(**fields["basic_params"]),
         Mmg3DofManeuveringParams(**fields["maneuvering_params"]),
-        ours.t, orders, np.full(len(ours.t), n), u0=ship.particulars["speed"], rtol=1e-8, atol=1e-10,
-    ).sol(ours.t[-1])  # fmt: skip
+        ours.t,
+        orders,
+        np.full(len(ours.t), n),
+        u0=ship.particulars["speed"],
+        rtol=1e-8,
+        atol=1e-10,
+    ).sol(ours.t[-1])
     apart = np.hypot(theirs[3] - ours["x"][-1], theirs[4] - ours["y"][-1])
     assert apart < 1e-3, f"{1000.0 * apart:.2f} mm apart"
 

@@ -1,7 +1,8 @@
 """Ships drawn around identified models, paths drawn for them, and all of it as one environment to learn in.
 
-A lane has a model, which is what is known of its ship, and the ship: the model with other coefficients. The
-agent is told the model's context and adds to the wheel-over autopilot designed on it.
+A lane has a model, which is what is known of its ship, and the ship: the model with
+other coefficients. The agent is told the model's context and adds to the wheel-over
+autopilot designed on it.
 """
 
 from __future__ import annotations
@@ -31,13 +32,17 @@ from shipgym.tasks.task import Task
 
 Floats = NDArray[np.float64]
 
-#: Standard deviations of logarithms: of all coefficients of an equation together, of each by itself, and of
-#: each of the ship against her model.
+#: Standard deviations of logarithms: of all coefficients of an equation together, of
+#: each by itself, and of each of the ship against her model.
 EQUATION, COEFFICIENT, ERROR = 0.2, 0.1, 0.05
 GEAR = np.log([0.25, 1.8])  # logarithms of what the rudder rate is multiplied by
-LEAST_STABILITY = -1.0  # prime determinant; the tanker, unstable on her course, has -0.1 to -0.2
+LEAST_STABILITY = (
+    -1.0
+)  # prime determinant; the tanker, unstable on her course, has -0.1 to -0.2
 TRIES = 20
-MEAN_COST = 100.0  # of an episode under wheel-over, whatever the path: rewards are scaled to it
+MEAN_COST = (
+    100.0  # of an episode under wheel-over, whatever the path: rewards are scaled to it
+)
 FIRST_SEED = 900_000
 NOTHING: dict[str, Any] = {}  # info of a row whose episode goes on
 
@@ -53,19 +58,37 @@ class Lane:
 
     def to_dict(self) -> dict[str, Any]:
         """As JSON has it."""
-        gear = [self.model.steering.rudder_limit_deg, self.model.steering.rudder_rate_deg_s]
+        gear = [
+            self.model.steering.rudder_limit_deg,
+            self.model.steering.rudder_rate_deg_s,
+        ]
         return {
-            "model": self.model.coefficients, "ship": self.ship.coefficients, "gear": gear,
-            "pilot": self.pilot.to_dict(), "told": self.told.tolist(),
-        }  # fmt: skip
+            "model": self.model.coefficients,
+            "ship": self.ship.coefficients,
+            "gear": gear,
+            "pilot": self.pilot.to_dict(),
+            "told": self.told.tolist(),
+        }
 
     @classmethod
     def from_dict(cls, content: Mapping[str, Any], base: ShipModel) -> Lane:
         """What `to_dict` gave, of a ship around a model."""
         limit, rate = content["gear"]
-        base = replace(base, steering=replace(base.steering, rudder_limit_deg=limit, rudder_rate_deg_s=rate))
-        model, ship = (replace(base, coefficients=content[name]) for name in ("model", "ship"))
-        return cls(model, ship, read_controller(content["pilot"], base.name), np.array(content["told"]))
+        base = replace(
+            base,
+            steering=replace(
+                base.steering, rudder_limit_deg=limit, rudder_rate_deg_s=rate
+            ),
+        )
+        model, ship = (
+            replace(base, coefficients=content[name]) for name in ("model", "ship")
+        )
+        return cls(
+            model,
+            ship,
+            read_controller(content["pilot"], base.name),
+            np.array(content["told"]),
+        )
 
 
 @dataclass(frozen=True)
@@ -94,7 +117,9 @@ class Fleet:
     def ruled(self, rule: Mapping[str, float]) -> Fleet:
         """The same with pilots whose settings are by a rule."""
         task = self.task
-        lanes = (replace(lane, pilot=base_for(lane.model, task, rule)) for lane in self.lanes)
+        lanes = (
+            replace(lane, pilot=base_for(lane.model, task, rule)) for lane in self.lanes
+        )
         return replace(self, lanes=tuple(lanes))
 
     def times(self, number: int) -> Fleet:
@@ -103,7 +128,12 @@ class Fleet:
 
     def engine(self) -> Engine:
         """A lane for each ship."""
-        return Engine([lane.ship for lane in self.lanes], len(self.lanes), self.task, allow_unstable=True)
+        return Engine(
+            [lane.ship for lane in self.lanes],
+            len(self.lanes),
+            self.task,
+            allow_unstable=True,
+        )
 
     def cost_of(self, policy: Any, seed: int = FIRST_SEED) -> Floats:
         """What an episode of each ship costs, by default of those that nobody learns from."""
@@ -119,12 +149,21 @@ class Fleet:
         """What `to_dict` gave."""
         base, options = load_model(content["base"]), dict(content["options"])
         options["sea"] = Weather.from_dict(options["sea"], "sea")
-        return cls(content["base"], options, tuple(Lane.from_dict(lane, base) for lane in content["lanes"]))
+        return cls(
+            content["base"],
+            options,
+            tuple(Lane.from_dict(lane, base) for lane in content["lanes"]),
+        )
 
 
-def path_like(random: np.random.Generator, speed: float, length: float) -> dict[str, Any]:
+def path_like(
+    random: np.random.Generator, speed: float, length: float
+) -> dict[str, Any]:
     """Options of a path and of its current at random; all weathers have one, be it next to none."""
-    radius, turn = float(random.uniform(2.5, 5.0)), float(random.choice([45.0, 60.0, 90.0, 120.0]))
+    radius, turn = (
+        float(random.uniform(2.5, 5.0)),
+        float(random.choice([45.0, 60.0, 90.0, 120.0])),
+    )
     least = max(8.0, 2.0 * radius * np.tan(np.radians(0.5 * turn)) + 1.0)
     corridor = float(np.exp(random.uniform(np.log(0.2), np.log(1.2))))
     share = float(random.choice([0.01, random.uniform(0.05, 0.3)]))
@@ -134,22 +173,34 @@ def path_like(random: np.random.Generator, speed: float, length: float) -> dict[
         time_constant=float(random.uniform(5, 40)) * length / speed,
     )
     return {
-        "turn_radius": radius, "max_turn_deg": turn, "leg_lengths": [least, least + 6.0],
-        "corridor": corridor, "ground": max(4.0 * corridor, 1.0), "sea": Weather(current=current),
-    }  # fmt: skip
+        "turn_radius": radius,
+        "max_turn_deg": turn,
+        "leg_lengths": [least, least + 6.0],
+        "corridor": corridor,
+        "ground": max(4.0 * corridor, 1.0),
+        "sea": Weather(current=current),
+    }
 
 
 def around(model: ShipModel, random: np.random.Generator) -> ShipModel:
     """A model with other coefficients, another steering gear and another rudder limit."""
     drawn = model.sample(1, random)[0] if model.covariance is not None else model
     drawn, table = replace(model, coefficients=drawn.coefficients), model.dynamics
-    factors = {name: float(np.exp(COEFFICIENT * random.standard_normal())) for name in varied(model)}
+    factors = {
+        name: float(np.exp(COEFFICIENT * random.standard_normal()))
+        for name in varied(model)
+    }
     for equation in table.equations if isinstance(table, Structure) else ():
         common = float(np.exp(EQUATION * random.standard_normal()))
-        factors |= {name: common * factors[name] for name in table.names(equation) if name in factors}
+        factors |= {
+            name: common * factors[name]
+            for name in table.names(equation)
+            if name in factors
+        }
     gear = replace(
         model.steering,
-        rudder_rate_deg_s=model.steering.rudder_rate_deg_s * float(np.exp(random.uniform(*GEAR))),
+        rudder_rate_deg_s=model.steering.rudder_rate_deg_s
+        * float(np.exp(random.uniform(*GEAR))),
         rudder_limit_deg=float(random.uniform(30.0, 40.0)),
     )
     return replace(scaled(drawn, factors), steering=gear)
@@ -160,13 +211,18 @@ def varied(model: ShipModel) -> list[str]:
     if model.covariance is None:
         return list(model.coefficients)
     return [
-        name for name, one in zip(model.coefficients, np.diag(model.covariance), strict=True) if one > 0.0
+        name
+        for name, one in zip(model.coefficients, np.diag(model.covariance), strict=True)
+        if one > 0.0
     ]
 
 
 def scaled(model: ShipModel, factors: Mapping[str, float]) -> ShipModel:
     """A model with some coefficients multiplied."""
-    changed = {name: value * factors.get(name, 1.0) for name, value in model.coefficients.items()}
+    changed = {
+        name: value * factors.get(name, 1.0)
+        for name, value in model.coefficients.items()
+    }
     return replace(model, coefficients=changed)
 
 
@@ -177,9 +233,13 @@ def draw_fleet(name: str, number: int, random: np.random.Generator) -> Fleet:
     task, kept = Task.of("PathFollowing-v1", **options), list[Lane]()
     for _ in range(TRIES):
         drawn = [draw_lane(base, task, random) for _ in range(number - len(kept))]
-        fleet = Fleet(name, options, (*kept, *(lane for lane in drawn if lane is not None)))
+        fleet = Fleet(
+            name, options, (*kept, *(lane for lane in drawn if lane is not None))
+        )
         seeds = np.arange(len(fleet.lanes))
-        found = rollout(Pilots(fleet.pilots), fleet.engine(), seeds, record={"reward_end"})
+        found = rollout(
+            Pilots(fleet.pilots), fleet.engine(), seeds, record={"reward_end"}
+        )
         lost = (found.infos["reward_end"][1:] * found.sailing).sum(axis=0) < 0.0
         if len(seeds) == number and not lost.any():
             return fleet
@@ -190,7 +250,9 @@ def draw_fleet(name: str, number: int, random: np.random.Generator) -> Fleet:
 def draw_lane(base: ShipModel, task: Task, random: np.random.Generator) -> Lane | None:
     """A ship and what is known of her; None where no autopilot can be designed, or she would hardly steer."""
     model = around(base, random)
-    wrong = {name: float(np.exp(ERROR * random.standard_normal())) for name in varied(base)}
+    wrong = {
+        name: float(np.exp(ERROR * random.standard_normal())) for name in varied(base)
+    }
     try:
         told = context(model, task)
         if told[CONTEXT.index("stability")] < LEAST_STABILITY:
@@ -210,7 +272,9 @@ class PerShip(np.ndarray):
         return np.asarray(numbers, dtype=np.float64).view(cls)
 
     def __getitem__(self, key: Any) -> Any:
-        return super().__getitem__((slice(None), key) if isinstance(key, int) and self.ndim == 2 else key)
+        return super().__getitem__(
+            (slice(None), key) if isinstance(key, int) and self.ndim == 2 else key
+        )
 
     def __gt__(self, other: Any) -> Any:
         return bool((np.asarray(self) > other).all())
@@ -224,7 +288,8 @@ def stacked(pilots: Sequence[Controller]) -> Any:
     first, like = pilots[0], {}
     for name in ("gains", "design"):
         columns = {
-            key: PerShip.of([getattr(one, name)[key] for one in pilots]) for key in getattr(first, name)
+            key: PerShip.of([getattr(one, name)[key] for one in pilots])
+            for key in getattr(first, name)
         }
         like[name] = columns
     for name in ("neutral_rudder", "neutral_sway", "observation_scales"):
@@ -240,7 +305,9 @@ class Pilots:
     def __init__(self, pilots: Sequence[Controller]) -> None:
         self.stacked = stacked(pilots)
 
-    def predict(self, observation: Any, state: Any = None, starts: Any = None, _: bool = True) -> Any:
+    def predict(
+        self, observation: Any, state: Any = None, starts: Any = None, _: bool = True
+    ) -> Any:
         """See `Policy.predict`."""
         action, state = self.stacked.predict(observation, state, starts)
         return np.asarray(action), state
@@ -252,7 +319,9 @@ class Fleets(VecEnv):
     def __init__(self, fleets: Sequence[Fleet]) -> None:
         self.engines = [fleet.engine() for fleet in fleets]
         self.bounds = np.cumsum([0, *(engine.num_envs for engine in self.engines)])
-        super().__init__(int(self.bounds[-1]), *spaces_of(fleets[0].task, fleets[0].lanes[0].model))
+        super().__init__(
+            int(self.bounds[-1]), *spaces_of(fleets[0].task, fleets[0].lanes[0].model)
+        )
 
     def reset(self) -> Any:
         """Begin an episode in each row, each of another age: a rollout is to show all parts of episodes."""
@@ -269,17 +338,24 @@ class Fleets(VecEnv):
     def step_wait(self) -> Any:
         """Observations, rewards, whether episodes ended, and infos of those."""
         columns, infos = [], [NOTHING] * self.num_envs
-        for engine, first, last in zip(self.engines, self.bounds, self.bounds[1:], strict=False):
+        for engine, first, last in zip(
+            self.engines, self.bounds, self.bounds[1:], strict=False
+        ):
             engine.order(self.actions[first:last])
             ended, shown = engine.advance(anew=True), engine.shown
             dones = shown.terminated | shown.truncated
             for row in np.flatnonzero(dones) if ended else ():
                 late = bool(shown.truncated[row] and not shown.terminated[row])
                 final = shown.observations[row].copy()
-                infos[first + row] = {"terminal_observation": final, "TimeLimit.truncated": late}
+                infos[first + row] = {
+                    "terminal_observation": final,
+                    "TimeLimit.truncated": late,
+                }
             if ended:
                 engine.begin_next(dones)
-            columns.append((shown.observations, shown.outcomes[0].astype(np.float32), dones))
+            columns.append(
+                (shown.observations, shown.outcomes[0].astype(np.float32), dones)
+            )
         return (*(np.concatenate(one) for one in zip(*columns, strict=True)), infos)
 
     def get_attr(self, attr_name: str, indices: Any = None) -> list[Any]:
@@ -293,7 +369,8 @@ class Fleets(VecEnv):
     def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:
         """Refused: the engines of a fleet have no attributes that a learner could change."""
         raise TypeError(
-            f"{attr_name!r}: a fleet of engines has neither attributes to set nor methods to call"
+            f"{attr_name!r}: a fleet of engines has neither attributes to set nor"
+            " methods to call"
         )
 
     env_method = set_attr
@@ -306,8 +383,14 @@ class Told(VecEnvWrapper):
     """Ships whose agent also sees numbers that stay the same; rewards are divided by each one's scale."""
 
     def __init__(self, venv: VecEnv, told: Any, scale: Any) -> None:
-        self.told, self.scale = np.asarray(told, dtype=np.float32), np.asarray(scale, dtype=np.float32)
-        space, largest = venv.observation_space, np.full(self.told.shape[1], 10.0, np.float32)
+        self.told, self.scale = (
+            np.asarray(told, dtype=np.float32),
+            np.asarray(scale, dtype=np.float32),
+        )
+        space, largest = (
+            venv.observation_space,
+            np.full(self.told.shape[1], 10.0, np.float32),
+        )
         low, high = np.append(space.low, -largest), np.append(space.high, largest)
         super().__init__(venv, observation_space=spaces.Box(low, high))
 
@@ -321,30 +404,52 @@ class Told(VecEnvWrapper):
         for row in np.flatnonzero(dones):
             last = infos[row]["terminal_observation"]
             infos[row]["terminal_observation"] = np.append(last, self.told[row])
-        return np.concatenate([observations, self.told], axis=1), rewards / self.scale, dones, infos
+        return (
+            np.concatenate([observations, self.told], axis=1),
+            rewards / self.scale,
+            dones,
+            infos,
+        )
 
 
 class Learner:
     """The policy of all ships as it is while it learns."""
 
     def __init__(self, agent: OneForAll, fleet: Fleet, action_repeat: int) -> None:
-        self.agent, self.repeat, self.pilots = agent, action_repeat, Pilots(fleet.pilots)
+        self.agent, self.repeat, self.pilots = (
+            agent,
+            action_repeat,
+            Pilots(fleet.pilots),
+        )
         self.told = agent.inputs(fleet.told)
 
-    def predict(self, observation: Any, state: Any = None, starts: Any = None, _: bool = True) -> Any:
+    def predict(
+        self, observation: Any, state: Any = None, starts: Any = None, _: bool = True
+    ) -> Any:
         """See `Policy.predict`; all episodes begin at once."""
         inner, added, number = state or (None, None, 0)
         proposed, inner = self.pilots.predict(observation, inner, starts)
         if number % self.repeat == 0:
-            inputs = np.concatenate([observation, proposed, self.told], axis=1).astype(np.float32)
-            added = self.agent.authority * np.clip(self.agent.network(inputs), -1.0, 1.0)
+            inputs = np.concatenate([observation, proposed, self.told], axis=1).astype(
+                np.float32
+            )
+            added = self.agent.authority * np.clip(
+                self.agent.network(inputs), -1.0, 1.0
+            )
         return np.clip(proposed + added, -1.0, 1.0), (inner, added, number + 1)
 
 
-def learning_ships(fleets: Sequence[Fleet], like: OneForAll, action_repeat: int) -> VecEnv:
+def learning_ships(
+    fleets: Sequence[Fleet], like: OneForAll, action_repeat: int
+) -> VecEnv:
     """All fleets, each ship with her own pilot and told her own context."""
     pilots = Pilots([pilot for fleet in fleets for pilot in fleet.pilots])
-    ships = ResidualVecEnv(Fleets(fleets), pilots, authority=like.authority, action_repeat=action_repeat)
-    costs = [np.full(len(fleet.lanes), fleet.cost_of(Pilots(fleet.pilots)).mean()) for fleet in fleets]
+    ships = ResidualVecEnv(
+        Fleets(fleets), pilots, authority=like.authority, action_repeat=action_repeat
+    )
+    costs = [
+        np.full(len(fleet.lanes), fleet.cost_of(Pilots(fleet.pilots)).mean())
+        for fleet in fleets
+    ]
     told = np.concatenate([fleet.told for fleet in fleets])
     return Told(ships, like.inputs(told), np.concatenate(costs) / MEAN_COST)

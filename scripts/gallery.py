@@ -1,7 +1,8 @@
 """Draw the pictures of the gallery and write its page.
 
-`python scripts/gallery.py` draws all, `python scripts/gallery.py turning_circle zigzag` some, into
-`docs/images/gallery`, and writes `docs/gallery.md` with the lines of each function below.
+`python scripts/gallery.py` draws all, `python scripts/gallery.py turning_circle zigzag`
+some, into `docs/images/gallery`, and writes `docs/gallery.md` with the lines of each
+function below.
 """
 
 from __future__ import annotations
@@ -33,9 +34,14 @@ DOCS = Path(__file__).parents[1] / "docs"
 IMAGES = DOCS / "images" / "gallery"
 SIZE, DPI = (6.4, 3.4), 110  # inches, dots an inch
 STYLE = {
-    "axes.spines.top": False, "axes.spines.right": False, "axes.grid": True, "grid.alpha": 0.25,
-    "font.size": 9, "legend.frameon": False, "lines.linewidth": 1.4,
-}  # fmt: skip
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "grid.alpha": 0.25,
+    "font.size": 9,
+    "legend.frameon": False,
+    "lines.linewidth": 1.4,
+}
 INTRODUCTION = """\
 # Gallery
 
@@ -62,13 +68,23 @@ def topic(name: str) -> Callable[[Callable[[], Any]], Callable[[], Any]]:
 def measured_and_identified() -> None:
     """A zigzag that took no part in the fit, measured and predicted from the measured rudder."""
     ship = shipgym.ShipFile.load(shipgym.example_ship())
-    result = identify(ship.trials(), particulars=ship.particulars, steering=ship.steering)
+    result = identify(
+        ship.trials(), particulars=ship.particulars, steering=ship.steering
+    )
     trial = next(one for one in ship.trials() if one.use == "validate")
     prediction = predict(result.model, trial)
     plt.plot(trial.t, np.degrees(trial["delta"]), color="0.7", label="rudder, measured")
-    plt.plot(trial.t, np.degrees(trial["psi"] - trial["psi"][0]), "k", label="heading, measured")
     plt.plot(
-        prediction.t, np.degrees(prediction["psi"] - trial["psi"][0]), "C3--", label="heading, predicted"
+        trial.t,
+        np.degrees(trial["psi"] - trial["psi"][0]),
+        "k",
+        label="heading, measured",
+    )
+    plt.plot(
+        prediction.t,
+        np.degrees(prediction["psi"] - trial["psi"][0]),
+        "C3--",
+        label="heading, predicted",
     )
     plt.xlabel("t, s"), plt.ylabel("deg"), plt.ylim(-30, 40), plt.legend(ncols=3)
 
@@ -79,13 +95,25 @@ def uncertainty_band() -> None:
     model = shipgym.load_model("kvlcc2-tanker-rm-svm")
     runs = [zigzag(one, 20, 20, duration=900) for one in model.sample(60, seed=0)]
     headings = np.degrees([run["psi"] for run in runs])
-    best, truth = (zigzag(one, 20, 20, duration=900) for one in (model, shipgym.truth_of(model)))
+    best, truth = (
+        zigzag(one, 20, 20, duration=900) for one in (model, shipgym.truth_of(model))
+    )
     plt.fill_between(
-        best.t, *np.percentile(headings, [2.5, 97.5], axis=0), alpha=0.3, label="95 % of the models"
+        best.t,
+        *np.percentile(headings, [2.5, 97.5], axis=0),
+        alpha=0.3,
+        label="95 % of the models",
     )
     plt.plot(best.t, np.degrees(best["psi"]), label="identified")
-    plt.plot(truth.t, np.degrees(truth["psi"]), "k--", label="the ship behind the trials")
-    plt.xlabel("t, s"), plt.ylabel("heading, deg"), plt.ylim(-40, 55), plt.legend(ncols=3)
+    plt.plot(
+        truth.t, np.degrees(truth["psi"]), "k--", label="the ship behind the trials"
+    )
+    (
+        plt.xlabel("t, s"),
+        plt.ylabel("heading, deg"),
+        plt.ylim(-40, 55),
+        plt.legend(ncols=3),
+    )
 
 
 @topic("Trials and models")
@@ -115,7 +143,10 @@ def overshoot() -> None:
     indices = manoeuvres.zigzag_indices(trial)
     plt.plot(trial.t, np.degrees(trial["delta"]), color="0.6", label="rudder")
     plt.plot(trial.t, np.degrees(trial["psi"]), label="heading")
-    plt.title(f"overshoots {indices.overshoot_1_deg:.1f} and {indices.overshoot_2_deg:.1f} deg")
+    plt.title(
+        f"overshoots {indices.overshoot_1_deg:.1f} and"
+        f" {indices.overshoot_2_deg:.1f} deg"
+    )
     plt.xlabel("t, s"), plt.ylabel("deg"), plt.ylim(-30, 40), plt.legend(ncols=2)
 
 
@@ -141,7 +172,10 @@ def shallow_water() -> None:
 def drifting_circle() -> None:
     """A turning circle in a current of one knot setting east, and in calm water."""
     mariner = shipgym.load_model("mariner")
-    for label, sea in {"calm": None, "current": Weather(current=Current(0.514, towards_deg=90))}.items():
+    for label, sea in {
+        "calm": None,
+        "current": Weather(current=Current(0.514, towards_deg=90)),
+    }.items():
         trial = manoeuvres.turning_circle(mariner, 20, duration=1500, weather=sea)
         plt.plot(trial["y"], trial["x"], label=label)
     plt.axis("equal"), plt.xlabel("east, m"), plt.ylabel("north, m"), plt.legend()
@@ -152,7 +186,9 @@ def course_in_waves() -> None:
     """An LQ autopilot keeps a course in calm water and in two seas."""
     mariner = shipgym.load_model("mariner")
     for sea in ("calm", "moderate", "rough"):
-        env = gym.make("shipgym/CourseKeeping-v0", model=mariner, sea=sea, course_change_deg=0)
+        env = gym.make(
+            "shipgym/CourseKeeping-v0", model=mariner, sea=sea, course_change_deg=0
+        )
         pilot, headings = LQ.from_model(mariner), []
         observation, _ = env.reset(seed=4)
         for _ in range(200):
@@ -168,7 +204,11 @@ def wave_spectra() -> None:
     frequency = np.linspace(0.3, 1.8, 200)
     for peak in (1.0, 3.3, 7.0):
         waves = Waves(2.5, 9.0, peak_enhancement=peak)
-        plt.plot(frequency, shipgym.sea.wave_spectrum(waves, frequency), label=f"peak enhancement {peak:g}")
+        plt.plot(
+            frequency,
+            shipgym.sea.wave_spectrum(waves, frequency),
+            label=f"peak enhancement {peak:g}",
+        )
     plt.xlabel("frequency, rad/s"), plt.ylabel("m² s"), plt.legend()
 
 
@@ -188,7 +228,9 @@ def around_the_corners() -> None:
     """A path with sharp turns: line of sight, and wheel-over, which begins turns in good time."""
     kvlcc2 = shipgym.load_model("kvlcc2")
     waypoints = [[0, 0], [3500, 0], [5500, 3000], [2500, 5500], [2500, 9000]]
-    env = gym.make("shipgym/PathFollowing-v0", model=kvlcc2, waypoints=waypoints).unwrapped
+    env = gym.make(
+        "shipgym/PathFollowing-v0", model=kvlcc2, waypoints=waypoints
+    ).unwrapped
     plt.plot(*np.transpose(waypoints)[::-1], "o--", color="0.6", label="path")
     for design in (LineOfSight, WheelOver):
         pilot, memory, track, over = design.from_model(kvlcc2), None, [], False
@@ -206,7 +248,10 @@ def around_the_corners() -> None:
 def frame() -> None:
     """A frame of path following, version 1: the path with its arcs, the corridor, the ship and her track."""
     env = gym.make("shipgym/PathFollowing-v1", sea="moderate", render_mode="rgb_array")
-    pilot, memory = WheelOver.from_model(env.unwrapped.model, task=env.unwrapped.task), None
+    pilot, memory = (
+        WheelOver.from_model(env.unwrapped.model, task=env.unwrapped.task),
+        None,
+    )
     observation, _ = env.reset(seed=3)
     for _ in range(420):
         action, memory = pilot.predict(observation, memory)
@@ -217,7 +262,9 @@ def frame() -> None:
 @topic("Environments")
 def many_ships() -> None:
     """512 ships in one vector environment, in three seas, each on a course of her own."""
-    envs = gym.make_vec("shipgym/CourseKeeping-v0", num_envs=512, sea=["calm", "moderate", "rough"])
+    envs = gym.make_vec(
+        "shipgym/CourseKeeping-v0", num_envs=512, sea=["calm", "moderate", "rough"]
+    )
     pilot = LQ.from_model(shipgym.load_model("mariner-tls-svm"))
     observations, _ = envs.reset(seed=0)
     tracks = []
@@ -233,12 +280,25 @@ def learning_curve() -> None:
     """PPO learns to keep a course: cost of an episode during training, and that of LQ."""
     with tempfile.TemporaryDirectory() as folder:
         plan = make_plan(
-            Given("ppo", environment="course-keeping", settings={"total_steps": 200_000, "base": "none"})
+            Given(
+                "ppo",
+                environment="course-keeping",
+                settings={"total_steps": 200_000, "base": "none"},
+            )
         )
         found = train(plan, f"{folder}/run")
-    plt.plot(*np.transpose([(row["steps"], row["cost"]) for row in found.curve]), ".-", label="PPO")
+    plt.plot(
+        *np.transpose([(row["steps"], row["cost"]) for row in found.curve]),
+        ".-",
+        label="PPO",
+    )
     plt.axhline(found.lq_cost, color="0.5", ls="--", label="LQ")
-    plt.xlabel("steps"), plt.ylabel("cost of an episode"), plt.yscale("log"), plt.legend()
+    (
+        plt.xlabel("steps"),
+        plt.ylabel("cost of an episode"),
+        plt.yscale("log"),
+        plt.legend(),
+    )
 
 
 def home() -> None:
@@ -246,15 +306,24 @@ def home() -> None:
     _, panels = plt.subplots(1, 3, figsize=(12.0, 2.7), dpi=100, layout="constrained")
     plt.sca(panels[0])
     for trial in shipgym.ShipFile.load(shipgym.example_ship()).trials():
-        plt.plot(trial.t, np.degrees(trial["psi"] - trial["psi"][0]), label=trial.name.removesuffix(".csv"))
+        plt.plot(
+            trial.t,
+            np.degrees(trial["psi"] - trial["psi"][0]),
+            label=trial.name.removesuffix(".csv"),
+        )
     plt.xlabel("t, s"), plt.ylabel("heading, deg"), plt.xlim(0, 500), plt.ylim(-45, 60)
     plt.sca(panels[1]), uncertainty_band()
     plt.sca(panels[2]), around_the_corners()
     titles = ("1  recorded trials", "2  a model, with its uncertainty", "3  autopilots")
     for panel, title in zip(panels, titles, strict=True):
         panel.set_title(title, loc="left", fontweight="bold")
-        columns, spacing = 1 if panel is panels[2] else 3, {"columnspacing": 0.6, "handlelength": 1.2}
-        panel.legend(fontsize=7, ncols=columns, **spacing, handletextpad=0.4, loc="upper right")
+        columns, spacing = (
+            1 if panel is panels[2] else 3,
+            {"columnspacing": 0.6, "handlelength": 1.2},
+        )
+        panel.legend(
+            fontsize=7, ncols=columns, **spacing, handletextpad=0.4, loc="upper right"
+        )
 
 
 def main(names: list[str]) -> None:
@@ -287,7 +356,9 @@ def page() -> str:
             code = textwrap.dedent(source.replace("\n\n\n", "\n")).strip()
             file = f"{draw.__name__}.webp"
             width, height = Image.open(IMAGES / file).size
-            picture = f"![{title}](images/gallery/{file}){{ width={width} height={height} }}"
+            picture = (
+                f"![{title}](images/gallery/{file}){{ width={width} height={height} }}"
+            )
             lines += [f"**{title}**", picture, f"```python\n{code}\n```"]
     return "\n\n".join(lines) + "\n"
 

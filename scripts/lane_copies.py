@@ -16,8 +16,8 @@ from shipgym.errors import InputError
 def copy_lanes(engine: Engine, source: Engine, lanes: ArrayLike) -> None:
     """Make each lane of an engine the copy of one of another: same ship, same episode, same future.
 
-    Gusts, noise and what will be asked are functions of the episode's seed and of the step, so copies that
-    are steered alike go on bit for bit like the original.
+    Gusts, noise and what will be asked are functions of the episode's seed and of the
+    step, so copies that are steered alike go on bit for bit like the original.
 
     Parameters
     ----------
@@ -29,24 +29,32 @@ def copy_lanes(engine: Engine, source: Engine, lanes: ArrayLike) -> None:
     Raises
     ------
     InputError
-        If the engines differ in more than the number of lanes, or there is no such lane.
+        If the engines differ in more than the number of lanes, or there is no such
+        lane.
     """
     which = np.asarray(lanes)
     if which.shape != (engine.num_envs,) or which.dtype.kind not in "iu":
         raise InputError(
-            f"lanes: {which.dtype} of shape {which.shape} found, expected {engine.num_envs} whole numbers"
+            f"lanes: {which.dtype} of shape {which.shape} found, expected"
+            f" {engine.num_envs} whole numbers"
         )
     if which.min() < 0 or which.max() >= source.num_envs:
-        raise InputError(f"lanes: {which.min()} to {which.max()} found, expected 0 to {source.num_envs - 1}")
+        raise InputError(
+            f"lanes: {which.min()} to {which.max()} found, expected 0 to"
+            f" {source.num_envs - 1}"
+        )
     _check_alike(engine, source)
     there, here = divmod(which, LANES), divmod(np.arange(engine.num_envs), LANES)
     pairs: list[tuple[NDArray[Any], NDArray[Any]]] = [
-        (engine._states, source._states), (engine._keys, source._keys),
-    ]  # fmt: skip
+        (engine._states, source._states),
+        (engine._keys, source._keys),
+    ]
     if not engine._voyages.shared:
         pairs.append((engine._ships, source._ships))
     for own, other in pairs:
-        lanes_of(own)[here[0], :, here[1]] = lanes_of(other)[there[0] % len(other), :, there[1]]
+        lanes_of(own)[here[0], :, here[1]] = lanes_of(other)[
+            there[0] % len(other), :, there[1]
+        ]
     engine.shown.observations[:] = source.shown.observations[which]
     engine.shown.outcomes[:] = source.shown.outcomes[:, which]
     engine.shown.flags[:] = source.shown.flags[:, which]
@@ -60,6 +68,12 @@ def _check_alike(engine: Engine, source: Engine) -> None:
         and np.array_equal(engine._settings, source._settings, equal_nan=True)
     )
     if not same_task:
-        raise InputError("source: an engine of another task found, expected one of the same")
-    if engine._voyages.shared and not np.array_equal(source._ships, engine._ships, equal_nan=True):
-        raise InputError("source: an engine with other ships found, expected one with the same")
+        raise InputError(
+            "source: an engine of another task found, expected one of the same"
+        )
+    if engine._voyages.shared and not np.array_equal(
+        source._ships, engine._ships, equal_nan=True
+    ):
+        raise InputError(
+            "source: an engine with other ships found, expected one with the same"
+        )

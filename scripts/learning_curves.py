@@ -1,9 +1,11 @@
 """Learning curves of PPO from scratch by the shipped settings, with seeds, against classical autopilots.
 
-    python scripts/learning_curves.py          about a minute of processor for each of six runs, the picture
-    python scripts/learning_curves.py --draw   the picture alone, from build/learning_curves.json
+    python scripts/learning_curves.py          about a minute of processor for each of
+    six runs, the picture python scripts/learning_curves.py --draw   the picture alone,
+    from build/learning_curves.json
 
-The picture is docs/images/learning_curves.png. Costs are means of a hundred episodes held out.
+The picture is docs/images/learning_curves.png. Costs are means of a hundred episodes
+held out.
 """
 
 from __future__ import annotations
@@ -19,26 +21,44 @@ from agents.training.training import HeldOut, train
 from shipgym.files import make_folder, read_json, write_json
 
 ROOT = Path(__file__).parents[1]
-FOUND, PICTURE = ROOT / "build" / "learning_curves.json", ROOT / "docs" / "images" / "learning_curves.png"
+FOUND, PICTURE = (
+    ROOT / "build" / "learning_curves.json",
+    ROOT / "docs" / "images" / "learning_curves.png",
+)
 SEEDS = (0, 1, 2)
 #: Classical autopilots by id.
-CLASSICAL = {"shipgym/CourseKeeping-v0": ("lq",), "shipgym/PathFollowing-v1": ("ilos", "wheel-over")}
+CLASSICAL = {
+    "shipgym/CourseKeeping-v0": ("lq",),
+    "shipgym/PathFollowing-v1": ("ilos", "wheel-over"),
+}
 SETTINGS = {"base": "none", "total_steps": 1_000_000, "evaluate_every": 32_768}
 
 
 def curves() -> dict[str, Any]:
     """Of each id, costs of the classical autopilots and evaluations of the runs."""
-    found: dict[str, Any] = dict(read_json(FOUND, "results", "remove it")) if FOUND.exists() else {}
+    found: dict[str, Any] = (
+        dict(read_json(FOUND, "results", "remove it")) if FOUND.exists() else {}
+    )
     for env_id, classical in CLASSICAL.items():
         task = make_plan(Given("ppo", environment=env_id)).task
         held_out = HeldOut(task, EVALUATION_SEED, N_EVALUATIONS)
         lines = {name: held_out.cost(design(name, task)) for name in classical}
-        runs = found.setdefault(env_id, {"model": task.model, "classical": lines, "runs": []})["runs"]
+        runs = found.setdefault(
+            env_id, {"model": task.model, "classical": lines, "runs": []}
+        )["runs"]
         for seed in SEEDS[len(runs) :]:
             before = time.process_time()
-            result = train(make_plan(Given("ppo", environment=env_id, settings=SETTINGS, seed=seed)))
+            result = train(
+                make_plan(
+                    Given("ppo", environment=env_id, settings=SETTINGS, seed=seed)
+                )
+            )
             seconds = time.process_time() - before
-            run = {"seed": seed, "processor_s": round(seconds, 1), "best_cost": result.best_cost}
+            run = {
+                "seed": seed,
+                "processor_s": round(seconds, 1),
+                "best_cost": result.best_cost,
+            }
             print(f"{env_id}: {lines}, {run}", flush=True)
             points = [[row["steps"], row["cost"]] for row in result.curve]
             runs.append(run | {"curve": points})
@@ -58,8 +78,15 @@ def draw(found: dict[str, Any]) -> None:
     for axis, (env_id, about) in zip(axes, found.items(), strict=True):
         for run in about["runs"]:
             steps, costs = zip(*run["curve"], strict=True)
-            axis.plot([step / 1e3 for step in steps], costs, lw=1.1, label=f"PPO, seed {run['seed']}")
-        for style, (name, cost) in zip(("-", "--"), about["classical"].items(), strict=False):
+            axis.plot(
+                [step / 1e3 for step in steps],
+                costs,
+                lw=1.1,
+                label=f"PPO, seed {run['seed']}",
+            )
+        for style, (name, cost) in zip(
+            ("-", "--"), about["classical"].items(), strict=False
+        ):
             axis.axhline(cost, color="black", lw=1.0, ls=style, label=name)
         axis.set_title(f"{env_id}, {about['model']}", fontsize=9)
         axis.set(xlabel="decisions, thousands", yscale="log")
@@ -70,4 +97,8 @@ def draw(found: dict[str, Any]) -> None:
 
 
 if __name__ == "__main__":
-    draw(dict(read_json(FOUND, "results", "run it without --draw")) if "--draw" in sys.argv else curves())
+    draw(
+        dict(read_json(FOUND, "results", "run it without --draw"))
+        if "--draw" in sys.argv
+        else curves()
+    )

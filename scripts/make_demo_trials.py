@@ -1,8 +1,9 @@
 """Write the demo's recorded manoeuvres: the Mariner class ship with the sensors of a sea trial.
 
-The reference ship is steered through zigzags and a turning circle by a helmsman who reads the noisy
-compass, and what the ship's sensors would have logged is written as CSV files in everyday units, with
-the ship file that reads them. The same seed always gives the same files.
+The reference ship is steered through zigzags and a turning circle by a helmsman who
+reads the noisy compass, and what the ship's sensors would have logged is written as CSV
+files in everyday units, with the ship file that reads them. The same seed always gives
+the same files.
 
     python scripts/make_demo_trials.py [folder]
 """
@@ -23,7 +24,11 @@ from shipgym import ShipModel, example_ship, load_model
 Floats = NDArray[np.float64]
 
 FOLDER = Path(__file__).parents[1] / "examples" / "mariner"
-PACKAGED = ("zigzag_20_20.csv", "zigzag_35_30_port.csv", "zigzag_15_15.csv")  # what the wheel holds
+PACKAGED = (
+    "zigzag_20_20.csv",
+    "zigzag_35_30_port.csv",
+    "zigzag_15_15.csv",
+)  # what the wheel holds
 SEED = 1965
 STEP = 0.1  # simulation, s
 SAMPLING = 0.5  # the logger, s
@@ -162,7 +167,14 @@ def write(folder: Path, files: Collection[str] | None = None) -> None:
             continue
         rng = np.random.default_rng([SEED, number])
         logged = log(sail(model, order, rng), rng)
-        np.savetxt(folder / order.file, logged, FORMATS, delimiter=",", header=HEADER, comments="")
+        np.savetxt(
+            folder / order.file,
+            logged,
+            FORMATS,
+            delimiter=",",
+            header=HEADER,
+            comments="",
+        )
         kind = "turning-circle" if order.heading_deg is None else "zigzag"
         text += TRIAL_ENTRY.format(file=order.file, kind=kind, use=order.use)
         print(f"{folder / order.file}: {len(logged)} samples")
@@ -170,7 +182,9 @@ def write(folder: Path, files: Collection[str] | None = None) -> None:
 
 
 def main(
-    folder: Annotated[Path | None, typer.Argument(help="By default those of the project.")] = None,
+    folder: Annotated[
+        Path | None, typer.Argument(help="By default those of the project.")
+    ] = None,
 ) -> None:
     """Write the ship file and its trials."""
     if folder is not None:

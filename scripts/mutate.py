@@ -1,18 +1,21 @@
 """Put small faults into modules, one at a time, and see whether the tests beside the module notice.
 
-`make mutate MODULES="shipgym/sea identification/estimators/l_curve.py"` draws 40 faults of these
-modules, by default of all. `tests/beside.toml` says which tests stand beside a module.
+`make mutate MODULES="shipgym/sea identification/estimators/l_curve.py"` draws 40 faults
+of these modules, by default of all. `tests/beside.toml` says which tests stand beside a
+module.
 
-The faults: a sign or factor turned over, a constant 10 % larger, a condition or comparison turned round, a
-statement dropped, a value not returned. Where they fit, they are cosmic-ray's. Its own loop changes the files
-in place and runs the same tests for all modules; here a copy of the tree is changed, and each module has its
-tests. (mutmut puts a dispatcher around every function, which Numba does not compile.)
+The faults: a sign or factor turned over, a constant 10 % larger, a condition or
+comparison turned round, a statement dropped, a value not returned. Where they fit, they
+are cosmic-ray's. Its own loop changes the files in place and runs the same tests for
+all modules; here a copy of the tree is changed, and each module has its tests. (mutmut
+puts a dispatcher around every function, which Numba does not compile.)
 
-The tests that reach the line with the fault run first, quick ones before slow ones, in a process that has the
-libraries loaded (`covered_tests.py`); what they do not notice, all tests beside the module are asked for.
+The tests that reach the line with the fault run first, quick ones before slow ones, in
+a process that has the libraries loaded (`covered_tests.py`); what they do not notice,
+all tests beside the module are asked for.
 
-A fault that makes tests run into the time limit counts as noticed. Annotations, imports, docstrings and what
-stands under TYPE_CHECKING have no faults.
+A fault that makes tests run into the time limit counts as noticed. Annotations,
+imports, docstrings and what stands under TYPE_CHECKING have no faults.
 """
 
 from __future__ import annotations
@@ -79,7 +82,11 @@ class LargerConstant(OwnOperator):
     def mutate(self, node, index):
         """Return the larger number."""
         value = ast.literal_eval(node.value)
-        larger = value + max(1, value // 10) if isinstance(value, int) else 1.1 * value or 0.1
+        larger = (
+            value + max(1, value // 10)
+            if isinstance(value, int)
+            else 1.1 * value or 0.1
+        )
         return parso.python.tree.Number(repr(larger), node.start_pos, node.prefix)
 
 
@@ -98,7 +105,9 @@ class DroppedStatement(OwnOperator):
     def mutate(self, node, index):
         """Return `pass` with the end of the line."""
         prefix = node.get_first_leaf().prefix
-        return parso.python.tree.Name(f"pass{node.get_last_leaf().value}", node.start_pos, prefix)
+        return parso.python.tree.Name(
+            f"pass{node.get_last_leaf().value}", node.start_pos, prefix
+        )
 
 
 class LostReturn(OwnOperator):
@@ -111,7 +120,9 @@ class LostReturn(OwnOperator):
 
     def mutate(self, node, index):
         """Return the statement without its value."""
-        node.children[1] = parso.python.tree.Name("None", node.children[1].start_pos, " ")
+        node.children[1] = parso.python.tree.Name(
+            "None", node.children[1].start_pos, " "
+        )
         return node
 
 
@@ -123,7 +134,11 @@ def _named(module, prefix: str, pairs: str) -> list[Operator]:
 COMPARED = "Lt_GtE LtE_Gt Gt_LtE GtE_Lt Eq_NotEq NotEq_Eq Is_IsNot IsNot_Is"
 KINDS: dict[str, list[Operator]] = {
     "sign": [
-        *_named(binary_operator_replacement, "ReplaceBinaryOperator", "Add_Sub Sub_Add Mul_Div Div_Mul"),
+        *_named(
+            binary_operator_replacement,
+            "ReplaceBinaryOperator",
+            "Add_Sub Sub_Add Mul_Div Div_Mul",
+        ),
         *_named(unary_operator_replacement, "ReplaceUnaryOperator", "Delete_USub"),
     ],
     "constant": [LargerConstant()],
@@ -133,7 +148,9 @@ KINDS: dict[str, list[Operator]] = {
         boolean_replacer.ReplaceOrWithAnd(),
         *_named(unary_operator_replacement, "ReplaceUnaryOperator", "Delete_Not"),
     ],
-    "comparison": _named(comparison_operator_replacement, "ReplaceComparisonOperator", COMPARED),
+    "comparison": _named(
+        comparison_operator_replacement, "ReplaceComparisonOperator", COMPARED
+    ),
     "dropped": [DroppedStatement()],
     "return": [LostReturn()],
 }
@@ -164,11 +181,15 @@ def without_faults(source: str) -> list[tuple[tuple[int, int], tuple[int, int]]]
             nodes.append(node.returns)
         elif isinstance(node, ast.If) and "TYPE_CHECKING" in ast.unparse(node.test):
             nodes.append(node)
-    return [((n.lineno, n.col_offset), (n.end_lineno, n.end_col_offset)) for n in nodes if n]
+    return [
+        ((n.lineno, n.col_offset), (n.end_lineno, n.end_col_offset)) for n in nodes if n
+    ]
 
 
 @cache
-def parsed(module: str) -> tuple[list[tuple[tuple[int, int], tuple[int, int]]], list[parso.tree.NodeOrLeaf]]:
+def parsed(
+    module: str,
+) -> tuple[list[tuple[tuple[int, int], tuple[int, int]]], list[parso.tree.NodeOrLeaf]]:
     """Return the stretches `without_faults`, and the nodes in the order in which cosmic-ray counts them."""
     source = (ROOT / module).read_text("utf-8")
     return without_faults(source), list(ast_nodes(get_ast(source)))
@@ -180,11 +201,20 @@ def faults(module: str, kind: str) -> list[Fault]:
     passed, nodes = parsed(module)
     found = []
     for number, operator in enumerate(KINDS[kind]):
-        places = [(place, node) for node in nodes for place in operator.mutation_positions(node)]
+        places = [
+            (place, node)
+            for node in nodes
+            for place in operator.mutation_positions(node)
+        ]
         for occurrence, ((start, _), node) in enumerate(places):
             # * and ** before arguments are no products
-            signature = node.type == "operator" and node.parent.type not in ("arith_expr", "term")
-            if not signature and not any(first <= start <= last for first, last in passed):
+            signature = node.type == "operator" and node.parent.type not in (
+                "arith_expr",
+                "term",
+            )
+            if not signature and not any(
+                first <= start <= last for first, last in passed
+            ):
                 found.append(Fault(module, start[0], kind, number, occurrence))
     return found
 
@@ -192,7 +222,9 @@ def faults(module: str, kind: str) -> list[Fault]:
 def drawn(modules: list[str], count: int, seed: int) -> Iterator[Fault]:
     """Draw faults: modules by their length, then kinds alike, then places alike, none twice."""
     random_ = random.Random(seed)
-    lengths = [len((ROOT / module).read_text("utf-8").splitlines()) for module in modules]
+    lengths = [
+        len((ROOT / module).read_text("utf-8").splitlines()) for module in modules
+    ]
     seen: set[Fault] = set()
     for _ in range(100 * count):
         module = random_.choices(modules, lengths)[0]
@@ -208,7 +240,10 @@ def beside(module: str) -> list[str]:
     """Return the files of the tests that stand beside a module."""
     table = tomllib.loads((ROOT / "tests" / "beside.toml").read_text("utf-8"))
     package, _, rest = module.removesuffix(".py").partition("/")
-    names = next((v for k, v in table[package].items() if fnmatch.fnmatch(rest, k)), Path(rest).name)
+    names = next(
+        (v for k, v in table[package].items() if fnmatch.fnmatch(rest, k)),
+        Path(rest).name,
+    )
     paths = (name if "/" in name else f"{package}/{name}" for name in names.split())
     return ["tests/{}/test_{}.py".format(*path.split("/")) for path in paths]
 
@@ -228,9 +263,9 @@ def statement(source: str, line: int) -> range:
 def copied(folder: Path) -> Path:
     """Copy the tree as it is, without what git ignores."""
     listed = ["git", "ls-files", "--cached", "--others", "--exclude-standard"]
-    for name in subprocess.run(listed, cwd=ROOT, capture_output=True, text=True, check=True).stdout.split(
-        "\n"
-    ):
+    for name in subprocess.run(
+        listed, cwd=ROOT, capture_output=True, text=True, check=True
+    ).stdout.split("\n"):
         if (ROOT / name).is_file():
             (folder / name).parent.mkdir(parents=True, exist_ok=True)
             shutil.copy2(ROOT / name, folder / name)
@@ -243,7 +278,9 @@ def written_at(path: Path, source: str, when: int) -> None:
     os.utime(path, (when, when))
 
 
-def tried(fault: Fault, folders: SimpleQueue[Path], maps: Maps, limit_s: float) -> dict[str, object]:
+def tried(
+    fault: Fault, folders: SimpleQueue[Path], maps: Maps, limit_s: float
+) -> dict[str, object]:
     """Put one fault into a copy of the tree, run the tests beside it, and take it out again."""
     folder = folders.get()
     path = folder / fault.module
@@ -251,7 +288,9 @@ def tried(fault: Fault, folders: SimpleQueue[Path], maps: Maps, limit_s: float) 
     changed, written = fault.applied(source), int(path.stat().st_mtime)
     try:
         lines = statement(source, fault.line)
-        result = noticed(maps, folder, beside(fault.module), fault.module, lines, limit_s)
+        result = noticed(
+            maps, folder, beside(fault.module), fault.module, lines, limit_s
+        )
         begun = time.monotonic()
         written_at(path, changed, written + next(LATER))
         found = result()
@@ -262,14 +301,22 @@ def tried(fault: Fault, folders: SimpleQueue[Path], maps: Maps, limit_s: float) 
     before, after = next(((a.strip(), b.strip()) for a, b in pairs if a != b), ("", ""))
     seconds = round(time.monotonic() - begun, 1)
     return asdict(fault) | {
-        "result": found.outcome, "before": before, "after": after, "test": found.report, "seconds": seconds
-    }  # fmt: skip
+        "result": found.outcome,
+        "before": before,
+        "after": after,
+        "test": found.report,
+        "seconds": seconds,
+    }
 
 
 def chosen(names: list[str]) -> list[str]:
     """Return the modules of files and folders."""
     paths = [
-        p for name in names for p in ([ROOT / name] if name.endswith(".py") else (ROOT / name).rglob("*.py"))
+        p
+        for name in names
+        for p in (
+            [ROOT / name] if name.endswith(".py") else (ROOT / name).rglob("*.py")
+        )
     ]
     return sorted({str(p.relative_to(ROOT)) for p in paths})
 
@@ -277,21 +324,40 @@ def chosen(names: list[str]) -> list[str]:
 def main() -> None:
     """Draw faults, try them, and print those that nobody noticed."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("modules", nargs="*", default=PACKAGES, help="files and folders; by default all")
-    parser.add_argument("--count", type=int, default=40, help="how many faults are drawn")
-    parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1)
-    parser.add_argument("--limit", type=float, default=1800.0, help="seconds for the tests of one fault")
-    parser.add_argument("--maps", type=Path, default=ROOT / "build" / "mutate", help="where maps are kept")
     parser.add_argument(
-        "--log", type=Path, help="JSON lines, a fault each; those in it already are not tried again"
+        "modules", nargs="*", default=PACKAGES, help="files and folders; by default all"
     )
     parser.add_argument(
-        "--trust", action="store_true", help="make no maps: do not run the tests without a fault first"
+        "--count", type=int, default=40, help="how many faults are drawn"
+    )
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1)
+    parser.add_argument(
+        "--limit", type=float, default=1800.0, help="seconds for the tests of one fault"
+    )
+    parser.add_argument(
+        "--maps",
+        type=Path,
+        default=ROOT / "build" / "mutate",
+        help="where maps are kept",
+    )
+    parser.add_argument(
+        "--log",
+        type=Path,
+        help="JSON lines, a fault each; those in it already are not tried again",
+    )
+    parser.add_argument(
+        "--trust",
+        action="store_true",
+        help="make no maps: do not run the tests without a fault first",
     )
     asked = parser.parse_args()
     multiprocessing.get_context("forkserver").set_forkserver_preload(PRELOADED)
-    log = asked.log.read_text("utf-8").splitlines() if asked.log and asked.log.exists() else []
+    log = (
+        asked.log.read_text("utf-8").splitlines()
+        if asked.log and asked.log.exists()
+        else []
+    )
     results = [json.loads(line) for line in log]
     done = {tuple(result[name] for name in Fault.__annotations__) for result in results}
     wanted = [
@@ -305,7 +371,10 @@ def main() -> None:
             folders.put(copied(Path(temporary) / str(job)))
         maps = Maps(asked.maps.resolve(), not asked.trust)
         with ThreadPoolExecutor(asked.jobs) as pool:
-            tasks = [pool.submit(tried, fault, folders, maps, asked.limit) for fault in wanted]
+            tasks = [
+                pool.submit(tried, fault, folders, maps, asked.limit)
+                for fault in wanted
+            ]
             for task in as_completed(tasks):
                 result = task.result()
                 results.append(result)
@@ -313,7 +382,12 @@ def main() -> None:
                     with asked.log.open("a", encoding="utf-8") as stream:
                         stream.write(json.dumps(result) + "\n")
                 if result["result"] == MISSED:
-                    print("{module}:{line} {kind}: {before}  ->  {after}".format(**result), flush=True)
+                    print(
+                        "{module}:{line} {kind}: {before}  ->  {after}".format(
+                            **result
+                        ),
+                        flush=True,
+                    )
     count = sum(result["result"] != MISSED for result in results)
     low, high = binomtest(count, len(results)).proportion_ci(method="wilson")
     share = f"{count / len(results):.0%} (95 %: {low:.0%} to {high:.0%})"

@@ -1,8 +1,8 @@
 """The engine's own functions run on NumPy arrays: what a batch of ships costs without compiling.
 
-The functions are rewritten mechanically: choices become `numpy.where`, least and largest become their NumPy
-functions, and sine, cosine, exponential and arc tangent are NumPy's own, which are faster on arrays than
-our polynomials.
+The functions are rewritten mechanically: choices become `numpy.where`, least and
+largest become their NumPy functions, and sine, cosine, exponential and arc tangent are
+NumPy's own, which are faster on arrays than our polynomials.
 """
 
 from __future__ import annotations
@@ -25,12 +25,19 @@ from shipgym.engine.specialise import Part, named_globals
 Floats = NDArray[np.float64]
 Batch = tuple[Floats, ...]
 MATHEMATICS = {
-    "sqrt": np.sqrt, "fabs": np.abs, "copysign": np.copysign,
-    "minimum": np.minimum, "maximum": np.maximum, "where": np.where,
-    "sin_cos": lambda x: (np.sin(x), np.cos(x)), "small_sin_cos": lambda x: (np.sin(x), np.cos(x)),
-    "turn_sin_cos": lambda x: (np.sin(x), np.cos(x)), "small_cosine": np.cos, "exponential": np.exp,
+    "sqrt": np.sqrt,
+    "fabs": np.abs,
+    "copysign": np.copysign,
+    "minimum": np.minimum,
+    "maximum": np.maximum,
+    "where": np.where,
+    "sin_cos": lambda x: (np.sin(x), np.cos(x)),
+    "small_sin_cos": lambda x: (np.sin(x), np.cos(x)),
+    "turn_sin_cos": lambda x: (np.sin(x), np.cos(x)),
+    "small_cosine": np.cos,
+    "exponential": np.exp,
     "arctan2": np.arctan2,
-}  # fmt: skip
+}
 
 
 class OnArrays(ast.NodeTransformer):
@@ -44,7 +51,9 @@ class OnArrays(ast.NodeTransformer):
         self.generic_visit(node)
         if isinstance(node.test, ast.Name) and node.test.id in self.constants:
             return node.body if self.constants[node.test.id] else node.orelse
-        return ast.Call(ast.Name("where", ast.Load()), [node.test, node.body, node.orelse], [])
+        return ast.Call(
+            ast.Name("where", ast.Load()), [node.test, node.body, node.orelse], []
+        )
 
     def visit_Name(self, node: ast.Name) -> ast.AST:
         """`min` and `max` become those of arrays."""
@@ -58,10 +67,16 @@ def on_arrays(function: Any, parts: Mapping[str, Any]) -> Any:
     for name, found in named_globals(function, parts):
         value = found.function if isinstance(found, Part) else found
         if name not in MATHEMATICS:
-            namespace[name] = on_arrays(value, parts) if isinstance(value, FunctionType) else value
+            namespace[name] = (
+                on_arrays(value, parts) if isinstance(value, FunctionType) else value
+            )
     source = textwrap.dedent(inspect.getsource(function))
     tree = ast.fix_missing_locations(OnArrays(namespace).visit(ast.parse(source)))
-    exec(compile(tree, "<on arrays>", "exec", dont_inherit=False), {**namespace, "Any": Any}, made := {})
+    exec(
+        compile(tree, "<on arrays>", "exec", dont_inherit=False),
+        {**namespace, "Any": Any},
+        made := {},
+    )
     made_function = made[function.__name__]
     made_function.__globals__.update(namespace)
     return made_function
@@ -82,8 +97,8 @@ def numpy_step(
     Returns
     -------
     callable
-        From the state (arrays of shape (n_ships,) in the order of `state_names`), rudder command, shaft
-        command and step to the state after it.
+        From the state (arrays of shape (n_ships,) in the order of `state_names`),
+        rudder command, shaft command and step to the state after it.
     """
     sail = on_arrays(motion.sail, model.vessel.parts())
     numbers = model.ship_numbers(depth)

@@ -1,18 +1,21 @@
 """What a task leaves to gain: rudder sequences found by sampling on the true ship in the weather to come.
 
-    from oracle import run_oracle                     # `scripts/best_known.py --search` uses it
+    from oracle import run_oracle                     # `scripts/best_known.py --search`
+    uses it
 
-No autopilot can steer like it. It knows the state without noise and every gust before it blows, tries
-hundreds of rudder sequences on copies of the ship, and takes the best: the cross-entropy method over a
-receding horizon, started from what a classical autopilot did. It does not know course changes before they
-are ordered.
+No autopilot can steer like it. It knows the state without noise and every gust before
+it blows, tries hundreds of rudder sequences on copies of the ship, and takes the best:
+the cross-entropy method over a receding horizon, started from what a classical
+autopilot did. It does not know course changes before they are ordered.
 
-A candidate is the autopilot's own sequence plus a smooth change, written as what is added to LQ's feedback of
-the true state, so that ships unstable on their course are held while the change is tried.
+A candidate is the autopilot's own sequence plus a smooth change, written as what is
+added to LQ's feedback of the true state, so that ships unstable on their course are
+held while the change is tried.
 
-Sources: Rubinstein & Kroese 2004, The Cross-Entropy Method; Williams, Aldrich & Theodorou 2017, Model
-predictive path integral control, Journal of Guidance, Control, and Dynamics 40 (sampling on the model in
-parallel); Bertsekas 2019, Reinforcement Learning and Optimal Control, 2.4 (rollout: improving a base policy).
+Sources: Rubinstein & Kroese 2004, The Cross-Entropy Method; Williams, Aldrich &
+Theodorou 2017, Model predictive path integral control, Journal of Guidance, Control,
+and Dynamics 40 (sampling on the model in parallel); Bertsekas 2019, Reinforcement
+Learning and Optimal Control, 2.4 (rollout: improving a base policy).
 """
 
 from __future__ import annotations
@@ -42,9 +45,9 @@ Floats = NDArray[np.float64]
 Rudder = NDArray[np.float32]
 
 ORACLE_EPISODES = 100
-LEAST_SCALE = (
-    0.1  # candidates differ by this part of the deviation to all of it: coarse and fine ones at once
-)
+# candidates differ by this part of the deviation to all of it: coarse and fine ones at
+# once
+LEAST_SCALE = 0.1
 LEARNING = 0.8  # share of the elites in the new mean and deviation
 LEAST_DEVIATION = 0.002  # parts of the rudder limit
 
@@ -64,15 +67,18 @@ class OracleSettings:
     horizon_steps : int
         Control intervals over which a candidate is compared.
     plan_steps : int
-        Of which the first are changed; on the others the plan stays and LQ brings the ship back to it.
+        Of which the first are changed; on the others the plan stays and LQ brings the
+        ship back to it.
     knot_steps : int
         Between two knots of a change, which is linear between them.
     replan_steps : int
         Sailed before planning again.
     passes : int
-        Times that the whole episode is gone through, each beginning with the best plan so far.
+        Times that the whole episode is gone through, each beginning with the best plan
+        so far.
     deviation : float
-        Standard deviation of a knot at first, parts of the rudder limit; half of it in each further pass.
+        Standard deviation of a knot at first, parts of the rudder limit; half of it in
+        each further pass.
     group : int
         Episodes planned side by side; the results do not depend on it.
     """
@@ -93,8 +99,18 @@ class OracleSettings:
             if item.name != "deviation":
                 check_whole(getattr(self, item.name), item.name, at_least=1)
         check_number(self.deviation, "deviation", above=0.0)
-        check_number(self.elites, "elites", at_most=self.candidates // 2, hint="half of the candidates")
-        check_number(self.plan_steps, "plan_steps", at_least=self.knot_steps, at_most=self.horizon_steps)
+        check_number(
+            self.elites,
+            "elites",
+            at_most=self.candidates // 2,
+            hint="half of the candidates",
+        )
+        check_number(
+            self.plan_steps,
+            "plan_steps",
+            at_least=self.knot_steps,
+            at_most=self.horizon_steps,
+        )
         check_number(self.replan_steps, "replan_steps", at_most=self.plan_steps)
 
 
@@ -136,8 +152,8 @@ def run_oracle(
     seeds : array-like of int, shape (n_episodes,)
         Of the episodes.
     start : Policy or sequence of Policy, optional
-        What each plan begins with, of several that which costs least in the episode; by default
-        `LQ.from_model(model)`.
+        What each plan begins with, of several that which costs least in the episode; by
+        default `LQ.from_model(model)`.
     settings : OracleSettings, optional
         How hard is searched.
     randomisation : Randomisation, optional
@@ -154,19 +170,31 @@ def run_oracle(
         For another action than the rudder.
     """
     if task.action != "rudder":
-        raise InputError(f"action: '{task.action}' found, expected 'rudder': the oracle steers by it alone")
+        raise InputError(
+            f"action: '{task.action}' found, expected 'rudder': the oracle steers by it"
+            " alone"
+        )
     asked = settings or OracleSettings()
     numbers = np.atleast_1d(np.asarray(seeds))
-    starts = list(start) if isinstance(start, Sequence) else [] if start is None else [start]
+    starts = (
+        list(start) if isinstance(start, Sequence) else [] if start is None else [start]
+    )
     feedback = _feedback(starts[0] if len(starts) == 1 else None, model, task)
     groups = np.split(numbers, range(asked.group, len(numbers), asked.group))
     runs = [
-        _Search(Engine(model, len(one), task, randomisation), one, feedback, asked, randomisation).run(
-            starts or [feedback]
-        )
+        _Search(
+            Engine(model, len(one), task, randomisation),
+            one,
+            feedback,
+            asked,
+            randomisation,
+        ).run(starts or [feedback])
         for one in groups
     ]
-    joined = (np.concatenate([getattr(one, item.name) for one in runs]) for item in fields(OracleRun))
+    joined = (
+        np.concatenate([getattr(one, item.name) for one in runs])
+        for item in fields(OracleRun)
+    )
     return OracleRun(*joined)
 
 
@@ -181,7 +209,9 @@ class _Ships:
 
     def begin(self) -> None:
         """Note that episodes begin."""
-        self.integral = np.zeros(self.engine.num_envs)  # of the heading error by the task's rule, rad s
+        self.integral = np.zeros(
+            self.engine.num_envs
+        )  # of the heading error by the task's rule, rad s
         self.over = np.zeros(self.engine.num_envs, dtype=np.bool_)
 
     def steer(self, added: Floats) -> Floats:
@@ -195,7 +225,9 @@ class _Ships:
     def gather(self) -> None:
         """Add the heading error of the last interval to its integral."""
         error = self.engine.info("heading_error")
-        gathered = np.where(self.over | (np.abs(error) > INTEGRAL_ZONE), 0.0, error * self.engine.dt)
+        gathered = np.where(
+            self.over | (np.abs(error) > INTEGRAL_ZONE), 0.0, error * self.engine.dt
+        )
         self.integral = np.clip(self.integral + gathered, -self.reach, self.reach)
 
     def held(self) -> Floats:
@@ -226,10 +258,19 @@ class _Search:
     """A group of episodes and the copies on which their candidates are tried."""
 
     def __init__(
-        self, engine: Engine, seeds: NDArray[Any], feedback: Controller, settings: OracleSettings,
+        self,
+        engine: Engine,
+        seeds: NDArray[Any],
+        feedback: Controller,
+        settings: OracleSettings,
         randomisation: Randomisation | None,
-    ) -> None:  # fmt: skip
-        self.task, self.seeds, self.settings, self.randomisation = engine.task, seeds, settings, randomisation
+    ) -> None:
+        self.task, self.seeds, self.settings, self.randomisation = (
+            engine.task,
+            seeds,
+            settings,
+            randomisation,
+        )
         self.n = len(seeds)
         self.ships = _Ships(engine, feedback)
         self._sizes: dict[int, _Ships] = {}
@@ -252,7 +293,12 @@ class _Search:
         return best
 
     def _keep_better(
-        self, best: OracleRun, added: Floats, costs: Floats, plan: Floats, actions: Rudder
+        self,
+        best: OracleRun,
+        added: Floats,
+        costs: Floats,
+        plan: Floats,
+        actions: Rudder,
     ) -> None:
         """Put a plan in the place of one that costs more."""
         better = costs < best.costs
@@ -268,13 +314,17 @@ class _Search:
             held.append(self.ships.held())
             return observations
 
-        run = rollout(policy, self.ships.engine, self.seeds, record=("set_point",), show=look)
+        run = rollout(
+            policy, self.ships.engine, self.seeds, record=("set_point",), show=look
+        )
         _, added, actions = self._nothing_yet()
         steps = len(held)
         actions[:, :steps] = run.actions[:, :, 0].T
         added[:, :steps] = actions[:, :steps] - np.array(held).T
         self._ordered[:, 0] = True
-        self._ordered[:, 1:steps] = (np.diff(run.states["set_point"][:steps], axis=0) != 0.0).T
+        self._ordered[:, 1:steps] = (
+            np.diff(run.states["set_point"][:steps], axis=0) != 0.0
+        ).T
         return run.costs, added, actions
 
     def _sailed(self, added: Floats) -> tuple[Floats, Floats, Rudder]:
@@ -303,7 +353,11 @@ class _Search:
         costs, added, actions = self._nothing_yet()
         next_plan = np.zeros(self.n, dtype=np.int64)
         for step in self._steps():
-            for lane in np.flatnonzero(self._ordered[:, step]) if self._changes_course or step == 0 else ():
+            for lane in (
+                np.flatnonzero(self._ordered[:, step])
+                if self._changes_course or step == 0
+                else ()
+            ):
                 added[lane, step:] = 0.0
                 end = self._next_order(int(lane), step)
                 added[lane, step:end] = last[lane, step:end]
@@ -323,7 +377,9 @@ class _Search:
         later = np.flatnonzero(self._ordered[lane, step + 1 :])
         return step + 1 + int(later[0]) if len(later) else self.task.episode_steps
 
-    def _plan(self, added: Floats, which: NDArray[np.int64], step: int, number: int) -> None:
+    def _plan(
+        self, added: Floats, which: NDArray[np.int64], step: int, number: int
+    ) -> None:
         """Improve the plan of some episodes from a step on by the cross-entropy method."""
         asked, episodes = self.settings, np.arange(len(which))
         shape = self._shape(step)
@@ -332,7 +388,9 @@ class _Search:
         deviation = np.full_like(mean, asked.deviation * 0.5**number)
         least, change = np.full(len(which), np.inf), np.zeros_like(mean)
         for _ in range(asked.iterations):
-            knots = mean[:, None] + deviation[:, None] * _drawn(random, asked.candidates, len(shape))
+            knots = mean[:, None] + deviation[:, None] * _drawn(
+                random, asked.candidates, len(shape)
+            )
             knots[:, 0] = change
             costs = self._tried(added[which], which, knots, shape, step)
             order = np.argsort(costs, axis=1, kind="stable")
@@ -342,7 +400,9 @@ class _Search:
             change[better] = knots[episodes, best][better]
             elites = np.take_along_axis(knots, order[:, : asked.elites, None], axis=1)
             mean += LEARNING * (elites.mean(axis=1) - mean)
-            deviation += LEARNING * (np.maximum(elites.std(axis=1), LEAST_DEVIATION) - deviation)
+            deviation += LEARNING * (
+                np.maximum(elites.std(axis=1), LEAST_DEVIATION) - deviation
+            )
         added[which, step : step + shape.shape[1]] += (change[:, None] @ shape)[:, 0]
 
     def _shape(self, step: int) -> Floats:
@@ -353,7 +413,12 @@ class _Search:
         return np.maximum(0.0, 1.0 - np.abs(at - np.arange(n_knots)[:, None]))
 
     def _tried(
-        self, added: Floats, which: NDArray[np.int64], knots: Floats, shape: Floats, step: int
+        self,
+        added: Floats,
+        which: NDArray[np.int64],
+        knots: Floats,
+        shape: Floats,
+        step: int,
     ) -> Floats:
         """Costs of candidates over the horizon, shape (n_episodes, n_candidates)."""
         copies = self._copies(len(which))
@@ -381,7 +446,11 @@ class _Search:
 def _feedback(start: Policy | None, model: ShipModel, task: Task) -> Controller:
     """The start itself, or the autopilot it leads, if it is plain feedback; else LQ."""
     inner = getattr(start, "autopilot", start)
-    return inner if isinstance(inner, PID | LQ) else LQ.from_model(model, dt=task.interval(model))
+    return (
+        inner
+        if isinstance(inner, PID | LQ)
+        else LQ.from_model(model, dt=task.interval(model))
+    )
 
 
 def _drawn(random: np.random.Generator, candidates: int, n_knots: int) -> Floats:

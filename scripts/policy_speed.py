@@ -21,7 +21,10 @@ def random_policy(activation: str) -> LearnedPolicy:
     random = np.random.default_rng(0)
     shapes = pairwise(SIZES)
     layers = tuple(
-        (random.normal(0.0, 0.2, (n_out, n_in)).astype(np.float32), np.zeros(n_out, np.float32))
+        (
+            random.normal(0.0, 0.2, (n_out, n_in)).astype(np.float32),
+            np.zeros(n_out, np.float32),
+        )
         for n_in, n_out in shapes
     )
     scales = tuple(observation_scales(load_model("mariner")).tolist())
@@ -30,7 +33,11 @@ def random_policy(activation: str) -> LearnedPolicy:
 
 def rate(policy: LearnedPolicy, ships: int) -> float:
     """Commands per second, the best of some repeats."""
-    seen = np.random.default_rng(1).uniform(-1.0, 1.0, (ships, SIZES[0])).astype(np.float32)
+    seen = (
+        np.random.default_rng(1)
+        .uniform(-1.0, 1.0, (ships, SIZES[0]))
+        .astype(np.float32)
+    )
     times = []
     for _ in range(REPEATS):
         start = time.thread_time()
@@ -44,7 +51,10 @@ def main() -> None:
     for activation in ("relu", "tanh"):
         policy = random_policy(activation)
         for ships in (1, 64, 4096):
-            print(f"{activation}, {ships} ships: {rate(policy, ships) / 1e3:.0f} k commands/s")
+            print(
+                f"{activation}, {ships} ships: {rate(policy, ships) / 1e3:.0f} k"
+                " commands/s"
+            )
 
 
 if __name__ == "__main__":

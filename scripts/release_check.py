@@ -1,12 +1,15 @@
 """Build the wheel, install it in clean environments and try what it is for: README's lines, and each extra.
 
-    python scripts/release_check.py                        the core and every extra, each in two environments:
-                                                           the lowest declared versions, and the newest
-    python scripts/release_check.py core report            only these
-    python scripts/release_check.py --newest core          only the newest versions; --lowest likewise
+    python scripts/release_check.py                        the core and every extra,
+    each in two environments:
+                                                           the lowest declared versions,
+                                                           and the newest
+    python scripts/release_check.py core report            only these python
+    scripts/release_check.py --newest core          only the newest versions; --lowest
+    likewise
 
-Needs the network. torch is taken in the version of `constraints.txt`: other builds bring gigabytes.
-Exits with 1 if something does not build, install or run.
+Needs the network. torch is taken in the version of `constraints.txt`: other builds
+bring gigabytes. Exits with 1 if something does not build, install or run.
 """
 
 from __future__ import annotations
@@ -84,19 +87,54 @@ episode = shipgym.Episode.load("episodes/episode-00000.json")
 dataset = shipgym.interchange.to_minari([episode], "shipgym/tried-v0")
 assert shipgym.interchange.from_minari(dataset)[0].rewards.tolist() == episode.rewards.tolist()
 """
-(README,) = re.findall(r"```python\n(.*?)```", (ROOT / "README.md").read_text(encoding="utf-8"), re.DOTALL)
+(README,) = re.findall(
+    r"```python\n(.*?)```", (ROOT / "README.md").read_text(encoding="utf-8"), re.DOTALL
+)
 SHIP = str(ROOT / "examples" / "mariner" / "ship.toml")
-BENCHMARK = ("benchmark", "--controllers", "pid", "--tasks", "mariner-calm", "--episodes", "2", "--out")
-LEARN = ("ppo", "--total-steps", "64", "--set", "ships=2", "--set", "n_steps=32", "--set", "batch_size=32")
+BENCHMARK = (
+    "benchmark",
+    "--controllers",
+    "pid",
+    "--tasks",
+    "mariner-calm",
+    "--episodes",
+    "2",
+    "--out",
+)
+LEARN = (
+    "ppo",
+    "--total-steps",
+    "64",
+    "--set",
+    "ships=2",
+    "--set",
+    "n_steps=32",
+    "--set",
+    "batch_size=32",
+)
 
 #: What is run with the core and with each extra: Python, or the words after `shipgym`.
 TRIED: dict[str, tuple[str | tuple[str, ...], ...]] = {
-    "core": (README, STEPS, HELP, ("--help",), ("doctor",), ("identify", SHIP, "--out", "ship")),
+    "core": (
+        README,
+        STEPS,
+        HELP,
+        ("--help",),
+        ("doctor",),
+        ("identify", SHIP, "--out", "ship"),
+    ),
     "report": (("trials", "mariner", "--draws", "0", "--out", "trials.html"),),
     "benchmark": ((*BENCHMARK, "results"),),
     "render": (PICTURE,),
     "mpc": (MPC,),
-    "onnx": (("export", str(ROOT / "agents/pretrained/mariner-calm-ppo.json"), "--onnx", "agent.onnx"),),
+    "onnx": (
+        (
+            "export",
+            str(ROOT / "agents/pretrained/mariner-calm-ppo.json"),
+            "--onnx",
+            "agent.onnx",
+        ),
+    ),
     "fmu": (("export", "mariner", "--fmu", "mariner.fmu"),),
     "nmea": (NMEA,),
     "logs": (LOGS,),
@@ -118,22 +156,57 @@ def check(wheel: Path, extra: str, resolution: str) -> str:
     with tempfile.TemporaryDirectory() as folder:
         home = Path(folder)
         python = str(home / "env" / "bin" / "python")
-        plain = {**os.environ, "SHIPGYM_CACHE": str(home / "cache"), "PYTHONWARNINGS": "ignore"}
+        plain = {
+            **os.environ,
+            "SHIPGYM_CACHE": str(home / "cache"),
+            "PYTHONWARNINGS": "ignore",
+        }
         if extra != "core":
             plain["NUMBA_DISABLE_JIT"] = "1"  # the core is tried compiled
-        wanted = {"core": str(wheel), "ray": f"{wheel}[ray,benchmark]"}.get(extra, f"{wheel}[{extra}]")
+        wanted = {"core": str(wheel), "ray": f"{wheel}[ray,benchmark]"}.get(
+            extra, f"{wheel}[{extra}]"
+        )
         pinned = home / "constraints.txt"
         lines = (ROOT / "constraints.txt").read_text().splitlines()
-        pinned.write_text("\n".join(line for line in lines if line.startswith("torch==")))
+        pinned.write_text(
+            "\n".join(line for line in lines if line.startswith("torch=="))
+        )
         commands = [
             [*UV, "venv", "--quiet", "--python", sys.executable, str(home / "env")],
-            [*UV, "pip", "install", "--quiet", "--python", python, "--resolution", resolution,
-             "--constraint", str(pinned), wanted],
-            *([python, *(["-c", one] if isinstance(one, str) else ["-m", "agents.cli", *one])]
-              for one in TRIED[extra]),
-        ]  # fmt: skip
+            [
+                *UV,
+                "pip",
+                "install",
+                "--quiet",
+                "--python",
+                python,
+                "--resolution",
+                resolution,
+                "--constraint",
+                str(pinned),
+                wanted,
+            ],
+            *(
+                [
+                    python,
+                    *(
+                        ["-c", one]
+                        if isinstance(one, str)
+                        else ["-m", "agents.cli", *one]
+                    ),
+                ]
+                for one in TRIED[extra]
+            ),
+        ]
         for command in commands:
-            done = subprocess.run(command, cwd=home, env=plain, capture_output=True, text=True, check=False)
+            done = subprocess.run(
+                command,
+                cwd=home,
+                env=plain,
+                capture_output=True,
+                text=True,
+                check=False,
+            )
             if done.returncode:
                 return f"{' '.join(command)}\n{done.stdout}{done.stderr}"
     return ""
@@ -143,11 +216,18 @@ def build(folder: Path) -> Path:
     """The wheel, built from the files that git knows."""
     source = folder / "source"
     source.mkdir()
-    archive = subprocess.run(["git", "stash", "create"], cwd=ROOT, capture_output=True, text=True, check=True)
+    archive = subprocess.run(
+        ["git", "stash", "create"], cwd=ROOT, capture_output=True, text=True, check=True
+    )
     tree = archive.stdout.strip() or "HEAD"  # with what is not committed yet
-    packed = subprocess.run(["git", "archive", tree], cwd=ROOT, capture_output=True, check=True).stdout
+    packed = subprocess.run(
+        ["git", "archive", tree], cwd=ROOT, capture_output=True, check=True
+    ).stdout
     subprocess.run(["tar", "-x", "-C", str(source)], input=packed, check=True)
-    subprocess.run([*UV, "build", "--quiet", "--wheel", "--out-dir", str(folder), str(source)], check=True)
+    subprocess.run(
+        [*UV, "build", "--quiet", "--wheel", "--out-dir", str(folder), str(source)],
+        check=True,
+    )
     (wheel,) = folder.glob("*.whl")
     print(f"{wheel.name}: {wheel.stat().st_size / 1e6:.1f} MB", flush=True)
     return wheel
@@ -155,12 +235,20 @@ def build(folder: Path) -> Path:
 
 def main() -> None:
     """Check the extras that are named, or all."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawTextHelpFormatter
+    )
     parser.add_argument(
-        "names", nargs="*", choices=[*TRIED, []], metavar="NAME", help="core, or extras; default: all"
+        "names",
+        nargs="*",
+        choices=[*TRIED, []],
+        metavar="NAME",
+        help="core, or extras; default: all",
     )
     for resolution, word in RESOLUTIONS.items():
-        parser.add_argument(f"--{word}", dest="only", action="append_const", const=resolution)
+        parser.add_argument(
+            f"--{word}", dest="only", action="append_const", const=resolution
+        )
     given = parser.parse_args()
     if unknown := set(given.names) - set(TRIED):
         parser.error(f"{', '.join(unknown)} found, expected some of {', '.join(TRIED)}")

@@ -1,6 +1,7 @@
 """Run the papers' tables again: `python scripts/reproduce.py all`, or one paper, or `requirements`.
 
-Two to four minutes in all. `shipgym reproduce` runs this program. Exits with 1 if an aim is missed.
+Two to four minutes in all. `shipgym reproduce` runs this program. Exits with 1 if an
+aim is missed.
 """
 
 from __future__ import annotations
@@ -16,20 +17,29 @@ from agents.cli.terminal import answer, err
 from agents.cli.terminal import out as console
 from shipgym.files import write_text
 
-app = typer.Typer(add_completion=False, pretty_exceptions_enable=False, rich_markup_mode=None)
+app = typer.Typer(
+    add_completion=False, pretty_exceptions_enable=False, rich_markup_mode=None
+)
 
 
 @app.command()
 @answered
 def main(
     paper: Annotated[
-        str, typer.Argument(metavar="PAPER", help="A paper's short name, comparators or requirements.")
+        str,
+        typer.Argument(
+            metavar="PAPER", help="A paper's short name, comparators or requirements."
+        ),
     ] = ALL,
     markdown: Annotated[
-        Path | None, typer.Option(metavar="PAGE.MD", help="Write the tables to this file.")
+        Path | None,
+        typer.Option(metavar="PAGE.MD", help="Write the tables to this file."),
     ] = None,
     images: Annotated[
-        Path | None, typer.Option(metavar="FOLDER", help="Draw the papers' figures into this folder.")
+        Path | None,
+        typer.Option(
+            metavar="FOLDER", help="Draw the papers' figures into this folder."
+        ),
     ] = None,
 ) -> None:
     """Run the papers' tables again: printed, ours their way, ours at its best, and whether the aim is met."""

@@ -1,7 +1,8 @@
 """Run the notebooks and keep what they print and draw; the site shows them so.
 
-`python scripts/run_notebooks.py` runs all of `notebooks/`, with names behind it those; it ends with 1 where a
-cell raises an error. Counters and other metadata that change with every run are left out.
+`python scripts/run_notebooks.py` runs all of `notebooks/`, with names behind it those;
+it ends with 1 where a cell raises an error. Counters and other metadata that change
+with every run are left out.
 """
 
 from __future__ import annotations
@@ -20,7 +21,9 @@ LONGEST = 600  # s, of a cell
 def run(path: Path) -> None:
     """Run a notebook in its folder and write it with its outputs."""
     notebook = nbformat.read(path, as_version=4)
-    NotebookClient(notebook, timeout=LONGEST, resources={"metadata": {"path": str(FOLDER.parent)}}).execute()
+    NotebookClient(
+        notebook, timeout=LONGEST, resources={"metadata": {"path": str(FOLDER.parent)}}
+    ).execute()
     for k, cell in enumerate(notebook.cells):
         cell.id = f"cell-{k}"
         cell.metadata = {}
@@ -28,7 +31,13 @@ def run(path: Path) -> None:
             cell.execution_count = None
             for output in cell.outputs:
                 output.pop("execution_count", None)
-    notebook.metadata = {"kernelspec": {"display_name": "Python 3", "language": "python", "name": "python3"}}
+    notebook.metadata = {
+        "kernelspec": {
+            "display_name": "Python 3",
+            "language": "python",
+            "name": "python3",
+        }
+    }
     nbformat.write(notebook, path)
 
 

@@ -1,7 +1,7 @@
 """What the site is built with beside its plugins: equations as MathML, notebooks as pages.
 
-mkdocs calls these functions (`hooks` in `mkdocs.yml`). Equations are drawn by the browser itself, so that no
-script is loaded from elsewhere.
+mkdocs calls these functions (`hooks` in `mkdocs.yml`). Equations are drawn by the
+browser itself, so that no script is loaded from elsewhere.
 """
 
 from __future__ import annotations
@@ -23,14 +23,21 @@ BLOCK = re.compile(r'<div class="arithmatex">\s*\\\[(.*?)\\\]\s*</div>', re.DOTA
 def on_files(files: Any, config: Any) -> Any:
     """Add a page for each notebook."""
     for path in sorted(NOTEBOOKS.glob("*.ipynb")):
-        files.append(File.generated(config, f"notebooks/{path.stem}.md", content=notebook_page(path)))
+        files.append(
+            File.generated(
+                config, f"notebooks/{path.stem}.md", content=notebook_page(path)
+            )
+        )
     return files
 
 
 def on_page_content(content: str, **_: Any) -> str:
     """Replace the equations of a page."""
     content = INLINE.sub(lambda found: convert(html.unescape(found[1])), content)
-    return BLOCK.sub(lambda found: f'<div class="equation">{_block(html.unescape(found[1]))}</div>', content)
+    return BLOCK.sub(
+        lambda found: f'<div class="equation">{_block(html.unescape(found[1]))}</div>',
+        content,
+    )
 
 
 def _block(latex: str) -> str:
@@ -53,6 +60,9 @@ def notebook_page(path: Path) -> str:
 def _output(output: dict[str, Any]) -> str:
     data = output.get("data", {})
     if picture := data.get("image/png"):
-        return f'<img alt="what the code above draws" src="data:image/png;base64,{picture.strip()}">'
+        return (
+            '<img alt="what the code above draws"'
+            f' src="data:image/png;base64,{picture.strip()}">'
+        )
     text = "".join(output.get("text", data.get("text/plain", "")))
     return f"```text\n{text.rstrip()}\n```"

@@ -3,8 +3,9 @@
     python scripts/soak.py                      10^8 steps
     python scripts/soak.py --steps 10000000     fewer
 
-Every id, with every shipped model that fits it, in calm water and in seas, with both ways of autoreset. Fails
-if an observation leaves its space, a reward, an info or a state is not a number, or memory grows.
+Every id, with every shipped model that fits it, in calm water and in seas, with both
+ways of autoreset. Fails if an observation leaves its space, a reward, an info or a
+state is not a number, or memory grows.
 """
 
 from __future__ import annotations
@@ -30,10 +31,15 @@ WARM = 20  # steps after which memory must not grow
 MOST_GROWTH = 50.0  # MiB
 KINDS = ("random", "extreme", "adversarial")
 WILD = {
-    "CourseKeeping": {"max_heading_error_deg": 180.0}, "PathFollowing": {"ground": 40.0},
+    "CourseKeeping": {"max_heading_error_deg": 180.0},
+    "PathFollowing": {"ground": 40.0},
     "PathFollowing-v1": {"ground": 40.0},
-}  # fmt: skip
-SEAS: dict[str, Any] = {"sea": ["calm", "moderate", "rough"], "noise": 2.0, "measurement": "filtered"}
+}
+SEAS: dict[str, Any] = {
+    "sea": ["calm", "moderate", "rough"],
+    "noise": 2.0,
+    "measurement": "filtered",
+}
 
 
 @dataclass(frozen=True)
@@ -54,7 +60,9 @@ class Run:
         """Its vector environment; wild ones are in seas and sail on where others stop."""
         wild = self.kind != "extreme"
         steps = {"episode_steps": 150} if self.kind == "random" else {}
-        options: dict[str, Any] = {"max_envelope_distance": 1e3, **WILD[self.task], **SEAS} if wild else {}
+        options: dict[str, Any] = (
+            {"max_envelope_distance": 1e3, **WILD[self.task], **SEAS} if wild else {}
+        )
         return gymnasium.make_vec(
             env_id(self.task, self.variant),
             ROWS,
@@ -81,7 +89,9 @@ def runs() -> Iterator[Run]:
                     yield Run(task, variant, model, kind)
 
 
-def adversary(observations: NDArray[np.float32], space: gymnasium.Space[Any], step: int) -> Any:
+def adversary(
+    observations: NDArray[np.float32], space: gymnasium.Space[Any], step: int
+) -> Any:
     """Steer away from the course as hard as the ship can, the shaft full ahead and astern by turns."""
     starboard = observations[:, 0] < 0.0
     if isinstance(space, gymnasium.spaces.MultiDiscrete):
@@ -96,13 +106,20 @@ def extreme(space: gymnasium.Space[Any], random: np.random.Generator) -> Any:
     """The largest actions that there are, and beyond."""
     if isinstance(space, gymnasium.spaces.MultiDiscrete):
         return random.choice([0, int(space.nvec[0]) - 1], space.shape)
-    return random.choice(np.array([-1e30, -1.0, 0.0, 1.0, 1e30], dtype=np.float32), space.shape)
+    return random.choice(
+        np.array([-1e30, -1.0, 0.0, 1.0, 1e30], dtype=np.float32), space.shape
+    )
 
 
-def check_shown(run: Run, env: Any, observations: Any, rewards: Any, infos: dict[str, Any]) -> None:
+def check_shown(
+    run: Run, env: Any, observations: Any, rewards: Any, infos: dict[str, Any]
+) -> None:
     """Leave if an observation is not in its space or a reward is not a number."""
     space = env.single_observation_space
-    shown = [observations, *infos.get("final_obs", np.empty(0))[infos.get("_final_obs", [])]]
+    shown = [
+        observations,
+        *infos.get("final_obs", np.empty(0))[infos.get("_final_obs", [])],
+    ]
     if not all(np.all((space.low <= one) & (one <= space.high)) for one in shown):
         sys.exit(f"{run.name}: an observation left its space")
     if not np.all(np.isfinite(rewards)):
@@ -111,8 +128,12 @@ def check_shown(run: Run, env: Any, observations: Any, rewards: Any, infos: dict
 
 def check_inside(run: Run, env: Any, infos: dict[str, Any]) -> None:
     """Leave if an info or a state is not a number."""
-    numbers = [value for key, value in infos.items() if not key.startswith(("_", "final"))]
-    if not all(np.all(np.isfinite(one)) for one in (*numbers, *env.physical_state().values())):
+    numbers = [
+        value for key, value in infos.items() if not key.startswith(("_", "final"))
+    ]
+    if not all(
+        np.all(np.isfinite(one)) for one in (*numbers, *env.physical_state().values())
+    ):
         sys.exit(f"{run.name}: an info or a state is not a number")
 
 
@@ -143,7 +164,9 @@ def sail(run: Run, steps: int, advance: Callable[[int], None]) -> tuple[int, flo
 
 
 def main(
-    steps: int = typer.Option(10**8, help="Environment steps over all ids, models and actions."),
+    steps: int = typer.Option(
+        10**8, help="Environment steps over all ids, models and actions."
+    ),
 ) -> None:
     """Sail every id with every shipped model that fits it and every kind of actions."""
     every, ended, grown = list(runs()), 0, 0.0
@@ -151,13 +174,15 @@ def main(
         bar = progress.add_task("sailing", total=steps)
         for run in every:
             progress.update(bar, description=run.name)
-            episodes, growth = sail(run, steps // len(every), lambda done: progress.advance(bar, done))
+            episodes, growth = sail(
+                run, steps // len(every), lambda done: progress.advance(bar, done)
+            )
             ended, grown = ended + episodes, grown + growth
     if grown > MOST_GROWTH:
         sys.exit(f"memory grew by {grown:.0f} MiB")
     print(
-        f"{steps:.3g} steps, {len(every)} runs, {ended} episodes: nothing left its space, every number is "
-        f"one, memory grew by {grown:.1f} MiB"
+        f"{steps:.3g} steps, {len(every)} runs, {ended} episodes: nothing left its"
+        f" space, every number is one, memory grew by {grown:.1f} MiB"
     )
 
 

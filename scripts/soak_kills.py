@@ -3,9 +3,10 @@
     python scripts/soak_kills.py                50 kills of each
     python scripts/soak_kills.py --kills 10     fewer
 
-Fails if a result differs by a bit, a run that is killed cannot be gone on with, or a lock, draft or other
-file is left over. The commands are forked from a process that has the libraries loaded: every kill falls into
-work, none into imports, and 200 take a third of the time.
+Fails if a result differs by a bit, a run that is killed cannot be gone on with, or a
+lock, draft or other file is left over. The commands are forked from a process that has
+the libraries loaded: every kill falls into work, none into imports, and 200 take a
+third of the time.
 """
 
 from __future__ import annotations
@@ -32,21 +33,48 @@ from agents.benchmarking.results import load_results
 from agents.training.run_folder import RUN, TENSORBOARD
 
 SHIP = str(Path(__file__).resolve().parents[1] / "examples" / "mariner" / "ship.toml")
-LEARN = ("ppo", "--set", "ships=4", "--set", "n_steps=32", "--set", "batch_size=64", "--set", "base=none")
+LEARN = (
+    "ppo",
+    "--set",
+    "ships=4",
+    "--set",
+    "n_steps=32",
+    "--set",
+    "batch_size=64",
+    "--set",
+    "base=none",
+)
 #: loaded once, before the commands are forked
 PRELOADED = [
-    "identification.pipeline", "identification.report.page", "agents.training.training",
-    "agents.training.tuning", "agents.benchmarking.run", "numba.core.registry", "scipy.signal",
-    "scipy.optimize", "sklearn.svm", "plotly.graph_objects", "pyarrow.parquet", "control", "torch._dynamo",
-    "stable_baselines3", "optuna.storages", "alembic.command", "rich.console",
-]  # fmt: skip
+    "identification.pipeline",
+    "identification.report.page",
+    "agents.training.training",
+    "agents.training.tuning",
+    "agents.benchmarking.run",
+    "numba.core.registry",
+    "scipy.signal",
+    "scipy.optimize",
+    "sklearn.svm",
+    "plotly.graph_objects",
+    "pyarrow.parquet",
+    "control",
+    "torch._dynamo",
+    "stable_baselines3",
+    "optuna.storages",
+    "alembic.command",
+    "rich.console",
+]
 
 
 def bytes_of(*patterns: str) -> Callable[[Path], Any]:
     """The bytes of some files of a folder by name."""
 
     def read(out: Path) -> Any:
-        return {path.name: path.read_bytes() for one in patterns for path in sorted(out.glob(one))}
+        return {
+            path.name: path.read_bytes()
+            for one in patterns
+            for path in sorted(out.glob(one))
+        }
 
     return read
 
@@ -55,7 +83,9 @@ def benchmarked(out: Path) -> Any:
     """What a benchmark found, without times."""
     found = load_results(out)
     return found.ranking, {
-        name: column.tobytes() for name, column in found.episodes.items() if column.dtype != object
+        name: column.tobytes()
+        for name, column in found.episodes.items()
+        if column.dtype != object
     }
 
 
@@ -70,7 +100,9 @@ class Victim:
     def started(self, home: Path, resume: bool) -> ForkServerProcess:
         """The command, running in a process of its own."""
         words = ["shipgym", *self.words, "--out", "out", *self.resumed * resume]
-        process = multiprocessing.get_context("forkserver").Process(target=command, args=(words, home))
+        process = multiprocessing.get_context("forkserver").Process(
+            target=command, args=(words, home)
+        )
         process.start()
         return process
 
@@ -92,15 +124,32 @@ def command(words: list[str], home: Path) -> None:
 VICTIMS = {
     "identify": Victim(("identify", SHIP), (), bytes_of("*.json", "*.html")),
     "train": Victim(
-        ("train", *LEARN, "--total-steps", "2048", "--set", "evaluate_every=512"), ("--resume",),
+        ("train", *LEARN, "--total-steps", "2048", "--set", "evaluate_every=512"),
+        ("--resume",),
         bytes_of("agent.*", "last.*"),
     ),
-    "tune": Victim(("tune", *LEARN, "--total-steps", "256", "--trials", "3"), (), bytes_of("best.toml")),
-    "benchmark": Victim(
-        ("benchmark", "--controllers", "pid,lq", "--tasks", "mariner-calm,kvlcc2-noise", "--episodes", "3",
-         "--no-page", "--workers", "1"), ("--resume",), benchmarked,
+    "tune": Victim(
+        ("tune", *LEARN, "--total-steps", "256", "--trials", "3"),
+        (),
+        bytes_of("best.toml"),
     ),
-}  # fmt: skip
+    "benchmark": Victim(
+        (
+            "benchmark",
+            "--controllers",
+            "pid,lq",
+            "--tasks",
+            "mariner-calm,kvlcc2-noise",
+            "--episodes",
+            "3",
+            "--no-page",
+            "--workers",
+            "1",
+        ),
+        ("--resume",),
+        benchmarked,
+    ),
+}
 
 
 def listing(home: Path) -> list[str]:
@@ -156,12 +205,17 @@ def soak(name: str, kills: int, draw: random.Random) -> str:
             left_over += bool(set(listing(home)) - set(files))
             run(victim, home, name == "benchmark" or (home / "out" / RUN).is_file())
             if victim.result(home / "out") != expected:
-                sys.exit(f"{name}: kill {kill} after {moment:.2f} s: the result is another")
+                sys.exit(
+                    f"{name}: kill {kill} after {moment:.2f} s: the result is another"
+                )
             if listing(home) != files:
-                sys.exit(f"{name}: kill {kill} after {moment:.2f} s: found {listing(home)}, expected {files}")
+                sys.exit(
+                    f"{name}: kill {kill} after {moment:.2f} s: found {listing(home)},"
+                    f" expected {files}"
+                )
     return (
-        f"{name}: {kills} kills within {lasted:.1f} s, {left_over} left drafts or locks for the next run; "
-        "every result is the same, and nothing is left over"
+        f"{name}: {kills} kills within {lasted:.1f} s, {left_over} left drafts or locks"
+        " for the next run; every result is the same, and nothing is left over"
     )
 
 

@@ -15,10 +15,15 @@ def main(names: list[str]) -> None:
     found = []
     for name in names:
         ship = load_model(name)
-        track = keep_track(WheelOver.from_model(ship, task=track_task(ship)), [ship, ship])
+        track = keep_track(
+            WheelOver.from_model(ship, task=track_task(ship)), [ship, ship]
+        )
         found.append(standards(ship, LQ.from_model(ship), [track]))
     for rows in zip(*found, strict=True):
-        values = ("not simulated" if row.value is None else f"{max(row.value, 0.0):.2f}" for row in rows)
+        values = (
+            "not simulated" if row.value is None else f"{max(row.value, 0.0):.2f}"
+            for row in rows
+        )
         print(" | ".join(["", rows[0].name, *values, rows[0].unit, ""]).strip())
 
 

@@ -26,12 +26,20 @@ def tell(now: Progress) -> None:
         print(f"step {now.steps:,}: cost {now.cost:.2f}, LQ's {now.lq_cost:.2f}")
 
 
-def main(folder: Annotated[Path, typer.Argument(help="Folder of the training.")]) -> None:
+def main(
+    folder: Annotated[Path, typer.Argument(help="Folder of the training.")],
+) -> None:
     """Train, or go on with a training that was stopped, then compare on new episodes."""
-    plan = make_plan(Given("ppo", environment="path-following", model="mariner", threads=2))
+    plan = make_plan(
+        Given("ppo", environment="path-following", model="mariner", threads=2)
+    )
     train(plan, folder, resume=folder.exists(), tell=tell)
     task = plan.task
-    for controller in (load_agent(folder, task.ship), design("ilos", task), design("lq", task)):
+    for controller in (
+        load_agent(folder, task.ship),
+        design("ilos", task),
+        design("lq", task),
+    ):
         costs = episode_costs(controller, task.engine(len(NEW_SEEDS)), NEW_SEEDS)
         print(f"{controller.name}: mean cost of 100 new episodes {costs.mean():.1f}")
 

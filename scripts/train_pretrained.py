@@ -1,18 +1,20 @@
 """Train the agents of `agents/pretrained` again, for the suite whose ships contestants know by models.
 
-    python scripts/train_pretrained.py                                   # every task's missing runs
-    python scripts/train_pretrained.py --tasks roll-limit --seeds 0,1
-    python scripts/train_pretrained.py --table results                   # markdown for docs/pretrained.md
-    python scripts/train_pretrained.py --shield 50                       # what the shield costs, 50 episodes
+    python scripts/train_pretrained.py                                   # every task's
+    missing runs python scripts/train_pretrained.py --tasks roll-limit --seeds 0,1
+    python scripts/train_pretrained.py --table results                   # markdown for
+    docs/pretrained.md python scripts/train_pretrained.py --shield 50
+    # what the shield costs, 50 episodes
 
-Each task is learned with its settings in `agents/training/hyperparameters`, once for each training seed, in
-the design model and over the models drawn from its covariance. Of each run the policy that costs least on
-held-out episodes of the model is kept; the runs are all shipped and all scored, none is chosen. All tasks
-learn with the first seed before any learns with the second, so that a set that was cut short is balanced.
-Killed at any moment, it goes on where it was.
+Each task is learned with its settings in `agents/training/hyperparameters`, once for
+each training seed, in the design model and over the models drawn from its covariance.
+Of each run the policy that costs least on held-out episodes of the model is kept; the
+runs are all shipped and all scored, none is chosen. All tasks learn with the first seed
+before any learns with the second, so that a set that was cut short is balanced. Killed
+at any moment, it goes on where it was.
 
-`results` is a folder of `shipgym benchmark --suite shipgym-v2` with the agents and the baselines; more
-folders may follow, of contestants that were run in fewer episodes.
+`results` is a folder of `shipgym benchmark --suite shipgym-v2` with the agents and the
+baselines; more folders may follow, of contestants that were run in fewer episodes.
 """
 
 from __future__ import annotations
@@ -50,20 +52,41 @@ GAIN, CLOSE = 0.05, 0.01  # what is asked of five tasks, and of the others
 
 def main() -> None:
     """Train what is missing, or print the table."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawTextHelpFormatter
+    )
     parser.add_argument("--suite", default="shipgym-v2")
     parser.add_argument("--algorithm", default="ppo")
-    parser.add_argument("--tasks", default="", help="names, separated by commas; by default all")
-    parser.add_argument("--seeds", default="0,1,2,3,4", help="training seeds, separated by commas")
-    parser.add_argument("--runs", type=Path, default=Path("runs/pretrained"), help="folder of the runs")
-    parser.add_argument("--table", type=Path, nargs="+", help="only print what the agents cost in results")
-    parser.add_argument("--shield", type=int, help="only print what the shield costs, in so many episodes")
+    parser.add_argument(
+        "--tasks", default="", help="names, separated by commas; by default all"
+    )
+    parser.add_argument(
+        "--seeds", default="0,1,2,3,4", help="training seeds, separated by commas"
+    )
+    parser.add_argument(
+        "--runs", type=Path, default=Path("runs/pretrained"), help="folder of the runs"
+    )
+    parser.add_argument(
+        "--table",
+        type=Path,
+        nargs="+",
+        help="only print what the agents cost in results",
+    )
+    parser.add_argument(
+        "--shield",
+        type=int,
+        help="only print what the shield costs, in so many episodes",
+    )
     asked = parser.parse_args()
     suite = load_suite(asked.suite)
     named = [suite.task(name) for name in asked.tasks.split(",") if name]
     tasks = named or [task for task in suite.tasks if task.on == "ship"]
     if asked.table:
-        print(table(tasks, [load_results(folder) for folder in asked.table], asked.algorithm))
+        print(
+            table(
+                tasks, [load_results(folder) for folder in asked.table], asked.algorithm
+            )
+        )
         return
     if asked.shield:
         print(shield_table(tasks, asked.algorithm, asked.shield))
@@ -98,31 +121,44 @@ def learn(algorithm: str, task: BenchmarkTask, seed: int, runs: Path) -> None:
             shown = time.monotonic()
             done = f"{progress.steps / 1e6:5.2f} of {progress.total / 1e6:.2f} M"
             print(
-                f"{task.name} {seed}: {done}, cost {progress.cost:.2f}, best {progress.best_cost:.2f}",
+                f"{task.name} {seed}: {done}, cost {progress.cost:.2f}, best"
+                f" {progress.best_cost:.2f}",
                 flush=True,
             )
 
     plan = make_plan(Given(algorithm, task=task.name, seed=seed))
     resume = (folder / run_folder.RUN).is_file()
-    result = train(plan, folder, resume=resume, tell=tell, command=command_of(algorithm, task, seed))
+    result = train(
+        plan,
+        folder,
+        resume=resume,
+        tell=tell,
+        command=command_of(algorithm, task, seed),
+    )
     write_json(result.to_dict(), folder / RESULT)
     first, spent = result.curve[0]["cost"], time.process_time() - began
     print(
-        f"{task.name} {seed}: {first:.2f} -> {result.best_cost:.2f} at {result.best_steps}, {spent:.0f} s",
+        f"{task.name} {seed}: {first:.2f} -> {result.best_cost:.2f} at"
+        f" {result.best_steps}, {spent:.0f} s",
         flush=True,
     )
 
 
 def publish(algorithm: str, task: BenchmarkTask, seed: int, runs: Path) -> None:
     """Write a run's policy with its record."""
-    folder, name = folder_of(runs, algorithm, task, seed), f"{task.name}-{algorithm}-s{seed}.json"
+    folder, name = (
+        folder_of(runs, algorithm, task, seed),
+        f"{task.name}-{algorithm}-s{seed}.json",
+    )
     result = read_json(folder / RESULT, "result of a run", BROKEN)
     policy = load_agent(folder / run_folder.AGENT)
     assert isinstance(policy, LearnedPolicy)
     record: dict[str, Any] = {
         **policy.training,
         "command": command_of(algorithm, task, seed),
-        "script": f"python scripts/train_pretrained.py --tasks {task.name} --seeds {seed}",
+        "script": (
+            f"python scripts/train_pretrained.py --tasks {task.name} --seeds {seed}"
+        ),
         "held_out_cost": result["best_cost"],
         "best_steps": result["best_steps"],
         "steps": result["steps"],
@@ -130,39 +166,70 @@ def publish(algorithm: str, task: BenchmarkTask, seed: int, runs: Path) -> None:
     }
     path = PRETRAINED / name
     replace(policy, training=record).save(path)
-    size = sum(file.stat().st_size for file in (path, path.with_suffix(".safetensors"))) / 1000.0
+    size = (
+        sum(file.stat().st_size for file in (path, path.with_suffix(".safetensors")))
+        / 1000.0
+    )
     if size > LARGEST_KB:
-        raise SystemExit(f"{path}: {size:.0f} kB with its weights, expected at most {LARGEST_KB:.0f}")
+        raise SystemExit(
+            f"{path}: {size:.0f} kB with its weights, expected at most {LARGEST_KB:.0f}"
+        )
 
 
-def table(tasks: Sequence[BenchmarkTask], results: Sequence[BenchmarkResult], algorithm: str) -> str:
+def table(
+    tasks: Sequence[BenchmarkTask], results: Sequence[BenchmarkResult], algorithm: str
+) -> str:
     """Costs of the best baseline and of every training seed, the gain, and whether the aim is met."""
     lines = [
-        "| task | best baseline | its cost | agents, by training seed | gain on the ship, % | on the model "
-        "| far from the design | lost far: agents, baseline | gain over the best other than MPC | aim |",
+        (
+            "| task | best baseline | its cost | agents, by training seed | gain on the"
+            " ship, % | on the model | far from the design | lost far: agents, baseline"
+            " | gain over the best other than MPC | aim |"
+        ),
         "| --- | --- | --- | --- | --- | --- | --- | --- | --- | --- |",
     ]
     for number, task in enumerate(tasks):
         best = best_baseline(results, task.name, algorithm)
         gain, *others = (
-            gain_of(*paired(results, task.name + end, algorithm, best), number) for end in SETS.values()
+            gain_of(*paired(results, task.name + end, algorithm, best), number)
+            for end in SETS.values()
         )
         learned, theirs = paired(results, task.name, algorithm, best)
         lost = [
-            f"{one.mean():.0%}" for one in paired(results, f"{task.name}-far", algorithm, best, "terminated")
+            f"{one.mean():.0%}"
+            for one in paired(
+                results, f"{task.name}-far", algorithm, best, "terminated"
+            )
         ]
-        seeds, n = ", ".join(f"{cost:.1f}" for cost in learned.mean(axis=1)), theirs.shape[1]
+        seeds, n = (
+            ", ".join(f"{cost:.1f}" for cost in learned.mean(axis=1)),
+            theirs.shape[1],
+        )
         fast = best_baseline(results, task.name, algorithm, SLOW)
         over = gain_of(*paired(results, task.name, algorithm, fast), number)
         named = best if n == N_EPISODES else f"{best} ({n} episodes)"
-        met = "gain" if gain.value >= GAIN and gain.low > 0 else "near" if gain.value >= -CLOSE else "missed"
-        cells = [named, f"{theirs.mean():.1f}", seeds, *map(_shown, (gain, *others)), ", ".join(lost)]
+        met = (
+            "gain"
+            if gain.value >= GAIN and gain.low > 0
+            else "near"
+            if gain.value >= -CLOSE
+            else "missed"
+        )
+        cells = [
+            named,
+            f"{theirs.mean():.1f}",
+            seeds,
+            *map(_shown, (gain, *others)),
+            ", ".join(lost),
+        ]
         cells += [f"{_shown(over)} {fast}", met]
         lines.append(f"| {' | '.join([task.name, *cells])} |")
     return "\n".join(lines)
 
 
-def best_baseline(results: Sequence[BenchmarkResult], task: str, algorithm: str, without: str = "") -> str:
+def best_baseline(
+    results: Sequence[BenchmarkResult], task: str, algorithm: str, without: str = ""
+) -> str:
     """The one of the lowest mean cost; one that was run in fewer episodes is compared in these."""
     names = {name for one in results for name in one.summary["contestants"]} - {
         algorithm,
@@ -171,7 +238,8 @@ def best_baseline(results: Sequence[BenchmarkResult], task: str, algorithm: str,
     }
     costs = {name: figures(results, name, task) for name in sorted(names)}
     best, *others = sorted(
-        (name for name in costs if costs[name].size), key=lambda name: (-costs[name].size, costs[name].mean())
+        (name for name in costs if costs[name].size),
+        key=lambda name: (-costs[name].size, costs[name].mean()),
     )
     for name in others:
         ours, theirs = paired(results, task, best, name)
@@ -183,12 +251,24 @@ def figures(
     results: Sequence[BenchmarkResult], name: str, task: str, figure: str = "cost"
 ) -> NDArray[np.float64]:
     """A figure of a contestant where most episodes of it were run, shape (n_runs, n_episodes)."""
-    held = [one for one in results if name in one.summary["contestants"] and task in one.tasks]
-    return max((one.figures(name, task, figure) for one in held), key=np.size, default=np.zeros((0, 0)))
+    held = [
+        one
+        for one in results
+        if name in one.summary["contestants"] and task in one.tasks
+    ]
+    return max(
+        (one.figures(name, task, figure) for one in held),
+        key=np.size,
+        default=np.zeros((0, 0)),
+    )
 
 
 def paired(
-    results: Sequence[BenchmarkResult], task: str, one: str, other: str, figure: str = "cost"
+    results: Sequence[BenchmarkResult],
+    task: str,
+    one: str,
+    other: str,
+    figure: str = "cost",
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """A figure of two contestants in the episodes that both were run in."""
     first, second = (figures(results, name, task, figure) for name in (one, other))
@@ -211,14 +291,21 @@ def shield_table(tasks: Sequence[BenchmarkTask], algorithm: str, episodes: int) 
         )
         without, held = float(free.costs.mean()), float(safe.costs.mean())
         steers = safe.shielded[safe.sailing].mean()
-        lines.append(f"| {task.name} | {without:.1f} | {held:.1f} | {held / without:.3f} | {steers:.2%} |")
+        lines.append(
+            f"| {task.name} | {without:.1f} | {held:.1f} | {held / without:.3f} |"
+            f" {steers:.2%} |"
+        )
     return "\n".join(lines)
 
 
-def gain_of(learned: NDArray[np.float64], theirs: NDArray[np.float64], number: int) -> Interval:
+def gain_of(
+    learned: NDArray[np.float64], theirs: NDArray[np.float64], number: int
+) -> Interval:
     """What part of a baseline's cost the agents cost less, drawn over episodes and training seeds."""
     draws = Draws(number + 1, learned.shape[1])
-    drawn = 1.0 - draws.means(learned, number, 1).mean(axis=1) / draws.means(theirs, number).mean(axis=1)
+    drawn = 1.0 - draws.means(learned, number, 1).mean(axis=1) / draws.means(
+        theirs, number
+    ).mean(axis=1)
     return interval(float(1.0 - learned.mean() / theirs.mean()), drawn)
 
 

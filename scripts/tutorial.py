@@ -1,9 +1,11 @@
 """Run the commands of `docs/tutorial.md` and put what they print, shortened, and pictures into the page.
 
-`python scripts/tutorial.py [FOLDER]`; the folder keeps the log, the ship file and all that is written.
+`python scripts/tutorial.py [FOLDER]`; the folder keeps the log, the ship file and all
+that is written.
 
-The log is that of a simulated ship, as a bridge would have written it: time of the day, latitude and
-longitude of an antenna forward of midship, heading, and the rudder positive to port, in a current.
+The log is that of a simulated ship, as a bridge would have written it: time of the day,
+latitude and longitude of an antenna forward of midship, heading, and the rudder
+positive to port, in a current.
 """
 
 from __future__ import annotations
@@ -40,8 +42,11 @@ ANTENNA = 30.0  # m forward of midship
 LATITUDE, LONGITUDE, EARTH = 54.2, 7.6, 6371e3  # degrees north and east, m
 BEGINS = pd.Timestamp("2026-05-04 09:00")
 #: A shell block, and the output behind it, which is replaced.
-BLOCK = re.compile(r"```sh\n(?P<command>.*?)```\n(?P<output>\n```text\n.*?```\n)?", re.DOTALL)
-#: What is shown of the output of commands that print much: so many lines from one that begins so.
+BLOCK = re.compile(
+    r"```sh\n(?P<command>.*?)```\n(?P<output>\n```text\n.*?```\n)?", re.DOTALL
+)
+#: What is shown of the output of commands that print much: so many lines from one that
+#: begins so.
 SHOWN = {
     "identify": {"": 7, "circle_35.csv, ": 1, "Open-loop": 12, "Worst": 1},
     "trials": {"Manoeuvres": 10, "IMO": 16, "advance:": 2},
@@ -77,8 +82,12 @@ def logged(run: Trial, number: int) -> pd.DataFrame:
         {
             "Time (UTC)": clock.strftime("%Y-%m-%dT%H:%M:%SZ"),
             "Latitude": np.round(LATITUDE + np.degrees(north / EARTH), 7),
-            "Longitude": np.round(LONGITUDE + np.degrees(east / EARTH / np.cos(np.radians(LATITUDE))), 7),
-            "Heading (deg)": np.round((np.degrees(psi) + rng.normal(0.0, 0.1, len(psi))) % 360.0, 1),
+            "Longitude": np.round(
+                LONGITUDE + np.degrees(east / EARTH / np.cos(np.radians(LATITUDE))), 7
+            ),
+            "Heading (deg)": np.round(
+                (np.degrees(psi) + rng.normal(0.0, 0.1, len(psi))) % 360.0, 1
+            ),
             "Rudder (deg)": np.round(-np.degrees(run["delta"][rows]), 1) + 0.0,
             "Shaft (rpm)": np.round(60.0 * run["n"][rows], 1),
         }
@@ -88,13 +97,24 @@ def logged(run: Trial, number: int) -> pd.DataFrame:
 def run_command(command: str, folder: Path) -> str:
     """What a command prints, without lines that a page does not need; nothing of one that ends in `&`."""
     if command.endswith("&"):
-        subprocess.Popen(command[:-1], shell=True, cwd=folder, stdout=subprocess.DEVNULL, env=environment())
+        subprocess.Popen(
+            command[:-1],
+            shell=True,
+            cwd=folder,
+            stdout=subprocess.DEVNULL,
+            env=environment(),
+        )
         time.sleep(START)
         return ""
     done = subprocess.run(
-        command, shell=True, cwd=folder, text=True, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
+        command,
+        shell=True,
+        cwd=folder,
+        text=True,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
         env=environment(),
-    )  # fmt: skip
+    )
     if done.returncode:
         raise SystemExit(f"{command}: exit code {done.returncode}\n{done.stdout}")
     lines = [line.rstrip() for line in done.stdout.splitlines() if line.strip()]
@@ -116,7 +136,12 @@ def shortened(lines: list[str], wanted: dict[str, int]) -> list[str]:
 def environment() -> dict[str, str]:
     """That of this process, with 100 columns, without colours, and its own programs first."""
     path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
-    return os.environ | {"COLUMNS": "100", "NO_COLOR": "1", "TERM": "dumb", "PATH": path}
+    return os.environ | {
+        "COLUMNS": "100",
+        "NO_COLOR": "1",
+        "TERM": "dumb",
+        "PATH": path,
+    }
 
 
 def edited(ship: str, wanted: str) -> str:
@@ -133,7 +158,9 @@ def edited(ship: str, wanted: str) -> str:
 def _with_lines(text: str, lines: str) -> str:
     for line in lines.strip().splitlines():
         key = line.split(" = ")[0]
-        text, count = re.subn(rf"^(# )?{key} = .*$", line, text, count=1, flags=re.MULTILINE)
+        text, count = re.subn(
+            rf"^(# )?{key} = .*$", line, text, count=1, flags=re.MULTILINE
+        )
         if not count:
             raise SystemExit(f"{key}: not in the ship file")
     return text
@@ -147,12 +174,22 @@ def pictures(folder: Path) -> None:
     with mpl.rc_context(STYLE):
         plt.figure(figsize=SIZE, dpi=DPI, layout="constrained")
         for label, run in trials.items():
-            plt.plot(run.t, np.degrees(run["r"]), "0.6" if label == "measured" else "C3", label=label)
+            plt.plot(
+                run.t,
+                np.degrees(run["r"]),
+                "0.6" if label == "measured" else "C3",
+                label=label,
+            )
         plt.ylim(-1.2, 0.2)
         _save("prediction", "yaw rate, deg/s")
         plt.figure(figsize=SIZE, dpi=DPI, layout="constrained")
-        runs = [manoeuvres.zigzag(one, 20, 20, duration=500) for one in model.sample(60, seed=0)]
-        band = np.percentile(np.degrees([run["psi"] for run in runs]), [2.5, 97.5], axis=0)
+        runs = [
+            manoeuvres.zigzag(one, 20, 20, duration=500)
+            for one in model.sample(60, seed=0)
+        ]
+        band = np.percentile(
+            np.degrees([run["psi"] for run in runs]), [2.5, 97.5], axis=0
+        )
         best = manoeuvres.zigzag(model, 20, 20, duration=500)
         plt.fill_between(best.t, *band, alpha=0.3, label="95 % of the models")
         plt.plot(best.t, np.degrees(best["psi"]), label="identified")
@@ -189,15 +226,21 @@ def main(folder: Path) -> None:
         print(found["command"], shown, sep="\n", flush=True)
         if "new-ship" in found["command"]:
             path = folder / "ship.toml"
-            path.write_text(edited(path.read_text(encoding="utf-8"), wanted[1]), encoding="utf-8")
-        return f"```sh\n{found['command']}```\n" + (f"\n```text\n{shown}\n```\n" if shown else "")
+            path.write_text(
+                edited(path.read_text(encoding="utf-8"), wanted[1]), encoding="utf-8"
+            )
+        return f"```sh\n{found['command']}```\n" + (
+            f"\n```text\n{shown}\n```\n" if shown else ""
+        )
 
     PAGE.write_text(BLOCK.sub(done, text), encoding="utf-8")
     pictures(folder)
 
 
 def run(
-    folder: Annotated[Path | None, typer.Argument(help="Keeps all files; by default none are.")] = None,
+    folder: Annotated[
+        Path | None, typer.Argument(help="Keeps all files; by default none are.")
+    ] = None,
 ) -> None:
     """Run the tutorial in a folder."""
     if folder is not None:

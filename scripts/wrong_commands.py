@@ -3,9 +3,10 @@
     python scripts/wrong_commands.py               all of them
     python scripts/wrong_commands.py --sample 60   some, drawn
 
-Unknown, missing, empty, repeated and wrongly typed arguments, numbers out of any range, names that do not
-exist, folders for files, files for folders, devices, paths that are too long. Fails if one is accepted, exits
-with another code than 1 or 2, shows a traceback, says nothing or several things, or leaves a file.
+Unknown, missing, empty, repeated and wrongly typed arguments, numbers out of any range,
+names that do not exist, folders for files, files for folders, devices, paths that are
+too long. Fails if one is accepted, exits with another code than 1 or 2, shows a
+traceback, says nothing or several things, or leaves a file.
 """
 
 from __future__ import annotations
@@ -31,7 +32,11 @@ LONGEST_S = 60  # that a wrong command may take
 
 #: The shortest right command line of each command; the folder that it is in is new.
 RIGHT: dict[str, list[str]] = {
-    "new-ship": [str(ROOT / "examples" / "mariner" / "zigzag_10_10.csv"), "--out", "out"],
+    "new-ship": [
+        str(ROOT / "examples" / "mariner" / "zigzag_10_10.csv"),
+        "--out",
+        "out",
+    ],
     "look": [SHIP, "--out", "out.html"],
     "identify": [SHIP, "--out", "out"],
     "advise": [SHIP],
@@ -53,11 +58,48 @@ NO_NUMBER = ("x", "", "1,5", "0x1", "--", "1e")
 WRONG: dict[str, tuple[str, ...]] = {
     "int": (*NO_NUMBER, "1.5", "-1", "nan", "1e3", "9" * 5000, "-" + "9" * 30),
     "float": (*NO_NUMBER, "nan", "-inf", "-1", "-1e999", "-1e-9"),
-    "str": ("", "no-such-thing", "-1", "nan", "[red]x", "\x1b[31mx", "x" * 5000, "a=b=c", "../..", "\0"),
-    "Path": ("", "no/such/thing", "/", ".", "/proc/self/mem", "/dev/null", "x" * 5000, "binary", "\0"),
-    "out": ("", "file", "file/out", "full", "/proc/self/mem", "/dev/full", "x" * 5000, "/proc/x", "\0"),
+    "str": (
+        "",
+        "no-such-thing",
+        "-1",
+        "nan",
+        "[red]x",
+        "\x1b[31mx",
+        "x" * 5000,
+        "a=b=c",
+        "../..",
+        "\0",
+    ),
+    "Path": (
+        "",
+        "no/such/thing",
+        "/",
+        ".",
+        "/proc/self/mem",
+        "/dev/null",
+        "x" * 5000,
+        "binary",
+        "\0",
+    ),
+    "out": (
+        "",
+        "file",
+        "file/out",
+        "full",
+        "/proc/self/mem",
+        "/dev/full",
+        "x" * 5000,
+        "/proc/x",
+        "\0",
+    ),
 }
-WRITTEN = ("out", "onnx", "markdown", "c", "fmu")  # parameters that name what is written
+WRITTEN = (
+    "out",
+    "onnx",
+    "markdown",
+    "c",
+    "fmu",
+)  # parameters that name what is written
 
 
 def commands() -> dict[str, Any]:
@@ -65,7 +107,11 @@ def commands() -> dict[str, Any]:
     group = typer.main.get_command(app)
     context = typer.Context(group, info_name="shipgym")
     return {
-        name: command.make_context(name, [], resilient_parsing=True, parent=context).command
+        name: (
+            command.make_context(
+                name, [], resilient_parsing=True, parent=context
+            ).command
+        )
         for name, command in group.commands.items()  # type: ignore[attr-defined]
         if name != "reproduce"
     }
@@ -73,14 +119,25 @@ def commands() -> dict[str, Any]:
 
 def lines() -> Iterator[list[str]]:
     """Every wrong command line; what comes last counts where an option is given twice."""
-    yield from (["no-such-command"], ["--no-such-option"], [""], ["\0"], ["-x"], ["--version=3"])
+    yield from (
+        ["no-such-command"],
+        ["--no-such-option"],
+        [""],
+        ["\0"],
+        ["-x"],
+        ["--version=3"],
+    )
     for name, command in commands().items():
         right = RIGHT[name]
         yield [name, *right, "--no-such-option"]
         yield [name, *right, "--no-such-option=3", "3"]
         yield [name, *right, ""]
         needed = right[: 1 + right.index("--out")] if "--out" in right else right
-        yield from ([name, *right[:k]] for k in range(len(needed)) if name not in ("doctor", "warm"))
+        yield from (
+            [name, *right[:k]]
+            for k in range(len(needed))
+            if name not in ("doctor", "warm")
+        )
         for parameter in command.params:
             kind = str(get_type_hints(command.callback).get(parameter.name))
             yield from ([name, *words] for words in _wrong(parameter, kind, right))
@@ -88,7 +145,9 @@ def lines() -> Iterator[list[str]]:
 
 def _wrong(parameter: Any, kind: str, right: list[str]) -> Iterator[list[str]]:
     """What is wrong of one parameter, beside what is right of the others."""
-    values = next((values for name, values in WRONG.items() if name in kind), WRONG["str"])
+    values = next(
+        (values for name, values in WRONG.items() if name in kind), WRONG["str"]
+    )
     if parameter.name in WRITTEN:
         values = tuple(
             one for one in WRONG["out"] if (parameter.name, one) != ("onnx", "file")
@@ -131,7 +190,10 @@ def fault(line: list[str]) -> str:
     told = answer.stderr.splitlines()
     if answer.exit_code not in (1, 2) or not isinstance(answer.exception, SystemExit):
         return f"exit code {answer.exit_code}, {answer.exception!r}"
-    if sum(text.lower().startswith("error:") for text in told) != 1 or "Traceback" in answer.output:
+    if (
+        sum(text.lower().startswith("error:") for text in told) != 1
+        or "Traceback" in answer.output
+    ):
         return f"{len(told)} lines: {answer.stderr[:300]!r}"
     left = sorted(set(Path().rglob("*")) - set(before))
     return f"left {', '.join(map(str, left))}" if left else ""
@@ -163,7 +225,9 @@ def main(
     found = faults(chosen)
     for line, wrong in found.items():
         print(f"shipgym {line}\n    {wrong}")
-    print(f"{len(chosen)} wrong command lines, {len(found)} not refused as they should be")
+    print(
+        f"{len(chosen)} wrong command lines, {len(found)} not refused as they should be"
+    )
     sys.exit(bool(found))
 
 

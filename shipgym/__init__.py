@@ -1,7 +1,7 @@
 """Ships for people who steer them with software: trials, models, manoeuvres and environments.
 
-Importing shipgym registers its environments with Gymnasium. The public names stand in `__init__.pyi`; each
-is imported when it is first used.
+Importing shipgym registers its environments with Gymnasium. The public names stand in
+`__init__.pyi`; each is imported when it is first used.
 """
 
 from lazy_loader import attach_stub

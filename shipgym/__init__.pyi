@@ -4,11 +4,11 @@ from . import plots as plots
 from . import weather as weather
 from .envs.checker import check_vector_env as check_vector_env
 from .envs.episode import Episode as Episode
-from .envs.registration import register_task as register_task
 from .envs.recording import RecordEpisode as RecordEpisode
+from .envs.registration import register_task as register_task
+from .envs.sb3 import ShipVecEnv as ShipVecEnv
 from .envs.task_checker import TaskCheck as TaskCheck
 from .envs.task_checker import check_task as check_task
-from .envs.sb3 import ShipVecEnv as ShipVecEnv
 from .errors import InputError as InputError
 from .errors import ManoeuvreError as ManoeuvreError
 from .errors import UnstableModelError as UnstableModelError
@@ -29,10 +29,10 @@ from .ships import register_structure as register_structure
 from .ships import truth_of as truth_of
 from .ships.checker import ModelCheck as ModelCheck
 from .ships.checker import check_ship_model as check_ship_model
-from .ships.particulars import Particulars as Particulars
-from .ships.scaling import scale_model as scale_model
 from .ships.linear import StraightLineStability as StraightLineStability
 from .ships.linear import straight_line_stability as straight_line_stability
+from .ships.particulars import Particulars as Particulars
+from .ships.scaling import scale_model as scale_model
 from .ships.steering import SteeringGear as SteeringGear
 from .trials.sensors import Sensor as Sensor
 from .trials.sensors import Sensors as Sensors

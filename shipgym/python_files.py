@@ -3,7 +3,13 @@
 import hashlib
 import sys
 from collections.abc import Callable
-from inspect import CO_ASYNC_GENERATOR, CO_COROUTINE, CO_GENERATOR, CO_VARARGS, CO_VARKEYWORDS
+from inspect import (
+    CO_ASYNC_GENERATOR,
+    CO_COROUTINE,
+    CO_GENERATOR,
+    CO_VARARGS,
+    CO_VARKEYWORDS,
+)
 from pathlib import Path
 from sysconfig import get_path
 from traceback import extract_tb
@@ -12,15 +18,21 @@ from typing import Any
 
 from shipgym.errors import InputError
 
-NOT_PLAIN = CO_VARARGS | CO_VARKEYWORDS | CO_GENERATOR | CO_COROUTINE | CO_ASYNC_GENERATOR
+NOT_PLAIN = (
+    CO_VARARGS | CO_VARKEYWORDS | CO_GENERATOR | CO_COROUTINE | CO_ASYNC_GENERATOR
+)
 #: Where code is that is not a user's own.
-LIBRARIES = (str(Path(__file__).parent), *(get_path(name) for name in ("stdlib", "purelib", "platlib")))
+LIBRARIES = (
+    str(Path(__file__).parent),
+    *(get_path(name) for name in ("stdlib", "purelib", "platlib")),
+)
 
 
 def load_file(path: Path, expected: str = "a Python file") -> ModuleType:
     """A Python file as a module, executed once however often it is asked for while it stays the same.
 
-    `expected` says what it is to be, for messages. InputError if there is none, or it cannot be executed.
+    `expected` says what it is to be, for messages. InputError if there is none, or it
+    cannot be executed.
     """
     if not path.is_file():
         raise InputError(f"{path}: no such file, expected {expected}")
@@ -33,8 +45,8 @@ def load_file(path: Path, expected: str = "a Python file") -> ModuleType:
     module.__file__ = str(resolved)
     sys.modules[name] = module
     try:
-        # compiled here, because Python's own cache takes a file changed within a second for the same; and
-        # independent of what this file may import from __future__
+        # compiled here, because Python's own cache takes a file changed within a second
+        # for the same; and independent of what this file may import from __future__
         code = compile(resolved.read_bytes(), str(resolved), "exec", dont_inherit=True)
         exec(code, vars(module))
     except BaseException as error:
@@ -47,8 +59,14 @@ def load_file(path: Path, expected: str = "a Python file") -> ModuleType:
         passed = (one.lineno for one in frames if one.filename == str(resolved))
         line = [getattr(error, "lineno", None), *passed][-1]  # the last one in the file
         place = f"{path}, line {line}" if line else path
-        others = (one for one in frames if not one.filename.startswith(("<", str(resolved), *LIBRARIES)))
-        within = [f" ({one.filename}, line {one.lineno})" for one in others][-1:]  # of what it imports
+        others = (
+            one
+            for one in frames
+            if not one.filename.startswith(("<", str(resolved), *LIBRARIES))
+        )
+        within = [f" ({one.filename}, line {one.lineno})" for one in others][
+            -1:
+        ]  # of what it imports
         why = f"{type(error).__name__}: {error}{''.join(within)}"
         raise InputError(f"{place}: cannot be executed: {why}") from error
     return module
@@ -60,16 +78,21 @@ def check_function(value: Any, count: int, where: str, what: str) -> None:
     if code is None:
         raise InputError(f"{where}: no plain function found, expected {what}")
     if code.co_flags & NOT_PLAIN or code.co_argcount != count:
-        more = " or more, a generator or a coroutine" if code.co_flags & NOT_PLAIN else ""
-        raise InputError(f"{where}: {code.co_argcount} arguments{more} found, expected {what}")
+        more = (
+            " or more, a generator or a coroutine" if code.co_flags & NOT_PLAIN else ""
+        )
+        raise InputError(
+            f"{where}: {code.co_argcount} arguments{more} found, expected {what}"
+        )
 
 
 def refuse_closure(function: Any) -> None:
     """Refuse a function made within another, as decorators make them: it cannot be compiled."""
     if getattr(function, "__closure__", None):
         raise InputError(
-            f"{place_of(function)}: uses variables of the function around it "
-            f"({', '.join(function.__code__.co_freevars)}), expected a function at the top of a file"
+            f"{place_of(function)}: uses variables of the function around it"
+            f" ({', '.join(function.__code__.co_freevars)}), expected a function at the"
+            " top of a file"
         )
 
 
@@ -80,7 +103,9 @@ def asked(function: Callable[..., Any], *arguments: Any) -> Any:
     except InputError:
         raise
     except Exception as error:
-        raise InputError(f"{place_of(function, error)}: {type(error).__name__}: {error}") from error
+        raise InputError(
+            f"{place_of(function, error)}: {type(error).__name__}: {error}"
+        ) from error
 
 
 def place_of(function: Any, error: BaseException | None = None) -> str:
@@ -90,6 +115,8 @@ def place_of(function: Any, error: BaseException | None = None) -> str:
         return repr(function)
     file, line, name = code.co_filename, code.co_firstlineno, code.co_name
     for frame in extract_tb(error.__traceback__) if error else ():
-        if frame.filename == code.co_filename or not frame.filename.startswith(LIBRARIES):
+        if frame.filename == code.co_filename or not frame.filename.startswith(
+            LIBRARIES
+        ):
             file, line, name = frame.filename, frame.lineno or line, frame.name
     return f"{file}, line {line}, in {name}"

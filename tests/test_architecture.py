@@ -12,7 +12,11 @@ import pytest
 
 ROOT = Path(__file__).parents[1]
 PACKAGES = ("shipgym", "identification", "agents")  # each imports those before it
-PAGES = [ROOT / "README.md", ROOT / "CHANGELOG.md", *sorted((ROOT / "docs").rglob("*.md"))]
+PAGES = [
+    ROOT / "README.md",
+    ROOT / "CHANGELOG.md",
+    *sorted((ROOT / "docs").rglob("*.md")),
+]
 LONGEST = 60  # lines of a function
 
 
@@ -24,7 +28,11 @@ def imports():
 
 def test_imports_run_from_agents_to_identification_to_shipgym(imports):
     rank = {name: i for i, name in enumerate(PACKAGES)}
-    upward = [(a, b) for a, b in imports if rank[a.partition(".")[0]] < rank[b.partition(".")[0]]]
+    upward = [
+        (a, b)
+        for a, b in imports
+        if rank[a.partition(".")[0]] < rank[b.partition(".")[0]]
+    ]
     assert not upward
 
 
@@ -82,7 +90,11 @@ def test_the_picture_of_a_step_names_functions_that_the_parts_have():
     from shipgym.sea import open_sea
     from shipgym.tasks import course_keeping, path_following
 
-    named = {(giver, one) for _, given in draw_architecture.stages().values() for giver, one in given}
+    named = {
+        (giver, one)
+        for _, given in draw_architecture.stages().values()
+        for giver, one in given
+    }
     for giver, one in named:
         if giver == "the task":
             assert hasattr(course_keeping, one), one
@@ -99,7 +111,8 @@ def test_no_function_is_longer_than_sixty_lines():
         f"{path.relative_to(ROOT)}:{node.lineno} {node.name}"
         for path in draw_architecture.modules().values()
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
-        if isinstance(node, ast.FunctionDef) and node.end_lineno - node.lineno >= LONGEST
+        if isinstance(node, ast.FunctionDef)
+        and node.end_lineno - node.lineno >= LONGEST
     ]
     assert not long
 
@@ -113,9 +126,15 @@ def test_the_wheel_has_every_file_that_is_no_code():
     named = project["tool"]["setuptools"]["package-data"]
     for package in PACKAGES:
         folder = ROOT / package
-        files = {path for path in folder.rglob("*") if path.is_file() and "__pycache__" not in path.parts}
+        files = {
+            path
+            for path in folder.rglob("*")
+            if path.is_file() and "__pycache__" not in path.parts
+        }
         files -= {path for path in files if path.suffix in (".py", ".pyi")}
-        assert not files.difference(*(folder.glob(pattern) for pattern in named[package]))
+        assert not files.difference(
+            *(folder.glob(pattern) for pattern in named[package])
+        )
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
@@ -127,14 +146,26 @@ def test_links_of_a_page_lead_somewhere(page):
         target = (page.parent / path).resolve() if path else page
         assert target.exists(), link
         if anchor:
-            headings = re.findall(r"^#+ (.*)$", target.read_text(encoding="utf-8"), re.MULTILINE)
-            anchors = [re.sub(r"[^\w\- ]", "", one.lower()).replace(" ", "-") for one in headings]
+            headings = re.findall(
+                r"^#+ (.*)$", target.read_text(encoding="utf-8"), re.MULTILINE
+            )
+            anchors = [
+                re.sub(r"[^\w\- ]", "", one.lower()).replace(" ", "-")
+                for one in headings
+            ]
             assert anchor in anchors, link
 
 
 def test_the_site_has_every_page():
-    named = re.findall(r": (\S+\.md)$", (ROOT / "mkdocs.yml").read_text(encoding="utf-8"), re.MULTILINE)
-    pages = {path.relative_to(ROOT / "docs").as_posix() for path in (ROOT / "docs").rglob("*.md")}
-    pages |= {f"notebooks/{path.stem}.md" for path in (ROOT / "notebooks").glob("*.ipynb")}
+    named = re.findall(
+        r": (\S+\.md)$", (ROOT / "mkdocs.yml").read_text(encoding="utf-8"), re.MULTILINE
+    )
+    pages = {
+        path.relative_to(ROOT / "docs").as_posix()
+        for path in (ROOT / "docs").rglob("*.md")
+    }
+    pages |= {
+        f"notebooks/{path.stem}.md" for path in (ROOT / "notebooks").glob("*.ipynb")
+    }
     assert set(named) == pages
     assert len(named) == len(pages)

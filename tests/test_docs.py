@@ -5,7 +5,8 @@ Comments of a page, which readers do not see, say what is special:
     <!-- not run: REASON -->            the next block is not run
     <!-- before: CODE -->               run first: what the page leaves to the reader
 
-Numbers of ships, steps and draws are made small (`SMALLER`). The notebooks are run by `make evidence`.
+Numbers of ships, steps and draws are made small (`SMALLER`). The notebooks are run by
+`make evidence`.
 """
 
 import ast
@@ -31,23 +32,32 @@ from shipgym import example_ship
 
 ROOT = Path(__file__).parents[1]
 BLOCK = re.compile(
-    r"(?:<!-- (?P<mark>not run|before): (?P<said>.*?) -->\n)?\n?^```python\n(?P<code>.*?)^```", re.M | re.S
+    r"(?:<!-- (?P<mark>not run|before): (?P<said>.*?)"
+    r" -->\n)?\n?^```python\n(?P<code>.*?)^```",
+    re.M | re.S,
 )
 PAGES = [
     path
     for path in sorted((ROOT / "docs").rglob("*.md"))
-    if "```python" in path.read_text(encoding="utf-8") and path.name != "gallery.md"  # made by its script
+    if "```python" in path.read_text(encoding="utf-8")
+    and path.name != "gallery.md"  # made by its script
 ]
 #: Pages that take few steps, for which loops are not worth compiling.
 PLAIN = "docs/environments/"
 SMALLER = {
-    "num_envs=1024": "num_envs=3", "range(1000)": "range(3)", "n_draws=200": "n_draws=3",
-    "threads=2": "threads=1", ".engine(100)": ".engine(3)", "(task.seeds)": "(task.seeds[:3])",
-}  # fmt: skip
+    "num_envs=1024": "num_envs=3",
+    "range(1000)": "range(3)",
+    "n_draws=200": "n_draws=3",
+    "threads=2": "threads=1",
+    ".engine(100)": ".engine(3)",
+    "(task.seeds)": "(task.seeds[:3])",
+}
 
 
 @pytest.mark.filterwarnings("ignore:.*multi-threaded, use of fork:DeprecationWarning")
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.relative_to(ROOT).as_posix())
+@pytest.mark.parametrize(
+    "page", PAGES, ids=lambda page: page.relative_to(ROOT).as_posix()
+)
 def test_the_blocks_of_a_page_run(page, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     shutil.copytree(example_ship().parent, tmp_path, dirs_exist_ok=True)
@@ -95,5 +105,8 @@ def test_every_block_that_is_not_run_is_parsed_and_has_its_mark():
 
 
 def test_the_reference_has_every_public_name():
-    written = {path.name: path.read_text(encoding="utf-8") for path in (ROOT / "docs" / "api").glob("*.md")}
+    written = {
+        path.name: path.read_text(encoding="utf-8")
+        for path in (ROOT / "docs" / "api").glob("*.md")
+    }
     assert written == document_api.pages()

@@ -37,7 +37,9 @@ def corpus(tmp_path, monkeypatch):
 
 def found(read, inputs=400):
     kinds = {"planted": Kind("planted", read)}
-    report = run(kinds, chunks(kinds.values(), inputs), 0, 1, math.inf, lambda one: None)["planted"]
+    report = run(
+        kinds, chunks(kinds.values(), inputs), 0, 1, math.inf, lambda one: None
+    )["planted"]
     assert report.inputs == inputs
     return report
 
@@ -55,7 +57,9 @@ def test_a_field_that_nobody_checked_is_found_with_the_one_change_that_matters(c
     assert report.refused > 50
     kinds = {what.split()[0] for what in report.findings}
     assert {"KeyError", "TypeError", "ValueError"} <= kinds
-    missing = next(one for what, one in report.findings.items() if what.startswith("KeyError"))
+    missing = next(
+        one for what, one in report.findings.items() if what.startswith("KeyError")
+    )
     assert len(missing.edits) == 1
     assert "length" not in json.loads(missing.files["a.json"])
 
@@ -93,28 +97,50 @@ def test_a_refusal_must_be_fit_to_read(corpus):
         error.args = ("x" * 10_000,)
         raise error
 
-    for refuse, told in ((surrogates, "cannot be printed"), (pages, "more than 5000 characters")):
+    for refuse, told in (
+        (surrogates, "cannot be printed"),
+        (pages, "more than 5000 characters"),
+    ):
         report = found(lambda path, refuse=refuse: when(path, lambda: refuse(path)), 40)
         assert any(told in what for what in report.findings)
 
 
-def test_the_same_seed_makes_the_same_inputs_in_any_number_of_processes(corpus, tmp_path, monkeypatch):
+def test_the_same_seed_makes_the_same_inputs_in_any_number_of_processes(
+    corpus, tmp_path, monkeypatch
+):
     def sizes(workers, seed):
         kinds = {"planted": Kind("planted", lambda path: 1.0 / read(path)["length"])}
-        report = run(kinds, chunks(kinds.values(), 1200), seed, workers, math.inf, lambda one: None)[
-            "planted"
-        ]
-        return report.read, report.refused, {what: one.count for what, one in report.findings.items()}
+        report = run(
+            kinds,
+            chunks(kinds.values(), 1200),
+            seed,
+            workers,
+            math.inf,
+            lambda one: None,
+        )["planted"]
+        return (
+            report.read,
+            report.refused,
+            {what: one.count for what, one in report.findings.items()},
+        )
 
     assert sizes(1, 0) == sizes(3, 0) != sizes(1, 1)
-    monkeypatch.setattr(processes, "LARGEST_MIB", 0)  # a process is replaced after each chunk
+    monkeypatch.setattr(
+        processes, "LARGEST_MIB", 0
+    )  # a process is replaced after each chunk
     assert sizes(3, 0) == sizes(1, 0)
 
 
-@pytest.mark.parametrize("name", ["a.json", "a.toml", "a.csv", "a.safetensors", "a.bin"])
+@pytest.mark.parametrize(
+    "name", ["a.json", "a.toml", "a.csv", "a.safetensors", "a.bin"]
+)
 def test_a_change_is_a_function_of_what_it_is_drawn_from(name):
     corpus = ROOT / "tests" / "corpus"
-    seeds = {path.suffix: path.read_bytes() for path in sorted(corpus.rglob("*")) if path.is_file()}
+    seeds = {
+        path.suffix: path.read_bytes()
+        for path in sorted(corpus.rglob("*"))
+        if path.is_file()
+    }
     content = seeds.get(Path(name).suffix, b"some bytes")
     changed = {mutate(Random(k), name, content)[0] for k in range(100)}
     assert len(changed) > 60
@@ -123,5 +149,7 @@ def test_a_change_is_a_function_of_what_it_is_drawn_from(name):
 
 def test_every_kind_of_file_is_read_or_refused():
     command = [sys.executable, "scripts/fuzz.py", f"--inputs={INPUTS}", "--workers=1"]
-    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+    done = subprocess.run(
+        command, cwd=ROOT, capture_output=True, text=True, check=False
+    )
     assert done.returncode == 0, done.stdout + done.stderr

@@ -26,13 +26,15 @@ EXPECTED = {
     "sign": {"y = x * 2 - 1", "y = x / 2 + 1", "return y if y < LIMIT else LIMIT"},
     "constant": {'LIMIT: "float | None" = 2.75', "y = x / 3 - 1", "y = x / 2 - 2"},
     "condition": {
-        "if not x is None or not go:", "if x is None and not go:", "if x is None or  go:",
+        "if not x is None or not go:",
+        "if x is None and not go:",
+        "if x is None or  go:",
         "return y if not y < LIMIT else -LIMIT",
     },
     "comparison": {"if x is not None or not go:", "return y if y >= LIMIT else -LIMIT"},
     "dropped": {"pass"},
     "return": {"return None"},
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("kind", EXPECTED)
@@ -54,7 +56,10 @@ def test_every_module_has_tests_that_stand_beside_it():
     modules = mutate.chosen(list(mutate.PACKAGES))
     assert len(modules) > 200
     missing = {
-        test for module in modules for test in mutate.beside(module) if not (mutate.ROOT / test).is_file()
+        test
+        for module in modules
+        for test in mutate.beside(module)
+        if not (mutate.ROOT / test).is_file()
     }
     assert not missing
     assert mutate.beside("shipgym/envs/sb3.py") == ["tests/shipgym/test_sb3.py"]
@@ -81,19 +86,35 @@ def test_a_fault_is_gone_when_it_is_taken_out(tmp_path):
     path = tmp_path / "module_with_a_fault.py"
     command = [sys.executable, "-c", "import module_with_a_fault as m; print(m.X)"]
     found = []
-    for text, later in (("X = 1\n", 0), ("X = 2\n", next(mutate.LATER)), ("X = 1\n", 0)):
+    for text, later in (
+        ("X = 1\n", 0),
+        ("X = 2\n", next(mutate.LATER)),
+        ("X = 1\n", 0),
+    ):
         mutate.written_at(path, text, 1_700_000_000 + later)
-        asked = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=True)
+        asked = subprocess.run(
+            command, cwd=tmp_path, capture_output=True, text=True, check=True
+        )
         found.append(asked.stdout.strip())
     assert found == ["1", "2", "1"]
 
 
-def test_tests_that_reach_a_line_come_first_and_the_cheapest_file_before_others(monkeypatch):
+def test_tests_that_reach_a_line_come_first_and_the_cheapest_file_before_others(
+    monkeypatch,
+):
     known = {
-        "slow.py": {"tests": {"s1": 3.0, "s2": 1.0, "s3": 0.1}, "lines": {"m.py": {"7": [0, 1], "9": [2]}}},
-        "fast.py": {"tests": {"f1": 0.5, "f2": 0.2}, "lines": {"m.py": {"8": [0]}, "n.py": {"7": [1]}}},
+        "slow.py": {
+            "tests": {"s1": 3.0, "s2": 1.0, "s3": 0.1},
+            "lines": {"m.py": {"7": [0, 1], "9": [2]}},
+        },
+        "fast.py": {
+            "tests": {"f1": 0.5, "f2": 0.2},
+            "lines": {"m.py": {"8": [0]}, "n.py": {"7": [1]}},
+        },
     }
-    monkeypatch.setattr(covered_tests.Maps, "read", lambda maps, folder, test, plain: known[test])
+    monkeypatch.setattr(
+        covered_tests.Maps, "read", lambda maps, folder, test, plain: known[test]
+    )
     maps = covered_tests.Maps(Path("nowhere"))
     first, seconds = maps.ordered(Path(), list(known), "m.py", range(7, 9), plain=False)
     assert list(first.items()) == [("f1", 0.5), ("s2", 1.0), ("s1", 3.0)]

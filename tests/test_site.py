@@ -1,6 +1,7 @@
 """The built site in a browser. `make docs` builds it and runs this; `make test` leaves it out.
 
-`SHIPGYM_SITE` names a folder that is built already; otherwise it is built here, in half a minute.
+`SHIPGYM_SITE` names a folder that is built already; otherwise it is built here, in half
+a minute.
 """
 
 import functools
@@ -17,16 +18,26 @@ import pytest
 
 from tests.agents.browser import COMMAND, Browser
 
-pytest.importorskip("mkdocs", reason="the site is built by mkdocs: pip install 'shipgym[docs]'")
+pytest.importorskip(
+    "mkdocs", reason="the site is built by mkdocs: pip install 'shipgym[docs]'"
+)
 
 ROOT = Path(__file__).parents[1]
 BOX = "e.getBoundingClientRect()"
 WIDE, TELEPHONE = (1280, 800), (375, 667)
 NARROW = (
-    "index.html", "tutorial.html", "gallery.html", "identification.html", "reproduction.html",
-    "theory/motion.html", "theory/identification.html", "theory/autopilots.html", "howto/nmea.html",
-    "api/shipgym.html", "notebooks/identify.html",
-)  # fmt: skip
+    "index.html",
+    "tutorial.html",
+    "gallery.html",
+    "identification.html",
+    "reproduction.html",
+    "theory/motion.html",
+    "theory/identification.html",
+    "theory/autopilots.html",
+    "howto/nmea.html",
+    "api/shipgym.html",
+    "notebooks/identify.html",
+)
 
 
 class Page(HTMLParser):
@@ -54,9 +65,22 @@ def site(tmp_path_factory):
         return Path(built).resolve()
     folder = tmp_path_factory.mktemp("site")
     done = subprocess.run(
-        [sys.executable, "-m", "mkdocs", "build", "--strict", "--quiet", "--site-dir", str(folder)],
-        cwd=ROOT, capture_output=True, text=True, check=False, env=os.environ | {"NO_MKDOCS_2_WARNING": "1"},
-    )  # fmt: skip
+        [
+            sys.executable,
+            "-m",
+            "mkdocs",
+            "build",
+            "--strict",
+            "--quiet",
+            "--site-dir",
+            str(folder),
+        ],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=False,
+        env=os.environ | {"NO_MKDOCS_2_WARNING": "1"},
+    )
     assert done.returncode == 0, done.stderr
     return folder
 
@@ -70,7 +94,9 @@ class Quiet(http.server.SimpleHTTPRequestHandler):
 
 @pytest.fixture(scope="module")
 def address(site):
-    server = http.server.ThreadingHTTPServer(("127.0.0.1", 0), functools.partial(Quiet, directory=site))
+    server = http.server.ThreadingHTTPServer(
+        ("127.0.0.1", 0), functools.partial(Quiet, directory=site)
+    )
     threading.Thread(target=server.serve_forever, daemon=True).start()
     yield f"http://127.0.0.1:{server.server_port}"
     server.shutdown()
@@ -95,11 +121,19 @@ def test_links_lead_somewhere_and_nothing_is_loaded_from_elsewhere(site):
         for link in page.links | page.loads:
             parts = urlsplit(link)
             if parts.scheme or parts.netloc:
-                broken += [(path.name, link)] if link in page.loads and parts.scheme != "data" else []
+                broken += (
+                    [(path.name, link)]
+                    if link in page.loads and parts.scheme != "data"
+                    else []
+                )
                 continue
-            target = (path.parent / unquote(parts.path)).resolve() if parts.path else path
+            target = (
+                (path.parent / unquote(parts.path)).resolve() if parts.path else path
+            )
             if not target.exists() or (
-                parts.fragment and target in pages and unquote(parts.fragment) not in pages[target].anchors
+                parts.fragment
+                and target in pages
+                and unquote(parts.fragment) not in pages[target].anchors
             ):
                 broken.append((path.relative_to(site).as_posix(), link))
     assert len(pages) > 60
@@ -109,12 +143,15 @@ def test_links_lead_somewhere_and_nothing_is_loaded_from_elsewhere(site):
 def test_the_first_page_says_all_without_scrolling(browser, address):
     browser.open(f"{address}/index.html")
     bottoms = browser.run(
-        "[...document.querySelectorAll('.cards li')].map(e => e.getBoundingClientRect().bottom)"
+        "[...document.querySelectorAll('.cards li')].map(e =>"
+        " e.getBoundingClientRect().bottom)"
     )
     assert len(bottoms) == 3
     assert max(bottoms) <= WIDE[1]
-    picture = browser.run("(e => [e.complete && e.naturalWidth, e.getBoundingClientRect().top])"
-                          "(document.querySelector('.banner'))")  # fmt: skip
+    picture = browser.run(
+        "(e => [e.complete && e.naturalWidth, e.getBoundingClientRect().top])"
+        "(document.querySelector('.banner'))"
+    )
     assert picture[0] > 0
     assert picture[1] > 0
 
@@ -124,16 +161,23 @@ def test_pages_fit_a_telephone_and_say_nothing_on_the_console(browser, address):
     try:
         for page in NARROW:
             browser.open(f"{address}/{page}")
-            assert browser.run("document.documentElement.scrollWidth") <= TELEPHONE[0], page
+            assert (
+                browser.run("document.documentElement.scrollWidth") <= TELEPHONE[0]
+            ), page
             assert not browser.complaints, (page, browser.complaints)
-            assert all(url.startswith((address, "data:", "blob:")) for url in browser.requests), page
+            assert all(
+                url.startswith((address, "data:", "blob:")) for url in browser.requests
+            ), page
     finally:
         browser.resize(*WIDE)
 
 
 def test_equations_are_drawn(browser, address):
     browser.open(f"{address}/theory/identification.html")
-    sizes = browser.run("[...document.querySelectorAll('math')].map(e => e.getBoundingClientRect().width)")
+    sizes = browser.run(
+        "[...document.querySelectorAll('math')].map(e =>"
+        " e.getBoundingClientRect().width)"
+    )
     assert len(sizes) > 20
     assert min(sizes) > 3
     text = browser.run("document.querySelector('article').innerText")
@@ -143,7 +187,10 @@ def test_equations_are_drawn(browser, address):
 
 def test_dark_and_light(browser, address):
     browser.open(f"{address}/certainty.html")
-    brightness = "getComputedStyle(document.body).backgroundColor.match(/\\d+/g).slice(0, 3).map(Number)"
+    brightness = (
+        "getComputedStyle(document.body).backgroundColor.match(/\\d+/g).slice(0,"
+        " 3).map(Number)"
+    )
     light = browser.run(brightness)
     browser.click("label.md-header__button[for^=__palette]:not([hidden])")
     browser.wait("document.body.dataset.mdColorScheme === 'slate'")

@@ -2,22 +2,22 @@
 
 A contestant is named on the command line as
 
-    pid                        a classical controller, designed for each task's ship with `from_model`
-    tuned-pid                  the same with the settings that direct search found for each task of the suite
-    tuned-best                 of these the one that costs least in each task
-    best-known                 the lowest cost that anything reached in each episode, kept with the suite
-    ppo                        the pretrained agents of `agents/pretrained`
-    one-for-all                the pretrained agent for all ships, made for each task's
-    runs/agent.json            a file of an agent or controller
-    runs/model.zip             an agent as stable-baselines3 saves it
-    runs/{task}-ppo-*.json     one for each task; several that match are training runs of one contestant
-    a.json+b.json              training runs, one by one
-    my_module:factory          your own function: given a `BenchmarkTask`, it returns a controller
-    my_module:Mine             your own class, a subclass of `agents.Controller`
-    name=...                   any of these under another name
+    pid                        a classical controller, designed for each task's ship
+    with `from_model` tuned-pid                  the same with the settings that direct
+    search found for each task of the suite tuned-best                 of these the one
+    that costs least in each task best-known                 the lowest cost that
+    anything reached in each episode, kept with the suite ppo                        the
+    pretrained agents of `agents/pretrained` one-for-all                the pretrained
+    agent for all ships, made for each task's runs/agent.json            a file of an
+    agent or controller runs/model.zip             an agent as stable-baselines3 saves
+    it runs/{task}-ppo-*.json     one for each task; several that match are training
+    runs of one contestant a.json+b.json              training runs, one by one
+    my_module:factory          your own function: given a `BenchmarkTask`, it returns a
+    controller my_module:Mine             your own class, a subclass of
+    `agents.Controller` name=...                   any of these under another name
 
-What a file of results names so is made again by name, or from files that have the hashes in it; code only
-where the user names it too (`remade`).
+What a file of results names so is made again by name, or from files that have the
+hashes in it; code only where the user names it too (`remade`).
 """
 
 import glob
@@ -36,7 +36,11 @@ from typing import Any
 from agents.agent_file import find_agent, read_agent
 from agents.controllers.controller import Controller, Policy, model_hash
 from agents.controllers.designs import CLASSICAL, design, tuned
-from agents.controllers.registry import controller_class, controller_kinds, register_controller
+from agents.controllers.registry import (
+    controller_class,
+    controller_kinds,
+    register_controller,
+)
 from agents.engines.job import working_folder
 from agents.policies.one_for_all import ONE_FOR_ALL, OneForAll
 from agents.policies.sb3_zip import read_sb3
@@ -49,7 +53,12 @@ from shipgym.files import LARGEST_TENSORS, read_bytes
 LEARNED = ("ppo", "sac", "td3", "tqc")
 TUNED = "tuned-"
 BEST_KNOWN = "best-known"
-PARTS = ("policy", "fallback", "base", "autopilot")  # attributes of a policy that are policies
+PARTS = (
+    "policy",
+    "fallback",
+    "base",
+    "autopilot",
+)  # attributes of a policy that are policies
 MOST_PARTS = 1000
 
 
@@ -58,8 +67,8 @@ class Contestant:
     """One who takes part."""
 
     name: str  # in tables and files
-    #: a text as in the module's docstring; a controller; a factory, given a `BenchmarkTask`; or several,
-    #: each a training run
+    #: a text as in the module's docstring; a controller; a factory, given a
+    #: `BenchmarkTask`; or several, each a training run
     source: Any
 
     @property
@@ -70,7 +79,8 @@ class Contestant:
     def policies(self, task: BenchmarkTask, suite: str) -> tuple[Policy, ...]:
         """Its controllers for a task, one for each training run.
 
-        Raises InputError if it cannot be made for this task, or was made for other observations.
+        Raises InputError if it cannot be made for this task, or was made for other
+        observations.
         """
         handed, where = task.handed_out, f"'{self.name}' on task '{task.name}'"
         made = tuple(_made(self.source, handed, suite))
@@ -78,8 +88,8 @@ class Contestant:
             check_fits(policy, handed.task, handed.ship, where)
             if task.behind and model_hash(task.sailed[0]) in _models(policy):
                 raise InputError(
-                    f"{where}: was designed on the ship, '{task.behind}', expected on the model that it is "
-                    f"handed, '{task.model}'"
+                    f"{where}: was designed on the ship, '{task.behind}', expected on"
+                    f" the model that it is handed, '{task.model}'"
                 )
         return made
 
@@ -100,30 +110,43 @@ def _models(policy: Any) -> set[str]:
                 parts.append(inner)
         if len(parts) > MOST_PARTS:
             raise InputError(
-                f"{type(policy).__name__}: more than {MOST_PARTS} policies within one another found, "
-                "expected a policy made of fewer"
+                f"{type(policy).__name__}: more than {MOST_PARTS} policies within one"
+                " another found, expected a policy made of fewer"
             )
     return {getattr(part, "model_sha256", "") for part in parts}
 
 
 def remade(
-    name: str, about: Mapping[str, Any], task: BenchmarkTask, allow_code: Collection[str]
+    name: str,
+    about: Mapping[str, Any],
+    task: BenchmarkTask,
+    allow_code: Collection[str],
 ) -> Contestant:
     """A contestant of a file of results, to run once more in a task.
 
-    `about`: what the file says of it; `allow_code`: functions that the user names. Raises InputError for any
-    other function, for files that did not take part or have changed since, and for an object.
+    `about`: what the file says of it; `allow_code`: functions that the user names.
+    Raises InputError for any other function, for files that did not take part or have
+    changed since, and for an object.
     """
     if about.get("source") is None:
         raise InputError(f"'{name}' was given as an object, which results do not hold")
     source = check_text(about["source"], f"'{name}': source")
     if names_code(source) and source not in allow_code:
-        raise InputError(f"'{source}' is code, run only if you name it: --allow-code {source}")
+        raise InputError(
+            f"'{source}' is code, run only if you name it: --allow-code {source}"
+        )
     if names_code(source) or source in _known():
         return Contestant(name, source)
     files = check_table(about.get("files"), f"'{name}': files")
-    patterns = [Path(one.replace("{task}", task.name)).parts for one in source.split("+")]
-    found = [path for pattern in patterns for path in sorted(files) if _is_like(Path(path).parts, pattern)]
+    patterns = [
+        Path(one.replace("{task}", task.name)).parts for one in source.split("+")
+    ]
+    found = [
+        path
+        for pattern in patterns
+        for path in sorted(files)
+        if _is_like(Path(path).parts, pattern)
+    ]
     for path in found:
         if not Path(path).is_file() or file_hash(path) != files[path]:
             raise InputError(f"'{path}' is not the file that took part")
@@ -148,18 +171,26 @@ def check_agents(one: Contestant, tasks: Sequence[BenchmarkTask]) -> None:
     refusals: list[str] = []
     for path, task in pairs:
         try:
-            check_fits(_policy(agents[path], task), task.task, task.ship, f"'{path}' on task '{task.name}'")
+            check_fits(
+                _policy(agents[path], task),
+                task.task,
+                task.ship,
+                f"'{path}' on task '{task.name}'",
+            )
         except InputError as error:
             refusals.append(str(error))
     if pairs and len(refusals) == len(pairs):
-        raise InputError(f"controllers: '{one.name}' fits no task asked for: {refusals[0]}")
+        raise InputError(
+            f"controllers: '{one.name}' fits no task asked for: {refusals[0]}"
+        )
 
 
 def contestants(given: Any) -> tuple[Contestant, ...]:
     """Contestants from what a user gave.
 
-    `given`: texts (several in one are separated by commas), contestants, controllers with a `name`; or any
-    source by name. Raises InputError for an unknown one, with the nearest known; or two of one name.
+    `given`: texts (several in one are separated by commas), contestants, controllers
+    with a `name`; or any source by name. Raises InputError for an unknown one, with the
+    nearest known; or two of one name.
     """
     if isinstance(given, Mapping):
         found = [_named(str(name), source) for name, source in given.items()]
@@ -173,7 +204,10 @@ def contestants(given: Any) -> tuple[Contestant, ...]:
     names = [one.name for one in found]
     for name in names:
         if names.count(name) > 1:
-            raise InputError(f"controllers: '{name}' found twice; give one of them a name: other={name}")
+            raise InputError(
+                f"controllers: '{name}' found twice; give one of them a name:"
+                f" other={name}"
+            )
     return tuple(found)
 
 
@@ -187,13 +221,20 @@ def _contestant(one: Any) -> Contestant:
             return _named(name.strip(), source.strip())
         _check_text(text)
         return Contestant(_short_name(text), text)
-    name = getattr(one, "name", None) or getattr(one, "__name__", None) or type(one).__name__
+    name = (
+        getattr(one, "name", None)
+        or getattr(one, "__name__", None)
+        or type(one).__name__
+    )
     return _named(str(name), one)
 
 
 def _named(name: str, source: Any) -> Contestant:
     if not name or set(name) & set(",=/{}*"):
-        raise InputError(f"controllers: name '{name}' found, expected one without any of , = / {{ }} *")
+        raise InputError(
+            f"controllers: name '{name}' found, expected one without any of , = / {{"
+            " } *"
+        )
     if isinstance(source, str):
         _check_text(source)
     else:
@@ -205,8 +246,9 @@ def _named(name: str, source: Any) -> Contestant:
 def _check_object(source: Any, name: str) -> None:
     if not callable(getattr(source, "predict", None)) and not callable(source):
         raise InputError(
-            f"controllers: '{name}' is {source!r}, expected a controller (with `predict`), a function that "
-            f"makes one for a task, or a text such as 'pid'"
+            f"controllers: '{name}' is {source!r}, expected a controller (with"
+            " `predict`), a function that makes one for a task, or a text such as"
+            " 'pid'"
         )
 
 
@@ -221,10 +263,14 @@ def _check_text(text: str) -> None:
     known = _known()
     if names_code(text):
         _factory(text)
-    elif text not in known and "{task}" not in text and not all(map(_matches, text.split("+"))):
+    elif (
+        text not in known
+        and "{task}" not in text
+        and not all(map(_matches, text.split("+")))
+    ):
         raise InputError(
-            f"controllers: '{text}' found, expected one of {quoted(known)}, a file of an agent that is "
-            f"there, or module:function.{did_you_mean(text, known)}"
+            f"controllers: '{text}' found, expected one of {quoted(known)}, a file of"
+            f" an agent that is there, or module:function.{did_you_mean(text, known)}"
         )
 
 
@@ -232,7 +278,12 @@ def _short_name(text: str) -> str:
     if names_code(text):
         return text.rpartition(":")[2]
     if text.endswith((".json", ".zip")):
-        stem = Path(text.split("+")[0]).stem.replace("{task}", "").replace("*", "").strip("-_.")
+        stem = (
+            Path(text.split("+")[0])
+            .stem.replace("{task}", "")
+            .replace("*", "")
+            .strip("-_.")
+        )
         return stem or "agent"
     return text
 
@@ -240,7 +291,11 @@ def _short_name(text: str) -> str:
 def names_code(text: str) -> bool:
     """Whether a text names a function, `module:function`."""
     module, colon, function = text.rpartition(":")
-    return bool(colon) and function.isidentifier() and all(part.isidentifier() for part in module.split("."))
+    return (
+        bool(colon)
+        and function.isidentifier()
+        and all(part.isidentifier() for part in module.split("."))
+    )
 
 
 def _factory(text: str) -> Any:
@@ -251,7 +306,8 @@ def _factory(text: str) -> Any:
             found = getattr(import_module(module), function)
     except (ImportError, AttributeError) as error:
         raise InputError(
-            f"controllers: '{text}' cannot be imported ({error}); expected module:function"
+            f"controllers: '{text}' cannot be imported ({error}); expected"
+            " module:function"
         ) from None
     if isinstance(found, type) and issubclass(found, Controller):
         return partial(design, register_controller(found).kind)
@@ -275,7 +331,11 @@ def _files(text: str, task: BenchmarkTask) -> list[Path]:
         return [Path(source)] if source else []
     if text in controller_kinds() or text == BEST_KNOWN or text.startswith(TUNED):
         return []
-    return [path for one in text.split("+") for path in _matches(one.replace("{task}", name))]
+    return [
+        path
+        for one in text.split("+")
+        for path in _matches(one.replace("{task}", name))
+    ]
 
 
 def pretrained(task: str, algorithm: str) -> list[Path]:
@@ -287,7 +347,10 @@ def pretrained(task: str, algorithm: str) -> list[Path]:
 
 def _made(source: Any, task: BenchmarkTask, suite: str) -> list[Policy]:
     if not isinstance(source, str):
-        return [_policy(run, task) for run in (source if isinstance(source, Sequence) else [source])]
+        return [
+            _policy(run, task)
+            for run in (source if isinstance(source, Sequence) else [source])
+        ]
     if source in controller_kinds():
         led = controller_class(source).has_autopilot and not task.task.follows_path
         return [design("lq" if led else source, task)]
@@ -309,7 +372,11 @@ def _loaded(path: Path) -> Any:
         zipped = read_sb3(path)
         return lambda task: zipped.policy(task.task, task.ship)
     agent = read_agent(path)
-    return (lambda task: agent.for_ship(task.ship, task.task)) if isinstance(agent, OneForAll) else agent
+    return (
+        (lambda task: agent.for_ship(task.ship, task.task))
+        if isinstance(agent, OneForAll)
+        else agent
+    )
 
 
 def _policy(source: Any, task: BenchmarkTask) -> Policy:
@@ -317,8 +384,8 @@ def _policy(source: Any, task: BenchmarkTask) -> Policy:
     made: Policy = source if hasattr(source, "predict") else source(task)
     if not callable(getattr(made, "predict", None)):
         raise InputError(
-            f"{getattr(source, '__name__', source)}: {made!r} found for task '{task.name}', expected a "
-            f"controller with `predict`"
+            f"{getattr(source, '__name__', source)}: {made!r} found for task"
+            f" '{task.name}', expected a controller with `predict`"
         )
     return made
 

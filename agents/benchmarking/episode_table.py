@@ -15,26 +15,34 @@ from shipgym.files import LARGEST_TENSORS, atomic_path, read_bytes
 Columns = dict[str, NDArray[Any]]
 
 KEYS = ("contestant", "task", "run", "seed")
-#: Figures that are yes or no, and numbers of events: so they are in the file; missing ones are null.
+#: Figures that are yes or no, and numbers of events: so they are in the file; missing
+#: ones are null.
 FLAGS = ("left_corridor", "grounded", "success", "terminated", "failed")
 COUNTS = ("interventions",)
 MOST_NUMBERS = 5_000_000  # of a table; characters of a column of texts
 
 
 def joined(
-    parts: Sequence[tuple[str, str, int, NDArray[np.int64], Mapping[str, NDArray[np.float64]]]],
+    parts: Sequence[
+        tuple[str, str, int, NDArray[np.int64], Mapping[str, NDArray[np.float64]]]
+    ],
 ) -> Columns:
     """One table of the episodes of all contestants, tasks and runs; figures that one lacks are NaN."""
     counts = [len(seeds) for *_, seeds, _ in parts]
     columns: Columns = {
-        "contestant": np.repeat(np.array([part[0] for part in parts], dtype=np.str_), counts),
+        "contestant": np.repeat(
+            np.array([part[0] for part in parts], dtype=np.str_), counts
+        ),
         "task": np.repeat(np.array([part[1] for part in parts], dtype=np.str_), counts),
         "run": np.repeat(np.array([part[2] for part in parts], dtype=np.int64), counts),
-        "seed": np.concatenate([np.zeros(0, dtype=np.int64), *(part[3] for part in parts)]),
+        "seed": np.concatenate(
+            [np.zeros(0, dtype=np.int64), *(part[3] for part in parts)]
+        ),
     }
     for name in dict.fromkeys(name for *_, figures in parts for name in figures):
         columns[name] = np.concatenate(
-            [part[4].get(name, np.full(len(part[3]), np.nan)) for part in parts], dtype=np.float64
+            [part[4].get(name, np.full(len(part[3]), np.nan)) for part in parts],
+            dtype=np.float64,
         )
     return columns
 
@@ -64,14 +72,30 @@ def read_episodes(path: Path, rows: int) -> Columns:
         file = parquet.ParquetFile(arrow.BufferReader(content))
         found, names = file.metadata.num_rows, file.schema_arrow.names
         if found != rows or rows * len(names) > MOST_NUMBERS:
-            raise InputError(f"{path}: {len(names)} columns of {found} rows found, expected {rows} rows")
+            raise InputError(
+                f"{path}: {len(names)} columns of {found} rows found, expected {rows}"
+                " rows"
+            )
         if len(set(names)) < len(names) or not set(KEYS) <= set(names):
-            raise InputError(f"{path}: columns {quoted(names)} found, expected {quoted(KEYS)} and figures")
-        return {name: _column(arrow, name, file.read([name]).column(0)) for name in names}
+            raise InputError(
+                f"{path}: columns {quoted(names)} found, expected {quoted(KEYS)} and"
+                " figures"
+            )
+        return {
+            name: _column(arrow, name, file.read([name]).column(0)) for name in names
+        }
     except InputError:
         raise
-    except (OSError, arrow.ArrowException, ValueError, TypeError, OverflowError) as error:
-        raise InputError(f"{path}: cannot be read as Parquet ({error}); it may be cut short") from None
+    except (
+        OSError,
+        arrow.ArrowException,
+        ValueError,
+        TypeError,
+        OverflowError,
+    ) as error:
+        raise InputError(
+            f"{path}: cannot be read as Parquet ({error}); it may be cut short"
+        ) from None
 
 
 def _column(arrow: Any, name: str, values: Any) -> NDArray[Any]:
@@ -81,7 +105,11 @@ def _column(arrow: Any, name: str, values: Any) -> NDArray[Any]:
         if len(texts) * len(max(texts, key=len, default="")) > MOST_NUMBERS:
             raise ValueError(f"column '{name}' of long texts")
         return np.array(texts, dtype=np.str_)
-    if not (arrow.types.is_integer(values.type) or arrow.types.is_floating(values.type) or name in FLAGS):
+    if not (
+        arrow.types.is_integer(values.type)
+        or arrow.types.is_floating(values.type)
+        or name in FLAGS
+    ):
         raise TypeError(f"column '{name}' of {values.type}")
     kind = arrow.int64() if name in KEYS else arrow.float64()
     numbers: NDArray[Any] = values.cast(kind).to_numpy(zero_copy_only=False)

@@ -9,7 +9,13 @@ from typing import Any
 
 from agents.benchmarking import page_figures as figures
 from agents.benchmarking.contestants import BEST_KNOWN
-from agents.benchmarking.page_replays import bests_of, contestants_of, hardest_of, replay_data, replayable
+from agents.benchmarking.page_replays import (
+    bests_of,
+    contestants_of,
+    hardest_of,
+    replay_data,
+    replayable,
+)
 from agents.benchmarking.replays import EpisodeId, Rerun, rerun
 from agents.benchmarking.results import RESULTS, BenchmarkResult
 from agents.output import check_page
@@ -22,17 +28,28 @@ PAGE = "index.html"
 WORST = 3  # episodes of each contestant in each task that may be replayed
 
 #: Further figures of a task: what the head shows, and how a number is written.
-METRICS: dict[str, tuple[str, str]] = shipped_toml("agents.benchmarking", "words.toml")["metrics"]
-RARE = ("extrapolating", "shielded", "interventions")  # shown only where not 0 throughout
+METRICS: dict[str, tuple[str, str]] = shipped_toml("agents.benchmarking", "words.toml")[
+    "metrics"
+]
+RARE = (
+    "extrapolating",
+    "shielded",
+    "interventions",
+)  # shown only where not 0 throughout
 
 
 def write_page(
-    result: BenchmarkResult, path: str | Path, controllers: Any = None, worst: int = WORST,
-    workers: int | None = 1, progress: Progress | None = None,
-) -> None:  # fmt: skip
+    result: BenchmarkResult,
+    path: str | Path,
+    controllers: Any = None,
+    worst: int = WORST,
+    workers: int | None = 1,
+    progress: Progress | None = None,
+) -> None:
     """Write the page of a benchmark. The worst episodes are run again for it.
 
-    Raises InputError if plotly is not installed or the page cannot be written; nothing is written then.
+    Raises InputError if plotly is not installed or the page cannot be written; nothing
+    is written then.
 
     Parameters
     ----------
@@ -41,9 +58,11 @@ def write_page(
     path : str or Path
         The HTML file; one that exists is replaced. It loads nothing.
     controllers : optional
-        As `benchmark` was given them; needed to replay contestants that were given as objects.
+        As `benchmark` was given them; needed to replay contestants that were given as
+        objects.
     worst : int
-        How many episodes of each contestant in each task may be replayed; fewer if they are too many.
+        How many episodes of each contestant in each task may be replayed; fewer if they
+        are too many.
     workers : int or None
         Processes that run them; None for as many as there are cores.
     progress : callable, optional
@@ -52,7 +71,10 @@ def write_page(
     target = Path(path)
     check_page(target, plots=True)
     count, episodes = replayable(result, worst)
-    write_text(_page(result, rerun(result, episodes, controllers, workers, progress), count), target)
+    write_text(
+        _page(result, rerun(result, episodes, controllers, workers, progress), count),
+        target,
+    )
 
 
 def _page(result: BenchmarkResult, again: Rerun, count: int) -> str:
@@ -60,17 +82,32 @@ def _page(result: BenchmarkResult, again: Rerun, count: int) -> str:
     wins = [name for task in result.tasks for name in bests_of(result, task)]
     scores, profile = figures.scores_figure(result), result.summary["profile"]
     replays = {
-        "count": count, "episodes": len(again.episodes), "different": again.different,
-        "refused": dict.fromkeys((name, why) for (name, _), why in again.refused.items()),
+        "count": count,
+        "episodes": len(again.episodes),
+        "different": again.different,
+        "refused": dict.fromkeys(
+            (name, why) for (name, _), why in again.refused.items()
+        ),
         "data": replay_data(result, again, count),
-    }  # fmt: skip
+    }
     return render(
-        "agents.benchmarking/page.html", about=result.summary, names=result.ranking, best_known=BEST_KNOWN,
-        styles=figures.styles(result.ranking), wins={name: wins.count(name) for name in result.ranking},
-        failures=result.failures, tasks=[_task(result, again, task) for task in result.tasks],
-        figures={"scores": scores, "profile": figures.profile_figure(profile, result.ranking)},
-        replays=replays, command=command(result), results_file=RESULTS, packed=packed,
-    )  # fmt: skip
+        "agents.benchmarking/page.html",
+        about=result.summary,
+        names=result.ranking,
+        best_known=BEST_KNOWN,
+        styles=figures.styles(result.ranking),
+        wins={name: wins.count(name) for name in result.ranking},
+        failures=result.failures,
+        tasks=[_task(result, again, task) for task in result.tasks],
+        figures={
+            "scores": scores,
+            "profile": figures.profile_figure(profile, result.ranking),
+        },
+        replays=replays,
+        command=command(result),
+        results_file=RESULTS,
+        packed=packed,
+    )
 
 
 def packed(text: str) -> str:
@@ -82,12 +119,17 @@ def _task(result: BenchmarkResult, again: Rerun, task: str) -> dict[str, Any]:
     """What the page shows of a task."""
     found = result.summary["tasks"][task]
     return {
-        "name": task, **result.summary["suite"]["tasks"][task], "found": found,
+        "name": task,
+        **result.summary["suite"]["tasks"][task],
+        "found": found,
         "best": bests_of(result, task),
-        "metrics": [(name, *METRICS[name]) for name in METRICS if _is_shown(name, found)],
-        "costs": figures.costs_figure(result, task), "seed": hardest_of(result, task),
+        "metrics": [
+            (name, *METRICS[name]) for name in METRICS if _is_shown(name, found)
+        ],
+        "costs": figures.costs_figure(result, task),
+        "seed": hardest_of(result, task),
         "hardest": _hardest(result, again, task),
-    }  # fmt: skip
+    }
 
 
 def _is_shown(metric: str, found: Mapping[str, Any]) -> bool:
@@ -99,8 +141,12 @@ def _is_shown(metric: str, found: Mapping[str, Any]) -> bool:
 def _hardest(result: BenchmarkResult, again: Rerun, task: str) -> dict[str, Any]:
     """Figures of all contestants in the hardest episode; none where none of them can be replayed."""
     names, seed = contestants_of(result, task), hardest_of(result, task)
-    wanted = {name: again.episodes.get(EpisodeId(name, task, 0, seed)) for name in names}
-    episodes = {name: episode for name, episode in wanted.items() if episode is not None}
+    wanted = {
+        name: again.episodes.get(EpisodeId(name, task, 0, seed)) for name in names
+    }
+    episodes = {
+        name: episode for name, episode in wanted.items() if episode is not None
+    }
     if not episodes:
         return {}
     found = {"histories": figures.histories_figure(episodes, result.ranking)}
@@ -112,9 +158,21 @@ def _hardest(result: BenchmarkResult, again: Rerun, task: str) -> dict[str, Any]
 def command(result: BenchmarkResult) -> str:
     """The command that makes these results; contestants that were objects stand as `...`."""
     about = result.summary
-    sources = {name: one["source"] or "..." for name, one in about["contestants"].items()}
-    given = [source if source == name else f"{name}={source}" for name, source in sources.items()]
-    words = ["shipgym", "benchmark", "--controllers", ",".join(given), "--suite", about["suite"]["name"]]
+    sources = {
+        name: one["source"] or "..." for name, one in about["contestants"].items()
+    }
+    given = [
+        source if source == name else f"{name}={source}"
+        for name, source in sources.items()
+    ]
+    words = [
+        "shipgym",
+        "benchmark",
+        "--controllers",
+        ",".join(given),
+        "--suite",
+        about["suite"]["name"],
+    ]
     if len(about["tasks"]) < len(load_suite(about["suite"]["name"]).tasks):
         words += ["--tasks", ",".join(about["tasks"])]
     if about["seeds"]["count"] != N_EPISODES:

@@ -9,29 +9,53 @@ from shipgym.checks import ANY_KEY, Shape, check_choice, check_shape, check_whol
 TEXT, COUNT, NUMBER = (str,), (int,), (int, float)
 PERHAPS = (int, float, NoneType)
 INTERVAL: Shape = {"value": PERHAPS, "low": PERHAPS, "high": PERHAPS}
-TASK: dict[str, Shape] = dict.fromkeys(("environment", "model", "model_sha256", "why", "on", "ship"), TEXT)
+TASK: dict[str, Shape] = dict.fromkeys(
+    ("environment", "model", "model_sha256", "why", "on", "ship"), TEXT
+)
 CONTESTANT: Shape = {  # files: SHA-256 by path; refused: why, by task
-    "source": (str, NoneType), "files": {ANY_KEY: TEXT}, "runs": COUNT, "refused": {ANY_KEY: TEXT},
-}  # fmt: skip
+    "source": (str, NoneType),
+    "files": {ANY_KEY: TEXT},
+    "runs": COUNT,
+    "refused": {ANY_KEY: TEXT},
+}
 FOUND: Shape = {
-    "cost": {"value": NUMBER, "low": PERHAPS, "high": PERHAPS}, "cost_iqm": INTERVAL, "score": INTERVAL,
-    "relative_cost": PERHAPS, "runs": COUNT, "lost": COUNT, "failed": COUNT, "failure": TEXT,
-    "policy_sha256": [(str, NoneType)], "microseconds_per_action": PERHAPS,
+    "cost": {"value": NUMBER, "low": PERHAPS, "high": PERHAPS},
+    "cost_iqm": INTERVAL,
+    "score": INTERVAL,
+    "relative_cost": PERHAPS,
+    "runs": COUNT,
+    "lost": COUNT,
+    "failed": COUNT,
+    "failure": TEXT,
+    "policy_sha256": [(str, NoneType)],
+    "microseconds_per_action": PERHAPS,
     "metrics": {ANY_KEY: {"mean": PERHAPS, "median": PERHAPS, "p95": PERHAPS}},
-}  # fmt: skip
+}
 ENTRY: dict[str, Shape] = {
-    "score": INTERVAL, "relative_cost": PERHAPS, "tasks": COUNT, "lost": COUNT, "failed": COUNT,
-}  # fmt: skip
-RANKED: Shape = {"name": TEXT, **ENTRY, "elsewhere": {ANY_KEY: ENTRY}}  # the last by set of episodes
+    "score": INTERVAL,
+    "relative_cost": PERHAPS,
+    "tasks": COUNT,
+    "lost": COUNT,
+    "failed": COUNT,
+}
+RANKED: Shape = {
+    "name": TEXT,
+    **ENTRY,
+    "elsewhere": {ANY_KEY: ENTRY},
+}  # the last by set of episodes
 SHAPE: dict[str, Shape] = {
     "versions": {ANY_KEY: TEXT},  # and the processor: bit for bit on equal ones only
     "suite": {"name": TEXT, "sha256": TEXT, "tasks": {ANY_KEY: TASK}},
     "seeds": {"first": COUNT, "count": COUNT},
     "contestants": {ANY_KEY: CONTESTANT},
     "tasks": {ANY_KEY: {ANY_KEY: FOUND}},  # by task and contestant
-    "reference": {ANY_KEY: {"zero": NUMBER, "best": NUMBER}},  # costs that are scores of 0 and 1, by task
+    "reference": {
+        ANY_KEY: {"zero": NUMBER, "best": NUMBER}
+    },  # costs that are scores of 0 and 1, by task
     "ranking": [RANKED],  # best first
-    "improvement": {ANY_KEY: {ANY_KEY: INTERVAL}},  # probability that one costs less than another
+    "improvement": {
+        ANY_KEY: {ANY_KEY: INTERVAL}
+    },  # probability that one costs less than another
     "profile": {"thresholds": [NUMBER], "shares": {ANY_KEY: [NUMBER]}},
     "episodes": {"file": TEXT, "rows": COUNT, "sha256": (str, NoneType)},
 }

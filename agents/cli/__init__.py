@@ -1,7 +1,7 @@
 """The command `shipgym`: each subcommand imports what it needs when it is called.
 
-Exit codes: 0 done; 1 the work ran and failed its check; 2 wrong input or usage, with one message on
-standard error and nothing written; 130 interrupted.
+Exit codes: 0 done; 1 the work ran and failed its check; 2 wrong input or usage, with
+one message on standard error and nothing written; 130 interrupted.
 """
 
 from __future__ import annotations
@@ -34,10 +34,15 @@ if TYPE_CHECKING:
 
 app = typer.Typer(
     cls=command.Commands,
-    epilog="Example: shipgym new-ship zigzag.csv, then shipgym autopilot ship.toml --out report/",
-    no_args_is_help=True, pretty_exceptions_enable=False, rich_markup_mode=None,
+    epilog=(
+        "Example: shipgym new-ship zigzag.csv, then shipgym autopilot ship.toml --out"
+        " report/"
+    ),
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
     context_settings={"help_option_names": ["-h", "--help"]},
-)  # fmt: skip
+)
 
 
 def _version(wanted: bool) -> None:
@@ -51,7 +56,13 @@ def _version(wanted: bool) -> None:
 @app.callback()
 def shipgym_command(
     version: Annotated[
-        bool, Option("--version", callback=_version, is_eager=True, help="Print the version and exit.")
+        bool,
+        Option(
+            "--version",
+            callback=_version,
+            is_eager=True,
+            help="Print the version and exit.",
+        ),
     ] = False,
 ) -> None:
     """From recorded ship trials to an identified model, its uncertainty and verified autopilots."""
@@ -59,16 +70,25 @@ def shipgym_command(
 
 @answered
 def trials_command(
-    model: Annotated[str, Argument(metavar="MODEL", help="A model file, or the name of a shipped model.")],
-    out: Annotated[Path | None, Option(metavar="PLOTS.HTML", help="Write figures to this file.")] = None,
-    draws: Annotated[int, Option(min=0, help="Models drawn from an identified model's covariance.")] = 100,
+    model: Annotated[
+        str,
+        Argument(metavar="MODEL", help="A model file, or the name of a shipped model."),
+    ],
+    out: Annotated[
+        Path | None, Option(metavar="PLOTS.HTML", help="Write figures to this file.")
+    ] = None,
+    draws: Annotated[
+        int, Option(min=0, help="Models drawn from an identified model's covariance.")
+    ] = 100,
     seed: Annotated[int, Option(min=0, help="Random seed of the draws.")] = 0,
-    depth: Annotated[float | None, Option(metavar="M", help="Water depth, m; default: deep.")] = None,
+    depth: Annotated[
+        float | None, Option(metavar="M", help="Water depth, m; default: deep.")
+    ] = None,
 ) -> None:
     """Simulate the standard manoeuvres of a model. Assesses them by the IMO criteria.
 
-    Zigzags, turning circles, spirals, pull-outs, and, with a shaft, stops and an acceleration. The
-    indices of an identified model come with their 95 % intervals.
+    Zigzags, turning circles, spirals, pull-outs, and, with a shaft, stops and an
+    acceleration. The indices of an identified model come with their 95 % intervals.
     """
     from agents.cli.standard_trials import standard_trials
     from agents.cli.terminal import answer, progress_bars
@@ -82,7 +102,11 @@ def trials_command(
     if out is not None:
         check_page(out, plots=True)
     with progress_bars() as progress:
-        tell = None if progress is None else (lambda done: progress("models drawn", done, draws))
+        tell = (
+            None
+            if progress is None
+            else (lambda done: progress("models drawn", done, draws))
+        )
         found = standard_trials(ship, draws, seed, tell, water_depth)
     if out is not None:
         write_page(ship, found, out)
@@ -92,14 +116,24 @@ def trials_command(
 
 def _print_trials(found: StandardTrials, page: Path | None) -> None:
     """Print tables of the standard manoeuvres, and where the page was written."""
-    from agents.cli.terminal import console, criteria_notes, criteria_table, manoeuvre_table, say, warn
+    from agents.cli.terminal import (
+        console,
+        criteria_notes,
+        criteria_table,
+        manoeuvre_table,
+        say,
+        warn,
+    )
 
     console.print(manoeuvre_table(found.indices, found.water))
     console.print()
     if found.criteria:
         console.print(criteria_table(found.criteria))
     else:
-        console.print("The IMO criteria are made for deep water: leave --depth out to assess them.")
+        console.print(
+            "The IMO criteria are made for deep water: leave --depth out to assess"
+            " them."
+        )
     say(*criteria_notes(found.criteria))
     for name, reason in found.refused.items():
         warn(f"no {name}: {reason}")
@@ -110,25 +144,41 @@ def _print_trials(found: StandardTrials, page: Path | None) -> None:
 @answered
 def autopilot_command(
     ship: command.ShipFileArgument,
-    out: Annotated[Path, Option(metavar="FOLDER", help="Folder for the report, model and autopilots.")],
-    draws: Annotated[int, Option(min=2, help="Models drawn from the coefficient covariance.")] = 200,
+    out: Annotated[
+        Path,
+        Option(metavar="FOLDER", help="Folder for the report, model and autopilots."),
+    ],
+    draws: Annotated[
+        int, Option(min=2, help="Models drawn from the coefficient covariance.")
+    ] = 200,
     seed: Annotated[int, Option(min=0, help="Random seed of draws and episodes.")] = 0,
     *,
     options: command.IdentifyOptions,
     agents: Annotated[
         list[str] | None,
-        Option("--agent", metavar="AGENT", help="Also run this autopilot, a file or a name; repeatable."),
+        Option(
+            "--agent",
+            metavar="AGENT",
+            help="Also run this autopilot, a file or a name; repeatable.",
+        ),
     ] = None,
     autopilots: Annotated[
         str | None,
         Option(
             metavar="NAMES",
-            help="Autopilots to design; default: pid,lq,lq-scheduled,turn-rate,wheel-over. "
-            "Others: preview-mpc, lqg.",
+            help=(
+                "Autopilots to design; default:"
+                " pid,lq,lq-scheduled,turn-rate,wheel-over. "
+                "Others: preview-mpc, lqg."
+            ),
         ),
     ] = None,
     standards: Annotated[
-        bool, Option("--standards", help="Simulate topics of ISO 11674 and IEC 62065, with our own limits.")
+        bool,
+        Option(
+            "--standards",
+            help="Simulate topics of ISO 11674 and IEC 62065, with our own limits.",
+        ),
     ] = False,
     engine: command.EngineName = "local",
     workers: command.Workers = 1,
@@ -136,19 +186,32 @@ def autopilot_command(
 ) -> None:
     """Go from trials to a report on autopilots. Identifies, predicts, designs, runs them on drawn models.
 
-    Options not given here are taken from the ship file's table [identify]. Exits with 1 if the identified
-    model is unstable, or no autopilot designed on it can be trusted; the report then says why.
+    Options not given here are taken from the ship file's table [identify]. Exits with 1
+    if the identified model is unstable, or no autopilot designed on it can be trusted;
+    the report then says why.
     """
     from agents.cli.terminal import progress_bars
     from agents.engines.jobs import JobEngine
     from agents.verification.chain import DESIGNS, build_autopilot
 
-    designs = DESIGNS if autopilots is None else [name.strip() for name in autopilots.split(",")]
+    designs = (
+        DESIGNS
+        if autopilots is None
+        else [name.strip() for name in autopilots.split(",")]
+    )
     with progress_bars() as progress:
         result = build_autopilot(
-            ship, out, draws=draws, seed=seed, options=options, agents=agents or (), designs=designs,
-            standards=standards, progress=progress, where=JobEngine(engine, workers, address),
-        )  # fmt: skip
+            ship,
+            out,
+            draws=draws,
+            seed=seed,
+            options=options,
+            agents=agents or (),
+            designs=designs,
+            standards=standards,
+            progress=progress,
+            where=JobEngine(engine, workers, address),
+        )
     _print_result(result, out / "report.html", draws)
 
 
@@ -171,19 +234,28 @@ def _print_result(result: AutopilotResult, report: Path, draws: int) -> None:
         console.print()
         for row in result.verification.standards:
             if not row.passed:
-                warn(f"{row.standard}, {row.topic.lower()}: {row.value} {row.unit}, limit {row.limit:g}")
+                warn(
+                    f"{row.standard}, {row.topic.lower()}: {row.value} {row.unit},"
+                    f" limit {row.limit:g}"
+                )
         for name, track in result.metrics["tracks"].items():
             console.print(
-                f"{name.upper()} on the track: largest cross-track error "
-                f"{track['cross_track_largest_m']:.1f} m, rms {track['cross_track_rmse_m']:.1f} m\n"
+                f"{name.upper()} on the track: largest cross-track error"
+                f" {track['cross_track_largest_m']:.1f} m, rms"
+                f" {track['cross_track_rmse_m']:.1f} m\n"
             )
     if not result.stable:
-        fail(f"the identified model is unstable: {result.instability}; see {report}", FAILED)
+        fail(
+            f"the identified model is unstable: {result.instability}; see {report}",
+            FAILED,
+        )
     if result.refusal is not None:
         fail(f"no autopilot is given: {result.refusal}; see {report}", FAILED)
     for warning in model_warnings(result.identification):
         warn(warning)
-    for name, reason in (result.verification.refused if result.verification else {}).items():
+    for name, reason in (
+        result.verification.refused if result.verification else {}
+    ).items():
         warn(f"no {name.upper()} autopilot: {reason}")
     say(f"report: {report}")
 
@@ -191,7 +263,8 @@ def _print_result(result: AutopilotResult, report: Path, draws: int) -> None:
 @answered
 def replay_command(
     episodes: Annotated[
-        list[Path], Argument(metavar="EPISODE.JSON", help="Episodes that RecordEpisode wrote.")
+        list[Path],
+        Argument(metavar="EPISODE.JSON", help="Episodes that RecordEpisode wrote."),
     ],
     out: Annotated[Path, Option(metavar="REPLAY.HTML", help="The page to write.")],
 ) -> None:
@@ -223,15 +296,36 @@ def doctor_command() -> None:
 #: An example of each command, which stands below its help.
 EXAMPLES = tomllib.loads(Path(__file__).with_name("examples.toml").read_text("utf-8"))
 COMMANDS = (
-    new_ship_command, look_command, identify_command, advise_command, reduce_command, trials_command,
-    autopilot_command, export_command, steer_command, simulate_command, train_command, tune_command,
-    benchmark_command, reproduce_command, warm_command, replay_command, doctor_command,
-)  # fmt: skip
-IDENTIFYING = ("identify", "advise", "reduce", "autopilot")  # they take the options of `identify`
+    new_ship_command,
+    look_command,
+    identify_command,
+    advise_command,
+    reduce_command,
+    trials_command,
+    autopilot_command,
+    export_command,
+    steer_command,
+    simulate_command,
+    train_command,
+    tune_command,
+    benchmark_command,
+    reproduce_command,
+    warm_command,
+    replay_command,
+    doctor_command,
+)
+IDENTIFYING = (
+    "identify",
+    "advise",
+    "reduce",
+    "autopilot",
+)  # they take the options of `identify`
 
 for name, function in zip(EXAMPLES, COMMANDS, strict=True):
     kind = command.IdentifyCommand if name in IDENTIFYING else None
-    app.command(name, epilog=f"Example: shipgym {name} {EXAMPLES[name]}", cls=kind)(function)
+    app.command(name, epilog=f"Example: shipgym {name} {EXAMPLES[name]}", cls=kind)(
+        function
+    )
 
 
 def _show_warning(message: Warning | str, *_: Any, **__: Any) -> None:
@@ -247,7 +341,9 @@ def main() -> None:
     sys.stderr = sys.stderr or Path(os.devnull).open("w")  # noqa: SIM115 - until the end
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, TextIOWrapper):
-            stream.reconfigure(errors="backslashreplace")  # names of files may have any bytes
+            stream.reconfigure(
+                errors="backslashreplace"
+            )  # names of files may have any bytes
     warnings.showwarning = _show_warning  # names in it come from files
     try:
         app(prog_name="shipgym")

@@ -19,23 +19,38 @@ FAILED, WRONG_INPUT, INTERRUPTED = 1, 2, 130
 OUTPUT_GONE = (EPIPE, ENOSPC, EBADF)
 LONGEST_NAME = 200  # characters of a path that are told
 
-ShipFileArgument = Annotated[Path, Argument(metavar="SHIP.TOML", help="The ship file with its trials.")]
-EngineName = Annotated[str, Option("--engine", help="Where jobs run: local (this computer) or ray.")]
-Workers = Annotated[int, Option(min=1, help="Jobs at a time; the results do not depend on it.")]
-Address = Annotated[
-    str | None, Option(metavar="HOST:PORT", help="Ray cluster; default: start Ray on this computer.")
+ShipFileArgument = Annotated[
+    Path, Argument(metavar="SHIP.TOML", help="The ship file with its trials.")
 ]
-IdentifyOptions = Annotated[dict[str, Any], Option(parser=dict, hidden=True)]  # see IdentifyCommand
-Json = Annotated[bool, Option("--json", help="Print JSON for programs instead of tables.")]
-Quiet = Annotated[bool, Option("--quiet", "-q", help="Print only errors, and the result with --json.")]
+EngineName = Annotated[
+    str, Option("--engine", help="Where jobs run: local (this computer) or ray.")
+]
+Workers = Annotated[
+    int, Option(min=1, help="Jobs at a time; the results do not depend on it.")
+]
+Address = Annotated[
+    str | None,
+    Option(
+        metavar="HOST:PORT", help="Ray cluster; default: start Ray on this computer."
+    ),
+]
+IdentifyOptions = Annotated[
+    dict[str, Any], Option(parser=dict, hidden=True)
+]  # see IdentifyCommand
+Json = Annotated[
+    bool, Option("--json", help="Print JSON for programs instead of tables.")
+]
+Quiet = Annotated[
+    bool, Option("--quiet", "-q", help="Print only errors, and the result with --json.")
+]
 SHARED = {"as_json": Json, "quiet": Quiet}  # options of every command
 
 
 def answered(command: Callable[..., None]) -> Callable[..., None]:
     """Give a command the options that all share, and turn what goes wrong into one message and an exit code.
 
-    It prints to the terminal's `out`, which is silent with `--json` and `--quiet`, and gives its result as
-    fields to `answer`.
+    It prints to the terminal's `out`, which is silent with `--json` and `--quiet`, and
+    gives its result as fields to `answer`.
     """
 
     @functools.wraps(command)
@@ -58,7 +73,9 @@ def answered(command: Callable[..., None]) -> Callable[..., None]:
             raise typer.Exit(told_failure(error)) from None
 
     shared = {
-        name: inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=False, annotation=kind)
+        name: inspect.Parameter(
+            name, inspect.Parameter.KEYWORD_ONLY, default=False, annotation=kind
+        )
         for name, kind in SHARED.items()
     }
     return take_parameters(wrapped, typed_parameters(command) | shared)
@@ -69,7 +86,9 @@ def told_failure(error: OSError) -> int:
     from agents.cli.terminal import fail as tell
 
     if error.filename is None and error.errno in OUTPUT_GONE:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), 1)  # what is left in buffers fails no more
+        os.dup2(
+            os.open(os.devnull, os.O_WRONLY), 1
+        )  # what is left in buffers fails no more
         if error.errno != EPIPE:  # the reader of the output went away
             tell(f"the output cannot be written ({error.strerror})")
         return FAILED
@@ -84,9 +103,13 @@ class Commands(TyperGroup):
     def parse_args(self, ctx: Any, args: list[str]) -> Any:
         """Refuse empty arguments, and those that no name of a file can be."""
         for k, text in enumerate(args):
-            name, sign, value = text.partition("=") if text.startswith("--") else ("", "", text)
+            name, sign, value = (
+                text.partition("=") if text.startswith("--") else ("", "", text)
+            )
             if "\0" in text or (not value and (sign or not name)):
-                name = name or (args[k - 1] if k and args[k - 1].startswith("-") else "argument")
+                name = name or (
+                    args[k - 1] if k and args[k - 1].startswith("-") else "argument"
+                )
                 ctx.fail(f"{name}: {value!r} found, expected a text that is not empty")
         return super().parse_args(ctx, args)
 
@@ -106,7 +129,9 @@ class IdentifyCommand(TyperCommand):
         """The context of the same command with these options in place of its parameter `options`."""
         from agents.cli.identify_options import takes_identify_options
 
-        app = typer.Typer(add_completion=False, rich_markup_mode=None, pretty_exceptions_enable=False)
+        app = typer.Typer(
+            add_completion=False, rich_markup_mode=None, pretty_exceptions_enable=False
+        )
         whole = takes_identify_options(inspect.unwrap(self.callback))  # type: ignore[arg-type]
         app.command(self.name, epilog=self.epilog)(answered(whole))
         return typer.main.get_command(app).make_context(*args, **kwargs)

@@ -14,13 +14,20 @@ from rich.text import Text
 
 import shipgym
 from agents.output import locks_and_drafts
-from shipgym.engine.cache_folder import CACHE_VARIABLE, cache_folder, loop_fault, open_folder
+from shipgym.engine.cache_folder import (
+    CACHE_VARIABLE,
+    cache_folder,
+    loop_fault,
+    open_folder,
+)
 
 OTHERS = ("dev", "docs")  # extras that are no part of what users do
 MARKS = {
-    "fine": ("ok", "green"), "absent": ("absent", "dim"), "left": ("left", "yellow"),
+    "fine": ("ok", "green"),
+    "absent": ("absent", "dim"),
+    "left": ("left", "yellow"),
     "wrong": ("wrong", "bold red"),
-}  # fmt: skip
+}
 OURS = ("shipgym", "identification", "agents")
 
 
@@ -29,8 +36,8 @@ class Finding:
     """The result of one check."""
 
     what: str
-    #: "fine"; "absent": an option that is not installed; "left": something that may be removed; "wrong":
-    #: something does not work
+    #: "fine"; "absent": an option that is not installed; "left": something that may be
+    #: removed; "wrong": something does not work
     state: str
     detail: str  # what was found and, where needed, what to do
 
@@ -42,7 +49,10 @@ class Finding:
 
 def examine_installation() -> list[Finding]:
     """Everything that `shipgym doctor` reports, in order."""
-    system = f"{shipgym.__version__}, Python {platform.python_version()}, {platform.platform()}"
+    system = (
+        f"{shipgym.__version__}, Python {platform.python_version()},"
+        f" {platform.platform()}"
+    )
     needed = _declared()
     return [
         Finding("shipgym", "fine", system),
@@ -61,9 +71,13 @@ def examine_installation() -> list[Finding]:
 def _declared() -> dict[str, list[str]]:
     """The distributions that shipgym declares to need, by extra, those of no extra by an empty text."""
     found: dict[str, list[str]] = {}
-    with suppress(importlib.metadata.PackageNotFoundError):  # run from a checkout without installing it
+    with suppress(
+        importlib.metadata.PackageNotFoundError
+    ):  # run from a checkout without installing it
         for line in importlib.metadata.requires("shipgym") or ():
-            name, _, extra = re.fullmatch(r'([\w.-]+)(.*?extra == "(\w+)")?.*', line).groups()  # type: ignore[union-attr]
+            name, _, extra = re.fullmatch(
+                r'([\w.-]+)(.*?extra == "(\w+)")?.*', line
+            ).groups()  # type: ignore[union-attr]
             if name != "shipgym":
                 found.setdefault(extra or "", []).append(name)
     return found
@@ -79,7 +93,9 @@ def _installed(what: str, names: list[str], otherwise: str, remedy: str) -> Find
         except importlib.metadata.PackageNotFoundError:
             missing.append(name)
     if missing:
-        return Finding(what, otherwise, f"{', '.join(missing)} not installed: pip install {remedy}")
+        return Finding(
+            what, otherwise, f"{', '.join(missing)} not installed: pip install {remedy}"
+        )
     return Finding(what, "fine", ", ".join(versions))
 
 
@@ -89,18 +105,36 @@ def _cache() -> tuple[str, str]:
     try:
         folder = open_folder()
         files = [path for path in folder.iterdir() if path.is_file()]
-        kept = f"{folder}, {len(files)} files, {sum(path.stat().st_size for path in files) / 1e6:.1f} MB"
-        if wrong := [f"{path.name} {why}" for path in files if (why := loop_fault(path))]:
-            told = f"{kept}, {len(wrong)} of them not usable: {wrong[0]}; delete what is not, or wait until"
+        kept = (
+            f"{folder}, {len(files)} files,"
+            f" {sum(path.stat().st_size for path in files) / 1e6:.1f} MB"
+        )
+        if wrong := [
+            f"{path.name} {why}" for path in files if (why := loop_fault(path))
+        ]:
+            told = (
+                f"{kept}, {len(wrong)} of them not usable: {wrong[0]}; delete what is"
+                " not, or wait until"
+            )
             return "wrong", f"{told} it is compiled again"
         with tempfile.NamedTemporaryFile(dir=folder):
             pass
     except ValueError as error:
         return "wrong", str(error)
     except OSError as error:
-        if folder.is_dir() and os.access(folder, os.R_OK | os.X_OK) and any(folder.iterdir()):
-            return "fine", f"{kept}, to be read only: what is missing is compiled in memory"
-        told = f"{folder} cannot be written ({error.strerror}): every process compiles its ships again"
+        if (
+            folder.is_dir()
+            and os.access(folder, os.R_OK | os.X_OK)
+            and any(folder.iterdir())
+        ):
+            return (
+                "fine",
+                f"{kept}, to be read only: what is missing is compiled in memory",
+            )
+        told = (
+            f"{folder} cannot be written ({error.strerror}): every process compiles its"
+            " ships again"
+        )
         return "wrong", f"{told}; set {CACHE_VARIABLE} to a folder that can be"
     return "fine", kept
 
@@ -110,7 +144,11 @@ def left_findings() -> list[Finding]:
     here = Path.cwd()
     return [
         Finding("left over" if dead else "in use", "left" if dead else "fine", told)
-        for folder in [here, *(path for path in sorted(here.iterdir()) if path.is_dir()), cache_folder()]
+        for folder in [
+            here,
+            *(path for path in sorted(here.iterdir()) if path.is_dir()),
+            cache_folder(),
+        ]
         for told, dead in locks_and_drafts(folder)
     ]
 
@@ -118,13 +156,23 @@ def left_findings() -> list[Finding]:
 def name_finding(name: str) -> Finding:
     """Whether an import name is this project's alone; `agents` is also that of other distributions."""
     what = f"import {name}"
-    others = sorted({*importlib.metadata.packages_distributions().get(name, ())} - {"shipgym"})
+    others = sorted(
+        {*importlib.metadata.packages_distributions().get(name, ())} - {"shipgym"}
+    )
     if others:
         told = f"also a package of {', '.join(others)}, they overwrite each other"
         return Finding(what, "wrong", f"{told}: use an environment without")
     found = importlib.util.find_spec(name)
-    folder = None if found is None or found.origin is None else Path(found.origin).resolve().parent
+    folder = (
+        None
+        if found is None or found.origin is None
+        else Path(found.origin).resolve().parent
+    )
     home = Path(shipgym.__file__).resolve().parents[1]
     if folder is None or folder.parent != home:
-        return Finding(what, "wrong", f"leads to {folder}, expected {home / name}: install shipgym again")
+        return Finding(
+            what,
+            "wrong",
+            f"leads to {folder}, expected {home / name}: install shipgym again",
+        )
     return Finding(what, "fine", os.fspath(folder))

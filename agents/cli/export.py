@@ -17,16 +17,29 @@ if TYPE_CHECKING:
 @answered
 def export_command(
     what: Annotated[
-        str, Argument(metavar="AGENT|MODEL", help="File of a controller, policy or model, or a shipped name.")
+        str,
+        Argument(
+            metavar="AGENT|MODEL",
+            help="File of a controller, policy or model, or a shipped name.",
+        ),
     ],
     onnx: Annotated[
-        Path | None, Option(metavar="OUT.ONNX", help="Write a learned policy as an ONNX graph.")
+        Path | None,
+        Option(metavar="OUT.ONNX", help="Write a learned policy as an ONNX graph."),
     ] = None,
-    c: Annotated[Path | None, Option("--c", metavar="FOLDER", help="Write C99: NAME.h, NAME.c.")] = None,
-    fmu: Annotated[Path | None, Option(metavar="OUT.FMU", help="Write an FMU for co-simulation.")] = None,
+    c: Annotated[
+        Path | None, Option("--c", metavar="FOLDER", help="Write C99: NAME.h, NAME.c.")
+    ] = None,
+    fmu: Annotated[
+        Path | None, Option(metavar="OUT.FMU", help="Write an FMU for co-simulation.")
+    ] = None,
     fmi: Annotated[str, Option(help="Version of the FMU: 3.0 or 2.0.")] = "3.0",
-    name: Annotated[str | None, Option(help="Name in C and FMU; default: the file's name.")] = None,
-    depth: Annotated[float, Option(metavar="M", help="For a model: water depth; default: deep.")] = inf,
+    name: Annotated[
+        str | None, Option(help="Name in C and FMU; default: the file's name.")
+    ] = None,
+    depth: Annotated[
+        float, Option(metavar="M", help="For a model: water depth; default: deep.")
+    ] = inf,
 ) -> None:
     """Write an autopilot or a ship model as C99 or FMU. Learned policies also as ONNX."""
     from agents.agent_file import load_agent
@@ -38,9 +51,14 @@ def export_command(
     from shipgym.files import write_bytes
 
     if not (onnx or c or fmu):
-        raise InputError("nothing to write: give --c FOLDER, --fmu OUT.FMU or --onnx OUT.ONNX")
+        raise InputError(
+            "nothing to write: give --c FOLDER, --fmu OUT.FMU or --onnx OUT.ONNX"
+        )
     if not (c or fmu) and (name, depth) != (None, inf):
-        raise InputError("--name and --depth found, which are for --c and --fmu alone; leave them out")
+        raise InputError(
+            "--name and --depth found, which are for --c and --fmu alone; leave"
+            " them out"
+        )
     if not fmu and fmi != "3.0":
         raise InputError(f"--fmi: {fmi} found, which is for --fmu alone; leave it out")
     if c or fmu:
@@ -75,9 +93,15 @@ def _source(what: str, name: str | None, depth: float) -> Source:
     from shipgym.ships import load_model
 
     file, what_it_is = Path(what), "file of a controller or a model"
-    content = read_json(file, what_it_is, "take another copy") if file.suffix == ".json" else {}
+    content = (
+        read_json(file, what_it_is, "take another copy")
+        if file.suffix == ".json"
+        else {}
+    )
     if "kind" in content or what in list_pretrained():
         if depth != inf:
-            raise InputError(f"--depth: {depth:g} found, but {what} is an autopilot; leave it out")
+            raise InputError(
+                f"--depth: {depth:g} found, but {what} is an autopilot; leave it out"
+            )
         return autopilot_source(load_agent(what), name or file.stem)
     return ship_source(load_model(what), name or file.stem, depth)

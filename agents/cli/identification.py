@@ -23,20 +23,31 @@ def identify_command(
     *,
     options: IdentifyOptions,
     compare: Annotated[
-        bool, Option("--compare", help="Fit structures and methods and rank them on held-out trials.")
+        bool,
+        Option(
+            "--compare",
+            help="Fit structures and methods and rank them on held-out trials.",
+        ),
     ] = False,
     methods: Annotated[
-        str | None, Option(metavar="NAMES", help="Methods to compare, separated by commas, or all.")
+        str | None,
+        Option(
+            metavar="NAMES", help="Methods to compare, separated by commas, or all."
+        ),
     ] = None,
     structures: Annotated[
-        str | None, Option(metavar="NAMES", help="Structures to compare, separated by commas, or auto.")
+        str | None,
+        Option(
+            metavar="NAMES", help="Structures to compare, separated by commas, or auto."
+        ),
     ] = None,
 ) -> None:
     """Identify a manoeuvring model from recorded trials. Writes model, metrics, settings and report.
 
-    Options not given here are taken from the ship file's table [identify]; if neither names a structure, the
-    structure and method that best predict held-out trials are chosen. With --compare, structures and methods
-    are ranked on the held-out trials, and comparison and models are written instead.
+    Options not given here are taken from the ship file's table [identify]; if neither
+    names a structure, the structure and method that best predict held-out trials are
+    chosen. With --compare, structures and methods are ranked on the held-out trials,
+    and comparison and models are written instead.
 
     Exits with 1 if the identified model is unstable.
     """
@@ -47,7 +58,9 @@ def identify_command(
         _identify(read, settings, out)
 
 
-def _chosen(ship: Path, options: dict[str, Any], *unnamed: str) -> tuple[ShipFile, dict[str, Any]]:
+def _chosen(
+    ship: Path, options: dict[str, Any], *unnamed: str
+) -> tuple[ShipFile, dict[str, Any]]:
     """The ship file, and the options: of the command line first; `unnamed`: the structure if not auto."""
     from agents.identifying import identification_settings
     from shipgym.trials.ship_file import ShipFile
@@ -57,7 +70,14 @@ def _chosen(ship: Path, options: dict[str, Any], *unnamed: str) -> tuple[ShipFil
 
 
 def _identify(read: ShipFile, settings: dict[str, Any], out: Path) -> None:
-    from agents.cli.terminal import answer, console, identifying, prediction_table, say, selection_table
+    from agents.cli.terminal import (
+        answer,
+        console,
+        identifying,
+        prediction_table,
+        say,
+        selection_table,
+    )
     from agents.identifying import identify_ship
     from agents.output import whole_folder
     from identification.result import FILES
@@ -67,7 +87,13 @@ def _identify(read: ShipFile, settings: dict[str, Any], out: Path) -> None:
         result = identify_ship(read, settings)
         result.save(draft)
     instability = why_unstable(result)
-    answer({**result.metrics, "stable": instability is None, "model": str(out / "model.json")})
+    answer(
+        {
+            **result.metrics,
+            "stable": instability is None,
+            "model": str(out / "model.json"),
+        }
+    )
     if "selection" in result.metrics:
         console.print(selection_table(result.metrics["selection"]))
         for name, reason in result.metrics["selection"]["refused"].items():
@@ -86,22 +112,38 @@ def _check_stable(result: IdentificationResult) -> None:
     from identification.validation.warnings import model_warnings, why_unstable
 
     if (instability := why_unstable(result)) is not None:
-        fail(f"the identified model is unstable: {instability}; it must not be used", FAILED)
+        fail(
+            f"the identified model is unstable: {instability}; it must not be used",
+            FAILED,
+        )
     notes = [f"{trial.name}: {note}" for trial in result.trials for note in trial.notes]
     for warning in [*notes, *model_warnings(result)]:
         warn(warning)
 
 
 def _compare(
-    read: ShipFile, settings: dict[str, Any], out: Path, names: tuple[str | None, str | None]
+    read: ShipFile,
+    settings: dict[str, Any],
+    out: Path,
+    names: tuple[str | None, str | None],
 ) -> None:
-    from agents.cli.terminal import answer, console, identifying, say, selection_table, warn
+    from agents.cli.terminal import (
+        answer,
+        console,
+        identifying,
+        say,
+        selection_table,
+        warn,
+    )
     from agents.identifying import compare_ship
     from agents.output import whole_folder
     from identification.validation.comparison import COMPARISON_FILES
 
     own = () if read.structure is None else (f"model-{read.structure.name}.json",)
-    with whole_folder(out, (*COMPARISON_FILES, *own)) as draft, identifying("comparing"):
+    with (
+        whole_folder(out, (*COMPARISON_FILES, *own)) as draft,
+        identifying("comparing"),
+    ):
         found = compare_ship(read, settings, *names)
         found.save(draft)
     answer(found.to_dict())
@@ -110,28 +152,38 @@ def _compare(
     for name, reason in found.refused.items():
         warn(f"{name} was not fitted: {reason}")
     for name, left in found.left_out.items():
-        warn(f"{name} has no setting of these names and was fitted without them: {', '.join(left)}")
+        warn(
+            f"{name} has no setting of these names and was fitted without them:"
+            f" {', '.join(left)}"
+        )
     first = found.standings[0]
     if not first.stable or first.error is None:
-        fail("no method gives a model that stays stable on every held-out trial", FAILED)
+        fail(
+            "no method gives a model that stays stable on every held-out trial", FAILED
+        )
 
 
 @answered
 def advise_command(
     ship: ShipFileArgument,
     criterion: Annotated[
-        str, Option(help="What to reduce: c (one coefficient), D (volume) or E (longest axis).")
+        str,
+        Option(
+            help="What to reduce: c (one coefficient), D (volume) or E (longest axis)."
+        ),
     ] = "c",
-    coefficient: Annotated[str | None, Option(help="For criterion c; default: the least certain.")] = None,
+    coefficient: Annotated[
+        str | None, Option(help="For criterion c; default: the least certain.")
+    ] = None,
     number: Annotated[int, Option(min=1, help="Number of manoeuvres.")] = 3,
     *,
     options: IdentifyOptions,
 ) -> None:
     """Show what the trials determine and what to run next.
 
-    Prints condition number, variance inflation and Fisher information of each trial; then by how much
-    zigzags, turning circles and binary rudder sequences, simulated on the model identified so far, would each
-    reduce what is least certain.
+    Prints condition number, variance inflation and Fisher information of each trial;
+    then by how much zigzags, turning circles and binary rudder sequences, simulated on
+    the model identified so far, would each reduce what is least certain.
     """
     from agents.cli.terminal import answer, identifying, say
     from agents.identifying import identify_ship
@@ -151,15 +203,19 @@ def advise_command(
 def reduce_command(
     ship: ShipFileArgument,
     out: Out,
-    direction: Annotated[str, Option(help="backward (drop terms) or forward (add them).")] = "backward",
-    tolerance: Annotated[float, Option(min=0.0, help="How far R2 on held-out stretches may fall.")] = 1e-3,
+    direction: Annotated[
+        str, Option(help="backward (drop terms) or forward (add them).")
+    ] = "backward",
+    tolerance: Annotated[
+        float, Option(min=0.0, help="How far R2 on held-out stretches may fall.")
+    ] = 1e-3,
     *,
     options: IdentifyOptions,
 ) -> None:
     """Drop the terms that the trials do not support. Identifies the model with the remaining ones.
 
-    Writes the reduced model's files and reduction.json, with all steps. Exits with 1 if the reduced
-    model is unstable.
+    Writes the reduced model's files and reduction.json, with all steps. Exits with 1 if
+    the reduced model is unstable.
     """
     from agents.cli.terminal import answer, console, identifying, prediction_table, say
     from agents.identifying import reduce_ship
@@ -168,7 +224,10 @@ def reduce_command(
     from shipgym.files import write_json
 
     read, settings = _chosen(ship, options, "abkowitz")
-    with whole_folder(out, (*FILES, "reduction.json")) as draft, identifying("reducing"):
+    with (
+        whole_folder(out, (*FILES, "reduction.json")) as draft,
+        identifying("reducing"),
+    ):
         found = reduce_ship(read, settings, direction, tolerance)
         fields = found.to_dict()
         found.reduced.save(draft)
@@ -179,5 +238,7 @@ def reduce_command(
     console.print(prediction_table(found.full, "with all terms"))
     console.print(prediction_table(found.reduced, "with the terms left"))
     count = fields["terms"]
-    console.print(f"\n{count['reduced']} of {count['full']} coefficients left; written to {out}")
+    console.print(
+        f"\n{count['reduced']} of {count['full']} coefficients left; written to {out}"
+    )
     _check_stable(found.reduced)

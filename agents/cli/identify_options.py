@@ -9,7 +9,16 @@ from typer import Option
 
 from agents.cli.parameters import take_parameters, typed_parameters
 from shipgym.files import named_values
-from shipgym.trials.identify_table import AUTO, FLAG, NUMBER, OPTIONS, TEXTS, WHOLE, Options, check_options
+from shipgym.trials.identify_table import (
+    AUTO,
+    FLAG,
+    NUMBER,
+    OPTIONS,
+    TEXTS,
+    WHOLE,
+    Options,
+    check_options,
+)
 
 TYPES: dict[str, Any] = {FLAG: bool, NUMBER: float, WHOLE: int, TEXTS: list[str]}
 #: Options with a name of their own on the command line.
@@ -26,14 +35,27 @@ def takes_identify_options(command: Callable[..., None]) -> Callable[..., None]:
 
     @functools.wraps(command)
     def wrapped(**arguments: Any) -> None:
-        named = {name: value for name in COMMON if (value := arguments.pop(name)) not in (None, [])}
-        tables = [f"{name}={value}" for name, value in named.items() if str(value).lstrip().startswith("{")]
+        named = {
+            name: value
+            for name in COMMON
+            if (value := arguments.pop(name)) not in (None, [])
+        }
+        tables = [
+            f"{name}={value}"
+            for name, value in named.items()
+            if str(value).lstrip().startswith("{")
+        ]
         others = parsed_options(arguments.pop(SET) or ())
-        command(options=others | check_options(named, "options") | parsed_options(tables), **arguments)
+        command(
+            options=others | check_options(named, "options") | parsed_options(tables),
+            **arguments,
+        )
 
     parameters: dict[str, inspect.Parameter] = {}
     for name, one in typed_parameters(command).items():
-        parameters |= {each.name: each for each in (_parameters() if name == "options" else [one])}
+        parameters |= {
+            each.name: each for each in (_parameters() if name == "options" else [one])
+        }
     return take_parameters(wrapped, parameters)
 
 
@@ -43,10 +65,17 @@ def _parameters() -> list[inspect.Parameter]:
     for name in COMMON:
         kind, flag = OPTIONS[name].kind, f"--{name.replace('_', '-')}"
         flag += f"/--no-{name}" if kind == FLAG else ""
-        kinds[name] = Annotated[TYPES.get(kind, str) | None, Option(flag, help=_help(name))]
-    kinds[SET] = Annotated[list[str] | None, Option("--set", metavar="OPTION=VALUE", help=SET_HELP)]
+        kinds[name] = Annotated[
+            TYPES.get(kind, str) | None, Option(flag, help=_help(name))
+        ]
+    kinds[SET] = Annotated[
+        list[str] | None, Option("--set", metavar="OPTION=VALUE", help=SET_HELP)
+    ]
     keyword = inspect.Parameter.KEYWORD_ONLY
-    return [inspect.Parameter(name, keyword, default=None, annotation=kind) for name, kind in kinds.items()]
+    return [
+        inspect.Parameter(name, keyword, default=None, annotation=kind)
+        for name, kind in kinds.items()
+    ]
 
 
 def _help(name: str) -> str:

@@ -9,18 +9,31 @@ from typer import Argument, Option
 
 from agents.cli.command import answered
 
-NO_FILE_YET = "; new-ship has written no ship file in which to do so: write one as in docs/ship_file.md"
+NO_FILE_YET = (
+    "; new-ship has written no ship file in which to do so: write one as in"
+    " docs/ship_file.md"
+)
 HISTORIES = ("psi", "r", "delta", "u", "v", "n", "phi", "wind_speed")
 
 
 @answered
 def new_ship_command(
     logs: Annotated[
-        list[Path], Argument(metavar="LOG...", help="Logs: CSV, NMEA 0183, Excel, Parquet or MATLAB.")
+        list[Path],
+        Argument(
+            metavar="LOG...", help="Logs: CSV, NMEA 0183, Excel, Parquet or MATLAB."
+        ),
     ],
-    out: Annotated[Path, Option(metavar="FILE", help="The ship file to write.")] = Path("ship.toml"),
+    out: Annotated[Path, Option(metavar="FILE", help="The ship file to write.")] = Path(
+        "ship.toml"
+    ),
     length: Annotated[
-        float | None, Option(min=0.01, max=2e3, help="Length between perpendiculars, m; or fill it in later.")
+        float | None,
+        Option(
+            min=0.01,
+            max=2e3,
+            help="Length between perpendiculars, m; or fill it in later.",
+        ),
     ] = None,
 ) -> None:
     """Write a ship file for recorded trials. Guesses columns, units and signs, and reports the guesses."""
@@ -34,11 +47,16 @@ def new_ship_command(
     from shipgym.trials.guesses import guess_trial
 
     if out.exists():
-        raise InputError(f"{out}: exists already; choose another name with --out, or remove it")
+        raise InputError(
+            f"{out}: exists already; choose another name with --out, or remove it"
+        )
     try:
         read = [guess_trial(logs[0])]
     except InputError as error:
-        declared = any(word in str(error) for word in ("[columns]", "[conventions]", "[sensors]", "declare "))
+        declared = any(
+            word in str(error)
+            for word in ("[columns]", "[conventions]", "[sensors]", "declare ")
+        )
         raise InputError(f"{error}{NO_FILE_YET if declared else ''}") from None
     for log in logs[1:]:
         try:
@@ -46,20 +64,41 @@ def new_ship_command(
         except InputError as error:
             warn(str(error))
     guesses, _, trial, unused = read[0]
-    # one log with another convention is enough: the usual one is also what a log says that does not tell
+    # one log with another convention is enough: the usual one is also what a log says
+    # that does not tell
     found = {name: value for one in read for name, value in one.conventions.items()}
     side = found.pop("rudder_positive", "starboard")
-    known = [[one.trial[name] for name in ("u", "stw", "sog") if name in one.trial.channels] for one in read]
+    known = [
+        [one.trial[name] for name in ("u", "stw", "sog") if name in one.trial.channels]
+        for one in read
+    ]
     speeds = [float(np.quantile(speed[0], 0.9)) for speed in known if speed]
     facts: dict[str, Any] = {
-        "out": out, "length": length, "guesses": guesses, "side": side, "conventions": found, "trial": trial,
-        "unused": ", ".join(map(shown, unused)), "speed": max(speeds, default=None),
-        "files": [json.dumps(os.path.relpath(log, out.parent), ensure_ascii=False) for log in logs],
-    }  # fmt: skip
+        "out": out,
+        "length": length,
+        "guesses": guesses,
+        "side": side,
+        "conventions": found,
+        "trial": trial,
+        "unused": ", ".join(map(shown, unused)),
+        "speed": max(speeds, default=None),
+        "files": [
+            json.dumps(os.path.relpath(log, out.parent), ensure_ascii=False)
+            for log in logs
+        ],
+    }
     write_text(render("shipgym.pages/ship.toml.jinja", **facts), out)
     columns = {one.channel: {"column": one.column, "unit": one.unit} for one in guesses}
     words = {"rudder_positive": side, **found}
-    answer({"written": str(out), "columns": columns, "unused": unused, **words, "notes": [*trial.notes]})
+    answer(
+        {
+            "written": str(out),
+            "columns": columns,
+            "unused": unused,
+            **words,
+            "notes": [*trial.notes],
+        }
+    )
     say(render("shipgym.pages/new_ship.txt.jinja", **facts).strip())
     for note in trial.notes:
         warn(note)
@@ -67,8 +106,13 @@ def new_ship_command(
 
 @answered
 def look_command(
-    log: Annotated[Path, Argument(metavar="LOG|SHIP.TOML", help="A log, or a ship file with trials.")],
-    out: Annotated[Path, Option(metavar="FILE", help="The page to write.")] = Path("look.html"),
+    log: Annotated[
+        Path,
+        Argument(metavar="LOG|SHIP.TOML", help="A log, or a ship file with trials."),
+    ],
+    out: Annotated[Path, Option(metavar="FILE", help="The page to write.")] = Path(
+        "look.html"
+    ),
 ) -> None:
     """Draw the trials of a ship file, or a log. Shows track, channels, repairs and problems found."""
     from agents.cli.terminal import answer, say, warn
@@ -80,19 +124,34 @@ def look_command(
     from shipgym.trials.ship_file import ShipFile
 
     check_page(out, plots=True)
-    trials = ShipFile.load(log).trials() if log.suffix == ".toml" else [guess_trial(log).trial]
-    tracks = [path_figure({"measured": one}) if {"x", "y"} <= one.channels.keys() else None for one in trials]
+    trials = (
+        ShipFile.load(log).trials()
+        if log.suffix == ".toml"
+        else [guess_trial(log).trial]
+    )
+    tracks = [
+        path_figure({"measured": one}) if {"x", "y"} <= one.channels.keys() else None
+        for one in trials
+    ]
     histories = [history_figure({"measured": one}, HISTORIES) for one in trials]
     shown = zip(trials, tracks, histories, strict=True)
     write_text(render("shipgym.pages/look.html", name=log.name, trials=shown), out)
     fields = [
-        {"name": one.name, "samples": len(one), "duration_s": one.duration, "channels": [*one.channels],
-         "notes": [*one.notes]}
+        {
+            "name": one.name,
+            "samples": len(one),
+            "duration_s": one.duration,
+            "channels": [*one.channels],
+            "notes": [*one.notes],
+        }
         for one in trials
-    ]  # fmt: skip
+    ]
     answer({"written": str(out), "trials": fields})
     for trial in trials:
-        about = f"{len(trial)} samples over {trial.duration:.5g} s: {', '.join(trial.channels)}"
+        about = (
+            f"{len(trial)} samples over {trial.duration:.5g} s:"
+            f" {', '.join(trial.channels)}"
+        )
         say(f"{trial.name}: {about}")
         for note in trial.notes:
             warn(f"{trial.name}: {note}")

@@ -21,9 +21,14 @@ class StandardTrials:
     """Standard manoeuvres of a model, and of models drawn from its covariance."""
 
     families: dict[str, dict[str, Manoeuvre]]  # the manoeuvres by family and name
-    sailed: dict[str, Trial | Spiral]  # by manoeuvre, as simulated with the model itself
-    indices: dict[str, dict[str, IndexInterval]]  # by manoeuvre and index, units in the names
-    #: the criteria of IMO resolution MSC.137(76); none in shallow water, which they are not made for
+    sailed: dict[
+        str, Trial | Spiral
+    ]  # by manoeuvre, as simulated with the model itself
+    indices: dict[
+        str, dict[str, IndexInterval]
+    ]  # by manoeuvre and index, units in the names
+    #: the criteria of IMO resolution MSC.137(76); none in shallow water, which they are
+    #: not made for
     criteria: dict[str, Criterion]
     refused: dict[str, str]  # why a manoeuvre could not be sailed
     draws: int  # models drawn
@@ -32,7 +37,11 @@ class StandardTrials:
     @property
     def water(self) -> str:
         """Where they were sailed, in words."""
-        return "deep water" if np.isinf(self.water_depth) else f"water of {self.water_depth:g} m"
+        return (
+            "deep water"
+            if np.isinf(self.water_depth)
+            else f"water of {self.water_depth:g} m"
+        )
 
     def to_dict(self) -> dict[str, Any]:
         """As `--json` prints it."""
@@ -44,24 +53,32 @@ class StandardTrials:
                 for name, indices in self.indices.items()
             },
             "refused": self.refused,
-            "imo": {name: criterion.to_dict() for name, criterion in self.criteria.items()},
+            "imo": {
+                name: criterion.to_dict() for name, criterion in self.criteria.items()
+            },
         }
 
 
 def standard_trials(
-    model: ShipModel, draws: int = 0, seed: int = 0, progress: Callable[[int], None] | None = None,
+    model: ShipModel,
+    draws: int = 0,
+    seed: int = 0,
+    progress: Callable[[int], None] | None = None,
     water_depth: float = np.inf,
-) -> StandardTrials:  # fmt: skip
+) -> StandardTrials:
     """Sail every standard manoeuvre that suits the ship, with the model and with models drawn from it.
 
-    `model`: the ship; `draws`: models drawn from its covariance; a ship without one has none; `seed`: of the
-    draws; `progress`: told the number of draws done; `water_depth`: m, for ships with
-    shallow-water equations. Raises InputError for water too shallow, or a ship without such equations;
-    UnstableModelError if the ship itself runs away in every manoeuvre; where she does in some, or an index
-    cannot be read, these are in `refused` and the others stay.
+    `model`: the ship; `draws`: models drawn from its covariance; a ship without one has
+    none; `seed`: of the draws; `progress`: told the number of draws done;
+    `water_depth`: m, for ships with shallow-water equations. Raises InputError for
+    water too shallow, or a ship without such equations; UnstableModelError if the ship
+    itself runs away in every manoeuvre; where she does in some, or an index cannot be
+    read, these are in `refused` and the others stay.
     """
     families = families_of(model, water_depth)
-    manoeuvres = {name: one for family in families.values() for name, one in family.items()}
+    manoeuvres = {
+        name: one for family in families.values() for name, one in family.items()
+    }
     sailed: dict[str, Trial | Spiral] = {}
     own: dict[str, dict[str, float | None]] = {}
     refused: dict[str, str] = {}
@@ -79,4 +96,6 @@ def standard_trials(
     evaluated = {name: manoeuvre.evaluate for name, manoeuvre in manoeuvres.items()}
     found = intervals_of(own, drawn, evaluated, progress)
     criteria = imo_criteria(model, found) if np.isinf(water_depth) else {}
-    return StandardTrials(families, sailed, found, criteria, refused, len(drawn), water_depth)
+    return StandardTrials(
+        families, sailed, found, criteria, refused, len(drawn), water_depth
+    )

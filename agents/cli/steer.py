@@ -9,41 +9,70 @@ from typer import Argument, Option
 from agents.cli.command import FAILED, answered, fail
 
 Address = Annotated[
-    str, Option("--nmea", help="tcp:HOST:PORT, udp:HOST:PORT, serial:DEVICE or serial:DEVICE@BAUD.")
+    str,
+    Option(
+        "--nmea",
+        help="tcp:HOST:PORT, udp:HOST:PORT, serial:DEVICE or serial:DEVICE@BAUD.",
+    ),
 ]
-Duration = Annotated[float, Option(min=0.0, help="Seconds after which to stop; default: never.")]
-SpeedUp = Annotated[float, Option(min=0.01, help="Times faster than real time; same at both ends.")]
+Duration = Annotated[
+    float, Option(min=0.0, help="Seconds after which to stop; default: never.")
+]
+SpeedUp = Annotated[
+    float, Option(min=0.01, help="Times faster than real time; same at both ends.")
+]
 
 
 @answered
 def steer_command(
     agent: Annotated[
-        str, Argument(metavar="AGENT", help="A controller's file, or the name of a pretrained agent.")
+        str,
+        Argument(
+            metavar="AGENT",
+            help="A controller's file, or the name of a pretrained agent.",
+        ),
     ],
     nmea: Address,
     heading: Annotated[
         float | None,
-        Option(metavar="DEG", min=0.0, max=360.0, help="Heading to steer; default: the plotter's (APB)."),
+        Option(
+            metavar="DEG",
+            min=0.0,
+            max=360.0,
+            help="Heading to steer; default: the plotter's (APB).",
+        ),
     ] = None,
     rate: Annotated[
         float | None,
-        Option("--rate-of-turn", metavar="DEG", help="deg/min, for turn-rate; with --heading the limit."),
+        Option(
+            "--rate-of-turn",
+            metavar="DEG",
+            help="deg/min, for turn-rate; with --heading the limit.",
+        ),
     ] = None,
     route: Annotated[
-        Path | None, Option(metavar="CSV", help="Route for wheel-over: columns latitude, longitude, degrees.")
+        Path | None,
+        Option(
+            metavar="CSV",
+            help="Route for wheel-over: columns latitude, longitude, degrees.",
+        ),
     ] = None,
     limit: Annotated[
         list[str] | None,
-        Option(metavar="NAME=VALUE", help="When to hand over: silence_s=3, rudder_deg=5; repeatable."),
+        Option(
+            metavar="NAME=VALUE",
+            help="When to hand over: silence_s=3, rudder_deg=5; repeatable.",
+        ),
     ] = None,
     duration: Duration = inf,
     speed_up: SpeedUp = 1.0,
 ) -> None:
     """Steer over NMEA 0183. Reads HDT/THS, ROT, RSA, VBW, VTG/RMC, APB, XTE, BWC, BWR; writes ROR, HTD.
 
-    It begins when everything that the autopilot reads is available. If a sensor falls silent, two disagree,
-    the rudder does not follow or the computer is late, it raises the alarm (ALR), marks its order invalid and
-    stops steering. Not certified: read docs/deployment.md first. Exits with 1 after an alarm.
+    It begins when everything that the autopilot reads is available. If a sensor falls
+    silent, two disagree, the rudder does not follow or the computer is late, it raises
+    the alarm (ALR), marks its order invalid and stops steering. Not certified: read
+    docs/deployment.md first. Exits with 1 after an alarm.
     """
     import asyncio
 
@@ -61,9 +90,16 @@ def steer_command(
     radius = getattr(pilot, "gains", {}).get("path_radius", 0.0)
     track = None if route is None else Route.from_csv(route, radius)
     steering = steer(
-        pilot, nmea, heading=course, limits=Limits(**limits), duration=duration, speed_up=speed_up, told=say,
-        route=track, rate=None if rate is None else radians(rate) / 60.0,
-    )  # fmt: skip
+        pilot,
+        nmea,
+        heading=course,
+        limits=Limits(**limits),
+        duration=duration,
+        speed_up=speed_up,
+        told=say,
+        route=track,
+        rate=None if rate is None else radians(rate) / 60.0,
+    )
     found = asyncio.run(steering)
     answer({"state": found.state, "alarm": found.alarm, **found.counts})
     if found.alarm:
@@ -72,21 +108,30 @@ def steer_command(
 
 @answered
 def simulate_command(
-    model: Annotated[str, Argument(metavar="MODEL", help="A model file, or the name of a shipped model.")],
+    model: Annotated[
+        str,
+        Argument(metavar="MODEL", help="A model file, or the name of a shipped model."),
+    ],
     nmea: Address,
-    leg: Annotated[float, Option(metavar="DEG", min=0.0, max=360.0, help="Leg on her plotter.")] = 0.0,
+    leg: Annotated[
+        float, Option(metavar="DEG", min=0.0, max=360.0, help="Leg on her plotter.")
+    ] = 0.0,
     sea: Annotated[str, Option(help="calm, slight, moderate or rough.")] = "calm",
     seed: Annotated[int, Option(min=0, help="Seed of the sea.")] = 0,
     drop: Annotated[
         list[str] | None,
-        Option(metavar="HDT=60", help="Sentence that falls silent, HDT after 60 s, say; repeatable."),
+        Option(
+            metavar="HDT=60",
+            help="Sentence that falls silent, HDT after 60 s, say; repeatable.",
+        ),
     ] = None,
     duration: Duration = inf,
     speed_up: SpeedUp = 1.0,
 ) -> None:
     """Simulate a ship for `shipgym steer`. Sends instrument readings and receives rudder orders.
 
-    Over TCP it waits for connections; the autopilot and a chart plotter may connect at once.
+    Over TCP it waits for connections; the autopilot and a chart plotter may connect at
+    once.
     """
     import asyncio
 
@@ -98,9 +143,18 @@ def simulate_command(
 
     given = named_values(drop or (), "--drop", "HDT=60")
     dropped = {
-        kind.upper(): check_number(after, f"--drop {kind}", at_least=0.0) for kind, after in given.items()
+        kind.upper(): check_number(after, f"--drop {kind}", at_least=0.0)
+        for kind, after in given.items()
     }
     ship = SimulatedShip(load_model(model), radians(leg), sea, seed)
-    asyncio.run(simulate_ship(ship, nmea, duration=duration, speed_up=speed_up, drop=dropped))
-    answer({"model": ship.model.name, "duration_s": round(ship.steps * STEP, 1), "state": ship.now})
+    asyncio.run(
+        simulate_ship(ship, nmea, duration=duration, speed_up=speed_up, drop=dropped)
+    )
+    answer(
+        {
+            "model": ship.model.name,
+            "duration_s": round(ship.steps * STEP, 1),
+            "state": ship.now,
+        }
+    )
     say(f"{ship.model.name}: sailed for {ship.steps * STEP:.1f} s")

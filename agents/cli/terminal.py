@@ -27,7 +27,13 @@ WIDTH_WITHOUT_TERMINAL = 110
 
 #: Control characters but tab and newline, and those that turn the direction of writing.
 CONTROLS = dict.fromkeys(
-    [*range(9), *range(11, 32), *range(127, 160), *range(0x202A, 0x202F), *range(0x2066, 0x206A)]
+    [
+        *range(9),
+        *range(11, 32),
+        *range(127, 160),
+        *range(0x202A, 0x202F),
+        *range(0x2066, 0x206A),
+    ]
 )
 
 
@@ -40,7 +46,11 @@ class _Plain(Console):
     def render(self, *what: Any, **more: Any) -> Iterable[Segment]:
         """What is printed, without the control characters of its texts, which must not steer a terminal."""
         for segment in super().render(*what, **more):
-            yield segment if segment.control else segment._replace(text=segment.text.translate(CONTROLS))
+            yield (
+                segment
+                if segment.control
+                else segment._replace(text=segment.text.translate(CONTROLS))
+            )
 
 
 AS_JSON: ContextVar[bool] = ContextVar("as_json", default=False)
@@ -51,12 +61,21 @@ console, err = out, _Plain(stderr=True)
 def plain_table(title: str, *headings: str) -> Table:
     """A table without lines, its title to the left; a heading that begins with > is aligned right."""
     table = Table(
-        title=title, title_style="bold", title_justify="left", header_style="dim", box=None, pad_edge=False,
+        title=title,
+        title_style="bold",
+        title_justify="left",
+        header_style="dim",
+        box=None,
+        pad_edge=False,
         padding=(0, 2, 0, 0),
-    )  # fmt: skip
+    )
     for k, heading in enumerate(headings):
         right = heading.startswith(">")
-        table.add_column(heading.removeprefix(">"), justify="right" if right else "left", no_wrap=k == 0)
+        table.add_column(
+            heading.removeprefix(">"),
+            justify="right" if right else "left",
+            no_wrap=k == 0,
+        )
     return table
 
 
@@ -99,18 +118,25 @@ def fail(message: str) -> None:
 def progress_bars() -> Iterator[Progress | None]:
     """Bars on standard error, one for each stage, with the time that remains, in the end that it took.
 
-    Yields a function to be told the stage, units done and their total, 0 where that is not known; None
-    where nothing is shown, as with `--json` and `--quiet`.
+    Yields a function to be told the stage, units done and their total, 0 where that is
+    not known; None where nothing is shown, as with `--json` and `--quiet`.
     """
     if out.quiet or not err.is_terminal:
         yield None
         return
-    from rich.progress import BarColumn, TaskProgressColumn, TextColumn, TimeRemainingColumn
+    from rich.progress import (
+        BarColumn,
+        TaskProgressColumn,
+        TextColumn,
+        TimeRemainingColumn,
+    )
     from rich.progress import Progress as Bars
 
     described = TextColumn("{task.description:<30}", markup=False)
     left = TimeRemainingColumn(elapsed_when_finished=True)
-    with Bars(described, BarColumn(bar_width=32), TaskProgressColumn(), left, console=err) as bars:
+    with Bars(
+        described, BarColumn(bar_width=32), TaskProgressColumn(), left, console=err
+    ) as bars:
         tasks: dict[str, Any] = {}
 
         def tell(stage: str, done: int, total: int) -> None:
@@ -148,26 +174,43 @@ def training_bar() -> Iterator[Callable[[Training], None] | None]:
 
         def line(now: Training) -> None:
             if now.evaluated:
-                told = f"step {now.steps:,} of {now.total:,}, {now.seconds:.0f} s: {_costs(now)}"
+                told = (
+                    f"step {now.steps:,} of {now.total:,}, {now.seconds:.0f} s:"
+                    f" {_costs(now)}"
+                )
                 err.print(told, soft_wrap=True)
 
         yield line
         return
-    from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
+    from rich.progress import (
+        BarColumn,
+        Progress,
+        TaskProgressColumn,
+        TextColumn,
+        TimeRemainingColumn,
+    )
 
     told = TextColumn("{task.fields[costs]}", markup=False)
     with Progress(
-        TextColumn("training"), BarColumn(bar_width=32), TaskProgressColumn(), TimeRemainingColumn(), told,
+        TextColumn("training"),
+        BarColumn(bar_width=32),
+        TaskProgressColumn(),
+        TimeRemainingColumn(),
+        told,
         console=err,
-    ) as bars:  # fmt: skip
+    ) as bars:
         task = bars.add_task("training", total=None, costs="")
-        yield lambda now: bars.update(task, completed=now.steps, total=now.total, costs=_costs(now))
+        yield lambda now: bars.update(
+            task, completed=now.steps, total=now.total, costs=_costs(now)
+        )
 
 
 def _costs(now: Training) -> str:
     """Costs of a training so far, beside LQ's."""
     lq = "" if now.lq_cost is None else f", LQ {now.lq_cost:.2f}"
-    return "" if now.cost is None else f"cost {now.cost:.2f}, best {now.best_cost:.2f}{lq}"
+    return (
+        "" if now.cost is None else f"cost {now.cost:.2f}, best {now.best_cost:.2f}{lq}"
+    )
 
 
 def prediction_table(result: IdentificationResult, what: str = "") -> Table:
@@ -178,12 +221,18 @@ def prediction_table(result: IdentificationResult, what: str = "") -> Table:
     table.add_column("use")
     for heading in ("heading\ndeg", "yaw rate\ndeg/s", "surge\nm/s", "sway\nm/s"):
         table.add_column(heading, justify="right")
-    table.add_column("measured -> predicted\n(rudder reversed at headings)", no_wrap=True)
+    table.add_column(
+        "measured -> predicted\n(rudder reversed at headings)", no_wrap=True
+    )
     for name, metrics in result.metrics["trials"].items():
         rmse = metrics["rmse"]
-        angles = (None if rmse[c] is None else np.degrees(rmse[c]) for c in ("psi", "r"))
+        angles = (
+            None if rmse[c] is None else np.degrees(rmse[c]) for c in ("psi", "r")
+        )
         errors = [number(value, 3) for value in (*angles, rmse["u"], rmse["v"])]
-        found = Text("ran away", "bold red") if metrics["diverged"] else _indices(metrics)
+        found = (
+            Text("ran away", "bold red") if metrics["diverged"] else _indices(metrics)
+        )
         table.add_row(PurePath(name).name, metrics["use"], *errors, found)
     return table
 
@@ -191,15 +240,30 @@ def prediction_table(result: IdentificationResult, what: str = "") -> Table:
 def selection_table(ranking: Mapping[str, Any]) -> Table:
     """Structures and methods by how well they predict the held-out trials, the best first."""
     headings = (
-        "method", "structure", ">coeffi-\ncients", "model", ">error by\nstd. dev.", ">heading\ndeg",
-        ">yaw rate\ndeg/s", ">ran away\ntrials",
-    )  # fmt: skip
-    table = plain_table(f"Structures and methods by how they predict {ranking['held_out']}", *headings)
+        "method",
+        "structure",
+        ">coeffi-\ncients",
+        "model",
+        ">error by\nstd. dev.",
+        ">heading\ndeg",
+        ">yaw rate\ndeg/s",
+        ">ran away\ntrials",
+    )
+    table = plain_table(
+        f"Structures and methods by how they predict {ranking['held_out']}", *headings
+    )
     for one in ranking["ranking"]:
         state = "stable" if one["stable"] else Text("unstable", "bold red")
-        figures = (("error", 4), ("heading_deg", 2), ("yaw_rate_deg_s", 4), ("ran_away", 0))
+        figures = (
+            ("error", 4),
+            ("heading_deg", 2),
+            ("yaw_rate_deg_s", 4),
+            ("ran_away", 0),
+        )
         numbers = (number(one[name], digits) for name, digits in figures)
-        table.add_row(one["method"], one["structure"], str(one["coefficients"]), state, *numbers)
+        table.add_row(
+            one["method"], one["structure"], str(one["coefficients"]), state, *numbers
+        )
     return table
 
 
@@ -214,16 +278,29 @@ def _indices(metrics: Mapping[str, Any]) -> str:
     )
 
 
-def manoeuvre_table(rows: Mapping[str, Mapping[str, IndexInterval]], water: str = "deep water") -> Table:
+def manoeuvre_table(
+    rows: Mapping[str, Mapping[str, IndexInterval]], water: str = "deep water"
+) -> Table:
     """Indices of manoeuvres, one line each, with their intervals where there are models drawn."""
-    drawn = any(len(index.values) for indices in rows.values() for index in indices.values())
+    drawn = any(
+        len(index.values) for indices in rows.values() for index in indices.values()
+    )
     more = (">95 % interval", ">draws without value") if drawn else ()
-    table = plain_table(f"Manoeuvres from service speed in {water}", "manoeuvre", "index", ">value", *more)
+    table = plain_table(
+        f"Manoeuvres from service speed in {water}",
+        "manoeuvre",
+        "index",
+        ">value",
+        *more,
+    )
     for manoeuvre, indices in rows.items():
         for k, (name, index) in enumerate(indices.items()):
             cells = [manoeuvre if k == 0 else "", name, number(index.value, 2)]
             if drawn:
-                cells += [between(index.interval, 2), str(index.n_ran_away + index.n_never_reached)]
+                cells += [
+                    between(index.interval, 2),
+                    str(index.n_ran_away + index.n_never_reached),
+                ]
             table.add_row(*cells)
     return table
 
@@ -233,33 +310,62 @@ def criteria_table(criteria: Mapping[str, Criterion]) -> Table:
     drawn = any(criterion.share_passed is not None for criterion in criteria.values())
     measured = any(criterion.measured is not None for criterion in criteria.values())
     headings = {
-        "criterion": True, ">measured": measured, ">value": True, ">95 % interval": drawn, ">limit": True,
-        "unit": True, "verdict": True, ">probability": drawn, "manoeuvre": True, "paragraph": True,
-    }  # fmt: skip
+        "criterion": True,
+        ">measured": measured,
+        ">value": True,
+        ">95 % interval": drawn,
+        ">limit": True,
+        "unit": True,
+        "verdict": True,
+        ">probability": drawn,
+        "manoeuvre": True,
+        "paragraph": True,
+    }
     there = [heading for heading, shown in headings.items() if shown]
     table = plain_table("IMO criteria, resolution MSC.137(76)", *there)
     for name, criterion in criteria.items():
         probability = criterion.probability
         cells = [
-            name, number(criterion.measured, 2), number(criterion.value, 2), between(criterion.interval, 2),
-            number(criterion.limit, 2), criterion.unit, _verdict(criterion),
+            name,
+            number(criterion.measured, 2),
+            number(criterion.value, 2),
+            between(criterion.interval, 2),
+            number(criterion.limit, 2),
+            criterion.unit,
+            _verdict(criterion),
             "-" if probability is None else f"{100.0 * probability:.1f} %",
-            criterion.manoeuvre, criterion.source.rpartition(" ")[2],
-        ]  # fmt: skip
-        table.add_row(*(cell for cell, shown in zip(cells, headings.values(), strict=True) if shown))
+            criterion.manoeuvre,
+            criterion.source.rpartition(" ")[2],
+        ]
+        table.add_row(
+            *(
+                cell
+                for cell, shown in zip(cells, headings.values(), strict=True)
+                if shown
+            )
+        )
     return table
 
 
 def criteria_notes(criteria: Mapping[str, Criterion]) -> list[str]:
     """What is to be said of criteria below their table: why one is not decided, and draws without a value."""
     notes = [f"{name}: {one.note}" for name, one in criteria.items() if one.note]
-    lost = {name: "" if one.drawn is None else one.drawn.lost_in_words for name, one in criteria.items()}
-    return notes + [f"{name}: {who}, which are not in its interval" for name, who in lost.items() if who]
+    lost = {
+        name: "" if one.drawn is None else one.drawn.lost_in_words
+        for name, one in criteria.items()
+    }
+    return notes + [
+        f"{name}: {who}, which are not in its interval"
+        for name, who in lost.items()
+        if who
+    ]
 
 
 def _verdict(criterion: Criterion) -> str | Text:
     if criterion.passed is None:
-        return Text("not decided", "yellow") if criterion.manoeuvre else "not assessable"
+        return (
+            Text("not decided", "yellow") if criterion.manoeuvre else "not assessable"
+        )
     return Text("passes", "green") if criterion.passed else Text("fails", "red")
 
 
@@ -267,19 +373,29 @@ def ranking_table(result: AutopilotResult) -> Table:
     """Autopilots over the models drawn, the best first."""
     metrics = result.metrics
     table = plain_table(
-        f"Autopilots over {metrics['draws']['count']} models drawn, best first", "autopilot", ">cost, mean",
-        ">cost, 95 %", ">heading rmse, deg", ">rudder, deg/min", ">gain margin", ">phase margin, deg",
+        f"Autopilots over {metrics['draws']['count']} models drawn, best first",
+        "autopilot",
+        ">cost, mean",
+        ">cost, 95 %",
+        ">heading rmse, deg",
+        ">rudder, deg/min",
+        ">gain margin",
+        ">phase margin, deg",
         ">lost control",
-    )  # fmt: skip
+    )
     for name in metrics["ranking"]:
         found = metrics["controllers"][name]
         margins = found["margins"] or {}
         table.add_row(
-            name.upper(), number(found["cost_mean"], 2), number(found["cost_quantile_95"], 2),
-            number(found["heading_rmse_deg_mean"], 2), number(found["rudder_travel_deg_min_mean"], 1),
-            _margin(margins, "gain_margin", 2), _margin(margins, "phase_margin_deg", 1),
+            name.upper(),
+            number(found["cost_mean"], 2),
+            number(found["cost_quantile_95"], 2),
+            number(found["heading_rmse_deg_mean"], 2),
+            number(found["rudder_travel_deg_min_mean"], 1),
+            _margin(margins, "gain_margin", 2),
+            _margin(margins, "phase_margin_deg", 1),
             str(found["lost_control"]),
-        )  # fmt: skip
+        )
     return table
 
 
@@ -298,4 +414,8 @@ def number(value: float | None, decimals: int) -> str:
 def between(ends: tuple[float | None, float | None] | None, decimals: int) -> str:
     """An interval, a dash where there is none."""
     low, high = ends or (None, None)
-    return "-" if low is None or high is None else f"{low:.{decimals}f} to {high:.{decimals}f}"
+    return (
+        "-"
+        if low is None or high is None
+        else f"{low:.{decimals}f} to {high:.{decimals}f}"
+    )

@@ -20,23 +20,43 @@ UNITS = {"_deg_s": "deg/s", "_deg": "deg", "_lengths": "ship lengths", "_s": "s"
 def write_page(model: ShipModel, found: StandardTrials, path: Path) -> None:
     """Write indices, criteria and figures as one self-contained page."""
     page = render(
-        "agents.cli/trials.html", model=model, water=found.water, draws=found.draws,
-        criteria={criterion_name(name, one): one for name, one in found.criteria.items()},
-        sections=[_section(name, family, found) for name, family in found.families.items() if family],
-    )  # fmt: skip
+        "agents.cli/trials.html",
+        model=model,
+        water=found.water,
+        draws=found.draws,
+        criteria={
+            criterion_name(name, one): one for name, one in found.criteria.items()
+        },
+        sections=[
+            _section(name, family, found)
+            for name, family in found.families.items()
+            if family
+        ],
+    )
     write_text(page, path)
 
 
-def _section(name: str, family: dict[str, Manoeuvre], found: StandardTrials) -> dict[str, Any]:
+def _section(
+    name: str, family: dict[str, Manoeuvre], found: StandardTrials
+) -> dict[str, Any]:
     """What the page shows of one family of manoeuvres: a row for each index, and figures."""
     keys = list(family)
     indices = dict.fromkeys(index for key in keys for index in found.indices[key])
     return {
-        "name": name, "title": FAMILIES[name].title, "manoeuvres": keys,
-        "indices": {_readable(index): [found.indices[key].get(index) for key in keys] for index in indices},
+        "name": name,
+        "title": FAMILIES[name].title,
+        "manoeuvres": keys,
+        "indices": {
+            _readable(index): [found.indices[key].get(index) for key in keys]
+            for index in indices
+        },
         "refused": {key: found.refused[key] for key in keys if key in found.refused},
-        "figures": _figures(name, family, {key: found.sailed[key] for key in keys if key in found.sailed}),
-    }  # fmt: skip
+        "figures": _figures(
+            name,
+            family,
+            {key: found.sailed[key] for key in keys if key in found.sailed},
+        ),
+    }
 
 
 def _figures(
@@ -50,13 +70,25 @@ def _figures(
         found = []
         for k, (key, run) in enumerate(sailed.items()):
             caption = f"{key[0].upper()}{key[1:]}. {family[key].caption}"
-            found.append((f"{name}-{k}", (family[key].figure or manoeuvre_figure)(run), caption))
+            found.append(
+                (f"{name}-{k}", (family[key].figure or manoeuvre_figure)(run), caption)
+            )
         if trials:
-            found.append((f"{name}-paths", path_figure(trials), "Paths from above, north up, in metres."))
-    histories = trials or {key: run.trial for key, run in sailed.items() if isinstance(run, Spiral)}
+            found.append(
+                (
+                    f"{name}-paths",
+                    path_figure(trials),
+                    "Paths from above, north up, in metres.",
+                )
+            )
+    histories = trials or {
+        key: run.trial for key, run in sailed.items() if isinstance(run, Spiral)
+    }
     if histories:
         caption = "Time histories: heading, rudder, yaw rate, speed and drift angle."
-        found.append((f"{name}-histories", history_figure(histories, HISTORIES), caption))
+        found.append(
+            (f"{name}-histories", history_figure(histories, HISTORIES), caption)
+        )
     return found
 
 

@@ -14,13 +14,20 @@ from agents.cli.command import answered
 Wanted = Annotated[
     list[str] | None,
     Argument(
-        metavar="[ID|MODEL|FILE]...", help="Ids of environments, models, files of models, ships and tasks."
+        metavar="[ID|MODEL|FILE]...",
+        help="Ids of environments, models, files of models, ships and tasks.",
     ),
 ]
 Ship = Annotated[
-    str | None, Option("--model", help="Ship of the environments and tasks, by default their own.")
+    str | None,
+    Option("--model", help="Ship of the environments and tasks, by default their own."),
 ]
-All = Annotated[bool, Option("--all", help="All environments, calm and in a sea, and all shipped models.")]
+All = Annotated[
+    bool,
+    Option(
+        "--all", help="All environments, calm and in a sea, and all shipped models."
+    ),
+]
 SEAS: dict[str, Any] = {
     "calm water": {},
     "a sea": {"sea": "rough"},
@@ -28,12 +35,14 @@ SEAS: dict[str, Any] = {
 
 
 @answered
-def warm_command(wanted: Wanted = None, everything: All = False, model: Ship = None) -> None:
+def warm_command(
+    wanted: Wanted = None, everything: All = False, model: Ship = None
+) -> None:
     """Compile ships in advance. Without arguments, both tasks with the Mariner.
 
-    An environment, or the file of a task, stands for its ship in calm water and in a sea, a model for its
-    manoeuvres and simulations in calm water. Writes only to the cache (SHIPGYM_CACHE or the user's cache
-    folder).
+    An environment, or the file of a task, stands for its ship in calm water and in a
+    sea, a model for its manoeuvres and simulations in calm water. Writes only to the
+    cache (SHIPGYM_CACHE or the user's cache folder).
     """
     from agents.cli.terminal import answer, say
     from shipgym.engine.cache_folder import CacheWarning, usable_folder
@@ -41,7 +50,9 @@ def warm_command(wanted: Wanted = None, everything: All = False, model: Ship = N
 
     if (folder := usable_folder()) is None:
         raise InputError("there is no cache to fill, for the reason above")
-    jobs = dict(job for name in _names(wanted, everything) for job in _jobs(name, model))
+    jobs = dict(
+        job for name in _names(wanted, everything) for job in _jobs(name, model)
+    )
     done: list[dict[str, Any]] = []
     for number, (what, job) in enumerate(jobs.items(), start=1):
         begin, refused = time.perf_counter(), ""
@@ -53,8 +64,12 @@ def warm_command(wanted: Wanted = None, everything: All = False, model: Ship = N
         except InputError as error:
             if not everything:
                 raise
-            refused = str(error)  # not every ship has the particulars that a sea asks for
-        seconds = time.perf_counter() - begin  # that compiling took; few if it was in the cache
+            refused = str(
+                error
+            )  # not every ship has the particulars that a sea asks for
+        seconds = (
+            time.perf_counter() - begin
+        )  # that compiling took; few if it was in the cache
         done.append({"what": what, "seconds": round(seconds, 2), "refused": refused})
         say(f"{number}/{len(jobs)}  {what}: {refused or f'{seconds:.1f} s'}")
     answer({"cache": str(folder), "ready": done})
@@ -71,7 +86,9 @@ def _names(wanted: list[str] | None, everything: bool) -> list[str]:
     return wanted or [*map(env_id, TASKS), "mariner"]
 
 
-def _jobs(name: str, ship: str | None = None) -> Iterator[tuple[str, Callable[[], Any]]]:
+def _jobs(
+    name: str, ship: str | None = None
+) -> Iterator[tuple[str, Callable[[], Any]]]:
     """What is to be compiled for an id or a model, each with words for it."""
     import shipgym
     from shipgym.engine.loops import LOOPS, ship_loop
@@ -86,12 +103,17 @@ def _jobs(name: str, ship: str | None = None) -> Iterator[tuple[str, Callable[[]
         given: dict[str, Any] = {"model": ship} if ship else {}
         given |= {"task": name} if task else {}
         for water, sea in SEAS.items():
-            yield f"{name} in {water}", partial(_make, env_id(DEFAULT_TASK) if task else name, given | sea)
+            yield (
+                f"{name} in {water}",
+                partial(_make, env_id(DEFAULT_TASK) if task else name, given | sea),
+            )
         return
     try:
         model = shipgym.load_model(name)
     except InputError as error:
-        raise InputError(f"{name!r} found, expected an environment's id or a model: {error}") from None
+        raise InputError(
+            f"{name!r} found, expected an environment's id or a model: {error}"
+        ) from None
     for loop in LOOPS:
         yield f"{model.name}: {loop}", partial(ship_loop, model.vessel, loop)
 
@@ -99,5 +121,7 @@ def _jobs(name: str, ship: str | None = None) -> Iterator[tuple[str, Callable[[]
 def _make(env_id: str, options: dict[str, Any]) -> None:
     import gymnasium
 
-    with warnings.catch_warnings(action="ignore", category=DeprecationWarning):  # of older ids
+    with warnings.catch_warnings(
+        action="ignore", category=DeprecationWarning
+    ):  # of older ids
         gymnasium.make(env_id, **options).close()

@@ -32,8 +32,8 @@ def checked_observation(
     given, n = np.asarray(observation, dtype=dtype), len(names)
     if given.ndim not in (1, 2) or given.shape[-1] < n:
         raise InputError(
-            f"observation: shape {given.shape} found, expected ({n},) or (n, {n}), or more: '{names[-1]}' is "
-            f"the last that is needed"
+            f"observation: shape {given.shape} found, expected ({n},) or (n, {n}), or"
+            f" more: '{names[-1]}' is the last that is needed"
         )
     return given
 
@@ -43,7 +43,9 @@ def checked_starts(starts: Any, shape: tuple[int, ...]) -> Flags:
     flags = np.asarray(False if starts is None else starts, dtype=np.bool_)
     n = int(np.prod(shape))
     if flags.size not in (1, n):
-        raise InputError(f"episode_start: {flags.size} found, expected one for each of {n} ships")
+        raise InputError(
+            f"episode_start: {flags.size} found, expected one for each of {n} ships"
+        )
     return np.full(shape, flags.reshape(shape if flags.size == n else ()))
 
 
@@ -51,17 +53,20 @@ def checked_memory(memory: Any, shape: tuple[int, ...]) -> NDArray[Any]:
     """Return the memory of ships, which must have a shape: not that of other ships or another controller."""
     if np.shape(memory) != shape:
         raise InputError(
-            f"state: shape {np.shape(memory)} found, expected {shape}: what the last predict of as many "
-            f"ships returned, or None where episodes begin"
+            f"state: shape {np.shape(memory)} found, expected {shape}: what the last"
+            " predict of as many ships returned, or None where episodes begin"
         )
     return np.asarray(memory)
 
 
-def begun(memory: Any, starts: Any, shape: tuple[int, ...], size: int) -> tuple[Floats, Flags]:
+def begun(
+    memory: Any, starts: Any, shape: tuple[int, ...], size: int
+) -> tuple[Floats, Flags]:
     """Memory of each ship, a copy with zeros where an episode begins, and where it does.
 
-    `memory`: what the last `predict` returned, shape (*shape, size); None where all episodes begin; `starts`:
-    where the memory is that of the episode before; `shape`: (n_ships,), or () for a single ship.
+    `memory`: what the last `predict` returned, shape (*shape, size); None where all
+    episodes begin; `starts`: where the memory is that of the episode before; `shape`:
+    (n_ships,), or () for a single ship.
     """
     if memory is None:
         return np.zeros((*shape, size)), np.ones(shape, dtype=np.bool_)
@@ -76,7 +81,9 @@ def heading_error(seen: dict[str, Floats]) -> Floats:
     return np.arctan2(seen["heading_error_sin"], seen["heading_error_cos"])
 
 
-def on_course(seen: NDArray[Any], error: Floats, integral: Floats, reach: float) -> NDArray[np.float32]:
+def on_course(
+    seen: NDArray[Any], error: Floats, integral: Floats, reach: float
+) -> NDArray[np.float32]:
     """Observations of ships with another heading error, rad, and its integral of at most `reach`, rad s."""
     shown = seen.astype(np.float32)
     angle = {"heading_error_sin": np.sin(error), "heading_error_cos": np.cos(error)}
@@ -85,7 +92,13 @@ def on_course(seen: NDArray[Any], error: Floats, integral: Floats, reach: float)
     return shown
 
 
-def gathered(integral: Floats | float, error: Floats | float, begins: Any, dt: float, reach: float) -> Floats:
+def gathered(
+    integral: Floats | float,
+    error: Floats | float,
+    begins: Any,
+    dt: float,
+    reach: float,
+) -> Floats:
     """Integral of the heading error, rad s, an interval later, as environments have it."""
     more = np.where((np.abs(error) > INTEGRAL_ZONE) | begins, 0.0, error * dt)
     return np.clip(integral + more, -reach, reach)
@@ -94,7 +107,10 @@ def gathered(integral: Floats | float, error: Floats | float, begins: Any, dt: f
 def deviations(seen: dict[str, Floats], rudder: Any, sway: Any) -> Floats:
     """Deviations from straight running, shape (n, 5), in the order of `linear_loop.SIGNALS`."""
     signals = (
-        seen["sway"] - sway, seen["yaw_rate"], heading_error(seen), seen["rudder"] - rudder,
+        seen["sway"] - sway,
+        seen["yaw_rate"],
+        heading_error(seen),
+        seen["rudder"] - rudder,
         seen["heading_error_integral"],
-    )  # fmt: skip
+    )
     return np.stack(signals, axis=-1)

@@ -1,7 +1,8 @@
 """PID autopilot by pole placement on the ship's Nomoto model.
 
-Source: Fossen 2011, Handbook of Marine Craft Hydrodynamics and Motion Control, 12.2 (pole placement);
-van Amerongen 1982, Adaptive steering of ships, chapter 3 (bandwidth from the steering cost).
+Source: Fossen 2011, Handbook of Marine Craft Hydrodynamics and Motion Control, 12.2
+(pole placement); van Amerongen 1982, Adaptive steering of ships, chapter 3 (bandwidth
+from the steering cost).
 """
 
 from collections.abc import Mapping
@@ -18,17 +19,23 @@ from shipgym.ships.linear import Nomoto, linearise, nomoto_of
 from shipgym.tasks.steering import RUDDER_WEIGHT
 from shipgym.tasks.task import control_interval
 
-# Measured by the environment's cost on ships stable and unstable, gears slow and fast, and lags up to half
-# a ship length: with these the PID costs at most 1.1 times its best, 1.2 times in course changes of 5 deg.
-LAG_SHARE = 0.5  # of the gear's lag that is made up for; all of it would make the ship slow
-FREQUENCY_SHARE = 0.85  # of the optimal regulator, which feeds back the rudder too and can be faster
+# Measured by the environment's cost on ships stable and unstable, gears slow and fast,
+# and lags up to half a ship length: with these the PID costs at most 1.1 times its
+# best, 1.2 times in course changes of 5 deg.
+LAG_SHARE = (
+    0.5  # of the gear's lag that is made up for; all of it would make the ship slow
+)
+FREQUENCY_SHARE = (
+    0.85  # of the optimal regulator, which feeds back the rudder too and can be faster
+)
 
 
 @dataclass(frozen=True, eq=False)
 class PID(Controller):
     """Proportional, integral and derivative feedback of the heading error, with neutral rudder.
 
-    order = neutral rudder + proportional * error + integral * (integral of error) - derivative * yaw rate.
+    order = neutral rudder + proportional * error + integral * (integral of error) -
+    derivative * yaw rate.
     """
 
     kind: ClassVar[str] = "pid"
@@ -40,17 +47,23 @@ class PID(Controller):
 
     @classmethod
     def from_model(
-        cls, model: ShipModel, *, dt: float | None = None, frequency: float | None = None,
-        damping: float | None = None, integral_lengths: float = 20.0,
-    ) -> Self:  # fmt: skip
+        cls,
+        model: ShipModel,
+        *,
+        dt: float | None = None,
+        frequency: float | None = None,
+        damping: float | None = None,
+        integral_lengths: float = 20.0,
+    ) -> Self:
         """Design on a model, about straight running.
 
-        The poles are placed on the first-order Nomoto form with half of the steering gear's lag and half
-        a control interval for the held command. Their natural frequency and damping are, if not given,
-        near those that the environment's cost asks for (`optimal_poles`), lower where the lag is long.
+        The poles are placed on the first-order Nomoto form with half of the steering
+        gear's lag and half a control interval for the held command. Their natural
+        frequency and damping are, if not given, near those that the environment's cost
+        asks for (`optimal_poles`), lower where the lag is long.
 
-        Raises InputError if the model has no straight course, an argument is out of its range, or the poles
-        asked for leave the ship unstable.
+        Raises InputError if the model has no straight course, an argument is out of its
+        range, or the poles asked for leave the ship unstable.
 
         Parameters
         ----------
@@ -65,7 +78,9 @@ class PID(Controller):
             Time for an offset to decay, in times to travel one ship length.
         """
         check_number(integral_lengths, "integral_lengths", above=0.0)
-        interval = control_interval(model) if dt is None else check_number(dt, "dt", above=0.0)
+        interval = (
+            control_interval(model) if dt is None else check_number(dt, "dt", above=0.0)
+        )
         ship = sample_ship(model, interval)
         response = nomoto_of(*linearise(model, ship.about))
         lag = LAG_SHARE * model.steering.time_constant + 0.5 * interval
@@ -79,21 +94,34 @@ class PID(Controller):
         if frequency is not None:
             wanted = check_number(frequency, "frequency", above=0.0)
         design = {
-            "frequency": wanted, "damping": ratio, "integral_lengths": float(integral_lengths), "lag": lag,
-            "nomoto_K": response.K, "nomoto_T": response.T,
-        }  # fmt: skip
-        return cls.designed(model, ship, place_poles(response, lag, wanted, ratio, slow), design)
+            "frequency": wanted,
+            "damping": ratio,
+            "integral_lengths": float(integral_lengths),
+            "lag": lag,
+            "nomoto_K": response.K,
+            "nomoto_T": response.T,
+        }
+        return cls.designed(
+            model, ship, place_poles(response, lag, wanted, ratio, slow), design
+        )
 
 
 def optimal_poles(response: Nomoto, rate_weight: float) -> tuple[float, float]:
     """Natural frequency, rad/s, and damping that the steering cost asks for.
 
-    They are those of the dominant poles of the LQ regulator with weights on heading error, rudder and rudder
-    rate (`rate_weight`, s^2), for the first-order Nomoto form with the rudder rate as input.
+    They are those of the dominant poles of the LQ regulator with weights on heading
+    error, rudder and rudder rate (`rate_weight`, s^2), for the first-order Nomoto form
+    with the rudder rate as input.
     """
     import control  # here, because it takes a second to import
 
-    A = np.array([[-1.0 / response.T, 0.0, response.rudder_effect], [-1.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
+    A = np.array(
+        [
+            [-1.0 / response.T, 0.0, response.rudder_effect],
+            [-1.0, 0.0, 0.0],
+            [0.0, 0.0, 0.0],
+        ]
+    )
     B = np.array([[0.0], [0.0], [1.0]])
     weights = np.diag([0.0, 1.0, RUDDER_WEIGHT])
     _, _, poles = control.lqr(A, B, weights, np.array([[rate_weight]]))
@@ -108,10 +136,11 @@ def place_poles(
 ) -> dict[str, float]:
     """PID gains for a pair of poles and a slow one on Nomoto's first-order form with a gear.
 
-    The characteristic polynomial s^2 (s + 1/T) (lag s + 1) + K/T (Kd s^2 + Kp s + Ki) has a fixed sum of
-    roots, which leaves the fourth to the gear. `lag`: of the gear and the held command, s; `frequency`,
-    `damping`: of the pair of poles, rad/s and ratio; `slow`: the pole of the integral action, 1/s. Returns
-    `proportional` (rad/rad), `integral` (1/s), `derivative` (s).
+    The characteristic polynomial s^2 (s + 1/T) (lag s + 1) + K/T (Kd s^2 + Kp s + Ki)
+    has a fixed sum of roots, which leaves the fourth to the gear. `lag`: of the gear
+    and the held command, s; `frequency`, `damping`: of the pair of poles, rad/s and
+    ratio; `slow`: the pole of the integral action, 1/s. Returns `proportional`
+    (rad/rad), `integral` (1/s), `derivative` (s).
     """
     fourth = 1.0 / lag + 1.0 / response.T - 2.0 * damping * frequency - slow
     pair = np.array([1.0, 2.0 * damping * frequency, frequency**2])

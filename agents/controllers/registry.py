@@ -21,26 +21,37 @@ _REGISTERED: dict[str, type[Controller]] = {}
 def register_controller(controller: type[C]) -> type[C]:
     """Make a controller known by its `kind` to `--controllers`, files, the benchmark and learning.
 
-    Returns the class, so that this may decorate it. Raises InputError if it is not such a class, or there is
-    another controller of that kind.
+    Returns the class, so that this may decorate it. Raises InputError if it is not such
+    a class, or there is another controller of that kind.
 
     Parameters
     ----------
     controller : type
-        A subclass of `Controller` with a `kind` and `from_model(model, *, dt=None, ...)`. To be found by
-        workers it is to be at the top level of a module that they can import.
+        A subclass of `Controller` with a `kind` and `from_model(model, *, dt=None,
+        ...)`. To be found by workers it is to be at the top level of a module that they
+        can import.
     """
     where = "register_controller"
     if not (isinstance(controller, type) and issubclass(controller, Controller)):
-        raise InputError(f"{where}: {controller!r} found, expected a subclass of agents.Controller")
+        raise InputError(
+            f"{where}: {controller!r} found, expected a subclass of agents.Controller"
+        )
     kind, name = controller.kind, controller.__name__
     if not kind or set(kind) & set(",=+:/{}*. "):
-        raise InputError(f"{where}: {name}.kind is '{kind}', expected a name such as 'my-lq'")
+        raise InputError(
+            f"{where}: {name}.kind is '{kind}', expected a name such as 'my-lq'"
+        )
     if not callable(getattr(controller, "from_model", None)):
-        raise InputError(f"{where}: {name} has no class method 'from_model(model, *, dt=None, ...)'")
-    other = _HOMES.get(kind) or (_home(_REGISTERED[kind]) if kind in _REGISTERED else None)
+        raise InputError(
+            f"{where}: {name} has no class method 'from_model(model, *, dt=None, ...)'"
+        )
+    other = _HOMES.get(kind) or (
+        _home(_REGISTERED[kind]) if kind in _REGISTERED else None
+    )
     if other not in (None, _home(controller)):
-        raise InputError(f"{where}: kind '{kind}' is that of {other} already, expected another one")
+        raise InputError(
+            f"{where}: kind '{kind}' is that of {other} already, expected another one"
+        )
     if kind not in _HOMES:
         _REGISTERED[kind] = controller
     return controller

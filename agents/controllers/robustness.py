@@ -22,8 +22,8 @@ class MarginUncertainty:
     nominal : Margins
         On the model it was designed on.
     by_name : dict of str to array of shape (n_models,)
-        Each figure of `Margins` on each ship; nan where the loop is unstable or the ship has no straight
-        course.
+        Each figure of `Margins` on each ship; nan where the loop is unstable or the
+        ship has no straight course.
     stable : bool array of shape (n_models,)
         Where the loop is stable.
     """
@@ -32,17 +32,26 @@ class MarginUncertainty:
     by_name: dict[str, Floats]
     stable: NDArray[np.bool_]
 
-    def quantiles(self, share: Sequence[float] = (0.05, 0.5, 0.95)) -> dict[str, Floats]:
+    def quantiles(
+        self, share: Sequence[float] = (0.05, 0.5, 0.95)
+    ) -> dict[str, Floats]:
         """Quantiles of each figure over ships with a stable loop, by name; InputError if none is stable."""
         if not self.stable.any():
-            raise InputError("margins: the loop is stable on none of the ships, so there are no quantiles")
+            raise InputError(
+                "margins: the loop is stable on none of the ships, so there are no"
+                " quantiles"
+            )
         return {
-            name: np.quantile(values[self.stable], share, method="lower")  # finite and infinite ones mixed
+            name: np.quantile(
+                values[self.stable], share, method="lower"
+            )  # finite and infinite ones mixed
             for name, values in self.by_name.items()
         }
 
 
-def margin_uncertainty(controller: Controller, models: Sequence[ShipModel]) -> MarginUncertainty:
+def margin_uncertainty(
+    controller: Controller, models: Sequence[ShipModel]
+) -> MarginUncertainty:
     """Margins of a linear controller on each of many ships.
 
     Raises InputError if there are no models.
@@ -50,7 +59,8 @@ def margin_uncertainty(controller: Controller, models: Sequence[ShipModel]) -> M
     Parameters
     ----------
     controller : Controller
-        A linear one; of a scheduled or adaptive one the design at service speed, of MPC without limits.
+        A linear one; of a scheduled or adaptive one the design at service speed, of MPC
+        without limits.
     models : sequence of ShipModel
         For example `model.sample(100, seed)`, drawn from the estimated covariance.
     """

@@ -19,7 +19,8 @@ LONGEST_LINE = 512  # bytes; 82 are the standard's
 BAUD = 4800  # of the standard
 TABLES = read_toml(Path(__file__).with_name("sentences.toml"), "table of sentences")
 TO_SI = {**UNITS["length"], **UNITS["angle"], **UNITS["angular rate"], **UNITS["speed"]}
-#: Signs of the cross-track error by the side to steer to, and of a latitude or longitude.
+#: Signs of the cross-track error by the side to steer to, and of a latitude or
+#: longitude.
 SIDES = {"L": 1.0, "R": -1.0, "N": 1.0, "S": -1.0, "E": 1.0, "W": -1.0}
 EXPECTED = "expected tcp:HOST:PORT, udp:HOST:PORT, serial:DEVICE or serial:DEVICE@BAUD"
 
@@ -52,7 +53,13 @@ def readings(line: str) -> list[Reading] | None:
         sentence = nmea.parse(line, check=True)
         if not isinstance(sentence, nmea.TalkerSentence):
             return []
-        return list(_told(sentence.data, TABLES["fields"].get(sentence.sentence_type, {}), sentence.talker))
+        return list(
+            _told(
+                sentence.data,
+                TABLES["fields"].get(sentence.sentence_type, {}),
+                sentence.talker,
+            )
+        )
     except nmea.SentenceTypeError:
         return []
     except (ValueError, IndexError, KeyError):
@@ -61,11 +68,20 @@ def readings(line: str) -> list[Reading] | None:
 
 def _told(fields: list[str], kinds: dict[str, Any], talker: str) -> Iterator[Reading]:
     for quantity, one in kinds.items():
-        if all(fields[int(k)] == text for k, text in one["needs"].items()) and fields[one["at"]]:
+        if (
+            all(fields[int(k)] == text for k, text in one["needs"].items())
+            and fields[one["at"]]
+        ):
             value = float(fields[one["at"]])
             minutes = one["unit"] == "deg min"  # as 5430.5, 54 degrees and 30.5 minutes
-            value = radians(value // 100.0 + value % 100.0 / 60.0) if minutes else value * TO_SI[one["unit"]]
-            value = copysign(value, SIDES[fields[one["side"]]]) if "side" in one else value
+            value = (
+                radians(value // 100.0 + value % 100.0 / 60.0)
+                if minutes
+                else value * TO_SI[one["unit"]]
+            )
+            value = (
+                copysign(value, SIDES[fields[one["side"]]]) if "side" in one else value
+            )
             if abs(value) <= TABLES["believed"][quantity]:
                 yield Reading(quantity, value, talker)
 
@@ -133,7 +149,9 @@ class Link:
                 await self._open_serial(*rest.partition("@")[::2])
             elif kind == "udp":
                 where = "remote_addr" if serve else "local_addr"
-                await loop.create_datagram_endpoint(self.line, **{where: (host, int(port))})  # type: ignore[arg-type]
+                await loop.create_datagram_endpoint(
+                    self.line, **{where: (host, int(port))}
+                )  # type: ignore[arg-type]
             elif kind == "tcp" and serve:
                 self.others.append(await loop.create_server(self.line, host, int(port)))
             elif kind == "tcp":
@@ -143,13 +161,19 @@ class Link:
         except (ValueError, OverflowError):
             raise InputError(f"address: '{address[:80]}' found, {EXPECTED}") from None
         except OSError as error:
-            raise InputError(f"{address}: cannot be opened ({error.strerror or error})") from error
+            raise InputError(
+                f"{address}: cannot be opened ({error.strerror or error})"
+            ) from error
 
     async def _open_serial(self, device: str, baud: str) -> None:
         serial, line = library("serial"), self.line()
-        port = serial.Serial(device, int(baud or BAUD), timeout=0, write_timeout=0, exclusive=True)
+        port = serial.Serial(
+            device, int(baud or BAUD), timeout=0, write_timeout=0, exclusive=True
+        )
         line.transport = port  # written to at once, read when there is something
-        self.others.append((await asyncio.get_running_loop().connect_read_pipe(lambda: line, port))[0])
+        self.others.append(
+            (await asyncio.get_running_loop().connect_read_pipe(lambda: line, port))[0]
+        )
 
     def send(self, text: str) -> None:
         """Send sentences to all that are connected."""

@@ -29,24 +29,35 @@ class _Scale(NamedTuple):
 class Route:
     """Legs joined by arcs of one radius, m, as the path-following environment has them.
 
-    `waypoints`: latitude and longitude, degrees, shape (n, 2). Raises InputError for a path that cannot be
-    sailed, or that reaches too far for a plane.
+    `waypoints`: latitude and longitude, degrees, shape (n, 2). Raises InputError for a
+    path that cannot be sailed, or that reaches too far for a plane.
     """
 
-    #: What it gives to an autopilot (`variables.toml`), beside the direction of the path as set-point.
+    #: What it gives to an autopilot (`variables.toml`), beside the direction of the
+    #: path as set-point.
     GIVES = (
-        "cross_track", "next_turn_distance", "next_turn_angle", "second_turn_distance", "second_turn_angle"
-    )  # fmt: skip
+        "cross_track",
+        "next_turn_distance",
+        "next_turn_angle",
+        "second_turn_distance",
+        "second_turn_angle",
+    )
 
     def __init__(self, waypoints: Floats, radius: float) -> None:
         self.origin = float(waypoints[0, 0]), float(waypoints[0, 1])
-        path = Path(np.column_stack(local_metres(waypoints[:, 0], waypoints[:, 1], self.origin)))
+        path = Path(
+            np.column_stack(local_metres(waypoints[:, 0], waypoints[:, 1], self.origin))
+        )
         if (far := float(np.abs(path.waypoints).max())) > FURTHEST_M:
             expected = f"expected at most {FURTHEST_M / 1e3:.0f} km; divide the route"
-            raise InputError(f"waypoints: {far / 1e3:.0f} km from the first found, {expected}")
+            raise InputError(
+                f"waypoints: {far / 1e3:.0f} km from the first found, {expected}"
+            )
         path.check_turns(radius)
         self.plan, self.ended = path.waypoints.ravel(), False
-        self.ship: Any = _Scale(1.0, radius, 1.0)  # stands for the records of the environment
+        self.ship: Any = _Scale(
+            1.0, radius, 1.0
+        )  # stands for the records of the environment
         self.leg = leg_from(0, 0.0, radius, self.plan)
 
     @classmethod
@@ -59,24 +70,33 @@ class Route:
                 where = f"{path}: {table.place(row)}, column '{name}'"
                 check_number(value, where, at_least=-most, at_most=most, hint="degrees")
         if len(table.lines) < 2:
-            raise InputError(f"{path}: {len(table.lines)} waypoints found, expected at least 2")
+            raise InputError(
+                f"{path}: {len(table.lines)} waypoints found, expected at least 2"
+            )
         with placed(str(path)):
             return cls(np.column_stack(columns), radius)
 
     def given(self, latitude: float, longitude: float) -> dict[str, float]:
         """Direction of the path beside the ship, distance from it and turns ahead; position in rad."""
         ship, radius = self.ship, self.ship.turn_radius
-        x, y = local_metres(np.array(degrees(latitude)), np.array(degrees(longitude)), self.origin)
+        x, y = local_metres(
+            np.array(degrees(latitude)), np.array(degrees(longitude)), self.origin
+        )
         at = fix(float(x), float(y), self.leg, ship, ship)
         while turned_off(self.leg, at.way, ship, ship):
             end = self.leg.turn_at + radius * fabs(self.leg.turn)
-            self.leg = leg_from(next_turn(int(self.leg.number), self.plan), end, radius, self.plan)
+            self.leg = leg_from(
+                next_turn(int(self.leg.number), self.plan), end, radius, self.plan
+            )
             at = fix(float(x), float(y), self.leg, ship, ship)
         leg = self.leg
         self.ended = leg.turn == 0.0 and at.way >= leg.turn_at
         values = (
-            at.cross, leg.turn_at - at.way, copysign(max(fabs(leg.turn) - at.turned, 0.0), leg.turn),
-            leg.second_at - at.way, leg.second_turn,
-        )  # fmt: skip
+            at.cross,
+            leg.turn_at - at.way,
+            copysign(max(fabs(leg.turn) - at.turned, 0.0), leg.turn),
+            leg.second_at - at.way,
+            leg.second_turn,
+        )
         direction = leg.course + copysign(at.turned, leg.turn)
         return {"set_point": direction, **dict(zip(self.GIVES, values, strict=True))}

@@ -22,7 +22,11 @@ JobFunction = Callable[[dict[str, Any]], Any]
 Outcome = tuple[str, dict[str, Any]]
 
 #: Workers share the cores among them, and sums do not depend on how many there are.
-ONE_THREAD = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
+ONE_THREAD = {
+    "OMP_NUM_THREADS": "1",
+    "OPENBLAS_NUM_THREADS": "1",
+    "MKL_NUM_THREADS": "1",
+}
 
 
 class JobError(RuntimeError):
@@ -41,7 +45,10 @@ def do_job(function: JobFunction, text: str) -> Outcome:
     except InputError as error:
         return text, {"wrong": str(error)}
     except Exception as error:
-        return text, {"failed": f"{type(error).__name__}: {error}", "traceback": traceback.format_exc()}
+        return text, {
+            "failed": f"{type(error).__name__}: {error}",
+            "traceback": traceback.format_exc(),
+        }
 
 
 def check_outcome(outcome: dict[str, Any], job: str) -> dict[str, Any]:
@@ -58,12 +65,14 @@ def check_outcome(outcome: dict[str, Any], job: str) -> dict[str, Any]:
 def died_too_often(text: str, retries: int) -> WorkerDiedError:
     """The error of a job whose worker dies whenever it is done."""
     return WorkerDiedError(
-        f"job {shortened(text)}: its worker died {retries + 1} times. It was killed, perhaps for want of "
-        f"memory (try fewer workers), or the job crashes"
+        f"job {shortened(text)}: its worker died {retries + 1} times. It was killed,"
+        " perhaps for want of memory (try fewer workers), or the job crashes"
     )
 
 
-def with_modules(function: JobFunction, modules: Sequence[str], job: dict[str, Any]) -> Any:
+def with_modules(
+    function: JobFunction, modules: Sequence[str], job: dict[str, Any]
+) -> Any:
     """Do a job after importing modules, which another process has not imported."""
     with working_folder():
         for module in modules:

@@ -16,18 +16,23 @@ from joblib.externals.loky import get_reusable_executor
 from agents.engines.job import JobFunction, Outcome, died_too_often, do_job
 
 
-def in_processes(function: JobFunction, texts: list[str], workers: int, retries: int) -> Iterator[Outcome]:
+def in_processes(
+    function: JobFunction, texts: list[str], workers: int, retries: int
+) -> Iterator[Outcome]:
     """Do jobs in processes, which end with the last of them.
 
-    When a worker dies, the jobs that were being done are done again; the last time each alone, so that the
-    error names the job at fault. Raises WorkerDiedError if a job's worker dies more often than `retries`.
+    When a worker dies, the jobs that were being done are done again; the last time each
+    alone, so that the error names the job at fault. Raises WorkerDiedError if a job's
+    worker dies more often than `retries`.
     """
     waiting, alone, died = deque(texts), deque[str](), Counter[str]()
     try:
         while waiting or alone:
             doing: set[str] = set()
             try:
-                yield from _until_broken(function, waiting or deque([alone.popleft()]), doing, workers)
+                yield from _until_broken(
+                    function, waiting or deque([alone.popleft()]), doing, workers
+                )
             except BrokenProcessPool:
                 for text in doing:
                     if died[text] == retries:
@@ -49,10 +54,14 @@ def _until_broken(
             doing.add(text)
             yield delayed(_do_in_worker)(function, text)
 
-    at_once = max(workers, 2)  # one would be this process, which a job must not take with it
+    at_once = max(
+        workers, 2
+    )  # one would be this process, which a job must not take with it
     with warnings.catch_warnings(), parallel_config("loky", inner_max_num_threads=1):
         warnings.filterwarnings("ignore", ".*tasks which were still being processed")
-        run = Parallel(at_once, return_as="generator_unordered", batch_size=1, pre_dispatch=at_once)
+        run = Parallel(
+            at_once, return_as="generator_unordered", batch_size=1, pre_dispatch=at_once
+        )
         with closing(run(handed_out())) as outcomes:
             for text, outcome in outcomes:
                 doing.remove(text)

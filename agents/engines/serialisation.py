@@ -1,7 +1,8 @@
 """Jobs and their results as JSON text: what goes to workers, comes back, and is kept in files.
 
-Every result passes through this text, wherever it was computed and whether it was kept or not, so that it is
-the same bit for bit in every case. Arrays keep their type and shape.
+Every result passes through this text, wherever it was computed and whether it was kept
+or not, so that it is the same bit for bit in every case. Arrays keep their type and
+shape.
 """
 
 import base64
@@ -32,23 +33,29 @@ def serialised(job: Any, where: str) -> str:
         return json.dumps(job, allow_nan=False)
     except (TypeError, ValueError) as error:
         raise InputError(
-            f"{where}: {job!r} found, expected a dict of numbers, texts, lists and dicts ({error})"
+            f"{where}: {job!r} found, expected a dict of numbers, texts, lists and"
+            f" dicts ({error})"
         ) from None
 
 
 def shortened(text: str) -> str:
     """A job for a message."""
-    return text if len(text) <= LONGEST_IN_MESSAGE else f"{text[:LONGEST_IN_MESSAGE]} ..."
+    return (
+        text if len(text) <= LONGEST_IN_MESSAGE else f"{text[:LONGEST_IN_MESSAGE]} ..."
+    )
 
 
 def pack(value: Any) -> Any:
     """A result as JSON holds it: arrays become text, tuples lists, numbers of NumPy numbers.
 
-    Raises TypeError for anything else than numbers, texts, arrays, and lists and dicts of them.
+    Raises TypeError for anything else than numbers, texts, arrays, and lists and dicts
+    of them.
     """
     if isinstance(value, np.ndarray):
         if value.dtype.kind not in "biufcU":
-            raise TypeError(f"array of {value.dtype} found in a result, expected numbers or texts")
+            raise TypeError(
+                f"array of {value.dtype} found in a result, expected numbers or texts"
+            )
         data = base64.b64encode(np.ascontiguousarray(value).tobytes()).decode("ascii")
         return {ARRAY: [value.dtype.str, list(value.shape), data]}
     if isinstance(value, np.generic):
@@ -58,13 +65,18 @@ def pack(value: Any) -> Any:
     if isinstance(value, Mapping):
         for key in value:
             if not isinstance(key, str):
-                raise TypeError(f"key {key!r} found in a result, expected texts as keys")
+                raise TypeError(
+                    f"key {key!r} found in a result, expected texts as keys"
+                )
         return {key: pack(item) for key, item in value.items()}
     if isinstance(value, list | tuple):
         return [pack(item) for item in value]
     if value is None or isinstance(value, str | int | float):
         return value
-    raise TypeError(f"{type(value).__name__} found in a result, expected what JSON holds, and arrays")
+    raise TypeError(
+        f"{type(value).__name__} found in a result, expected what JSON holds, and"
+        " arrays"
+    )
 
 
 def unpack(value: Any) -> Any:
@@ -86,16 +98,21 @@ def unpack(value: Any) -> Any:
 class KeptResults:
     """A folder with one file for each job that is done, named by a hash of the job.
 
-    `folder`: made with the first result where it does not exist, so that nothing is left of a call that does
-    none; `function`: does the jobs: results of another one, or of another version of shipgym, are not taken.
-    Raises InputError if there is a file of that name.
+    `folder`: made with the first result where it does not exist, so that nothing is
+    left of a call that does none; `function`: does the jobs: results of another one, or
+    of another version of shipgym, are not taken. Raises InputError if there is a file
+    of that name.
     """
 
-    def __init__(self, folder: str | Path, function: Callable[[dict[str, Any]], Any]) -> None:
+    def __init__(
+        self, folder: str | Path, function: Callable[[dict[str, Any]], Any]
+    ) -> None:
         self.folder = Path(folder)
         self.function = f"{function.__module__}.{function.__qualname__}"
         if self.folder.exists() and not self.folder.is_dir():
-            raise InputError(f"{folder}: is not a folder, expected one for results; choose another")
+            raise InputError(
+                f"{folder}: is not a folder, expected one for results; choose another"
+            )
 
     def load(self, text: str) -> dict[str, Any] | None:
         """The packed result of a job, None where there is none yet or its file is broken."""
@@ -104,7 +121,11 @@ class KeptResults:
             unpack(content["result"]["value"])
         except (InputError, LookupError, TypeError, ValueError, OverflowError):
             return None
-        return dict(content["result"]) if self._key(text).items() <= content.items() else None
+        return (
+            dict(content["result"])
+            if self._key(text).items() <= content.items()
+            else None
+        )
 
     def save(self, text: str, packed: dict[str, Any]) -> None:
         """Keep the packed result of a job, whole or not at all; InputError if it cannot be written."""
@@ -112,7 +133,11 @@ class KeptResults:
         write_json({**self._key(text), "result": packed}, self._path(text))
 
     def _key(self, text: str) -> dict[str, Any]:
-        return {"shipgym": shipgym.__version__, "function": self.function, "job": json.loads(text)}
+        return {
+            "shipgym": shipgym.__version__,
+            "function": self.function,
+            "job": json.loads(text),
+        }
 
     def _path(self, text: str) -> Path:
         key = json.dumps(self._key(text), sort_keys=True)

@@ -25,7 +25,9 @@ OUTPUTS = ("linear", "tanh")
 class Network:
     """Dense layers, one activation between; InputError if shapes do not fit, or a number is not finite."""
 
-    layers: tuple[Layer, ...]  # float32 arrays of shape (n_out, n_in) and (n_out,), as torch has them
+    layers: tuple[
+        Layer, ...
+    ]  # float32 arrays of shape (n_out, n_in) and (n_out,), as torch has them
     activation: str = "relu"  # relu or tanh, after every layer but the last
     output: str = "linear"  # linear or tanh, after the last
 
@@ -39,14 +41,17 @@ class Network:
         for i, ((before, _), (weight, _)) in enumerate(pairwise(self.layers)):
             if weight.shape[1] != before.shape[0]:
                 raise InputError(
-                    f"network.layers[{i + 1}].weight: {weight.shape[1]} inputs found, expected the "
-                    f"{before.shape[0]} outputs of the layer before"
+                    f"network.layers[{i + 1}].weight: {weight.shape[1]} inputs found,"
+                    f" expected the {before.shape[0]} outputs of the layer before"
                 )
 
     @property
     def sizes(self) -> tuple[int, ...]:
         """Numbers of inputs, of each layer's outputs."""
-        return (self.layers[0][0].shape[1], *(weight.shape[0] for weight, _ in self.layers))
+        return (
+            self.layers[0][0].shape[1],
+            *(weight.shape[0] for weight, _ in self.layers),
+        )
 
     def __call__(self, x: Numbers) -> Numbers:
         """Outputs of shape (n, n_out) for inputs of shape (n, n_in); the inputs are left as they are."""
@@ -66,15 +71,22 @@ def _check_layer(weight: Any, bias: Any, where: str) -> None:
         place = f"{where}.{name}"
         known = isinstance(array, np.ndarray) and array.dtype == np.float32
         if not known or array.ndim != ndim or array.size == 0:
-            found = getattr(array, "dtype", type(array).__name__), getattr(array, "shape", ())
+            found = (
+                getattr(array, "dtype", type(array).__name__),
+                getattr(array, "shape", ()),
+            )
             raise InputError(
-                f"{place}: {found[0]} of shape {found[1]} found, expected float32 with {ndim} axes, none of "
-                f"them empty"
+                f"{place}: {found[0]} of shape {found[1]} found, expected float32 with"
+                f" {ndim} axes, none of them empty"
             )
         if not np.isfinite(array).all():
             wrong = tuple(np.argwhere(~np.isfinite(array))[0].tolist())
-            raise InputError(f"{place}: {array[wrong]} found at {list(wrong)}, expected finite numbers")
+            raise InputError(
+                f"{place}: {array[wrong]} found at {list(wrong)}, expected finite"
+                " numbers"
+            )
     if len(bias) != len(weight):
         raise InputError(
-            f"{where}.bias: {len(bias)} found, expected {len(weight)}, one for each row of weight"
+            f"{where}.bias: {len(bias)} found, expected {len(weight)}, one for each row"
+            " of weight"
         )

@@ -1,8 +1,8 @@
 """The zip in which stable-baselines3 saves an agent, read without running anything that is in it.
 
-Two of its members are read: `data`, JSON whose pickles (in base64) stay closed, and `policy.pth`, by torch's
-reader of weights alone. One pickle, that of the last observations, is disassembled for its numbers and not
-executed.
+Two of its members are read: `data`, JSON whose pickles (in base64) stay closed, and
+`policy.pth`, by torch's reader of weights alone. One pickle, that of the last
+observations, is disassembled for its numbers and not executed.
 """
 
 import base64
@@ -29,13 +29,25 @@ from shipgym.files import LARGEST_TENSORS, parse_json, read_bytes
 from shipgym.tasks.task import Task
 
 REMEDY = "save the agent again"
-POLICIES = re.compile(r"stable_baselines3\.(common|sac|td3)\.policies|sb3_contrib\.tqc\.policies")
+POLICIES = re.compile(
+    r"stable_baselines3\.(common|sac|td3)\.policies|sb3_contrib\.tqc\.policies"
+)
 #: Entries of `policy_kwargs` with which a network is as its weights say.
 KWARGS = {
-    ":type:", ":serialized:", "net_arch", "activation_fn", "log_std_init", "ortho_init", "use_sde",
-    "n_critics", "n_quantiles", "optimizer_class", "optimizer_kwargs", "share_features_extractor",
+    ":type:",
+    ":serialized:",
+    "net_arch",
+    "activation_fn",
+    "log_std_init",
+    "ortho_init",
+    "use_sde",
+    "n_critics",
+    "n_quantiles",
+    "optimizer_class",
+    "optimizer_kwargs",
+    "share_features_extractor",
     "normalize_images",
-}  # fmt: skip
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,38 +68,54 @@ class Sb3Agent:
         bounds = np.array([(one.low, one.high) for one in shown])
         if bounds.shape != self.bounds.shape or not np.allclose(bounds, self.bounds):
             raise InputError(
-                f"{self.path}: {len(self.bounds)} observations within {self.bounds.tolist()} found, expected "
-                f"the task's {len(bounds)} within {bounds.tolist()}; what learned with a base or a frame "
-                f"stack is written by LearnedPolicy.from_sb3(agent).save(...)"
+                f"{self.path}: {len(self.bounds)} observations within"
+                f" {self.bounds.tolist()} found, expected the task's {len(bounds)}"
+                f" within {bounds.tolist()}; what learned with a base or a frame stack"
+                " is written by LearnedPolicy.from_sb3(agent).save(...)"
             )
         with placed(str(self.path)):
             return LearnedPolicy(
-                self.network, names, tuple(one.scale for one in shown), task.action,
-                env_id=env_id(task_showing(names)), model_name=ship.name, model_sha256=model_hash(ship),
-            )  # fmt: skip
+                self.network,
+                names,
+                tuple(one.scale for one in shown),
+                task.action,
+                env_id=env_id(task_showing(names)),
+                model_name=ship.name,
+                model_sha256=model_hash(ship),
+            )
 
 
 def read_sb3(path: Path) -> Sb3Agent:
     """The agent in a zip that stable-baselines3 or sb3-contrib saved.
 
-    Raises InputError for a file that is no such zip, for policies and feature extractors of one's own, for
-    observations that VecNormalize scaled, and if torch is not installed.
+    Raises InputError for a file that is no such zip, for policies and feature
+    extractors of one's own, for observations that VecNormalize scaled, and if torch is
+    not installed.
     """
     content = read_bytes(path, "zip of stable-baselines3", LARGEST_TENSORS)
     try:
         with _opened(content) as file:
-            data, weights = file.read("data").decode(), _weights(file.read("policy.pth"))
+            data, weights = (
+                file.read("data").decode(),
+                _weights(file.read("policy.pth")),
+            )
     except ModuleNotFoundError:
-        raise InputError(f"{path}: needs torch, not installed: pip install 'shipgym[rl]'") from None
+        raise InputError(
+            f"{path}: needs torch, not installed: pip install 'shipgym[rl]'"
+        ) from None
     except Exception as error:  # of zipfile and of torch, of any kind
         why = f"{type(error).__name__}: {error}".partition("\n")[0][:200]
-        raise InputError(f"{path}: not a zip of stable-baselines3 ({why!r}); {REMEDY}") from None
+        raise InputError(
+            f"{path}: not a zip of stable-baselines3 ({why!r}); {REMEDY}"
+        ) from None
     about = check_table(parse_json(data, f"{path}: data:", REMEDY), f"{path}: data")
     with placed(str(path)):
         activation = _activation(about)
         bounds = _bounds(about)
         _check_not_scaled(about, len(bounds))
-        return Sb3Agent(path, actor_network(weights, activation, "another algorithm"), bounds)
+        return Sb3Agent(
+            path, actor_network(weights, activation, "another algorithm"), bounds
+        )
 
 
 def _opened(content: bytes) -> ZipFile:
@@ -95,7 +123,9 @@ def _opened(content: bytes) -> ZipFile:
     file = ZipFile(BytesIO(content))
     stored = all(one.compress_type == ZIP_STORED for one in file.infolist())
     if not stored or sum(one.file_size for one in file.infolist()) > len(content):
-        raise ValueError("compressed members found, expected them as `save` writes them")
+        raise ValueError(
+            "compressed members found, expected them as `save` writes them"
+        )
     return file
 
 
@@ -104,9 +134,15 @@ def _weights(content: bytes) -> dict[str, Any]:
     import torch
 
     with _opened(content):
-        found: dict[str, Any] = torch.load(BytesIO(content), map_location="cpu", weights_only=True)
+        found: dict[str, Any] = torch.load(
+            BytesIO(content), map_location="cpu", weights_only=True
+        )
     for name, one in found.items():
-        if not isinstance(name, str) or one.dtype != torch.float32 or one.numel() * 4 > len(content):
+        if (
+            not isinstance(name, str)
+            or one.dtype != torch.float32
+            or one.numel() * 4 > len(content)
+        ):
             raise ValueError(f"weights {name!r}: expected numbers of type float32")
         one.numpy()
     return found
@@ -114,25 +150,38 @@ def _weights(content: bytes) -> dict[str, Any]:
 
 def _activation(about: Mapping[str, Any]) -> str | None:
     """What is between the layers, None for the usual; the policy has to be one that is known."""
-    module = check_table(about.get("policy_class"), "data: policy_class").get("__module__")
+    module = check_table(about.get("policy_class"), "data: policy_class").get(
+        "__module__"
+    )
     if not POLICIES.fullmatch(str(module)):
         raise InputError(
-            f"policy of {module!r} found, expected 'MlpPolicy' of stable-baselines3, sb3-contrib"
+            f"policy of {module!r} found, expected 'MlpPolicy' of stable-baselines3,"
+            " sb3-contrib"
         )
     kwargs = check_table(about.get("policy_kwargs"), "data: policy_kwargs")
     if about.get("use_sde") or kwargs.get("use_sde"):
         raise InputError(SDE)
     if other := kwargs.keys() - KWARGS:
-        raise InputError(f"policy_kwargs {quoted(sorted(other))} found, expected 'MlpPolicy' as it is")
-    return str(kwargs.get("activation_fn", "")).rpartition(".")[2].removesuffix("'>") or None
+        raise InputError(
+            f"policy_kwargs {quoted(sorted(other))} found, expected 'MlpPolicy' as"
+            " it is"
+        )
+    return (
+        str(kwargs.get("activation_fn", "")).rpartition(".")[2].removesuffix("'>")
+        or None
+    )
 
 
 def _bounds(about: Mapping[str, Any]) -> NDArray[np.float64]:
     space = check_table(about.get("observation_space"), "data: observation_space")
     try:
-        return np.array([str(space[name]).strip("[]").split() for name in ("low", "high")], float).T
+        return np.array(
+            [str(space[name]).strip("[]").split() for name in ("low", "high")], float
+        ).T
     except (KeyError, ValueError):
-        raise InputError("data: observation_space: no flat Box found, expected that of a task") from None
+        raise InputError(
+            "data: observation_space: no flat Box found, expected that of a task"
+        ) from None
 
 
 def _check_not_scaled(about: Mapping[str, Any], n: int) -> None:
@@ -140,14 +189,21 @@ def _check_not_scaled(about: Mapping[str, Any], n: int) -> None:
     if about.get("_last_obs") is None:  # has not learned
         return
     try:
-        pickled = base64.b64decode(check_table(about["_last_obs"], "data: _last_obs")[":serialized:"])
-        found = [one for _, one, _ in pickletools.genops(pickled) if isinstance(one, bytes | bytearray)]
+        pickled = base64.b64decode(
+            check_table(about["_last_obs"], "data: _last_obs")[":serialized:"]
+        )
+        found = [
+            one
+            for _, one, _ in pickletools.genops(pickled)
+            if isinstance(one, bytes | bytearray)
+        ]
         seen = np.frombuffer(max(found, key=len), np.float32).reshape(-1, n)
         known = bool(np.allclose(np.hypot(seen[:, 0], seen[:, 1]), 1.0, atol=1e-4))
     except (LookupError, TypeError, ValueError, OverflowError):
         known = False
     if not known:
         raise InputError(
-            "last observations found that are scaled, or not of shipgym: a zip lacks the statistics of "
-            "VecNormalize; train with norm_obs=False, the environments scale their observations"
+            "last observations found that are scaled, or not of shipgym: a zip lacks"
+            " the statistics of VecNormalize; train with norm_obs=False, the"
+            " environments scale their observations"
         )

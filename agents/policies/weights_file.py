@@ -1,7 +1,7 @@
 """The two files of a policy, NAME.json and NAME.safetensors: written whole, and the weights read back.
 
-The weights are written first, and the JSON holds their SHA-256, so that files that do not belong together are
-refused. No pickle, no torch.
+The weights are written first, and the JSON holds their SHA-256, so that files that do
+not belong together are refused. No pickle, no torch.
 """
 
 import hashlib
@@ -20,7 +20,10 @@ from shipgym.files import LARGEST_TENSORS, read_bytes, write_bytes, write_json
 Tensors = dict[str, NDArray[Any]]
 
 REMEDY = "take another copy of both files"
-RENAMED = {"history": "frame_stack", "hold": "action_repeat"}  # fields and settings of older files
+RENAMED = {
+    "history": "frame_stack",
+    "hold": "action_repeat",
+}  # fields and settings of older files
 
 
 def present_names(content: Mapping[str, Any]) -> dict[str, Any]:
@@ -31,16 +34,21 @@ def present_names(content: Mapping[str, Any]) -> dict[str, Any]:
 def write_policy(content: Mapping[str, Any], tensors: Tensors, path: Path) -> None:
     """Write NAME.json and, first, NAME.safetensors.
 
-    `content`: what stands in the JSON; `tensors`: the weights; none where a policy has none; `path`:
-    NAME.json. Raises InputError if the name does not end in .json, the folder cannot be written, or JSON
-    cannot hold the content.
+    `content`: what stands in the JSON; `tensors`: the weights; none where a policy has
+    none; `path`: NAME.json. Raises InputError if the name does not end in .json, the
+    folder cannot be written, or JSON cannot hold the content.
     """
     if path.suffix != ".json":
-        raise InputError(f"{path}: a policy's file ends in .json, with the weights beside it in .safetensors")
+        raise InputError(
+            f"{path}: a policy's file ends in .json, with the weights beside it in"
+            " .safetensors"
+        )
     try:
         json.dumps(content, allow_nan=False)
     except (TypeError, ValueError) as error:
-        raise InputError(f"{path}: training and env_options: {error}; expected what JSON can hold") from None
+        raise InputError(
+            f"{path}: training and env_options: {error}; expected what JSON can hold"
+        ) from None
     weights = None
     if tensors:
         from safetensors.numpy import save as as_bytes
@@ -62,15 +70,20 @@ def read_weights(path: Path, sha256: str, json_path: Path) -> Tensors:
     found = hashlib.sha256(content).hexdigest()
     if found != sha256:
         raise InputError(
-            f"{path}: SHA-256 {found[:12]}... found in {len(content)} bytes, expected {sha256[:12]}..., "
-            f"which is the field weights.sha256 of {json_path}: cut short, or of another policy; {REMEDY}"
+            f"{path}: SHA-256 {found[:12]}... found in {len(content)} bytes, expected"
+            f" {sha256[:12]}..., which is the field weights.sha256 of {json_path}: cut"
+            f" short, or of another policy; {REMEDY}"
         )
     from safetensors.numpy import load
 
     try:
         tensors: Tensors = load(content)
-    except Exception as error:  # safetensors' own errors and those of the types it does not know
-        raise InputError(f"{path}: not a safetensors file ({error}); {REMEDY}") from None
+    except (
+        Exception
+    ) as error:  # safetensors' own errors and those of the types it does not know
+        raise InputError(
+            f"{path}: not a safetensors file ({error}); {REMEDY}"
+        ) from None
     return tensors
 
 

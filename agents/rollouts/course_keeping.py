@@ -40,8 +40,9 @@ class Episodes:
     extrapolating : array
         Share of the time outside the model's operating envelope.
     terminated : bool array
-        Whether control was lost or the model ran away. Nothing is dropped: the cost of these holds the
-        rest of the episode at the largest error, the other figures the time up to then.
+        Whether control was lost or the model ran away. Nothing is dropped: the cost of
+        these holds the rest of the episode at the largest error, the other figures the
+        time up to then.
     duration_s : array
         Time sailed, s.
     seeds : int array
@@ -80,14 +81,19 @@ class StepResponses(NamedTuple):
 
 
 def sail(
-    controller: Policy, models: ShipModel | Sequence[ShipModel], task: Task | None = None,
-    seeds: ArrayLike = 0, *, allow_unstable: bool = False,
-) -> Episodes:  # fmt: skip
+    controller: Policy,
+    models: ShipModel | Sequence[ShipModel],
+    task: Task | None = None,
+    seeds: ArrayLike = 0,
+    *,
+    allow_unstable: bool = False,
+) -> Episodes:
     """Sail episodes of course keeping with one controller, many at once.
 
-    Returns the same for the same arguments, whatever else is sailed with them. Raises InputError if the
-    controller was designed for other observations, answers with something that is not a command for each
-    ship, seeds and models do not fit, or a model is unstable.
+    Returns the same for the same arguments, whatever else is sailed with them. Raises
+    InputError if the controller was designed for other observations, answers with
+    something that is not a command for each ship, seeds and models do not fit, or a
+    model is unstable.
 
     Parameters
     ----------
@@ -98,23 +104,35 @@ def sail(
     task : Task, optional
         What is asked; by default the environment's own task.
     seeds : array-like of int
-        Seeds of the episodes. With several models: one for all, or of shape (n_models,), one each, or
-        (n_models, n_episodes). With one model any shape.
+        Seeds of the episodes. With several models: one for all, or of shape
+        (n_models,), one each, or (n_models, n_episodes). With one model any shape.
     allow_unstable : bool
-        Whether models that were found unstable when they were identified may be sailed, with a warning.
+        Whether models that were found unstable when they were identified may be sailed,
+        with a warning.
     """
     fleet = _fleet(models)
     numbers = _seeds(seeds, len(fleet))
-    lanes = [model for model in fleet for _ in range(numbers[0].size)] if len(fleet) > 1 else fleet
-    check_fits(controller, task or course_keeping_task(), lanes[0], f"model '{lanes[0].name}'")
+    lanes = (
+        [model for model in fleet for _ in range(numbers[0].size)]
+        if len(fleet) > 1
+        else fleet
+    )
+    check_fits(
+        controller, task or course_keeping_task(), lanes[0], f"model '{lanes[0].name}'"
+    )
     found = []
     for first in range(0, numbers.size, AT_ONCE):
         some = numbers.reshape(-1)[first : first + AT_ONCE]
         ships = lanes[first : first + AT_ONCE] if len(fleet) > 1 else fleet
         engine = Engine(ships, some.size, task, allow_unstable=allow_unstable)
         found.append(_figures(rollout(controller, engine, some, record=RECORDED)))
-    figures = {name: np.concatenate([part[name] for part in found]) for name in found[0]}
-    return Episodes(**{name: one.reshape(numbers.shape) for name, one in figures.items()}, seeds=numbers)
+    figures = {
+        name: np.concatenate([part[name] for part in found]) for name in found[0]
+    }
+    return Episodes(
+        **{name: one.reshape(numbers.shape) for name, one in figures.items()},
+        seeds=numbers,
+    )
 
 
 def _seeds(seeds: ArrayLike, n_models: int) -> Integers:
@@ -135,8 +153,14 @@ def _figures(run: Rollout) -> dict[str, NDArray[np.generic]]:
     cost, steered = costs(run), steering(run)
     return {
         "cost": cost["cost"],
-        **{f"{part}_cost": cost[f"cost_{part}"] for part in ("heading", "rudder", "rudder_rate", "end")},
-        **{name: steered[name] for name in ("heading_rmse_deg", "rudder_travel_deg_min")},
+        **{
+            f"{part}_cost": cost[f"cost_{part}"]
+            for part in ("heading", "rudder", "rudder_rate", "end")
+        },
+        **{
+            name: steered[name]
+            for name in ("heading_rmse_deg", "rudder_travel_deg_min")
+        },
         "extrapolating": mean(run, run.infos["extrapolating"]),
         "terminated": run.terminated,
         "duration_s": run.steps * run.dt,
@@ -144,9 +168,14 @@ def _figures(run: Rollout) -> dict[str, NDArray[np.generic]]:
 
 
 def step_response(
-    controller: Policy, models: ShipModel | Sequence[ShipModel], step_deg: float = 20.0,
-    duration: float | None = None, task: Task | None = None, *, allow_unstable: bool = False,
-) -> StepResponses:  # fmt: skip
+    controller: Policy,
+    models: ShipModel | Sequence[ShipModel],
+    step_deg: float = 20.0,
+    duration: float | None = None,
+    task: Task | None = None,
+    *,
+    allow_unstable: bool = False,
+) -> StepResponses:
     """Turn ships from straight ahead to a new course, all at once.
 
     Raises InputError as `sail`; or if the step or the duration is out of its range.
@@ -163,26 +192,39 @@ def step_response(
         In s; by default the time to travel 16 ship lengths.
     """
     fleet = _fleet(models)
-    check_number(step_deg, "step_deg", at_least=-LARGEST_STEP_DEG, at_most=LARGEST_STEP_DEG)
+    check_number(
+        step_deg, "step_deg", at_least=-LARGEST_STEP_DEG, at_most=LARGEST_STEP_DEG
+    )
     asked = task or course_keeping_task()
     check_fits(controller, asked, fleet[0], f"model '{fleet[0].name}'")
     lasts = STEP_LENGTHS * fleet[0].travel_time if duration is None else duration
-    steps = int(np.ceil(check_number(lasts, "duration", above=0.0) / asked.interval(fleet[0])))
+    steps = int(
+        np.ceil(check_number(lasts, "duration", above=0.0) / asked.interval(fleet[0]))
+    )
     straight = asked.changed(course_change_deg=0.0, episode_steps=steps)
     engine = Engine(fleet, len(fleet), straight, allow_unstable=allow_unstable)
     seeds = np.zeros(len(fleet), dtype=np.int64)
     course = _other_course(engine, np.radians(step_deg))
     states = rollout(controller, engine, seeds, record=RECORDED, show=course).states
-    left = ((0, steps + 1 - len(states["psi"])), (0, 0))  # after all were lost, if they were
+    left = (
+        (0, steps + 1 - len(states["psi"])),
+        (0, 0),
+    )  # after all were lost, if they were
     found = states["psi"] - states["set_point"], states["delta"]
     heading, rudder = (np.pad(values, left, mode="edge").T for values in found)
     t: Floats = np.arange(steps + 1, dtype=np.float64) * engine.dt
     return StepResponses(t, heading, rudder)
 
 
-def _other_course(engine: Engine, step: float) -> Callable[[NDArray[np.float32]], NDArray[np.float32]]:
+def _other_course(
+    engine: Engine, step: float
+) -> Callable[[NDArray[np.float32]], NDArray[np.float32]]:
     """What ships that keep their course in the engine observe of another one, a step away, rad."""
-    reach, integral, begins = observation_scales(engine.model)[-1], np.zeros(engine.num_envs), True
+    reach, integral, begins = (
+        observation_scales(engine.model)[-1],
+        np.zeros(engine.num_envs),
+        True,
+    )
 
     def shown(observations: NDArray[np.float32]) -> NDArray[np.float32]:
         nonlocal integral, begins

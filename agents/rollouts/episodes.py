@@ -26,11 +26,14 @@ class Recorded(NamedTuple):
     costs: Floats
 
 
-def recorded(policy: Policy, task: BenchmarkTask, seeds: Sequence[int], samples: int = SAMPLES) -> Recorded:
+def recorded(
+    policy: Policy, task: BenchmarkTask, seeds: Sequence[int], samples: int = SAMPLES
+) -> Recorded:
     """Sail episodes of a task side by side and keep their histories.
 
-    `samples`: of an episode of full length at most: the histories have one sample for several control
-    intervals, in which rewards are summed. The last one is filled up: the ship stays where her episode ended.
+    `samples`: of an episode of full length at most: the histories have one sample for
+    several control intervals, in which rewards are summed. The last one is filled up:
+    the ship stays where her episode ended.
     """
     engine = task.engine(len(seeds))
     run = rollout(policy, engine, np.asarray(seeds), record=True, tolerant=True)
@@ -39,10 +42,14 @@ def recorded(policy: Policy, task: BenchmarkTask, seeds: Sequence[int], samples:
     return Recorded(episodes, np.where(run.failed, np.nan, run.costs))
 
 
-def _episode(run: Rollout, task: BenchmarkTask, lane: int, engine: Engine, stride: int) -> Episode | None:
+def _episode(
+    run: Rollout, task: BenchmarkTask, lane: int, engine: Engine, stride: int
+) -> Episode | None:
     """One lane of a rollout that recorded everything."""
     ship, failed, steps = run.model, bool(run.failed[lane]), int(run.steps[lane])
-    count = steps // stride if failed else -(-steps // stride)  # where the policy failed she drifts on
+    count = (
+        steps // stride if failed else -(-steps // stride)
+    )  # where the policy failed she drifts on
     if not count:
         return None
     at = np.minimum(stride * np.arange(count + 1), steps)
@@ -56,21 +63,35 @@ def _episode(run: Rollout, task: BenchmarkTask, lane: int, engine: Engine, strid
     parts = task.task.reward_parts
     commands = {name: states.get(f"{name}_command") for name in ship.command_names}
     return Episode(
-        environment=task.env_id, model=ship.name, dt=run.dt * stride,
-        length=ship.particulars["length"], beam=ship.particulars.get("beam"),
-        rudder_limit=ship.steering.limit, states=_finite(states),
-        actions=run.actions[at[:-1], lane], rewards=summed(run.rewards[:steps, lane]),
-        commands={name: values[1:] for name, values in commands.items() if values is not None},
+        environment=task.env_id,
+        model=ship.name,
+        dt=run.dt * stride,
+        length=ship.particulars["length"],
+        beam=ship.particulars.get("beam"),
+        rudder_limit=ship.steering.limit,
+        states=_finite(states),
+        actions=run.actions[at[:-1], lane],
+        rewards=summed(run.rewards[:steps, lane]),
+        commands={
+            name: values[1:] for name, values in commands.items() if values is not None
+        },
         reward_parts={name: summed(infos[name][1:]) for name in parts},
-        info=_finite({name: infos[name][at] for name in infos if name not in {*parts, *SUCCESS}}),
-        waypoints=engine.waypoints(lane), corridor=engine.path_metres("corridor"),
+        info=_finite(
+            {name: infos[name][at] for name in infos if name not in {*parts, *SUCCESS}}
+        ),
+        waypoints=engine.waypoints(lane),
+        corridor=engine.path_metres("corridor"),
         turn_radius=engine.path_metres("turn_radius"),
-        arguments=plain({"model": task.model, **task.options}), seed=int(run.seeds[lane]),
+        arguments=plain({"model": task.model, **task.options}),
+        seed=int(run.seeds[lane]),
         terminated=not failed and bool(run.terminated[lane]),
-        truncated=not failed and bool(run.truncated[lane]), success=success[0] if success else None,
-    )  # fmt: skip
+        truncated=not failed and bool(run.truncated[lane]),
+        success=success[0] if success else None,
+    )
 
 
 def _finite(histories: Mapping[str, Floats]) -> dict[str, Floats]:
     """Those that are finite throughout."""
-    return {name: values for name, values in histories.items() if np.isfinite(values).all()}
+    return {
+        name: values for name, values in histories.items() if np.isfinite(values).all()
+    }

@@ -1,11 +1,12 @@
 """What an episode comes to: figures of rollouts, one number an episode.
 
-Intervals in which an episode was over do not count. A figure that an episode does not have (nothing sailed,
-no course change, no path) is NaN.
+Intervals in which an episode was over do not count. A figure that an episode does not
+have (nothing sailed, no course change, no path) is NaN.
 
-Sources: Norrbin 1972, On the added resistance due to steering on a straight course (steering cost); van
-Amerongen 1982, Adaptive steering of ships (way lengthened and speed lost by steering); Carlton 2012, Marine
-Propellers and Propulsion, chapter 6 (propeller law: power is proportional to the cube of the shaft speed).
+Sources: Norrbin 1972, On the added resistance due to steering on a straight course
+(steering cost); van Amerongen 1982, Adaptive steering of ships (way lengthened and
+speed lost by steering); Carlton 2012, Marine Propellers and Propulsion, chapter 6
+(propeller law: power is proportional to the cube of the shaft speed).
 """
 
 from itertools import pairwise
@@ -61,12 +62,17 @@ def metrics(run: Rollout) -> dict[str, Floats]:
     Returns
     -------
     dict of str to array of shape (n,)
-        docs/benchmark.md says what they are. An episode in which the policy failed is charged as if it had
-        lost control then; success is on a path whether its end was reached, else whether control was kept.
+        docs/benchmark.md says what they are. An episode in which the policy failed is
+        charged as if it had lost control then; success is on a path whether its end was
+        reached, else whether control was kept.
     """
     shielded = run.shielded & run.sailing
     kept = (~(run.terminated | run.failed)).astype(np.float64)
-    own = path_following(run) if _on_path(run.task) else {**course_changes(run), "success": kept}
+    own = (
+        path_following(run)
+        if _on_path(run.task)
+        else {**course_changes(run), "success": kept}
+    )
     lost = run.terminated & ~(own["success"] > 0.0)
     return {
         **costs(run),
@@ -86,11 +92,15 @@ def metrics(run: Rollout) -> dict[str, Floats]:
 def costs(run: Rollout) -> dict[str, Floats]:
     """Cost of each episode and its parts, see `metrics`."""
     parts = {
-        f"cost_{name.removeprefix('reward_')}": total(-run.infos[name][1:] * run.sailing)
+        f"cost_{name.removeprefix('reward_')}": total(
+            -run.infos[name][1:] * run.sailing
+        )
         for name in run.task.reward_parts
     }
     left = run.task.episode_steps - run.steps
-    parts["cost_end"] = parts["cost_end"] + np.where(run.failed, left * worst_step_cost(run.task), 0.0)
+    parts["cost_end"] = parts["cost_end"] + np.where(
+        run.failed, left * worst_step_cost(run.task), 0.0
+    )
     return {"cost": sum(parts.values(), start=np.zeros(len(run.seeds))), **parts}
 
 
@@ -99,7 +109,9 @@ def steering(run: Rollout) -> dict[str, Floats]:
     minutes, rudder = run.steps * run.dt / 60.0, run.states["delta"]
     turned = np.abs(np.diff(rudder, axis=0)) * run.sailing
     return {
-        "heading_rmse_deg": np.degrees(np.sqrt(mean(run, run.infos["heading_error"] ** 2))),
+        "heading_rmse_deg": np.degrees(
+            np.sqrt(mean(run, run.infos["heading_error"] ** 2))
+        ),
         "rudder_travel_deg_min": ratio(np.degrees(total(turned)), minutes),
         "rudder_reversals_min": ratio(reversals(rudder, run.sailing), minutes),
     }
@@ -108,8 +120,8 @@ def steering(run: Rollout) -> dict[str, Floats]:
 def reversals(angle: Floats, counts: Flags, dead_band: float = DEAD_BAND) -> Floats:
     """How often an angle turns round, by more than a dead band each time.
 
-    `angle`: rad, shape (n_steps + 1, n); `counts`: intervals that count, shape (n_steps, n); `dead_band`:
-    rad; a smaller return does not count. Returns shape (n,).
+    `angle`: rad, shape (n_steps + 1, n); `counts`: intervals that count, shape
+    (n_steps, n); `dead_band`: rad; a smaller return does not count. Returns shape (n,).
     """
     low, high = angle[0], angle[0]  # since the last turn
     way: Floats = np.zeros(angle.shape[1])  # -1, 0 or 1
@@ -128,11 +140,12 @@ def reversals(angle: Floats, counts: Flags, dead_band: float = DEAD_BAND) -> Flo
 def course_changes(run: Rollout) -> dict[str, Floats]:
     """Overshoot and settling after the course changes of an episode, means over its changes.
 
-    A change begins with a new set-point at least 5 degrees from the heading, and lasts until the next or the
-    end of the episode. Its overshoot is the largest heading error on the other side, in percent of the first
-    error; it has settled at the time from which on the error stays within 5 % of the first one, but no less
-    than 1 degree. One that has not counts as unsettled, with the whole of its duration as the time. Returns
-    `OF_COURSES`, the last a share of the changes, each of shape (n,).
+    A change begins with a new set-point at least 5 degrees from the heading, and lasts
+    until the next or the end of the episode. Its overshoot is the largest heading error
+    on the other side, in percent of the first error; it has settled at the time from
+    which on the error stays within 5 % of the first one, but no less than 1 degree. One
+    that has not counts as unsettled, with the whole of its duration as the time.
+    Returns `OF_COURSES`, the last a share of the changes, each of shape (n,).
     """
     means = np.full((3, len(run.seeds)), np.nan)
     for episode in range(len(run.seeds)):
@@ -143,7 +156,9 @@ def course_changes(run: Rollout) -> dict[str, Floats]:
         found = []
         for begin, end in pairwise(begins):
             if end > begin and abs(error[begin]) >= SMALLEST_CHANGE:
-                changed = course[end] != course[begin]  # the error at `end` is that against the next course
+                changed = (
+                    course[end] != course[begin]
+                )  # the error at `end` is that against the next course
                 found.append(step_figures(error[begin : end + (not changed)], run.dt))
         if found:
             means[:, episode] = np.mean(found, axis=0)
@@ -153,7 +168,8 @@ def course_changes(run: Rollout) -> dict[str, Floats]:
 def step_figures(error: Floats, dt: float) -> tuple[float, float, float]:
     """Overshoot in percent, settling time in s and whether it has not settled, of one change of course.
 
-    `error`: heading error from the change on, rad, shape (n_samples,); `dt`: between the samples, s.
+    `error`: heading error from the change on, rad, shape (n_samples,); `dt`: between
+    the samples, s.
     """
     first = float(error[0])
     beyond = max(0.0, float((-np.sign(first) * error).max()))
@@ -167,16 +183,19 @@ def step_figures(error: Floats, dt: float) -> tuple[float, float, float]:
 def fuel_per_distance(run: Rollout) -> Floats:
     """Fuel for each mile made good, that of straight running at service speed in calm water being 1.
 
-    Power is proportional to the cube of the shaft speed (propeller law); the way made good is along the path,
-    over ground, or in course keeping along the ordered course, through the water. So it counts the speed lost
-    to rudder and drift, the way lengthened by yawing, and the weather. It is no consumption: how the engine
-    answers to load is not modelled. NaN where no way was made good, shape (n,).
+    Power is proportional to the cube of the shaft speed (propeller law); the way made
+    good is along the path, over ground, or in course keeping along the ordered course,
+    through the water. So it counts the speed lost to rudder and drift, the way
+    lengthened by yawing, and the weather. It is no consumption: how the engine answers
+    to load is not modelled. NaN where no way was made good, shape (n,).
     """
     service = run.model.service_shaft_speed if "n" in run.model.state_names else 0.0
     shaft = run.states["n"][1:] / service if service > 0.0 else 1.0
     spent = total(np.where(run.sailing, shaft, 0.0) ** 3) * run.dt
     if _on_path(run.task):
-        way = np.where(run.sailing, run.infos["distance_made_good"][1:], 0.0).max(axis=0, initial=0.0)
+        way = np.where(run.sailing, run.infos["distance_made_good"][1:], 0.0).max(
+            axis=0, initial=0.0
+        )
     else:
         error = run.infos["heading_error"]
         along = run.states["u"] * np.cos(error) + run.states["v"] * np.sin(error)
@@ -213,7 +232,11 @@ def total(values: Floats | Flags) -> Floats:
 
 def ratio(above: Floats, below: Floats) -> Floats:
     """A quotient, NaN where the divisor is 0."""
-    return np.asarray(np.divide(above, below, out=np.full(np.shape(above), np.nan), where=below != 0.0))
+    return np.asarray(
+        np.divide(
+            above, below, out=np.full(np.shape(above), np.nan), where=below != 0.0
+        )
+    )
 
 
 class Evaluation(NamedTuple):
@@ -224,14 +247,20 @@ class Evaluation(NamedTuple):
 
 
 def evaluate(
-    policy: Policy, task: BenchmarkTask, seeds: ArrayLike | None = None, model: ShipModel | None = None
+    policy: Policy,
+    task: BenchmarkTask,
+    seeds: ArrayLike | None = None,
+    model: ShipModel | None = None,
 ) -> Evaluation:
     """Sail the episodes of a task, all at once, whatever the policy does (`rollout`, tolerant).
 
-    `policy`: anything with `predict`; it is given the observations of all ships together; `task`: of a suite;
-    `seeds`: by default those that are scored, shape (n,); `model`: another ship than the task's own.
+    `policy`: anything with `predict`; it is given the observations of all ships
+    together; `task`: of a suite; `seeds`: by default those that are scored, shape (n,);
+    `model`: another ship than the task's own.
     """
     numbers = np.asarray(task.seeds if seeds is None else seeds, dtype=np.int64)
     engine = task.engine(len(numbers), model)
-    run = rollout(policy, engine, numbers, record=recorded_for_metrics(task.task), tolerant=True)
+    run = rollout(
+        policy, engine, numbers, record=recorded_for_metrics(task.task), tolerant=True
+    )
     return Evaluation(metrics(run), run)

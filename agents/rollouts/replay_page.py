@@ -9,15 +9,16 @@ from shipgym import Episode, InputError
 from shipgym.files import write_text
 from shipgym.pages import render
 
-#: Template that loads nothing and replays its `data`: `runs` and `quantities`, or a placeholder.
+#: Template that loads nothing and replays its `data`: `runs` and `quantities`, or a
+#: placeholder.
 PLAYER = "agents.rollouts/replay.html"
 
 
 def write_replay(paths: Sequence[str | Path], out: str | Path) -> None:
     """Write the replay page of recorded episodes.
 
-    Raises InputError if there is no episode, one cannot be read, or the page cannot be written; nothing is
-    written then.
+    Raises InputError if there is no episode, one cannot be read, or the page cannot be
+    written; nothing is written then.
 
     Parameters
     ----------
@@ -31,7 +32,9 @@ def write_replay(paths: Sequence[str | Path], out: str | Path) -> None:
     if not paths:
         raise InputError("episodes: none found, expected at least one episode file")
     called = names([Path(path) for path in paths])
-    episodes = {name: Episode.load(path) for name, path in zip(called, paths, strict=True)}
+    episodes = {
+        name: Episode.load(path) for name, path in zip(called, paths, strict=True)
+    }
     write_text(replay_page(episodes), target)
 
 
@@ -41,7 +44,11 @@ def replay_page(episodes: Mapping[str, Episode]) -> str:
         raise InputError("episodes: none found, expected at least one")
     runs = [run(name, episode) for name, episode in episodes.items()]
     ships = ", ".join(dict.fromkeys(episode.model for episode in episodes.values()))
-    return render(PLAYER, title=f"Replay: {ships}", data={"runs": runs, "quantities": quantities(runs)})
+    return render(
+        PLAYER,
+        title=f"Replay: {ships}",
+        data={"runs": runs, "quantities": quantities(runs)},
+    )
 
 
 def names(paths: Sequence[Path]) -> list[str]:
@@ -55,4 +62,7 @@ def names(paths: Sequence[Path]) -> list[str]:
         if len(set(called)) == len(set(stems)):
             break
     earlier = [called[:i].count(name) for i, name in enumerate(called)]
-    return [name if k == 0 else f"{name} ({k + 1})" for name, k in zip(called, earlier, strict=True)]
+    return [
+        name if k == 0 else f"{name} ({k + 1})"
+        for name, k in zip(called, earlier, strict=True)
+    ]

@@ -10,10 +10,25 @@ from shipgym.arrays import Floats
 from shipgym.files import shipped_toml
 from shipgym.tasks.guidance import wrapped
 
-DIGITS = 7  # significant, of the numbers in the page: a millimetre in a kilometre; nine decimals at most
+# significant, of the numbers in the page: a millimetre in a kilometre; nine decimals at
+# most
+DIGITS = 7
 BEAM = 1.0 / 6.5  # of the length, drawn where the beam is not known
-COURSE_ORDERS = ("set_point", "course_order", "heading_order", "desired_course", "los_course")
-FACTS = ("environment", "model", "number", "dt", "length", "corridor")  # of an episode, as they are
+COURSE_ORDERS = (
+    "set_point",
+    "course_order",
+    "heading_order",
+    "desired_course",
+    "los_course",
+)
+FACTS = (
+    "environment",
+    "model",
+    "number",
+    "dt",
+    "length",
+    "corridor",
+)  # of an episode, as they are
 SHOWN = ("x", "y", "psi", "r", "phi", "delta", "n", "heading_error")  # each by itself
 CROSS_TRACK = ("cross_track_error", "cross_track")
 
@@ -26,8 +41,8 @@ TOLD = ("label", "unit", "decimals", "line", "order", "short")  # of a quantity
 def run(name: str, episode: Episode) -> dict[str, Any]:
     """An episode ready for the page's JSON.
 
-    `name`: what the legend calls it. Returns what it is, the ship to draw, the path, series of n + 1 values
-    each, and under `other` what was recorded besides, SI units.
+    `name`: what the legend calls it. Returns what it is, the ship to draw, the path,
+    series of n + 1 values each, and under `other` what was recorded besides, SI units.
     """
     recorded = {**episode.info, **episode.states}
     shown = {*SHOWN, _first(COURSE_ORDERS, recorded), _first(CROSS_TRACK, recorded)}
@@ -35,7 +50,9 @@ def run(name: str, episode: Episode) -> dict[str, Any]:
     return {
         "name": name,
         **{fact: getattr(episode, fact) for fact in FACTS},
-        "seed": None if episode.seed is None else str(episode.seed),  # too long for a number in a browser
+        "seed": (
+            None if episode.seed is None else str(episode.seed)
+        ),  # too long for a number in a browser
         "steps": episode.n_steps,
         "beam": BEAM * episode.length if episode.beam is None else episode.beam,
         "rudderLimit": float(np.degrees(episode.rudder_limit)),
@@ -44,7 +61,10 @@ def run(name: str, episode: Episode) -> dict[str, Any]:
         "waypoints": None if episode.waypoints is None else rounded(episode.waypoints),
         "path": None if episode.path is None else rounded(episode.path),
         "series": {key: rounded(values) for key, values in series(episode).items()},
-        "parts": {key: rounded(np.append(0.0, values)) for key, values in episode.reward_parts.items()},
+        "parts": {
+            key: rounded(np.append(0.0, values))
+            for key, values in episode.reward_parts.items()
+        },
         "rewards": rounded(np.append(0.0, episode.rewards)),
         "other": {key: rounded(values) for key, values in other.items()},
     }
@@ -53,17 +73,23 @@ def run(name: str, episode: Episode) -> dict[str, Any]:
 def series(episode: Episode) -> dict[str, Floats]:
     """What is shown over time, each of shape (n_steps + 1,); angles in degrees.
 
-    Headings go through north without a jump, from one within 0 to 360 degrees at the start.
+    Headings go through north without a jump, from one within 0 to 360 degrees at the
+    start.
     """
     states, commands = episode.states, episode.commands
     heading = np.unwrap(states["psi"])
     heading -= 2.0 * np.pi * np.floor(heading[0] / (2.0 * np.pi))
     found: dict[str, Floats] = {
-        "x": states["x"], "y": states["y"], "psi": np.degrees(heading), "delta": np.degrees(states["delta"]),
+        "x": states["x"],
+        "y": states["y"],
+        "psi": np.degrees(heading),
+        "delta": np.degrees(states["delta"]),
         "reward_so_far": np.append(0.0, np.cumsum(episode.rewards)),
-    }  # fmt: skip
+    }
     if "u" in states:
-        found["speed"] = np.hypot(states["u"], states["v"]) if "v" in states else np.abs(states["u"])
+        found["speed"] = (
+            np.hypot(states["u"], states["v"]) if "v" in states else np.abs(states["u"])
+        )
     for shown, name in (("yaw_rate", "r"), ("heel", "phi")):
         if name in states:
             found[shown] = np.degrees(states[name])
@@ -76,7 +102,9 @@ def series(episode: Episode) -> dict[str, Floats]:
     if order := _first(COURSE_ORDERS, states):
         error = wrapped(states[order] - heading)
         found["heading_error"] = np.degrees(error)
-        found["course_order"] = np.degrees(heading + error)  # without a jump from the heading
+        found["course_order"] = np.degrees(
+            heading + error
+        )  # without a jump from the heading
     recorded = {**episode.info, **states}
     if cross_track := _first(CROSS_TRACK, recorded):
         found["cross_track_error"] = recorded[cross_track]
@@ -85,7 +113,9 @@ def series(episode: Episode) -> dict[str, Floats]:
 
 def quantities(runs: list[dict[str, Any]]) -> list[dict[str, Any]]:
     """The histories and read-outs that some of the runs have."""
-    shown = [one for one in QUANTITIES if any(one["line"] in run["series"] for run in runs)]
+    shown = [
+        one for one in QUANTITIES if any(one["line"] in run["series"] for run in runs)
+    ]
     return [{name: one.get(name) for name in TOLD} for one in shown]
 
 

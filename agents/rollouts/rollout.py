@@ -32,7 +32,8 @@ class Rollout:
     costs : array of shape (n,)
         Minus the sum of the rewards, up to where the policy failed.
     sailing : bool array of shape (n_steps, n)
-        Whether the episode was running in the interval; what is recorded of the others is meaningless.
+        Whether the episode was running in the interval; what is recorded of the others
+        is meaningless.
     terminated, truncated, failed : bool array of shape (n,)
         How the episode ended; the last: because the policy gave no command.
     failure : str
@@ -40,7 +41,8 @@ class Rollout:
     seconds_per_action : float
         Process time of `predict` over the number of commands it gave, in a batch.
     actions, rewards, shielded : array of shape (n_steps, n, n_commands), and twice (n_steps, n)
-        Of each interval, the last whether a safety shield steered; without steps if nothing was recorded.
+        Of each interval, the last whether a safety shield steered; without steps if
+        nothing was recorded.
     states, infos : dict of str to array of shape (n_steps + 1, n)
         Physical states and entries of `info` that were recorded, from the beginning on.
     """
@@ -69,13 +71,18 @@ class Rollout:
 
 
 def rollout(
-    policy: Policy, engine: Engine, seeds: ArrayLike, *, record: bool | Collection[str] = False,
-    tolerant: bool = False, show: Callable[[NDArray[np.float32]], NDArray[np.float32]] | None = None,
-) -> Rollout:  # fmt: skip
+    policy: Policy,
+    engine: Engine,
+    seeds: ArrayLike,
+    *,
+    record: bool | Collection[str] = False,
+    tolerant: bool = False,
+    show: Callable[[NDArray[np.float32]], NDArray[np.float32]] | None = None,
+) -> Rollout:
     """Steer the ships of an engine through one episode each.
 
-    Returns the same for the same arguments; only the time differs. Raises InputError if the policy gives no
-    finite command for each ship, unless `tolerant`.
+    Returns the same for the same arguments; only the time differs. Raises InputError if
+    the policy gives no finite command for each ship, unless `tolerant`.
 
     Parameters
     ----------
@@ -88,16 +95,20 @@ def rollout(
     record : bool or collection of str
         Names of physical states and of entries of `info` to record; True for all.
     tolerant : bool
-        Whether a policy that raises an error, or gives NaN or no command for each ship, ends the episodes
-        that it fails in and the others go on; otherwise that is an error.
+        Whether a policy that raises an error, or gives NaN or no command for each ship,
+        ends the episodes that it fails in and the others go on; otherwise that is an
+        error.
     show : callable, optional
-        What the policy is shown in place of the observations; asked before each command.
+        What the policy is shown in place of the observations; asked before each
+        command.
     """
     log = _Log(engine, record, tolerant)
     seen, memory, starts = engine.reset(seeds), None, log.sailing
     log.look()
     while log.sailing.any():
-        command, memory = log.ask(policy, seen if show is None else show(seen), memory, starts)
+        command, memory = log.ask(
+            policy, seen if show is None else show(seen), memory, starts
+        )
         if not log.sailing.any():  # the policy has failed in all episodes
             break
         seen, rewards, terminated, truncated = engine.step(command)
@@ -114,8 +125,8 @@ def episode_costs(policy: Policy, engine: Engine, seeds: NDArray[np.int64]) -> F
 def check_fits(policy: Any, task: Task, ship: ShipModel, where: str) -> None:
     """Refuse a policy made for other observations than a task shows of a ship.
 
-    `policy`: without a method `check_fits` it steers by anything; `where`: start of the message. Raises
-    InputError naming the first difference.
+    `policy`: without a method `check_fits` it steers by anything; `where`: start of the
+    message. Raises InputError naming the first difference.
     """
     check = getattr(policy, "check_fits", None)
     if check is not None:
@@ -126,7 +137,9 @@ def check_fits(policy: Any, task: Task, ship: ShipModel, where: str) -> None:
 class _Log:
     """What has become of the episodes so far."""
 
-    def __init__(self, engine: Engine, record: bool | Collection[str], tolerant: bool) -> None:
+    def __init__(
+        self, engine: Engine, record: bool | Collection[str], tolerant: bool
+    ) -> None:
         self.engine, self.record, self.tolerant = engine, record, tolerant
         self.names = [name for name in engine.task.info_names if self._keeps(name)]
         self.sailing = np.ones(engine.num_envs, dtype=np.bool_)
@@ -134,7 +147,9 @@ class _Log:
         self.costs = np.zeros(engine.num_envs)
         self.failure, self.seconds, self.asked = "", 0.0, 0
         self.sailed: list[Flags] = []
-        self.intervals: list[tuple[NDArray[np.float32], Floats, Flags]] = []  # actions, rewards, shielded
+        self.intervals: list[
+            tuple[NDArray[np.float32], Floats, Flags]
+        ] = []  # actions, rewards, shielded
         self.states: list[dict[str, Floats]] = []
         self.infos: list[list[Floats]] = []
 
@@ -145,10 +160,14 @@ class _Log:
         """Record where the ships are."""
         if self.record:
             state = self.engine.physical_state()
-            self.states.append({name: values for name, values in state.items() if self._keeps(name)})
+            self.states.append(
+                {name: values for name, values in state.items() if self._keeps(name)}
+            )
             self.infos.append([self.engine.info(name).copy() for name in self.names])
 
-    def ask(self, policy: Policy, shown: Any, memory: Any, starts: Flags) -> tuple[NDArray[np.float32], Any]:
+    def ask(
+        self, policy: Policy, shown: Any, memory: Any, starts: Flags
+    ) -> tuple[NDArray[np.float32], Any]:
         """A policy's commands, 0 for ships that do not sail; episodes without a command have failed."""
         began, why = time.process_time(), ""
         try:
@@ -156,7 +175,10 @@ class _Log:
         except Exception as error:  # whatever a user's policy raises
             if not self.tolerant:
                 raise
-            actions, why = None, f"{type(error).__name__}: {error} (at step {len(self.sailed)})"
+            actions, why = (
+                None,
+                f"{type(error).__name__}: {error} (at step {len(self.sailed)})",
+            )
         self.seconds += time.process_time() - began
         self.asked += int(self.sailing.sum())
         command, bad, found = self._commands(actions)
@@ -170,29 +192,46 @@ class _Log:
 
     def _commands(self, actions: Any) -> tuple[NDArray[np.float32], Flags, str]:
         """Commands, of which ships that sail there is none, and why."""
-        expected, at = (self.engine.num_envs, len(self.engine.command)), f"found at step {len(self.sailed)}"
+        expected, at = (
+            (self.engine.num_envs, len(self.engine.command)),
+            f"found at step {len(self.sailed)}",
+        )
         nothing = np.zeros(expected, dtype=np.float32)
         try:
             with np.errstate(over="ignore"):
                 found = np.array(actions, dtype=np.float32)
         except (TypeError, ValueError):
-            return nothing, self.sailing, f"actions of type {type(actions).__name__} {at}, expected numbers"
+            return (
+                nothing,
+                self.sailing,
+                f"actions of type {type(actions).__name__} {at}, expected numbers",
+            )
         if found.shape != expected:
             seen = f"for observations of shape {self.engine.observations.shape}"
-            return nothing, self.sailing, f"actions of shape {found.shape} {at}, expected {expected} {seen}"
+            return (
+                nothing,
+                self.sailing,
+                f"actions of shape {found.shape} {at}, expected {expected} {seen}",
+            )
         wrong = self.sailing[:, None] & ~np.isfinite(found)
         bad: Flags = np.any(wrong, axis=1)
         if not bad.any():
             return found, bad, ""
         said = (
-            f"action {found[wrong][0]} {at} for ship {np.argmax(bad)}: no finite number for {bad.sum()} of "
-            f"{self.sailing.sum()} ships, expected numbers in [-1, 1], the command over its limit; look for "
-            f"a division by zero in the controller"
+            f"action {found[wrong][0]} {at} for ship {np.argmax(bad)}: no finite number"
+            f" for {bad.sum()} of {self.sailing.sum()} ships, expected numbers in [-1,"
+            " 1], the command over its limit; look for a division by zero in the"
+            " controller"
         )
         return found, bad, said
 
     def note(
-        self, command: NDArray[np.float32], memory: Any, rewards: Floats, terminated: Flags, truncated: Flags
+        self,
+        command: NDArray[np.float32],
+        memory: Any,
+        rewards: Floats,
+        terminated: Flags,
+        truncated: Flags,
     ) -> None:
         """Note what came of an interval."""
         self.sailed.append(self.sailing)
@@ -201,7 +240,9 @@ class _Log:
         self.truncated = self.truncated | self.sailing & truncated
         if self.record:
             shield = isinstance(memory, ShieldState)
-            shielded = interventions(memory).steering if shield else np.zeros_like(terminated)
+            shielded = (
+                interventions(memory).steering if shield else np.zeros_like(terminated)
+            )
             self.intervals.append((command, rewards, shielded))
         self.look()
         self.sailing = self.sailing & ~(terminated | truncated)
@@ -209,15 +250,32 @@ class _Log:
     def rollout(self, seeds: NDArray[np.int64]) -> Rollout:
         """All that was noted."""
         engine, n = self.engine, self.engine.num_envs
-        actions, rewards, shielded = zip(*self.intervals, strict=True) if self.intervals else ((), (), ())
+        actions, rewards, shielded = (
+            zip(*self.intervals, strict=True) if self.intervals else ((), (), ())
+        )
         return Rollout(
-            task=engine.task, model=engine.model, dt=engine.dt, seeds=seeds, costs=self.costs,
+            task=engine.task,
+            model=engine.model,
+            dt=engine.dt,
+            seeds=seeds,
+            costs=self.costs,
             sailing=np.array(self.sailed, dtype=np.bool_).reshape(-1, n),
-            terminated=self.terminated, truncated=self.truncated, failed=self.failed, failure=self.failure,
+            terminated=self.terminated,
+            truncated=self.truncated,
+            failed=self.failed,
+            failure=self.failure,
             seconds_per_action=self.seconds / max(self.asked, 1),
-            actions=np.array(actions, dtype=np.float32).reshape(-1, n, len(engine.command)),
+            actions=np.array(actions, dtype=np.float32).reshape(
+                -1, n, len(engine.command)
+            ),
             rewards=np.array(rewards).reshape(-1, n),
             shielded=np.array(shielded, dtype=np.bool_).reshape(-1, n),
-            states={name: np.array([one[name] for one in self.states]) for name in (self.states or [{}])[0]},
-            infos={name: np.array([one[k] for one in self.infos]) for k, name in enumerate(self.names)},
-        )  # fmt: skip
+            states={
+                name: np.array([one[name] for one in self.states])
+                for name in (self.states or [{}])[0]
+            },
+            infos={
+                name: np.array([one[k] for one in self.infos])
+                for k, name in enumerate(self.names)
+            },
+        )

@@ -2,10 +2,12 @@
 
 Files of `agents/suites`:
 
-    SUITE-best.json     by task: `zero`, mean cost of wheel-over designed on the model; of each scored
-                        episode the lowest cost that anything reached, `costs`, and by what, `by`
-                        (`scripts/best_known.py`)
-    SUITE-tuned.json    tasks: by task and controller `settings`, `cost`, `start_cost`, `evaluations`
+    SUITE-best.json     by task: `zero`, mean cost of wheel-over designed on the model;
+    of each scored
+                        episode the lowest cost that anything reached, `costs`, and by
+                        what, `by` (`scripts/best_known.py`)
+    SUITE-tuned.json    tasks: by task and controller `settings`, `cost`, `start_cost`,
+    `evaluations`
                         (`scripts/tune_controllers.py`)
 """
 
@@ -34,21 +36,28 @@ def best_known(suite: str) -> dict[str, dict[str, Any]]:
     check_shape(found, BEST, str(path))
     for task, one in found.items():
         if not len(one["costs"]) == len(one["by"]) == N_EPISODES:
-            raise InputError(f"{path}: {task}: expected costs of {N_EPISODES} episodes, and by what")
+            raise InputError(
+                f"{path}: {task}: expected costs of {N_EPISODES} episodes, and by what"
+            )
     return dict(found)
 
 
 def reference_costs(suite: str) -> dict[str, tuple[float, float]]:
     """Mean costs with scores 0 and 1, by task: wheel-over designed on the model, and the best known."""
     known = best_known(suite)
-    return {task: (float(one["zero"]), float(np.mean(one["costs"]))) for task, one in known.items()}
+    return {
+        task: (float(one["zero"]), float(np.mean(one["costs"])))
+        for task, one in known.items()
+    }
 
 
 def best_costs(task: BenchmarkTask, suite: str) -> Floats:
     """The best known cost of each scored episode, shape (100,); an InputError if there is none."""
     known = best_known(suite)
     if task.name not in known:
-        raise InputError(f"no best known costs are kept for task '{task.name}' of suite '{suite}'")
+        raise InputError(
+            f"no best known costs are kept for task '{task.name}' of suite '{suite}'"
+        )
     return np.array(known[task.name]["costs"], dtype=np.float64)
 
 
@@ -58,6 +67,11 @@ def load_tuned(suite: str) -> dict[str, dict[str, dict[str, Any]]]:
     Raises InputError if the suite has none, or the file is broken.
     """
     path = suite_file(suite, "tuned")
-    content = read_json(path, "file of tuned settings", "make it again with scripts/tune_controllers.py")
+    content = read_json(
+        path, "file of tuned settings", "make it again with scripts/tune_controllers.py"
+    )
     tasks = check_table(content.get("tasks"), f"{path}: tasks")
-    return {name: dict(check_table(found, f"{path}: tasks.{name}")) for name, found in tasks.items()}
+    return {
+        name: dict(check_table(found, f"{path}: tasks.{name}"))
+        for name, found in tasks.items()
+    }

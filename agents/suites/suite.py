@@ -1,8 +1,8 @@
 """Suites: named tasks with their ship, their sea and the seeds of their episodes, fixed once and for all.
 
-A suite is a TOML file of `agents/suites`, as docs/benchmark.md describes it. A task with a ship is three
-(`SETS`): contestants are made for the model and evaluated on the ship, on the model, and on the ship far from
-what they were made for.
+A suite is a TOML file of `agents/suites`, as docs/benchmark.md describes it. A task
+with a ship is three (`SETS`): contestants are made for the model and evaluated on the
+ship, on the model, and on the ship far from what they were made for.
 """
 
 import hashlib
@@ -16,7 +16,14 @@ import numpy as np
 
 from shipgym import InputError, ShipModel, SteeringGear, Weather
 from shipgym.arrays import Integers
-from shipgym.checks import check_choice, check_keys, check_table, check_text, data_only, placed
+from shipgym.checks import (
+    check_choice,
+    check_keys,
+    check_table,
+    check_text,
+    data_only,
+    placed,
+)
 from shipgym.envs.engine import Engine
 from shipgym.envs.environment import read_options
 from shipgym.envs.randomisation import Randomisation
@@ -47,21 +54,29 @@ class BenchmarkTask:
     environment: str  # one of `ENVIRONMENTS`
     model: str  # shipped model that is steered
     why: str = ""  # what the task is there for
-    options: Mapping[str, Any] = field(default_factory=dict)  # keywords of the environment, `sea` among them
-    behind: str = ""  # shipped model of the ship that is steered, if not `model`; contestants are not told
-    far: Mapping[str, Any] = field(default_factory=dict)  # keywords that differ in the episodes, and `gear`
+    options: Mapping[str, Any] = field(
+        default_factory=dict
+    )  # keywords of the environment, `sea` among them
+    # shipped model of the ship that is steered, if not `model`; contestants are not
+    # told
+    behind: str = ""
+    far: Mapping[str, Any] = field(
+        default_factory=dict
+    )  # keywords that differ in the episodes, and `gear`
     on: str = "ship"  # which of `SETS`
     base: str = ""  # name of the task that contestants are made for, if another
 
     def __post_init__(self) -> None:
         check_choice(self.environment, ENVIRONMENTS, f"task '{self.name}': environment")
-        shown, steered = (task.observed(ship) for ship, task, _ in (self.parts, self.sailed))
+        shown, steered = (
+            task.observed(ship) for ship, task, _ in (self.parts, self.sailed)
+        )
         for one, other in zip(shown, steered, strict=True):
             if (one.name, one.scale) != (other.name, other.scale):
                 raise InputError(
-                    f"task '{self.name}': ship: '{one.name}' of '{self.behind}' is shown in units of "
-                    f"{other.scale:g}, of '{self.model}' in {one.scale:g}; expected a ship of the same "
-                    f"particulars"
+                    f"task '{self.name}': ship: '{one.name}' of '{self.behind}' is"
+                    f" shown in units of {other.scale:g}, of '{self.model}' in"
+                    f" {one.scale:g}; expected a ship of the same particulars"
                 )
 
     @property
@@ -79,16 +94,24 @@ class BenchmarkTask:
         """The same of its episodes, which contestants are evaluated in."""
         if not (self.behind or self.far):
             return self.parts
-        options = {name: value for name, value in {**self.options, **self.far}.items() if name != "gear"}
+        options = {
+            name: value
+            for name, value in {**self.options, **self.far}.items()
+            if name != "gear"
+        }
         given = ENVIRONMENTS[self.environment][1], self.behind or self.model, options
         ship, task, randomisation = read_options(*given)
-        gear = SteeringGear.from_mapping({**asdict(ship.steering), **self.far.get("gear", {})}, "far.gear")
+        gear = SteeringGear.from_mapping(
+            {**asdict(ship.steering), **self.far.get("gear", {})}, "far.gear"
+        )
         return replace(ship, steering=gear), task, randomisation
 
     @property
     def handed_out(self) -> Self:
         """What contestants are made for: the design model, without the ship."""
-        return replace(self, name=self.base or self.name, behind="", far={}, on="ship", base="")
+        return replace(
+            self, name=self.base or self.name, behind="", far={}, on="ship", base=""
+        )
 
     @property
     def ship(self) -> ShipModel:
@@ -105,10 +128,18 @@ class BenchmarkTask:
         """Of the episodes that are scored, shape (100,)."""
         return FIRST_SEED + np.arange(N_EPISODES)
 
-    def engine(self, num_envs: int, model: ShipModel | None = None, threads: int = 1) -> Engine:
+    def engine(
+        self, num_envs: int, model: ShipModel | None = None, threads: int = 1
+    ) -> Engine:
         """Many ships at once in its episodes, by default its own ship."""
         ship, task, randomisation = self.sailed
-        return Engine(ship if model is None else model, num_envs, task, randomisation, threads=threads)
+        return Engine(
+            ship if model is None else model,
+            num_envs,
+            task,
+            randomisation,
+            threads=threads,
+        )
 
 
 @dataclass(frozen=True)
@@ -145,14 +176,22 @@ def find_task(name: str) -> BenchmarkTask:
 
     Raises InputError for an unknown name, with the nearest known one of any suite.
     """
-    known = {one: task for suite in list_suites() for one, task in _designed_for(suite).items()}
+    known = {
+        one: task
+        for suite in list_suites()
+        for one, task in _designed_for(suite).items()
+    }
     return known[check_choice(name, known, "task")]
 
 
 @cache
 def _designed_for(suite: str) -> dict[str, BenchmarkTask]:
     """Tasks of a suite by name, as they are handed out."""
-    return {task.name: task.handed_out for task in load_suite(suite).tasks if task.on == "ship"}
+    return {
+        task.name: task.handed_out
+        for task in load_suite(suite).tasks
+        if task.on == "ship"
+    }
 
 
 def suite_hash(name: str = DEFAULT_SUITE) -> str:
@@ -177,7 +216,11 @@ def parse_suite(text: str, where: str) -> Suite:
     tasks = check_table(content.get("tasks"), f"{where}: tasks")
     return Suite(
         check_text(content.get("name"), f"{where}: name"),
-        tuple(task for name, table in tasks.items() for task in _sets(name, table, f"{where}: tasks.{name}")),
+        tuple(
+            task
+            for name, table in tasks.items()
+            for task in _sets(name, table, f"{where}: tasks.{name}")
+        ),
     )
 
 
@@ -187,10 +230,17 @@ def _sets(name: str, value: Any, where: str) -> list[BenchmarkTask]:
     if not task.behind:
         return [task]
     far = _options(check_table(value.get("far", {}), f"{where}.far"), f"{where}.far")
-    changes: dict[str, dict[str, Any]] = {"ship": {}, "model": {"behind": ""}, "far": {"far": far}}
+    changes: dict[str, dict[str, Any]] = {
+        "ship": {},
+        "model": {"behind": ""},
+        "far": {"far": far},
+    }
     with placed(where):
         sets = [on for on in SETS if on != "far" or far]
-        return [replace(task, name=name + SETS[on], on=on, base=name, **changes[on]) for on in sets]
+        return [
+            replace(task, name=name + SETS[on], on=on, base=name, **changes[on])
+            for on in sets
+        ]
 
 
 def _options(table: Mapping[str, Any], where: str) -> dict[str, Any]:
@@ -203,12 +253,21 @@ def _options(table: Mapping[str, Any], where: str) -> dict[str, Any]:
 
 def _task(name: str, value: Any, where: str) -> BenchmarkTask:
     table = check_table(value, where, FIELDS)
-    environment, model = (check_text(table.get(one), f"{where}.{one}") for one in ("environment", "model"))
+    environment, model = (
+        check_text(table.get(one), f"{where}.{one}") for one in ("environment", "model")
+    )
     data_only(table, where)
     sea = {"sea": table["sea"]} if "sea" in table else {}
-    options = _options({**check_table(table.get("options", {}), f"{where}.options"), **sea}, where)
+    options = _options(
+        {**check_table(table.get("options", {}), f"{where}.options"), **sea}, where
+    )
     behind = check_text(table["ship"], f"{where}.ship") if "ship" in table else ""
     if table.get("far") and not behind:
-        raise InputError(f"{where}.far: found without a ship, expected `ship`, the one behind the model")
+        raise InputError(
+            f"{where}.far: found without a ship, expected `ship`, the one behind the"
+            " model"
+        )
     with placed(where):
-        return BenchmarkTask(name, environment, model, table.get("why", ""), options, behind)
+        return BenchmarkTask(
+            name, environment, model, table.get("why", ""), options, behind
+        )

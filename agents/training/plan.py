@@ -16,14 +16,15 @@ from agents.training.settings import (
     make_settings,
     read_settings_file,
     settings_of,
-)  # fmt: skip
+)
 from shipgym.checks import check_choice, check_keys, check_whole
 from shipgym.envs.registration import environments
 from shipgym.errors import InputError
 from shipgym.sea.conditions import Weather
 from shipgym.sea.weather_column import as_weather, weather_column
 
-#: Seeds below those that are scored: of training a thousand for each `seed`, then those held out.
+#: Seeds below those that are scored: of training a thousand for each `seed`, then those
+#: held out.
 SEEDS_EACH = 1000
 LARGEST_SEED = 799
 MOST_THREADS = 1024
@@ -39,8 +40,8 @@ RUN = ("seed", "randomise", "threads")  # of a plan, whatever is learned
 class Plan:
     """A run of training.
 
-    Raises InputError for settings of another algorithm, commands that are not continuous, or a value out of
-    its range.
+    Raises InputError for settings of another algorithm, commands that are not
+    continuous, or a value out of its range.
     """
 
     algorithm: str  # "ppo", "sac", "td3", "tqc"
@@ -54,21 +55,31 @@ class Plan:
         kind = settings_of(self.algorithm)
         if type(self.settings) is not kind:
             raise InputError(
-                f"settings: {type(self.settings).__name__} found, expected {kind.__name__} for "
-                f"{self.algorithm}"
+                f"settings: {type(self.settings).__name__} found, expected"
+                f" {kind.__name__} for {self.algorithm}"
             )
         check_whole(self.seed, "seed", at_least=0, at_most=LARGEST_SEED)
         check_whole(self.settings.ships, "ships", at_least=1, at_most=SEEDS_EACH)
         check_whole(self.threads, "threads", at_least=1, at_most=MOST_THREADS)
         longest, hint = self.task.task.episode_steps, "no longer than an episode"
-        check_whole(self.settings.action_repeat, "action_repeat", at_least=1, at_most=longest, hint=hint)
+        check_whole(
+            self.settings.action_repeat,
+            "action_repeat",
+            at_least=1,
+            at_most=longest,
+            hint=hint,
+        )
         self.task.task.check_fits(self.task.ship)
         action, base = self.task.task.action, self.settings.base
         if action == "rudder-discrete" and self.algorithm != "ppo":
-            raise InputError(f"action: '{action}' found, which {self.algorithm} does not learn; take ppo")
+            raise InputError(
+                f"action: '{action}' found, which {self.algorithm} does not learn;"
+                " take ppo"
+            )
         if action != "rudder" and base != "none":
             raise InputError(
-                f"base: '{base}' found with action '{action}', expected 'none', or action 'rudder'"
+                f"base: '{base}' found with action '{action}', expected 'none', or"
+                " action 'rudder'"
             )
 
     @property
@@ -80,19 +91,34 @@ class Plan:
         """All that decides what is learned, ready for JSON; threads are stored beside it."""
         return {
             "algorithm": self.algorithm,
-            "task": self.task.name, "environment": self.task.environment,
-            "model": self.task.model, "model_sha256": model_hash(self.task.ship),
+            "task": self.task.name,
+            "environment": self.task.environment,
+            "model": self.task.model,
+            "model_sha256": model_hash(self.task.ship),
             "options": as_json(self.task.options),
-            "randomise": self.randomise, "seed": self.seed, "settings": self.settings.to_dict(),
-        }  # fmt: skip
+            "randomise": self.randomise,
+            "seed": self.seed,
+            "settings": self.settings.to_dict(),
+        }
 
     @classmethod
     def from_configuration(cls, content: Mapping[str, Any], threads: int) -> Self:
         """The run that `configuration` describes."""
-        options = {name: _read(value, name) for name, value in content["options"].items()}
-        task = BenchmarkTask(content["task"], content["environment"], content["model"], "", options)
+        options = {
+            name: _read(value, name) for name, value in content["options"].items()
+        }
+        task = BenchmarkTask(
+            content["task"], content["environment"], content["model"], "", options
+        )
         settings = make_settings(content["algorithm"], content["settings"])
-        return cls(content["algorithm"], task, settings, content["seed"], content["randomise"], threads)
+        return cls(
+            content["algorithm"],
+            task,
+            settings,
+            content["seed"],
+            content["randomise"],
+            threads,
+        )
 
 
 @dataclass(frozen=True)
@@ -100,14 +126,22 @@ class Given:
     """What a user gives; None or empty for what is left to the defaults, or to the run that is resumed."""
 
     algorithm: str
-    environment: str | None = None  # "course-keeping", "path-following", "path-following-v1", or an id
+    environment: str | None = (
+        None  # "course-keeping", "path-following", "path-following-v1", or an id
+    )
     #: name or file of a model, and a sea state
     model: str | None = None
     sea: str | None = None
-    task: str | None = None  # task of the suite, which says environment, model, sea and options
-    options: Mapping[str, Any] = field(default_factory=dict)  # further keywords of the environment
+    task: str | None = (
+        None  # task of the suite, which says environment, model, sea and options
+    )
+    options: Mapping[str, Any] = field(
+        default_factory=dict
+    )  # further keywords of the environment
     settings_file: Path | None = None  # TOML
-    settings: Mapping[str, Any] = field(default_factory=dict)  # by name; they go before the file
+    settings: Mapping[str, Any] = field(
+        default_factory=dict
+    )  # by name; they go before the file
     #: as in `Plan`
     seed: int | None = None
     randomise: bool | None = None
@@ -117,8 +151,8 @@ class Given:
 def make_plan(given: Given, stored: Plan | None = None) -> Plan:
     """The run that a user asks for.
 
-    Raises InputError for an unknown algorithm, environment, task, model, option or setting, with the nearest
-    known one, or a value out of its range.
+    Raises InputError for an unknown algorithm, environment, task, model, option or
+    setting, with the nearest known one, or a value out of its range.
 
     Parameters
     ----------
@@ -128,30 +162,45 @@ def make_plan(given: Given, stored: Plan | None = None) -> Plan:
     """
     settings_of(given.algorithm)  # its error goes before those of the task
     task = _task(given, stored)
-    own = read_settings_file(given.settings_file, given.algorithm) if given.settings_file else {}
+    own = (
+        read_settings_file(given.settings_file, given.algorithm)
+        if given.settings_file
+        else {}
+    )
     own |= given.settings
     if stored is None or stored.algorithm != given.algorithm:
-        settings = load_settings(given.algorithm, task.environment, task.name, own, task.task.action)
+        settings = load_settings(
+            given.algorithm, task.environment, task.name, own, task.task.action
+        )
     else:
         settings = changed(stored.settings, own)
     kept = {} if stored is None else {name: getattr(stored, name) for name in RUN}
-    asked = {name: getattr(given, name) for name in RUN if getattr(given, name) is not None}
+    asked = {
+        name: getattr(given, name) for name in RUN if getattr(given, name) is not None
+    }
     return Plan(given.algorithm, task, settings, **kept | asked)
 
 
 def _task(given: Given, stored: Plan | None) -> BenchmarkTask:
     """Environment, model and options."""
     named = {"--env": given.environment, "--model": given.model, "--sea": given.sea}
-    beside = [name for name, value in named.items() if value is not None] + ["--option"] * bool(given.options)
+    beside = [name for name, value in named.items() if value is not None] + [
+        "--option"
+    ] * bool(given.options)
     if given.task is not None:
         if beside:
             raise InputError(
-                f"--task: found together with {beside[0]}, which the task sets; leave one of them out"
+                f"--task: found together with {beside[0]}, which the task sets; leave"
+                " one of them out"
             )
         return find_task(given.task)
     if stored is not None and not beside:
         return stored.task
-    before = BenchmarkTask(NO_TASK, "course-keeping", "mariner") if stored is None else stored.task
+    before = (
+        BenchmarkTask(NO_TASK, "course-keeping", "mariner")
+        if stored is None
+        else stored.task
+    )
     environment, variant = read_environment(given.environment or before.environment)
     sea = {} if given.sea is None else {"sea": given.sea}
     options = {**before.options, **variant, **sea, **given.options}
@@ -162,7 +211,10 @@ def _task(given: Given, stored: Plan | None) -> BenchmarkTask:
 def read_environment(name: str) -> tuple[str, dict[str, Any]]:
     """Short name and variant's options of an environment, by name or id; InputError names the nearest one."""
     short_names = {task: short for short, (_, task) in ENVIRONMENTS.items()}
-    ids = {name: (short_names[options.pop("task")], options) for name, options in environments().items()}
+    ids = {
+        name: (short_names[options.pop("task")], options)
+        for name, options in environments().items()
+    }
     known = {short: (short, dict[str, Any]()) for short in ENVIRONMENTS} | ids
     return known[check_choice(name, known, "env")]
 
@@ -170,10 +222,11 @@ def read_environment(name: str) -> tuple[str, dict[str, Any]]:
 def training_options(plan: Plan) -> dict[str, Any]:
     """Keywords of the environment that the ships learn in.
 
-    With `randomise`, or the setting `model_uncertainty`, each episode has a ship drawn from the model's
-    covariance, where it has one; with `randomise` also an approach speed of 0.8 to 1.1 times the service
-    speed, and any of the sea states in which the ship's particulars allow weather to be worked out, the
-    task's own among them and its current in all of them.
+    With `randomise`, or the setting `model_uncertainty`, each episode has a ship drawn
+    from the model's covariance, where it has one; with `randomise` also an approach
+    speed of 0.8 to 1.1 times the service speed, and any of the sea states in which the
+    ship's particulars allow weather to be worked out, the task's own among them and its
+    current in all of them.
     """
     options = dict(plan.task.options)
     ship, task = plan.task.ship, plan.task.task
@@ -200,7 +253,9 @@ def _read(value: Any, name: str) -> Any:
     return [_read(one, name) for one in value] if isinstance(value, list) else value
 
 
-def first_difference(found: Mapping[str, Any], expected: Mapping[str, Any], where: str = "") -> str | None:
+def first_difference(
+    found: Mapping[str, Any], expected: Mapping[str, Any], where: str = ""
+) -> str | None:
     """The first entry in which two configurations differ, with both values; None if they are the same."""
     for name in {**expected, **found}:
         one, other = found.get(name), expected.get(name)
@@ -212,11 +267,13 @@ def first_difference(found: Mapping[str, Any], expected: Mapping[str, Any], wher
     return None
 
 
-def check_same(found: Mapping[str, Any], expected: Mapping[str, Any], where: str) -> None:
+def check_same(
+    found: Mapping[str, Any], expected: Mapping[str, Any], where: str
+) -> None:
     """Refuse to go on with another configuration than that of a run, naming the first difference."""
     check_keys(found, tuple(expected), where)
     if (difference := first_difference(found, expected)) is not None:
         raise InputError(
-            f"{where}: a run of another configuration: {difference}; resume it with its own, or name another "
-            "folder"
+            f"{where}: a run of another configuration: {difference}; resume it with its"
+            " own, or name another folder"
         )

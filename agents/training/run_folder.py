@@ -10,7 +10,15 @@ from agents.output import check_writable, present
 from agents.policies.weights_file import present_names
 from agents.training.plan import Given, Plan, check_same
 from agents.training.settings import LATER
-from shipgym.checks import Shape, check_fields, check_format, check_shape, check_table, data_only, placed
+from shipgym.checks import (
+    Shape,
+    check_fields,
+    check_format,
+    check_shape,
+    check_table,
+    data_only,
+    placed,
+)
 from shipgym.errors import InputError
 from shipgym.files import make_folder, read_json, write_json
 
@@ -19,10 +27,24 @@ RUN, CHECKPOINT, PROGRESS = "run.json", "checkpoint.safetensors", "progress.json
 AGENT, LAST, TENSORBOARD = "agent.json", "last.json", "tensorboard"
 FIELDS = ("format", "configuration", "threads", "command", "versions")
 CONFIGURATION: Shape = {
-    "algorithm": (str,), "task": (str,), "environment": (str,), "model": (str,), "options": {},
-    "settings": {}, "seed": (int,), "randomise": (bool,),
-}  # fmt: skip
-PACKAGES = ("shipgym", "numpy", "numba", "gymnasium", "torch", "stable-baselines3", "sb3-contrib")
+    "algorithm": (str,),
+    "task": (str,),
+    "environment": (str,),
+    "model": (str,),
+    "options": {},
+    "settings": {},
+    "seed": (int,),
+    "randomise": (bool,),
+}
+PACKAGES = (
+    "shipgym",
+    "numpy",
+    "numba",
+    "gymnasium",
+    "torch",
+    "stable-baselines3",
+    "sb3-contrib",
+)
 REMEDY = "start a new run in another folder"
 
 
@@ -43,18 +65,26 @@ def check_new(folder: Path) -> None:
     Raises InputError which says how to go on with a run that is there.
     """
     if (folder / RUN).is_file():
-        raise InputError(f"{folder}: contains a run already; resume it with --resume, or name another folder")
+        raise InputError(
+            f"{folder}: contains a run already; resume it with --resume, or name"
+            " another folder"
+        )
     if folder.exists() and (not folder.is_dir() or present(folder)):
-        raise InputError(f"{folder}: exists and is not a training run; name another folder")
+        raise InputError(
+            f"{folder}: exists and is not a training run; name another folder"
+        )
     check_writable(folder)
 
 
 def begin_folder(folder: Path, plan: Plan, command: str) -> None:
     """Make the folder of a new run; raises InputError if it cannot be written."""
     content = {
-        "format": FORMAT, "configuration": plan.configuration(), "threads": plan.threads, "command": command,
+        "format": FORMAT,
+        "configuration": plan.configuration(),
+        "threads": plan.threads,
+        "command": command,
         "versions": versions(),
-    }  # fmt: skip
+    }
     make_folder(folder)
     write_json(content, folder / RUN)
 
@@ -62,13 +92,17 @@ def begin_folder(folder: Path, plan: Plan, command: str) -> None:
 def read_plan(folder: Path, given: Given | None = None) -> Plan:
     """The run that a folder is of.
 
-    Raises InputError if there is none, its file is broken or names code that the user has not given, or its
-    model has changed since.
+    Raises InputError if there is none, its file is broken or names code that the user
+    has not given, or its model has changed since.
     """
     content = _content(folder)
     where, configuration = f"{folder / RUN}", content["configuration"]
     named = {name: configuration.get(name) for name in ("model", "options")}
-    data_only(named, f"{where}: configuration", given and {"model": given.model, "options": given.options})
+    data_only(
+        named,
+        f"{where}: configuration",
+        given and {"model": given.model, "options": given.options},
+    )
     with placed(where):
         check_shape(configuration, CONFIGURATION, "configuration")
         plan = Plan.from_configuration(configuration, content["threads"])
@@ -86,7 +120,9 @@ def check_resumable(folder: Path, plan: Plan) -> None:
 
 def other_versions(folder: Path) -> list[str]:
     """What was installed in another version when the run began, a line each."""
-    found: Mapping[str, str] = check_table(_content(folder)["versions"], f"{folder / RUN}: versions")
+    found: Mapping[str, str] = check_table(
+        _content(folder)["versions"], f"{folder / RUN}: versions"
+    )
     return [
         f"{name} {now} in place of {found[name]}"
         for name, now in versions().items()
@@ -97,11 +133,15 @@ def other_versions(folder: Path) -> list[str]:
 def _content(folder: Path) -> Mapping[str, Any]:
     path = folder / RUN
     if not path.is_file():
-        raise InputError(f"{folder}: no run of training is there; leave --resume out to begin one")
+        raise InputError(
+            f"{folder}: no run of training is there; leave --resume out to begin one"
+        )
     content = read_json(path, "run file", REMEDY)
     check_fields(content, FIELDS, str(path), REMEDY)
     check_format(content, FORMAT, str(path))
-    configuration = dict(check_table(content["configuration"], f"{path}: configuration"))
+    configuration = dict(
+        check_table(content["configuration"], f"{path}: configuration")
+    )
     if isinstance(settings := configuration.get("settings"), Mapping):
         configuration["settings"] = {**LATER, **present_names(settings)}
     return {**content, "configuration": configuration}

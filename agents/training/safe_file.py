@@ -12,19 +12,28 @@ from shipgym.errors import InputError
 from shipgym.files import check_readable, write_bytes
 
 Arrays = dict[str, Any]
-#: Entries of the file's metadata: what is not an array, as JSON, and the SHA-256 of all.
+#: Entries of the file's metadata: what is not an array, as JSON, and the SHA-256 of
+#: all.
 CONTENT, SHA256 = "content", "sha256"
 DEEPEST = 20  # values within values
 #: What reading anything else raises.
-MALFORMED = (OSError, LookupError, TypeError, ValueError, AttributeError, RecursionError)
+MALFORMED = (
+    OSError,
+    LookupError,
+    TypeError,
+    ValueError,
+    AttributeError,
+    RecursionError,
+)
 TYPES = ("BOOL", "U8", "U32", "U64", "I32", "I64", "F32", "F64")  # of arrays
 
 
 def write_values(value: Any, path: Path) -> None:
     """Write a nested value to a temporary name beside the file, then rename it.
 
-    `value`: dictionaries, lists and tuples of arrays, torch's tensors, numbers, texts and None. Raises
-    InputError if the file cannot be written; TypeError for anything else in it.
+    `value`: dictionaries, lists and tuples of arrays, torch's tensors, numbers, texts
+    and None. Raises InputError if the file cannot be written; TypeError for anything
+    else in it.
     """
     from safetensors.numpy import save
 
@@ -46,14 +55,20 @@ def read_values(path: Path, what: str) -> Any:
         with safe_open(path, "numpy") as file:
             for name in file.keys():  # noqa: SIM118 - it is no mapping
                 if (kind := file.get_slice(name).get_dtype()) not in TYPES:
-                    raise ValueError(f"'{name}' of type {kind}, expected one of {', '.join(TYPES)}")
+                    raise ValueError(
+                        f"'{name}' of type {kind}, expected one of {', '.join(TYPES)}"
+                    )
                 arrays[name] = file.get_tensor(name)
             about = file.metadata()
-        if about.get(SHA256, sha256 := _hash(about[CONTENT], arrays)) != sha256:  # older files have none
+        if (
+            about.get(SHA256, sha256 := _hash(about[CONTENT], arrays)) != sha256
+        ):  # older files have none
             raise ValueError("its SHA-256 is not that of its content")
         return _unpacked(json.loads(about[CONTENT]), arrays)
     except (SafetensorError, *MALFORMED) as error:
-        raise InputError(f"{path}: not a {what}, or one that is cut short ({error})") from None
+        raise InputError(
+            f"{path}: not a {what}, or one that is cut short ({error})"
+        ) from None
 
 
 def _hash(content: str, arrays: Arrays) -> str:
@@ -67,9 +82,9 @@ def _hash(content: str, arrays: Arrays) -> str:
 def check_like(found: Any, own: Any, where: str) -> None:
     """Raise ValueError, naming the first place, unless one value is like another.
 
-    The same names and texts, lists of one length, arrays and tensors of the same type and shape, finite where
-    `own` is finite, numbers of a kind: finite, whole ones not negative. A function in `own` is asked what is
-    expected, of what is found.
+    The same names and texts, lists of one length, arrays and tensors of the same type
+    and shape, finite where `own` is finite, numbers of a kind: finite, whole ones not
+    negative. A function in `own` is asked what is expected, of what is found.
     """
     own = own(found) if callable(own) else own
     told, expected = _kind(found), _kind(own)
@@ -79,16 +94,22 @@ def check_like(found: Any, own: Any, where: str) -> None:
         for name in own:
             place = where + (f".{name}" if isinstance(name, str) else f"[{name}]")
             if name not in found:
-                raise ValueError(f"{place}: nothing found, beside {', '.join(map(str, found))[:200]}")
+                raise ValueError(
+                    f"{place}: nothing found, beside {', '.join(map(str, found))[:200]}"
+                )
             check_like(found[name], own[name], place)
     elif isinstance(own, list | tuple):
         for number, one in enumerate(own):
             check_like(found[number], one, f"{where}[{number}]")
     elif _is_array(own):
         numbers = _as_array(found)
-        if wrong := np.argwhere(np.isfinite(_as_array(own)) & ~np.isfinite(numbers)).tolist():
+        if wrong := np.argwhere(
+            np.isfinite(_as_array(own)) & ~np.isfinite(numbers)
+        ).tolist():
             number = numbers[tuple(wrong[0])]
-            raise ValueError(f"{where}: {number} found at {wrong[0]}, expected a finite number")
+            raise ValueError(
+                f"{where}: {number} found at {wrong[0]}, expected a finite number"
+            )
 
 
 def _is_array(value: Any) -> bool:
@@ -126,7 +147,12 @@ def _packed(value: Any, name: str, arrays: Arrays) -> Any:
         return {"array": name}
     if isinstance(value, dict):
         inner = f"{name}." if name else ""
-        return {"dict": [[key, _packed(one, f"{inner}{key}", arrays)] for key, one in value.items()]}
+        return {
+            "dict": [
+                [key, _packed(one, f"{inner}{key}", arrays)]
+                for key, one in value.items()
+            ]
+        }
     if isinstance(value, list | tuple):
         items = [_packed(one, f"{name}.{i}", arrays) for i, one in enumerate(value)]
         return {"tuple" if isinstance(value, tuple) else "list": items}

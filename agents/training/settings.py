@@ -1,8 +1,9 @@
 """Settings of learning: one frozen dataclass an algorithm, read from TOML as docs/training.md says.
 
-The files in `hyperparameters/` have the tuned ones, later tables before earlier ones: `defaults`, every
-setting of the algorithm to learn from scratch; those that differ beside a base in an environment
-(`residual`), on every task of a suite (`suites`), on one of them (`tasks`).
+The files in `hyperparameters/` have the tuned ones, later tables before earlier ones:
+`defaults`, every setting of the algorithm to learn from scratch; those that differ
+beside a base in an environment (`residual`), on every task of a suite (`suites`), on
+one of them (`tasks`).
 """
 
 from collections.abc import Mapping, Sequence
@@ -13,7 +14,14 @@ from typing import Any, ClassVar
 from agents.controllers.registry import controller_kinds
 from agents.policies.weights_file import as_json, present_names
 from agents.suites.suite import ENVIRONMENTS, suite_of
-from shipgym.checks import check_choice, check_keys, check_number, check_table, check_text, check_whole
+from shipgym.checks import (
+    check_choice,
+    check_keys,
+    check_number,
+    check_table,
+    check_text,
+    check_whole,
+)
 from shipgym.errors import InputError
 from shipgym.files import read_toml, shipped_toml
 from shipgym.tasks.task import ACTIONS
@@ -35,7 +43,9 @@ KNOWN = hyperparameters("settings")
 class Settings:
     """What all algorithms have; a decision lasts `action_repeat` control intervals."""
 
-    section: ClassVar[str] = "all"  # of `hyperparameters/settings.toml`, which says what each setting is
+    section: ClassVar[str] = (
+        "all"  # of `hyperparameters/settings.toml`, which says what each setting is
+    )
 
     total_steps: int
     evaluate_every: int
@@ -56,11 +66,18 @@ class Settings:
 
     def __post_init__(self) -> None:
         for one in fields(self):
-            object.__setattr__(self, one.name, _checked(getattr(self, one.name), one, self.allowed(one.name)))
+            object.__setattr__(
+                self,
+                one.name,
+                _checked(getattr(self, one.name), one, self.allowed(one.name)),
+            )
         if not check_text(self.base, "base").endswith(".json"):
             check_choice(self.base, ("none", "tuned", *controller_kinds()), "base")
         if self.base == "none" and self.authority != 1.0:
-            raise InputError(f"authority: {self.authority:g} found without a base, expected 1, or a base")
+            raise InputError(
+                f"authority: {self.authority:g} found without a base, expected 1, or a"
+                " base"
+            )
         self._check_together()
 
     def _check_together(self) -> None:
@@ -69,7 +86,9 @@ class Settings:
     @classmethod
     def allowed(cls, name: str) -> dict[str, Any]:
         """What is allowed for a setting beside its type, as in `hyperparameters/settings.toml`."""
-        tables = (KNOWN[kind.section] for kind in cls.__mro__ if issubclass(kind, Settings))
+        tables = (
+            KNOWN[kind.section] for kind in cls.__mro__ if issubclass(kind, Settings)
+        )
         known = next(table[name] for table in tables if name in table)
         return {key: value for key, value in known.items() if key != "meaning"}
 
@@ -103,8 +122,8 @@ class PPOSettings(Settings):
         samples = self.ships * self.n_steps
         if samples % self.batch_size or self.batch_size < 2:
             raise InputError(
-                f"batch_size: {self.batch_size} found, expected a divisor above 1 of ships x n_steps, "
-                f"{samples}"
+                f"batch_size: {self.batch_size} found, expected a divisor above 1 of"
+                f" ships x n_steps, {samples}"
             )
 
 
@@ -124,7 +143,8 @@ class OffPolicySettings(Settings):
     def _check_together(self) -> None:
         if self.buffer_size < self.ships:
             raise InputError(
-                f"buffer_size: {self.buffer_size} found, expected one for each of {self.ships} ships at least"
+                f"buffer_size: {self.buffer_size} found, expected one for each of"
+                f" {self.ships} ships at least"
             )
 
 
@@ -164,15 +184,18 @@ class TQCSettings(SACSettings):
         super()._check_together()
         if self.top_quantiles_to_drop >= self.n_quantiles:
             raise InputError(
-                f"top_quantiles_to_drop: {self.top_quantiles_to_drop} found, expected fewer than "
-                f"n_quantiles = {self.n_quantiles}"
+                f"top_quantiles_to_drop: {self.top_quantiles_to_drop} found, expected"
+                f" fewer than n_quantiles = {self.n_quantiles}"
             )
 
 
 #: Settings by algorithm.
 ALGORITHMS: Mapping[str, type[Settings]] = {
-    "ppo": PPOSettings, "sac": SACSettings, "td3": TD3Settings, "tqc": TQCSettings,
-}  # fmt: skip
+    "ppo": PPOSettings,
+    "sac": SACSettings,
+    "td3": TD3Settings,
+    "tqc": TQCSettings,
+}
 
 
 def _checked(value: Any, one: Field[Any], allowed: dict[str, Any]) -> Any:
@@ -184,7 +207,9 @@ def _checked(value: Any, one: Field[Any], allowed: dict[str, Any]) -> Any:
         return check_number(value, name, **allowed)
     if one.type == WIDTHS:
         if isinstance(value, str) or not isinstance(value, Sequence):
-            raise InputError(f"{name}: {value!r} found, expected widths of layers, such as [64, 64]")
+            raise InputError(
+                f"{name}: {value!r} found, expected widths of layers, such as [64, 64]"
+            )
         return tuple(check_whole(width, name, **allowed) for width in value)
     if one.type == NUMBER_OR_WORD:
         return _number_or_word(value, name, allowed)
@@ -201,32 +226,40 @@ def _number_or_word(value: Any, name: str, allowed: dict[str, Any]) -> Any:
         try:
             check_number(float(value.removeprefix(word)), name, above=0.0)
         except (ValueError, InputError):
-            said = f"{name}: {value!r} found, expected a number, '{alone}' or such as '{word}0.1'"
+            said = (
+                f"{name}: {value!r} found, expected a number, '{alone}' or such as"
+                f" '{word}0.1'"
+            )
             raise InputError(said) from None
         return value
     return check_number(value, name, **allowed, hint=f"or '{alone}'")
 
 
 def load_settings(
-    algorithm: str, environment: str = "course-keeping", task: str = "",
-    given: Mapping[str, Any] | None = None, action: str = "rudder",
-) -> Settings:  # fmt: skip
+    algorithm: str,
+    environment: str = "course-keeping",
+    task: str = "",
+    given: Mapping[str, Any] | None = None,
+    action: str = "rudder",
+) -> Settings:
     """The tuned settings of an algorithm, with those given by name replaced.
 
-    Returns settings of the algorithm's class in `ALGORITHMS`. Raises InputError for an unknown algorithm or
-    setting, with the nearest known one, or a value out of its range.
+    Returns settings of the algorithm's class in `ALGORITHMS`. Raises InputError for an
+    unknown algorithm or setting, with the nearest known one, or a value out of its
+    range.
 
     Parameters
     ----------
     algorithm : {"ppo", "sac", "td3", "tqc"}
     environment : {"course-keeping", "path-following", "path-following-v1"}
     task : str
-        Name of a suite's task; one without settings of its own has those of its environment.
+        Name of a suite's task; one without settings of its own has those of its
+        environment.
     given : mapping of str to Any, optional
         Settings by name that go before the tuned ones.
     action : {"rudder", "rudder-discrete", "rudder-shaft"}
-        What is commanded. With others than the rudder, or `base` given as "none", a policy learns from
-        scratch.
+        What is commanded. With others than the rudder, or `base` given as "none", a
+        policy learns from scratch.
     """
     check_choice(algorithm, ALGORITHMS, "algorithm")
     check_choice(environment, ENVIRONMENTS, "environment")
@@ -235,7 +268,11 @@ def load_settings(
     chosen = dict(content["defaults"])
     if action == "rudder" and (given or {}).get("base") != "none":
         followed = environment.removesuffix("-v1")
-        for table, name in (("residual", followed), ("suites", suite_of(task)), ("tasks", task)):
+        for table, name in (
+            ("residual", followed),
+            ("suites", suite_of(task)),
+            ("tasks", task),
+        ):
             chosen |= content.get(table, {}).get(name, {})
     return make_settings(algorithm, chosen | dict(given or {}))
 
@@ -249,7 +286,12 @@ def make_settings(algorithm: str, values: Mapping[str, Any]) -> Settings:
     """Settings by name, all of them; InputError for one unknown or missing, or a value out of its range."""
     kind, where = settings_of(algorithm), f"settings of {algorithm}"
     table = _settings(values, kind, where)
-    check_keys(table, table, where, [one.name for one in fields(kind) if one.default is MISSING])
+    check_keys(
+        table,
+        table,
+        where,
+        [one.name for one in fields(kind) if one.default is MISSING],
+    )
     return kind(**table)
 
 
@@ -260,11 +302,15 @@ def changed(settings: Settings, given: Mapping[str, Any]) -> Settings:
 
 def read_settings_file(path: Path, algorithm: str) -> dict[str, Any]:
     """Settings in a user's own TOML file; InputError if it cannot be read, or names an unknown setting."""
-    return _settings(read_toml(path, "settings file"), settings_of(algorithm), str(path))
+    return _settings(
+        read_toml(path, "settings file"), settings_of(algorithm), str(path)
+    )
 
 
 #: What settings mean that older runs do not have.
-LATER = {one.name: one.default for one in fields(Settings) if one.default is not MISSING}
+LATER = {
+    one.name: one.default for one in fields(Settings) if one.default is not MISSING
+}
 
 
 def _settings(value: Any, kind: type[Settings], where: str) -> dict[str, Any]:
@@ -273,6 +319,10 @@ def _settings(value: Any, kind: type[Settings], where: str) -> dict[str, Any]:
     types = {one.name: one.type for one in fields(kind)}
     check_keys(table, tuple(types), where)
     return {
-        name: float(given) if types[name] in (float, NUMBER_OR_WORD) and type(given) is int else given
+        name: (
+            float(given)
+            if types[name] in (float, NUMBER_OR_WORD) and type(given) is int
+            else given
+        )
         for name, given in table.items()
     }

@@ -1,7 +1,8 @@
 """Training: agents learn on many ships at once, are evaluated on episodes held out, and can be resumed.
 
-A run can be killed at any moment. It goes on at the last boundary between a rollout and the next that was
-kept, and ends with the same policy, bit for bit, as if nothing had happened (same machine, same versions).
+A run can be killed at any moment. It goes on at the last boundary between a rollout and
+the next that was kept, and ends with the same policy, bit for bit, as if nothing had
+happened (same machine, same versions).
 """
 
 import time
@@ -34,9 +35,13 @@ try:
     from agents.training import checkpoints
     from agents.training.algorithms import make_agent, set_deviation
 except ModuleNotFoundError as error:
-    raise InputError(f"{error.name} is not installed, training needs it: pip install 'shipgym[rl]'") from None
+    raise InputError(
+        f"{error.name} is not installed, training needs it: pip install 'shipgym[rl]'"
+    ) from None
 
-REACHED = 1.001  # of LQ's cost: a network that has learned nothing yet adds nearly nothing
+REACHED = (
+    1.001  # of LQ's cost: a network that has learned nothing yet adds nearly nothing
+)
 CHECKPOINT_SECONDS = 45.0  # with a rollout on top a checkpoint is at most a minute old
 
 
@@ -46,13 +51,19 @@ class HeldOut:
     LQ follows paths by the course that the task shows.
     """
 
-    def __init__(self, task: BenchmarkTask, first: int, number: int, threads: int = 1) -> None:
-        self.engine, self.seeds = task.engine(number, threads=threads), first + np.arange(number)
+    def __init__(
+        self, task: BenchmarkTask, first: int, number: int, threads: int = 1
+    ) -> None:
+        self.engine, self.seeds = (
+            task.engine(number, threads=threads),
+            first + np.arange(number),
+        )
         lq = None
         if task.task.action == "rudder":
             with suppress(InputError):
                 lq = design("lq", task)
-        #: Mean cost of LQ designed on the task's ship; None where there is none for her.
+        #: Mean cost of LQ designed on the task's ship; None where there is none for
+        #: her.
         self.lq_cost = None if lq is None else self.cost(lq)
 
     def cost(self, policy: Policy) -> float:
@@ -67,7 +78,8 @@ class Progress(NamedTuple):
     steps: int
     total: int
     seconds: float  # spent so far, those before it was resumed among them
-    #: mean cost of the episodes held out, at the last evaluation, at the best one, and of LQ
+    #: mean cost of the episodes held out, at the last evaluation, at the best one, and
+    #: of LQ
     cost: float | None
     best_cost: float | None
     lq_cost: float | None
@@ -80,9 +92,11 @@ class TrainingResult:
 
     plan: Plan  # the run
     policy: LearnedPolicy  # the best one
-    #: evaluations: steps, seconds, cost on the episodes held out, mean return of those learned from
+    #: evaluations: steps, seconds, cost on the episodes held out, mean return of those
+    #: learned from
     curve: tuple[Mapping[str, Any], ...]
-    best_cost: float  # mean cost of the policy on the episodes held out, which it was chosen by
+    # mean cost of the policy on the episodes held out, which it was chosen by
+    best_cost: float
     #: when the policy was found, and when the training ended
     best_steps: int
     steps: int
@@ -100,22 +114,33 @@ class TrainingResult:
     def to_dict(self) -> dict[str, Any]:
         """For programs."""
         return {
-            "configuration": self.plan.configuration(), "steps": self.steps, "finished": self.finished,
-            "resumed_from": self.resumed_from, "seconds": self.seconds, "best_cost": self.best_cost,
-            "best_steps": self.best_steps, "lq_cost": self.lq_cost, "lq_reached": self.lq_reached,
+            "configuration": self.plan.configuration(),
+            "steps": self.steps,
+            "finished": self.finished,
+            "resumed_from": self.resumed_from,
+            "seconds": self.seconds,
+            "best_cost": self.best_cost,
+            "best_steps": self.best_steps,
+            "lq_cost": self.lq_cost,
+            "lq_reached": self.lq_reached,
             "curve": list(self.curve),
-        }  # fmt: skip
+        }
 
 
 def train(
-    plan: Plan, out: str | Path | None = None, *, resume: bool = False, max_seconds: float | None = None,
-    tell: Callable[[Progress], None] | None = None, command: str | None = None,
-) -> TrainingResult:  # fmt: skip
+    plan: Plan,
+    out: str | Path | None = None,
+    *,
+    resume: bool = False,
+    max_seconds: float | None = None,
+    tell: Callable[[Progress], None] | None = None,
+    command: str | None = None,
+) -> TrainingResult:
     """Train an agent.
 
-    Raises InputError if another process uses the folder; if it holds something already, or, to resume,
-    nothing or a run of another configuration; if the ship and the settings do not go together; or if the
-    networks diverge.
+    Raises InputError if another process uses the folder; if it holds something already,
+    or, to resume, nothing or a run of another configuration; if the ship and the
+    settings do not go together; or if the networks diverge.
 
     Parameters
     ----------
@@ -135,15 +160,24 @@ def train(
     folder = None if out is None else Path(out)
     if resume and folder is None:
         raise InputError("resume: found without a folder, expected the one of the run")
-    with _torch_threads(plan.threads), nullcontext() if folder is None else in_use(folder):
+    with (
+        _torch_threads(plan.threads),
+        nullcontext() if folder is None else in_use(folder),
+    ):
         if folder is None:
             return _Training(plan, None, tell, max_seconds).run()
-        run_folder.check_resumable(folder, plan) if resume else run_folder.check_new(folder)
+        (
+            run_folder.check_resumable(folder, plan)
+            if resume
+            else run_folder.check_new(folder)
+        )
         training = _Training(plan, folder, tell, max_seconds)
         if resume:
             training.restore(folder / run_folder.CHECKPOINT)
         else:
-            run_folder.begin_folder(folder, plan, command or f"train({plan.algorithm!r})")
+            run_folder.begin_folder(
+                folder, plan, command or f"train({plan.algorithm!r})"
+            )
         return training.run()
 
 
@@ -155,11 +189,19 @@ class _Training(BaseCallback):  # type: ignore[misc]  # stable-baselines3 is not
     """A training under way, which is called at each boundary between an update and the next rollout."""
 
     def __init__(
-        self, plan: Plan, folder: Path | None, tell: Callable[[Progress], None] | None,
+        self,
+        plan: Plan,
+        folder: Path | None,
+        tell: Callable[[Progress], None] | None,
         max_seconds: float | None,
-    ) -> None:  # fmt: skip
+    ) -> None:
         super().__init__()
-        self.plan, self.folder, self.tell, self.max_seconds = plan, folder, tell, max_seconds
+        self.plan, self.folder, self.tell, self.max_seconds = (
+            plan,
+            folder,
+            tell,
+            max_seconds,
+        )
         self.started = time.monotonic()
         base = design_base(plan.settings.base, plan.task)
         self.held_out = HeldOut(plan.task, EVALUATION_SEED, N_EVALUATIONS, plan.threads)
@@ -178,9 +220,13 @@ class _Training(BaseCallback):  # type: ignore[misc]  # stable-baselines3 is not
         try:
             if left > 0:
                 self.agent.learn(left, self, reset_num_timesteps=False)
-        except _TimeIsUpError:  # kept, and no evaluation that a run without an end would not have
+        except (
+            _TimeIsUpError
+        ):  # kept, and no evaluation that a run without an end would not have
             return self._result(finished=False)
-        except ValueError as error:  # torch refuses to draw from a distribution that is not one
+        except (
+            ValueError
+        ) as error:  # torch refuses to draw from a distribution that is not one
             if "invalid values" not in str(error):
                 raise
             raise self._diverged() from error
@@ -192,20 +238,28 @@ class _Training(BaseCallback):  # type: ignore[misc]  # stable-baselines3 is not
     def _diverged(self) -> InputError:
         steps = self.agent.num_timesteps
         return InputError(
-            f"training diverged after {steps} steps: the network's weights are not finite; "
-            "lower learning_rate, or raise reward_scale"
+            f"training diverged after {steps} steps: the network's weights are not"
+            " finite; lower learning_rate, or raise reward_scale"
         )
 
     def _result(self, finished: bool) -> TrainingResult:
         self.agent.logger.close()
         policy: Any = self.policy
-        if policy is None and self.folder is not None:  # found before the run was resumed
+        if (
+            policy is None and self.folder is not None
+        ):  # found before the run was resumed
             policy = load_agent(self.folder / run_folder.AGENT)
         found = self.found | {"curve": tuple(self.found["curve"])}
         return TrainingResult(
-            self.plan, policy, steps=self.agent.num_timesteps, lq_cost=self.held_out.lq_cost,
-            seconds=self.seconds, finished=finished, resumed_from=self.resumed_from, **found,
-        )  # fmt: skip
+            self.plan,
+            policy,
+            steps=self.agent.num_timesteps,
+            lq_cost=self.held_out.lq_cost,
+            seconds=self.seconds,
+            finished=finished,
+            resumed_from=self.resumed_from,
+            **found,
+        )
 
     def _evaluated(self, name: str, otherwise: Any) -> Any:
         """A figure of the last evaluation."""
@@ -232,20 +286,30 @@ class _Training(BaseCallback):  # type: ignore[misc]  # stable-baselines3 is not
         if time.monotonic() - self.kept_at >= CHECKPOINT_SECONDS:
             self.keep()
         set_deviation(self.agent, self.plan.settings)
-        if self.max_seconds is not None and time.monotonic() - self.started >= self.max_seconds:
+        if (
+            self.max_seconds is not None
+            and time.monotonic() - self.started >= self.max_seconds
+        ):
             self.keep()
             raise _TimeIsUpError
 
     def evaluate(self) -> None:
         """Run the held-out episodes; keep the policy if it is the best."""
         steps = self.agent.num_timesteps
-        if not all(bool(weight.isfinite().all()) for weight in self.agent.policy.parameters()):
+        if not all(
+            bool(weight.isfinite().all()) for weight in self.agent.policy.parameters()
+        ):
             raise self._diverged()
         policy = LearnedPolicy.from_sb3(self.agent)
         cost = self.held_out.cost(policy)
         returns = [episode["r"] for episode in self.agent.ep_info_buffer]
         mean = sum(returns) / len(returns) if returns else None
-        row = {"steps": steps, "seconds": round(self.seconds, 3), "cost": cost, "mean_return": mean}
+        row = {
+            "steps": steps,
+            "seconds": round(self.seconds, 3),
+            "cost": cost,
+            "mean_return": mean,
+        }
         self.found["curve"].append(row)
         self.agent.logger.record("evaluation/cost", cost)
         policy = replace(policy, training=self._record())
@@ -256,20 +320,27 @@ class _Training(BaseCallback):  # type: ignore[misc]  # stable-baselines3 is not
         if self.folder is not None:
             for name in [run_folder.LAST] + [run_folder.AGENT] * best:
                 policy.save(self.folder / name)
-            write_json({"lq_cost": self.held_out.lq_cost, **self.found}, self.folder / run_folder.PROGRESS)
+            write_json(
+                {"lq_cost": self.held_out.lq_cost, **self.found},
+                self.folder / run_folder.PROGRESS,
+            )
 
     def _record(self) -> dict[str, Any]:
         """How a policy was made; without times, so that the same run writes the same file."""
         plan = self.plan
         return {
             **plan.configuration(),
-            "training_seeds": [plan.training_seed, plan.training_seed + plan.settings.ships - 1],
+            "training_seeds": [
+                plan.training_seed,
+                plan.training_seed + plan.settings.ships - 1,
+            ],
             "evaluation_seeds": [EVALUATION_SEED, EVALUATION_SEED + N_EVALUATIONS - 1],
             "steps": self.agent.num_timesteps,
-            "cost": self._evaluated("cost", None), "lq_cost": self.held_out.lq_cost,
+            "cost": self._evaluated("cost", None),
+            "lq_cost": self.held_out.lq_cost,
             "curve": [[row["steps"], row["cost"]] for row in self.found["curve"]],
             "versions": run_folder.versions(),
-        }  # fmt: skip
+        }
 
     def keep(self) -> None:
         """Write the run as it is, whole or not at all."""
@@ -277,7 +348,10 @@ class _Training(BaseCallback):  # type: ignore[misc]  # stable-baselines3 is not
         if self.folder is None:
             return
         own = {**self.found, "seconds": self.seconds}
-        write_values({"run": own, "agent": checkpoints.take(self.agent)}, self.folder / run_folder.CHECKPOINT)
+        write_values(
+            {"run": own, "agent": checkpoints.take(self.agent)},
+            self.folder / run_folder.CHECKPOINT,
+        )
 
     def restore(self, checkpoint: Path) -> None:
         """Resume from a checkpoint; a run that was killed before its first one starts again."""
@@ -292,8 +366,12 @@ class _Training(BaseCallback):  # type: ignore[misc]  # stable-baselines3 is not
             self.found = {name: own[name] for name in self.found}
             self.seconds_before = own["seconds"]
         except (KeyError, TypeError, ValueError, RuntimeError, AttributeError) as error:
-            why = str(error).partition("\n")[0].rstrip(" :")  # torch lists every network's layer after it
-            raise InputError(f"{checkpoint}: does not fit this run ({why}); start a new run") from None
+            why = (
+                str(error).partition("\n")[0].rstrip(" :")
+            )  # torch lists every network's layer after it
+            raise InputError(
+                f"{checkpoint}: does not fit this run ({why}); start a new run"
+            ) from None
         self.resumed_from = self.agent.num_timesteps
 
 
@@ -312,5 +390,7 @@ def _logger(folder: Path | None) -> Logger:
     formats: list[Any] = []
     if folder is not None:
         with suppress(ImportError, AssertionError):
-            formats.append(TensorBoardOutputFormat(str(folder / run_folder.TENSORBOARD)))
+            formats.append(
+                TensorBoardOutputFormat(str(folder / run_folder.TENSORBOARD))
+            )
     return Logger(None, formats)

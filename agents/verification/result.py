@@ -31,10 +31,14 @@ STEP_DEG = 20.0
 class Pilot:
     """One autopilot and what it costs over the models drawn."""
 
-    key: str  # its name in metrics, no other's: that of the controller, with a number where there are several
+    # its name in metrics, no other's: that of the controller, with a number where there
+    # are several
+    key: str
     controller: Agent  # with gains and margins if it is a Controller
     episodes: Episodes  # one episode on each model drawn
-    step: StepResponses  # of the identified model, first, and of the stable models drawn
+    step: (
+        StepResponses  # of the identified model, first, and of the stable models drawn
+    )
 
     @property
     def name(self) -> str:
@@ -53,14 +57,20 @@ class Verification:
 
     draws: int  # number of models drawn from the coefficient covariance
     seed: int  # of the draw and of the episodes
-    manoeuvres: ManoeuvreUncertainty  # indices and IMO criteria of the model and its draws
+    manoeuvres: (
+        ManoeuvreUncertainty  # indices and IMO criteria of the model and its draws
+    )
     #: draws that do not hold a straight course with the rudder held, shape (n_draws,)
     course_unstable: NDArray[np.bool_]
     nomoto: Nomoto  # of the identified model
     pilots: tuple[Pilot, ...]  # ranked, the lowest mean cost first
-    refused: dict[str, str]  # autopilots that could not be designed on the model, and why
+    refused: dict[
+        str, str
+    ]  # autopilots that could not be designed on the model, and why
     tracks: tuple[Track, ...] = ()  # of autopilots that keep to a track
-    standards: tuple[Row, ...] = ()  # what the standards of heading and track control ask for
+    standards: tuple[
+        Row, ...
+    ] = ()  # what the standards of heading and track control ask for
 
     @property
     def by_name(self) -> list[Pilot]:
@@ -77,7 +87,10 @@ class AutopilotResult:
     identification: IdentificationResult  # the model and its predictions
     instability: str | None  # why the model must not be used; None where it is stable
     verification: Verification | None  # none where the model is unstable or refused
-    refusal: str | None = None  # why no autopilot is given although the model is stable, and what would help
+    refusal: str | None = (
+        # why no autopilot is given although the model is stable, and what would help
+        None
+    )
 
     @property
     def model(self) -> ShipModel:
@@ -94,9 +107,14 @@ class AutopilotResult:
         """The contents of metrics.json."""
         result = self.identification
         metrics: dict[str, Any] = {
-            **result.metrics, "stable": self.stable, "instability": self.instability, "refusal": self.refusal,
-            "diagnostics": {name: found.to_dict() for name, found in result.diagnostics.items()},
-        }  # fmt: skip
+            **result.metrics,
+            "stable": self.stable,
+            "instability": self.instability,
+            "refusal": self.refusal,
+            "diagnostics": {
+                name: found.to_dict() for name, found in result.diagnostics.items()
+            },
+        }
         if self.verification is not None:
             metrics |= verification_metrics(self.verification)
         return metrics
@@ -112,12 +130,17 @@ def verification_metrics(found: Verification) -> dict[str, Any]:
             "course_unstable": int(found.course_unstable.sum()),
         },
         "nomoto": {name: finite(value) for name, value in asdict(found.nomoto).items()},
-        "imo": {name: criterion.to_dict() for name, criterion in found.manoeuvres.criteria.items()},
+        "imo": {
+            name: criterion.to_dict()
+            for name, criterion in found.manoeuvres.criteria.items()
+        },
         "controllers": {pilot.key: pilot_metrics(pilot) for pilot in found.pilots},
         "ranking": [pilot.key for pilot in found.pilots],
         "refused": found.refused,
         "tracks": {track.key: track_metrics(track) for track in found.tracks},
-        "standards": {row.name: {**asdict(row), "passed": row.passed} for row in found.standards},
+        "standards": {
+            row.name: {**asdict(row), "passed": row.passed} for row in found.standards
+        },
     }
 
 
@@ -126,22 +149,31 @@ def track_metrics(track: Track) -> dict[str, Any]:
     drawn = track.largest[1:] if len(track.largest) > 1 else track.largest
     return {
         "gains": {name: float(value) for name, value in track.controller.gains.items()},
-        "cross_track_largest_m": float(track.largest[0]), "cross_track_rmse_m": float(track.rms[0]),
+        "cross_track_largest_m": float(track.largest[0]),
+        "cross_track_rmse_m": float(track.rms[0]),
         "cross_track_largest_m_quantile_95": float(np.quantile(drawn, 0.95)),
-        "arrived": bool(track.arrived[0]), "not_arrived": int(np.sum(~track.arrived[1:])),
-    }  # fmt: skip
+        "arrived": bool(track.arrived[0]),
+        "not_arrived": int(np.sum(~track.arrived[1:])),
+    }
 
 
 def pilot_metrics(pilot: Pilot) -> dict[str, Any]:
     """Gains and margins of one autopilot, null if it is learned, and its episodes over the models drawn."""
     episodes, design = pilot.episodes, pilot.design
     return {
-        "gains": design and {name: float(value) for name, value in design.gains.items()},
-        "margins": design and {name: finite(value) for name, value in asdict(design.margins).items()},
+        "gains": (
+            design and {name: float(value) for name, value in design.gains.items()}
+        ),
+        "margins": (
+            design
+            and {name: finite(value) for name, value in asdict(design.margins).items()}
+        ),
         "cost_mean": float(np.mean(episodes.cost)),
         "cost_quantile_95": float(np.quantile(episodes.cost, 0.95)),
         "heading_rmse_deg_mean": float(np.mean(episodes.heading_rmse_deg)),
-        "heading_rmse_deg_quantile_95": float(np.quantile(episodes.heading_rmse_deg, 0.95)),
+        "heading_rmse_deg_quantile_95": float(
+            np.quantile(episodes.heading_rmse_deg, 0.95)
+        ),
         "rudder_travel_deg_min_mean": float(np.mean(episodes.rudder_travel_deg_min)),
         "extrapolating_mean": float(np.mean(episodes.extrapolating)),
         "lost_control": int(np.sum(episodes.terminated)),

@@ -1,7 +1,8 @@
 """What a simulation shows of the standards of heading control (ISO 11674) and track control (IEC 62065).
 
-The identified ship is steered as `shipgym steer` would, by readings of her instruments instead of sentences.
-Topics, and the limits that are used, stand in `standards.toml`. No type approval follows from it.
+The identified ship is steered as `shipgym steer` would, by readings of her instruments
+instead of sentences. Topics, and the limits that are used, stand in `standards.toml`.
+No type approval follows from it.
 """
 
 from collections.abc import Sequence
@@ -27,10 +28,18 @@ from shipgym.sea.conditions import sea_states
 from shipgym.sea.waves import encounter_frequency
 from shipgym.ships import ShipModel
 
-REQUIREMENTS = read_toml(Path(__file__).with_name("standards.toml"), "table of standards")
-LENGTHS = 40.0  # of a run, times to travel a ship length; the first quarter does not count for keeping
+REQUIREMENTS = read_toml(
+    Path(__file__).with_name("standards.toml"), "table of standards"
+)
+# of a run, times to travel a ship length; the first quarter does not count for keeping
+LENGTHS = 40.0
 PER_INTERVAL = 2  # steps of the simulation in a control interval
-TURN_DEG, RUDDER_DEG, OFF_TRACK_M, LOST_S = 30.0, 10.0, 50.0, 60.0  # settings; when a sensor falls silent
+TURN_DEG, RUDDER_DEG, OFF_TRACK_M, LOST_S = (
+    30.0,
+    10.0,
+    50.0,
+    60.0,
+)  # settings; when a sensor falls silent
 
 
 @dataclass(frozen=True)
@@ -67,7 +76,9 @@ class Run(NamedTuple):
     alarm_at: float  # s, one interval after the last that was steered
 
 
-def run(helm: Helm, ship: SimulatedShip, seconds: float, lost: Sequence[str] = ()) -> Run:
+def run(
+    helm: Helm, ship: SimulatedShip, seconds: float, lost: Sequence[str] = ()
+) -> Run:
     """Steer a ship until the autopilot hands over; the quantities in `lost` fall silent after `LOST_S`."""
     dt, given, warnings = helm.pilot.dt, list[dict[str, Any]](), list[list[str]]()
     rows: list[tuple[float, ...]] = []
@@ -81,7 +92,9 @@ def run(helm: Helm, ship: SimulatedShip, seconds: float, lost: Sequence[str] = (
         if helm.alarm:
             break
         off = np.degrees((helm.heading or 0.0) - known["heading"])
-        rows.append((now, off, known["yaw_rate"], *np.degrees([known["rudder"], helm.order])))
+        rows.append(
+            (now, off, known["yaw_rate"], *np.degrees([known["rudder"], helm.order]))
+        )
         given.append(helm.given(now))
         warnings.append(helm.warnings)
         ship.order = helm.order
@@ -92,7 +105,9 @@ def run(helm: Helm, ship: SimulatedShip, seconds: float, lost: Sequence[str] = (
     return Run(t, error, rate, rudder, order, given, warnings, helm.alarm, alarm_at)
 
 
-def standards(model: ShipModel, pilot: Controller, tracks: Sequence[Track]) -> list[Row]:
+def standards(
+    model: ShipModel, pilot: Controller, tracks: Sequence[Track]
+) -> list[Row]:
     """Each requirement for a heading autopilot, and for the first of the path autopilots on a ship.
 
     What the ship's particulars do not allow, such as waves, has no value.
@@ -100,13 +115,24 @@ def standards(model: ShipModel, pilot: Controller, tracks: Sequence[Track]) -> l
     found = heading_control(model, pilot) | _sea(model, pilot) | _rate_of_turn(model)
     found |= track_control(model, tracks[0]) if tracks else {}
     rows = {name: {"least": False, **about} for name, about in REQUIREMENTS.items()}
-    return [Row(name=name, **about, value=found.get(name)) for name, about in rows.items()]
+    return [
+        Row(name=name, **about, value=found.get(name)) for name, about in rows.items()
+    ]
 
 
-def kept(model: ShipModel, pilot: Controller, sea: str = "calm", heading: float = 0.0, **more: Any) -> Run:
+def kept(
+    model: ShipModel,
+    pilot: Controller,
+    sea: str = "calm",
+    heading: float = 0.0,
+    **more: Any,
+) -> Run:
     """Steer a ship to a heading, deg, from straight running; `more`: limits, rate, what falls silent."""
     lost, step = more.pop("lost", ()), pilot.design["dt"] / PER_INTERVAL
-    ship, limits = SimulatedShip(model, weather=sea, seed=1, step=step), more.pop("limits", Limits())
+    ship, limits = (
+        SimulatedShip(model, weather=sea, seed=1, step=step),
+        more.pop("limits", Limits()),
+    )
     helm = Helm(pilot, None if "rate" in more else radians(heading), limits, **more)
     return run(helm, ship, LENGTHS * model.travel_time, lost)
 
@@ -118,24 +144,40 @@ def heading_control(model: ShipModel, pilot: Controller) -> dict[str, float]:
     return {
         "heading_calm": float(np.abs(_settled(kept(model, pilot).error)).max()),
         "overshoot": max(0.0, float(-turn.error.min())),
-        "rudder_limit": float(np.abs(small.order).max()) if abs(small.error[-1]) < 1.0 else np.inf,
-        "off_heading": _unwarned(turn, np.abs(turn.error), "off heading") - narrow.off_heading_deg,
+        "rudder_limit": (
+            float(np.abs(small.order).max()) if abs(small.error[-1]) < 1.0 else np.inf
+        ),
+        "off_heading": (
+            _unwarned(turn, np.abs(turn.error), "off heading") - narrow.off_heading_deg
+        ),
         "heading_lost": kept(model, pilot, lost=["heading"]).alarm_at - LOST_S,
     }
 
 
 def _sea(model: ShipModel, pilot: Controller) -> dict[str, float]:
     """Values of heading control in a seaway; none where the particulars do not tell what waves do."""
-    seas, wave = ("moderate", "rough"), 2.0 * np.pi / sea_states()["moderate"].peak_period
-    met = encounter_frequency(wave, model.particulars["speed"], radians(45.0))  # from north-east
+    seas, wave = (
+        ("moderate", "rough"),
+        2.0 * np.pi / sea_states()["moderate"].peak_period,
+    )
+    met = encounter_frequency(
+        wave, model.particulars["speed"], radians(45.0)
+    )  # from north-east
     period = 2.0 * np.pi / float(met)
     try:
         errors = {sea: _settled(kept(model, pilot, sea).error) for sea in seas}
-        found = {f"heading_{sea}": float(np.sqrt(np.mean(e**2))) for sea, e in errors.items()}
-        pilots = [FilteredPID.from_model(model, wave_period=one) for one in (period, None)]
+        found = {
+            f"heading_{sea}": float(np.sqrt(np.mean(e**2))) for sea, e in errors.items()
+        }
+        pilots = [
+            FilteredPID.from_model(model, wave_period=one) for one in (period, None)
+        ]
     except InputError:
         return {}
-    travel = [np.abs(np.diff(_settled(kept(model, one, "moderate").rudder))).sum() for one in pilots]
+    travel = [
+        np.abs(np.diff(_settled(kept(model, one, "moderate").rudder))).sum()
+        for one in pilots
+    ]
     return {**found, "sea_state": float(travel[0] / travel[1])}
 
 
@@ -157,11 +199,18 @@ def track_control(model: ShipModel, track: Track) -> dict[str, float]:
     along = _on_track(model, track, limits)
     before, last = (one["next_turn_distance"] for one in along.given[-2:])
     ended = along.t[-1] + last / (before - last) * guide.design["dt"]
-    to_go = np.array([one["next_turn_distance"] if one["next_turn_angle"] else np.nan for one in along.given])
+    to_go = np.array(
+        [
+            one["next_turn_distance"] if one["next_turn_angle"] else np.nan
+            for one in along.given
+        ]
+    )
     begun = np.flatnonzero((to_go[:-1] > reach) & (to_go[1:] <= reach)) + 1
     told = np.array(["course change ahead" in one for one in along.warnings])
     quiet = [np.flatnonzero(~told[:k]) for k in begun]
-    leads = [along.t[k] - along.t[q[-1]] for k, q in zip(begun, quiet, strict=True) if len(q)]
+    leads = [
+        along.t[k] - along.t[q[-1]] for k, q in zip(begun, quiet, strict=True) if len(q)
+    ]
     aside = _on_track(model, track, limits, aside=3.0 * OFF_TRACK_M)
     off = np.array([abs(one["cross_track"]) for one in aside.given])
     lost = _on_track(model, track, limits, lost=("latitude", "longitude"))
@@ -171,11 +220,17 @@ def track_control(model: ShipModel, track: Track) -> dict[str, float]:
         "early_indication": min(leads, default=0.0),
         "off_track": _unwarned(aside, off, "off track") - OFF_TRACK_M,
         "position_lost": lost.alarm_at - LOST_S,
-        "route_ended": float(along.alarm_at - ended) if "end of the route" in along.alarm else np.inf,
+        "route_ended": (
+            float(along.alarm_at - ended)
+            if "end of the route" in along.alarm
+            else np.inf
+        ),
     }
 
 
-def _on_track(model: ShipModel, track: Track, limits: Limits, aside: float = 0.0, **more: Any) -> Run:
+def _on_track(
+    model: ShipModel, track: Track, limits: Limits, aside: float = 0.0, **more: Any
+) -> Run:
     """Keep a ship to a track, from a distance to starboard of where it begins, m."""
     north, east = track.waypoints.T / MINUTE / 60.0
     latitude = START[0] + north
@@ -184,7 +239,12 @@ def _on_track(model: ShipModel, track: Track, limits: Limits, aside: float = 0.0
     step = track.controller.design["dt"] / PER_INTERVAL
     ship = SimulatedShip(model, weather=track_task(model).weather, step=step)
     ship.states[0, model.state_names.index("y")] = aside
-    return run(Helm(track.controller, None, limits, route), ship, 3.0 * LENGTHS * model.travel_time, **more)
+    return run(
+        Helm(track.controller, None, limits, route),
+        ship,
+        3.0 * LENGTHS * model.travel_time,
+        **more,
+    )
 
 
 def _unwarned(found: Run, size: Floats, text: str) -> float:

@@ -33,19 +33,32 @@ class Steersman:
     ) -> tuple[NDArray[np.float32], None]:
         """Rudder for each ship, as a share of its limit; deterministic always."""
         with torch.no_grad():
-            answer = self.module.forward_inference({"obs": torch.as_tensor(observation)})
-        mean = answer["action_dist_inputs"][:, :1]  # the logarithm of the deviation follows
+            answer = self.module.forward_inference(
+                {"obs": torch.as_tensor(observation)}
+            )
+        mean = answer["action_dist_inputs"][
+            :, :1
+        ]  # the logarithm of the deviation follows
         return np.clip(mean.numpy(), -1.0, 1.0), None
 
 
 def main() -> None:
     """Train for some iterations, then run the same 100 episodes as LQ."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--model", default="mariner", help="name of a shipped model, or a model file")
+    parser.add_argument(
+        "--model", default="mariner", help="name of a shipped model, or a model file"
+    )
     parser.add_argument("--iterations", type=int, default=12)
-    parser.add_argument("--runners", type=int, default=0, help="processes that sail; 0: this one")
-    parser.add_argument("--address", help="of a Ray cluster on which shipgym is installed; auto: this one's")
-    parser.add_argument("--nodes", type=int, default=0, help="start a cluster of so many nodes here")
+    parser.add_argument(
+        "--runners", type=int, default=0, help="processes that sail; 0: this one"
+    )
+    parser.add_argument(
+        "--address",
+        help="of a Ray cluster on which shipgym is installed; auto: this one's",
+    )
+    parser.add_argument(
+        "--nodes", type=int, default=0, help="start a cluster of so many nodes here"
+    )
     options = parser.parse_args()
     logging.getLogger("ray").setLevel(logging.ERROR)
     if options.nodes:
@@ -54,12 +67,17 @@ def main() -> None:
             cluster.add_node(num_cpus=1)
         options.address = cluster.address
     ray.init(address=options.address or "local", log_to_driver=False)
-    register_env("course-keeping", lambda config: gym.make("shipgym:shipgym/CourseKeeping-v0", **config))
+    register_env(
+        "course-keeping",
+        lambda config: gym.make("shipgym:shipgym/CourseKeeping-v0", **config),
+    )
     config = (
         PPOConfig()
         .environment("course-keeping", env_config={"model": options.model})
         .env_runners(
-            num_env_runners=options.runners, num_envs_per_env_runner=16, rollout_fragment_length="auto"
+            num_env_runners=options.runners,
+            num_envs_per_env_runner=16,
+            rollout_fragment_length="auto",
         )
         .training(
             lr=1e-3,
@@ -74,26 +92,40 @@ def main() -> None:
     )
     algorithm = config.build_algo()
     places = algorithm.env_runner_group.foreach_env_runner(
-        lambda _: ray.get_runtime_context().get_node_id(), local_env_runner=not options.runners
+        lambda _: ray.get_runtime_context().get_node_id(),
+        local_env_runner=not options.runners,
     )
     print(f"{len(places)} processes sail on {len(set(places))} nodes", flush=True)
     begin = time.perf_counter()
     for iteration in range(1, options.iterations + 1):
         found = algorithm.train()["env_runners"]
         episode = found.get("episode_return_mean")
-        told = "of no episode" if episode is None or np.isnan(episode) else f"{episode:.2f}"
+        told = (
+            "of no episode"
+            if episode is None or np.isnan(episode)
+            else f"{episode:.2f}"
+        )
         print(
-            f"iteration {iteration}: {found['num_env_steps_sampled_lifetime']:.0f} steps, mean return {told}",
+            f"iteration {iteration}: {found['num_env_steps_sampled_lifetime']:.0f}"
+            f" steps, mean return {told}",
             flush=True,
         )
     seconds = time.perf_counter() - begin
-    print(f"{found['num_env_steps_sampled_lifetime'] / seconds:.0f} steps per second, {seconds:.0f} s")
+    print(
+        f"{found['num_env_steps_sampled_lifetime'] / seconds:.0f} steps per second,"
+        f" {seconds:.0f} s"
+    )
     ship = shipgym.load_model(options.model)
     seeds = 1_000_000 + np.arange(100)
-    for name, controller in (("RLlib PPO", Steersman(algorithm.get_module())), ("LQ", LQ.from_model(ship))):
+    for name, controller in (
+        ("RLlib PPO", Steersman(algorithm.get_module())),
+        ("LQ", LQ.from_model(ship)),
+    ):
         episodes = sail(controller, ship, seeds=seeds)
         rmse = episodes.heading_rmse_deg.mean()
-        print(f"{name}: mean cost {episodes.cost.mean():.3f}, heading rmse {rmse:.2f} deg")
+        print(
+            f"{name}: mean cost {episodes.cost.mean():.3f}, heading rmse {rmse:.2f} deg"
+        )
     algorithm.stop()
     ray.shutdown()
     if options.nodes:

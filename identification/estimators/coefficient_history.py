@@ -40,7 +40,9 @@ class CoefficientHistory:
         """The history of one coefficient, shape (n_rows,)."""
         if name not in self.names:
             expected = f"expected one of {', '.join(self.names)}"
-            raise InputError(f"coefficient history: no coefficient {name!r}, {expected}")
+            raise InputError(
+                f"coefficient history: no coefficient {name!r}, {expected}"
+            )
         return self.values[:, self.names.index(name)]
 
     @property
@@ -50,9 +52,14 @@ class CoefficientHistory:
 
 
 def coefficient_history(
-    source: Samples | Trial | Sequence[Trial], structure: str | Structure, particulars: Particulars,
-    method: str | Recursion = "rls", *, shaft_speed: float = 0.0, **sampling: Any,
-) -> CoefficientHistory:  # fmt: skip
+    source: Samples | Trial | Sequence[Trial],
+    structure: str | Structure,
+    particulars: Particulars,
+    method: str | Recursion = "rls",
+    *,
+    shaft_speed: float = 0.0,
+    **sampling: Any,
+) -> CoefficientHistory:
     """Run a recursive method over trials and keep every estimate.
 
     Raises InputError for a method that is not recursive.
@@ -64,8 +71,8 @@ def coefficient_history(
     structure : str or Structure
         Terms of the model.
     particulars : Particulars
-        Length and service speed, and for structures of forces mass and added mass or what they are
-        estimated from.
+        Length and service speed, and for structures of forces mass and added mass or
+        what they are estimated from.
     method : {"rls", "sg", "nisg", "mils", "tmils"} or Recursion
         The method; an estimator brings its own settings.
     shaft_speed : float
@@ -77,12 +84,20 @@ def coefficient_history(
     estimator = get_method(method).estimator() if isinstance(method, str) else method
     if not isinstance(estimator, Recursion):
         raise InputError(
-            f"method: {method!r} found, which fits all samples at once; expected a recursive one"
+            f"method: {method!r} found, which fits all samples at once; expected a"
+            " recursive one"
         )
     ship = particulars.completed() if table.quantity == "force" else particulars
     if not isinstance(source, Samples):
         trials = [source] if isinstance(source, Trial) else list(source)
         source = build_samples(trials, table, ship, shaft_speed=shaft_speed, **sampling)
-    found = [clone(estimator).fit_history(source.features[q], source.targets[q]) for q in table.regressed]
-    values = np.linalg.solve(table.acceleration_matrix(ship, shaft_speed), np.hstack(found).T).T
-    return CoefficientHistory(table.coefficient_names, source.start + source.duration, source.trial, values)
+    found = [
+        clone(estimator).fit_history(source.features[q], source.targets[q])
+        for q in table.regressed
+    ]
+    values = np.linalg.solve(
+        table.acceleration_matrix(ship, shaft_speed), np.hstack(found).T
+    ).T
+    return CoefficientHistory(
+        table.coefficient_names, source.start + source.duration, source.trial, values
+    )

@@ -1,10 +1,11 @@
 """One decomposition from which the solutions for every rank and penalty follow.
 
-The samples are reduced once to the triangle R of an orthogonal decomposition of [1 X y], which has as many
-rows as columns whatever the number of samples: residuals have the norm of R [b; w; -1].
-Its first row holds the means; the rest is the triangle of the centred features and targets, of which
-the singular value decomposition costs nothing. Triangles of parts of the data, stacked, have the triangle of
-the whole. X'X would be as small but loses half of the digits.
+The samples are reduced once to the triangle R of an orthogonal decomposition of [1 X
+y], which has as many rows as columns whatever the number of samples: residuals have the
+norm of R [b; w; -1]. Its first row holds the means; the rest is the triangle of the
+centred features and targets, of which the singular value decomposition costs nothing.
+Triangles of parts of the data, stacked, have the triangle of the whole. X'X would be as
+small but loses half of the digits.
 """
 
 from collections.abc import Sequence
@@ -18,7 +19,9 @@ from identification.estimators.threads import single_threaded
 from shipgym import InputError
 from shipgym.arrays import Floats
 
-CONSTANT = 100 * np.finfo(float).eps  # of its size; a feature that varies less is constant but for rounding
+CONSTANT = (
+    100 * np.finfo(float).eps
+)  # of its size; a feature that varies less is constant but for rounding
 BLOCK = 32  # columns that LAPACK handles at once
 
 
@@ -39,7 +42,11 @@ class Decomposition:
     @property
     def numerical_rank(self) -> int:
         """Number of directions above rounding, at least 1."""
-        rounding = max(self.n_samples, len(self.scale)) * np.finfo(float).eps * self.singular_values[0]
+        rounding = (
+            max(self.n_samples, len(self.scale))
+            * np.finfo(float).eps
+            * self.singular_values[0]
+        )
         return max(int(np.sum(self.singular_values > rounding)), 1)
 
     def filters(self, C: ArrayLike, rank: int) -> Floats:
@@ -49,7 +56,9 @@ class Decomposition:
         """
         s = self.singular_values
         with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
-            filters = np.where(s > 0.0, s / (s**2 + 1.0 / np.asarray(C, dtype=float)), 0.0)
+            filters = np.where(
+                s > 0.0, s / (s**2 + 1.0 / np.asarray(C, dtype=float)), 0.0
+            )
         filters[..., min(rank, self.numerical_rank) :] = 0.0
         return filters
 
@@ -58,7 +67,9 @@ class Decomposition:
         return np.asarray(self.directions.T @ (filters * self.projections) / self.scale)
 
 
-def triangle(X: Floats, y: Floats, fit_intercept: bool, weights: Floats | None = None) -> Floats:
+def triangle(
+    X: Floats, y: Floats, fit_intercept: bool, weights: Floats | None = None
+) -> Floats:
     """Triangle of an orthogonal decomposition of [1 X y], without the ones where there is no intercept.
 
     The weights, shape (n_samples,), are those of the squared errors.
@@ -88,10 +99,16 @@ def _triangle_of(table: Floats) -> Floats:
 
 
 def decompose(
-    X: Floats, y: Floats, scale: bool | ArrayLike, fit_intercept: bool, weights: Floats | None = None
+    X: Floats,
+    y: Floats,
+    scale: bool | ArrayLike,
+    fit_intercept: bool,
+    weights: Floats | None = None,
 ) -> Decomposition:
     """Decompose the features of a regression (arguments as of `LSSVM` and `triangle`)."""
-    return decompose_triangle(triangle(X, y, fit_intercept, weights), len(y), scale, fit_intercept)
+    return decompose_triangle(
+        triangle(X, y, fit_intercept, weights), len(y), scale, fit_intercept
+    )
 
 
 def decompose_triangle(
@@ -110,12 +127,21 @@ def decompose_triangle(
     outside = float(inner[-1, -1] ** 2 + np.sum(projections[kept:] ** 2))
     means = R[0, 1:] / R[0, 0] if fit_intercept else np.zeros(n_features + 1)
     return Decomposition(
-        singular_values[:kept], directions[:kept], projections[:kept], outside, n_samples - first,
-        means[:-1], float(means[-1]), scales, n_samples,
-    )  # fmt: skip
+        singular_values[:kept],
+        directions[:kept],
+        projections[:kept],
+        outside,
+        n_samples - first,
+        means[:-1],
+        float(means[-1]),
+        scales,
+        n_samples,
+    )
 
 
-def centre_and_scale(X: Floats, scale: bool | ArrayLike, fit_intercept: bool) -> tuple[Floats, Floats]:
+def centre_and_scale(
+    X: Floats, scale: bool | ArrayLike, fit_intercept: bool
+) -> tuple[Floats, Floats]:
     """Means and scales of the features, shape (n_features,); zero means without intercept."""
     centre = X.mean(axis=0) if fit_intercept else np.zeros(X.shape[1])
     size = np.sqrt(np.mean((X - centre) ** 2, axis=0))
@@ -131,6 +157,7 @@ def scales_of(size: Floats, scale: bool | ArrayLike) -> Floats:
     given = np.asarray(scale, dtype=float)
     if given.shape != size.shape or not np.all(np.isfinite(given) & (given > 0)):
         raise InputError(
-            f"scale: shape {given.shape} found, expected {len(size)} finite numbers above 0, True or False"
+            f"scale: shape {given.shape} found, expected {len(size)} finite numbers"
+            " above 0, True or False"
         )
     return given

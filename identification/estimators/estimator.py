@@ -15,16 +15,17 @@ from shipgym.arrays import Floats
 class Estimator(Protocol):
     """A linear estimator in scikit-learn's manner.
 
-    Optional besides: `rank_` (directions kept), `collinear_groups_` (terms of the directions dropped),
-    `weights_` (of the samples; all equal where absent), `search_` (how settings were chosen) and
-    `chosen_` (the settings chosen, for the provenance).
+    Optional besides: `rank_` (directions kept), `collinear_groups_` (terms of the
+    directions dropped), `weights_` (of the samples; all equal where absent), `search_`
+    (how settings were chosen) and `chosen_` (the settings chosen, for the provenance).
     """
 
     coef_: Floats  # coefficients of the features as given, shape (n_features,)
-    #: of `coef_`, for exact features and independent errors, shape (n_features, n_features)
-    covariance_: Floats
-    #: regularised inverse M of X' W X: `coef_` is M X' W y with W the weights, shape (n_features,
+    #: of `coef_`, for exact features and independent errors, shape (n_features,
     #: n_features)
+    covariance_: Floats
+    #: regularised inverse M of X' W X: `coef_` is M X' W y with W the weights, shape
+    #: (n_features, n_features)
     inverse_moment_: Floats
 
     def fit(self, X: ArrayLike, y: ArrayLike) -> Self:

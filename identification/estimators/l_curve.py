@@ -7,7 +7,8 @@ from scipy.special import fdtri
 
 from shipgym.arrays import Floats
 
-#: A rank is not taken if its residuals exceed those of full rank by more than chance does at this level.
+#: A rank is not taken if its residuals exceed those of full rank by more than chance
+#: does at this level.
 SIGNIFICANCE = 0.1
 
 
@@ -15,31 +16,43 @@ SIGNIFICANCE = 0.1
 class LCurve:
     """Norms of residual and solution of the solutions of rank 1, 2, ..."""
 
-    residual_norm: Floats  # euclidean norm of the residuals of the fit of rank 1 to n_ranks, shape (n_ranks,)
+    # euclidean norm of the residuals of the fit of rank 1 to n_ranks, shape (n_ranks,)
+    residual_norm: Floats
     solution_norm: Floats  # norm of the scaled coefficients, shape (n_ranks,)
 
 
-def l_curve(singular_values: Floats, projections: Floats, filters: Floats, outside: float) -> LCurve:
+def l_curve(
+    singular_values: Floats, projections: Floats, filters: Floats, outside: float
+) -> LCurve:
     """Norms for every rank from what a `Decomposition` says of the directions, shape (n_ranks,)."""
     missed = projections**2
     explained_miss = (projections * (1.0 - singular_values * filters)) ** 2
-    total = missed.sum() - np.cumsum(missed) + np.cumsum(explained_miss) + max(outside, 0.0)
-    return LCurve(np.sqrt(np.maximum(total, 0.0)), np.sqrt(np.cumsum((filters * projections) ** 2)))
+    total = (
+        missed.sum() - np.cumsum(missed) + np.cumsum(explained_miss) + max(outside, 0.0)
+    )
+    return LCurve(
+        np.sqrt(np.maximum(total, 0.0)),
+        np.sqrt(np.cumsum((filters * projections) ** 2)),
+    )
 
 
 def corner_rank(curve: LCurve, n_samples: int) -> int:
     """Rank, from 1 to n_ranks, at the corner of the L-curve of `n_samples` samples (Xu 2020, section 3.2).
 
-    The corner is the point farthest towards the origin of the doubly logarithmic curve, where a line of slope
-    -1 touches it (Reginska 1996, SIAM J. Sci. Comput. 17(3)). Unlike the point of largest curvature this one
-    is well defined on the few points of a truncated decomposition, and can be an end: data without noise keep
-    every direction. A corner whose residuals are larger than those of full rank by more than chance (F test)
-    is passed over for the first rank where they are not: what the data do determine is not dropped.
+    The corner is the point farthest towards the origin of the doubly logarithmic curve,
+    where a line of slope -1 touches it (Reginska 1996, SIAM J. Sci. Comput. 17(3)).
+    Unlike the point of largest curvature this one is well defined on the few points of
+    a truncated decomposition, and can be an end: data without noise keep every
+    direction. A corner whose residuals are larger than those of full rank by more than
+    chance (F test) is passed over for the first rank where they are not: what the data
+    do determine is not dropped.
     """
     residual, solution = curve.residual_norm, curve.solution_norm
     full = len(residual)
     floor = max(np.finfo(float).eps * float(residual[0]), np.finfo(float).tiny)
-    height = np.log(np.maximum(residual, floor)) + np.log(np.maximum(solution, np.finfo(float).tiny))
+    height = np.log(np.maximum(residual, floor)) + np.log(
+        np.maximum(solution, np.finfo(float).tiny)
+    )
     corner = int(np.argmin(height)) + 1
     freedom = n_samples - full
     if freedom < 1:
@@ -47,7 +60,9 @@ def corner_rank(curve: LCurve, n_samples: int) -> int:
     dropped = np.arange(full - 1, -1, -1)
     quantile = fdtri(np.maximum(dropped, 1), freedom, 1.0 - SIGNIFICANCE)
     allowed = 1.0 + dropped / freedom * quantile
-    squared = residual * residual  # once: as array and as number it may differ in the last bit
+    squared = (
+        residual * residual
+    )  # once: as array and as number it may differ in the last bit
     adequate = squared <= allowed * max(squared[-1], floor**2)
     return int(np.flatnonzero(adequate[corner - 1 :])[0]) + corner
 
@@ -56,7 +71,9 @@ def gcv_rank(curve: LCurve, n_samples: int) -> int:
     """Rank that minimises generalised cross-validation (Golub, Heath & Wahba 1979)."""
     freedom = n_samples - np.arange(1, len(curve.residual_norm) + 1)
     with np.errstate(divide="ignore"):
-        score = np.where(freedom > 0, curve.residual_norm**2 / np.maximum(freedom, 1) ** 2, np.inf)
+        score = np.where(
+            freedom > 0, curve.residual_norm**2 / np.maximum(freedom, 1) ** 2, np.inf
+        )
     return int(np.argmin(score)) + 1
 
 

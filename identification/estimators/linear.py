@@ -13,7 +13,8 @@ from sklearn.utils.validation import check_is_fitted, validate_data
 from shipgym import InputError
 from shipgym.arrays import Floats
 
-#: A dataclass is an estimator of scikit-learn's: its fields are the settings, which `__init__` only stores.
+#: A dataclass is an estimator of scikit-learn's: its fields are the settings, which
+#: `__init__` only stores.
 settings = partial(dataclass, eq=False, repr=False)
 
 
@@ -34,7 +35,8 @@ class LinearRegressor(RegressorMixin, BaseEstimator):  # type: ignore[misc]
 def validated(estimator: Any, X: ArrayLike, y: ArrayLike) -> tuple[Floats, Floats]:
     """Features and targets as arrays of numbers, as scikit-learn checks them.
 
-    Its checks of what is sound already take as long as the decomposition: sound arrays do without.
+    Its checks of what is sound already take as long as the decomposition: sound arrays
+    do without.
     """
     if _sound(X, 2) and _sound(y, 1) and len(X) == len(y) >= 2 and X.shape[1] > 0:
         estimator.n_features_in_ = X.shape[1]
@@ -48,7 +50,11 @@ def validated(estimator: Any, X: ArrayLike, y: ArrayLike) -> tuple[Floats, Float
 
 def _sound(values: ArrayLike, n_dimensions: int) -> TypeGuard[Floats]:
     """Whether these are an array of finite numbers of double precision, and nothing else."""
-    if type(values) is not np.ndarray or values.dtype != np.float64 or values.ndim != n_dimensions:
+    if (
+        type(values) is not np.ndarray
+        or values.dtype != np.float64
+        or values.ndim != n_dimensions
+    ):
         return False
     return bool(np.isfinite(values).all())
 
@@ -57,6 +63,7 @@ def check_weight(value: Any, argument: str = "C") -> float:
     """Return a weight of errors: a number above 0, infinity included."""
     if isinstance(value, bool) or not isinstance(value, Real) or not float(value) > 0.0:
         raise InputError(
-            f"{argument}: {value!r} found, expected a number above 0 (infinity gives least squares)"
+            f"{argument}: {value!r} found, expected a number above 0 (infinity gives"
+            " least squares)"
         )
     return float(value)

@@ -1,13 +1,14 @@
 """Recursive identification: coefficients that follow the samples, one by one.
 
-Recursive least squares with forgetting (Zhu 2018, section 7.3), the stochastic gradient and its nonlinear
-innovation, and multi-innovation least squares with and without a matrix inverse (Song 2020, chapters 3
-and 4).
-Any of them may start from LS-SVR's estimate on the first samples.
+Recursive least squares with forgetting (Zhu 2018, section 7.3), the stochastic gradient
+and its nonlinear innovation, and multi-innovation least squares with and without a
+matrix inverse (Song 2020, chapters 3 and 4). Any of them may start from LS-SVR's
+estimate on the first samples.
 
-Song prints the nonlinear innovation of the least-squares forms as a factor tanh(omega e) of the innovation,
-which makes the correction even in e: an error of either sign would push the same way. Here e becomes
-tanh(omega e) / omega everywhere, odd and of slope 1 at 0, with e in units of the targets' root mean square.
+Song prints the nonlinear innovation of the least-squares forms as a factor tanh(omega
+e) of the innovation, which makes the correction even in e: an error of either sign
+would push the same way. Here e becomes tanh(omega e) / omega everywhere, odd and of
+slope 1 at 0, with e in units of the targets' root mean square.
 """
 
 from abc import abstractmethod
@@ -20,7 +21,10 @@ from sklearn.utils.validation import check_is_fitted
 from identification.estimators.decomposition import scales_of
 from identification.estimators.linear import LinearRegressor, settings, validated
 from identification.estimators.lssvm import LSSVM
-from identification.estimators.recursive_kernels import least_squares, stochastic_gradient
+from identification.estimators.recursive_kernels import (
+    least_squares,
+    stochastic_gradient,
+)
 from shipgym import InputError
 from shipgym.arrays import Floats
 from shipgym.checks import check_number, check_whole
@@ -33,11 +37,12 @@ class Recursion(LinearRegressor):
     Parameters
     ----------
     forgetting : float
-        Factor by which older samples count less at each step; 1 forgets nothing. No coefficient of the
-        least-squares forms becomes less certain than it was at the start, so that nothing winds up while the
-        ship sails straight.
+        Factor by which older samples count less at each step; 1 forgets nothing. No
+        coefficient of the least-squares forms becomes less certain than it was at the
+        start, so that nothing winds up while the ship sails straight.
     C : float
-        Covariance of the scaled coefficients at the start, that is the weight of the errors in LS-SVM.
+        Covariance of the scaled coefficients at the start, that is the weight of the
+        errors in LS-SVM.
     scale : bool or array-like of shape (n_features,)
         Divide the regressors by their root mean square, or by given values.
     start_samples : int
@@ -52,8 +57,8 @@ class Recursion(LinearRegressor):
     coef_ : array of shape (n_features,) or (n_signals, n_features)
         Estimate after the last sample.
     covariance_ : array of shape (n_features, n_features)
-        Of the least-squares estimate that the recursion tends to, for exact features and independent errors
-        (after `fit`).
+        Of the least-squares estimate that the recursion tends to, for exact features
+        and independent errors (after `fit`).
     inverse_moment_ : array of shape (n_features, n_features)
         Inverse of X'WX plus the start's, with W the weights (after `fit`).
     weights_ : array of shape (n_samples,)
@@ -85,7 +90,8 @@ class Recursion(LinearRegressor):
     def fit_history(self, X: ArrayLike, y: ArrayLike) -> Floats:
         """Fit, and return the estimate after each sample, shape (n_samples, n_features).
 
-        While LS-SVR gathers its samples these are the coefficients that it will find from them.
+        While LS-SVR gathers its samples these are the coefficients that it will find
+        from them.
         """
         self._check()
         features, targets = validated(self, X, y)
@@ -104,10 +110,11 @@ class Recursion(LinearRegressor):
     def update(self, phi: ArrayLike, y: ArrayLike) -> Self:
         """Take in the next sample or samples.
 
-        Scales are fixed by the first call: give several samples first, or `scale`. `phi`: regressors; where
-        signals share them, their axis may be absent, shape (n_features,), (n_samples, n_features) or
-        (n_samples, n_signals, n_features); `y`: what they explain, shape (n_samples,) or (n_samples,
-        n_signals). Raises InputError for shapes that do not fit and numbers that are not finite.
+        Scales are fixed by the first call: give several samples first, or `scale`.
+        `phi`: regressors; where signals share them, their axis may be absent, shape
+        (n_features,), (n_samples, n_features) or (n_samples, n_signals, n_features);
+        `y`: what they explain, shape (n_samples,) or (n_samples, n_signals). Raises
+        InputError for shapes that do not fit and numbers that are not finite.
         """
         self._check()
         features, targets = _shaped(phi, y)
@@ -115,8 +122,9 @@ class Recursion(LinearRegressor):
             self._begin(features, targets)
         if features.shape[1:] != self._theta.shape:
             raise InputError(
-                f"phi: {features.shape[1]} signals of {features.shape[2]} regressors found, expected "
-                f"{self._theta.shape[0]} of {self._theta.shape[1]} as before"
+                f"phi: {features.shape[1]} signals of {features.shape[2]} regressors"
+                f" found, expected {self._theta.shape[0]} of {self._theta.shape[1]} as"
+                " before"
             )
         self._run(features, targets)
         return self
@@ -159,7 +167,9 @@ class Recursion(LinearRegressor):
 
     def _start_from(self, features: Floats, targets: Floats) -> None:
         """Take LS-SVR's estimate on the first samples, and how certain it is (LSSVR-RLS, Zhu 2018, 7.3)."""
-        estimator = LSSVM(C=self.start_C, scale=self.scale_, fit_intercept=False).fit(features, targets)
+        estimator = LSSVM(C=self.start_C, scale=self.scale_, fit_intercept=False).fit(
+            features, targets
+        )
         self._theta[0] = estimator.coef_ * self.scale_ / self._unit[0]
         self.coef_ = estimator.coef_
         if hasattr(self, "_P"):
@@ -174,14 +184,22 @@ class Recursion(LinearRegressor):
         self._advance(scaled, np.ascontiguousarray(targets / self._unit), history)
         history *= self._unit[:, None] / self.scale_
         if len(history):
-            self.coef_ = history[-1, 0].copy() if history.shape[1] == 1 else history[-1].copy()
+            self.coef_ = (
+                history[-1, 0].copy() if history.shape[1] == 1 else history[-1].copy()
+            )
         return history
 
-    def _summarise(self, features: Floats, targets: Floats, multiplicity: Floats) -> None:
+    def _summarise(
+        self, features: Floats, targets: Floats, multiplicity: Floats
+    ) -> None:
         """Weights and covariance of what the recursion tends to."""
         # a sample is seen again while it is among the last
         used = np.minimum(self.innovations, len(targets) - np.arange(len(targets)))
-        self.weights_ = multiplicity * used * self.forgetting ** np.arange(len(targets) - 1.0, -1.0, -1.0)
+        self.weights_ = (
+            multiplicity
+            * used
+            * self.forgetting ** np.arange(len(targets) - 1.0, -1.0, -1.0)
+        )
         scaled = features / self.scale_
         start = np.eye(scaled.shape[1]) / self.C
         moment = (scaled.T * self.weights_) @ scaled + start
@@ -214,11 +232,23 @@ class RecursiveLeastSquares(Recursion):
 
     def _advance(self, phi: Floats, y: Floats, history: Floats) -> None:
         first = len(self._past[1])
-        phi, y = np.concatenate([self._past[0], phi]), np.concatenate([self._past[1], y])
+        phi, y = (
+            np.concatenate([self._past[0], phi]),
+            np.concatenate([self._past[1], y]),
+        )
         least_squares(self.inverse_free)(
-            phi, y, first, self._theta, self._P, self._ceiling, float(self.forgetting), self.innovations,
-            float(self.omega), history, np.empty(phi.shape[-1]),
-        )  # fmt: skip
+            phi,
+            y,
+            first,
+            self._theta,
+            self._P,
+            self._ceiling,
+            float(self.forgetting),
+            self.innovations,
+            float(self.omega),
+            history,
+            np.empty(phi.shape[-1]),
+        )
         kept = min(self.innovations - 1, len(y))
         self._past = (phi[len(y) - kept :].copy(), y[len(y) - kept :].copy())
 
@@ -236,8 +266,8 @@ class MultiInnovationLeastSquares(RecursiveLeastSquares):
     omega : float
         Slope of the nonlinear innovation tanh(omega e) / omega; 0 keeps it linear.
     inverse_free : bool
-        As that many scalar updates (TMILS), which with a linear innovation gives the same numbers, or with
-        the matrix of innovations solved (MILS).
+        As that many scalar updates (TMILS), which with a linear innovation gives the
+        same numbers, or with the matrix of innovations solved (MILS).
     """
 
     innovations: int = 5
@@ -249,14 +279,15 @@ class MultiInnovationLeastSquares(RecursiveLeastSquares):
 class StochasticGradient(Recursion):
     """Stochastic gradient, with a linear (SG) or a nonlinear innovation (NISG).
 
-    Cheap and slow: without forgetting its steps shrink as the samples grow, and with correlated regressors it
-    has not converged by the end of a trial. Prefer the least-squares forms for anything but comparison.
+    Cheap and slow: without forgetting its steps shrink as the samples grow, and with
+    correlated regressors it has not converged by the end of a trial. Prefer the
+    least-squares forms for anything but comparison.
 
     Parameters
     ----------
     forgetting, C, scale, start_samples, start_interval, start_C
-        As in `Recursion`; here the sum of squares that divides the steps forgets, and C is that of the ridge
-        in `inverse_moment_`.
+        As in `Recursion`; here the sum of squares that divides the steps forgets, and C
+        is that of the ridge in `inverse_moment_`.
     omega : float
         Slope of the nonlinear innovation tanh(omega e) / omega; 0 keeps it linear.
     """
@@ -268,26 +299,40 @@ class StochasticGradient(Recursion):
 
     def _advance(self, phi: Floats, y: Floats, history: Floats) -> None:
         stochastic_gradient()(
-            phi, y, self._theta, self._r, float(self.forgetting), float(self.omega), history
+            phi,
+            y,
+            self._theta,
+            self._r,
+            float(self.forgetting),
+            float(self.omega),
+            history,
         )
 
 
 def _shaped(phi: ArrayLike, y: ArrayLike) -> tuple[Floats, Floats]:
     """Samples of shape (n_samples, n_signals, n_features) and (n_samples, n_signals)."""
-    features, targets = np.asarray(phi, dtype=float), np.atleast_1d(np.asarray(y, dtype=float))
+    features, targets = (
+        np.asarray(phi, dtype=float),
+        np.atleast_1d(np.asarray(y, dtype=float)),
+    )
     if features.ndim == 1:
         features, targets = features[None], targets.reshape(1, -1)
     features = features[:, None] if features.ndim == 2 else features
     targets = targets[:, None] if targets.ndim == 1 else targets
     if features.ndim != 3 or targets.ndim != 2 or len(features) != len(targets):
         raise InputError(
-            f"phi, y: shapes {np.shape(phi)} and {np.shape(y)} found, expected (n_samples, n_features) and "
-            "(n_samples,), or (n_samples, n_signals, n_features) and (n_samples, n_signals)"
+            f"phi, y: shapes {np.shape(phi)} and {np.shape(y)} found, expected"
+            " (n_samples, n_features) and (n_samples,), or (n_samples, n_signals,"
+            " n_features) and (n_samples, n_signals)"
         )
     if features.shape[1] not in (1, targets.shape[1]):
-        raise InputError(f"phi: {features.shape[1]} signals found, expected {targets.shape[1]} as in y")
+        raise InputError(
+            f"phi: {features.shape[1]} signals found, expected {targets.shape[1]} as"
+            " in y"
+        )
     if not (np.all(np.isfinite(features)) and np.all(np.isfinite(targets))):
         raise InputError(
-            "phi, y: a value that is not finite found, expected numbers; repair the samples first"
+            "phi, y: a value that is not finite found, expected numbers; repair the"
+            " samples first"
         )
     return np.broadcast_to(features, (*targets.shape, features.shape[-1])), targets

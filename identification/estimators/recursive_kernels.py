@@ -19,7 +19,8 @@ def innovation(error: float, omega: float) -> float:
 def forget(P: Any, forgetting: float, ceiling: Any, stretch: Any) -> None:
     """Divide a covariance by the forgetting factor, but let no coefficient forget beyond where it began.
 
-    Rows and columns are stretched alike, so that the matrix stays positive; `stretch` is scratch.
+    Rows and columns are stretched alike, so that the matrix stays positive; `stretch`
+    is scratch.
     """
     full = 1.0 / np.sqrt(forgetting)
     for i in range(ceiling.size):
@@ -27,7 +28,9 @@ def forget(P: Any, forgetting: float, ceiling: Any, stretch: Any) -> None:
         stretch[i] = min(full, max(np.sqrt(room), 1.0))
     for i in range(ceiling.size):
         for j in range(ceiling.size):
-            P[i, j] *= stretch[i] * stretch[j]  # in this order the matrix stays symmetric to the last bit
+            P[i, j] *= (
+                stretch[i] * stretch[j]
+            )  # in this order the matrix stays symmetric to the last bit
 
 
 def rank_one(phi: Any, y: float, theta: Any, P: Any, omega: float, gain: Any) -> None:
@@ -50,12 +53,22 @@ def rank_one(phi: Any, y: float, theta: Any, P: Any, omega: float, gain: Any) ->
 
 
 def scalar_updates(
-    phi: Any, y: Any, first: int, theta: Any, P: Any, ceiling: Any, forgetting: float, innovations: int,
-    omega: float, history: Any, scratch: Any,
-) -> None:  # fmt: skip
+    phi: Any,
+    y: Any,
+    first: int,
+    theta: Any,
+    P: Any,
+    ceiling: Any,
+    forgetting: float,
+    innovations: int,
+    omega: float,
+    history: Any,
+    scratch: Any,
+) -> None:
     """Least squares by rank-one updates over the last samples (TMILS, Song 2020, 4-12); RLS with one.
 
-    Rows before `first` are history. `theta`, `P` are changed in place; `history` receives each theta.
+    Rows before `first` are history. `theta`, `P` are changed in place; `history`
+    receives each theta.
     """
     for t in range(first, phi.shape[0]):
         for s in range(theta.shape[0]):
@@ -68,9 +81,18 @@ def scalar_updates(
 
 
 def matrix_updates(
-    phi: Any, y: Any, first: int, theta: Any, P: Any, ceiling: Any, forgetting: float, innovations: int,
-    omega: float, history: Any, scratch: Any,
-) -> None:  # fmt: skip
+    phi: Any,
+    y: Any,
+    first: int,
+    theta: Any,
+    P: Any,
+    ceiling: Any,
+    forgetting: float,
+    innovations: int,
+    omega: float,
+    history: Any,
+    scratch: Any,
+) -> None:
     """Multi-innovation least squares with its matrix of innovations solved (MILS, Song 2020, 4-11)."""
     for t in range(first, phi.shape[0]):
         low = max(t - innovations + 1, 0)
@@ -109,7 +131,10 @@ def gradient_updates(
 @cache
 def least_squares(one_by_one: bool = True) -> Any:
     """`scalar_updates` or `matrix_updates`, compiled."""
-    arguments = f"{CUBE}, {TABLE}, int64, {TABLE}, {CUBE}, {TABLE}, float64, int64, float64, {CUBE}, {VECTOR}"
+    arguments = (
+        f"{CUBE}, {TABLE}, int64, {TABLE}, {CUBE}, {TABLE}, float64, int64, float64,"
+        f" {CUBE}, {VECTOR}"
+    )
     loop = scalar_updates if one_by_one else matrix_updates
     return compiled(loop, f"void({arguments})", {}, "recursive least squares")
 
@@ -118,4 +143,6 @@ def least_squares(one_by_one: bool = True) -> Any:
 def stochastic_gradient() -> Any:
     """`gradient_updates`, compiled."""
     arguments = f"{CUBE}, {TABLE}, {TABLE}, {VECTOR}, float64, float64, {CUBE}"
-    return compiled(gradient_updates, f"void({arguments})", {}, "the stochastic gradient")
+    return compiled(
+        gradient_updates, f"void({arguments})", {}, "the stochastic gradient"
+    )

@@ -1,8 +1,9 @@
 """RM-SVM: a linear support vector regression of what a reference ship leaves of the accelerations.
 
-Source: Mei, Sun & Shi 2019, Ship maneuvering prediction using grey box framework via adaptive RM-SVM with
-minor rudder. The Lagrangian printed there (9) is that of LS-SVM, but insensitive band and solver are those of
-the epsilon-SVR that is fitted here (Drucker et al. 1997, Support vector regression estimators).
+Source: Mei, Sun & Shi 2019, Ship maneuvering prediction using grey box framework via
+adaptive RM-SVM with minor rudder. The Lagrangian printed there (9) is that of LS-SVM,
+but insensitive band and solver are those of the epsilon-SVR that is fitted here
+(Drucker et al. 1997, Support vector regression estimators).
 """
 
 import warnings
@@ -28,11 +29,15 @@ from shipgym.ships import GreyBox
 
 OBJECTIVES = ("rmse", "correlation")
 REGRESSIONS = ("svr", "ls-svm")
-NO_CORRECTION = 0.0  # weight of the errors at which nothing is added to the reference ship
+NO_CORRECTION = (
+    0.0  # weight of the errors at which nothing is added to the reference ship
+)
 WEIGHTS = (NO_CORRECTION, *np.geomspace(0.01, 100.0, 9).tolist())
 ERROR_TOLERANCE = 1.1  # times the least error counts as equally good
 FIRST_BAND = 0.1
-MOST_ROWS = 600  # of the regression: sequential minimal optimisation takes the square of it
+MOST_ROWS = (
+    600  # of the regression: sequential minimal optimisation takes the square of it
+)
 MOST_SWEEPS = 20_000  # of coordinate descent through the samples
 
 Choice = TypeVar("Choice")
@@ -42,37 +47,42 @@ Choice = TypeVar("Choice")
 class RMSVM(LinearRegressor):
     """The linear correction of one equation: epsilon-SVR with standardised features and targets.
 
-    Minimises w.w / 2 + C mean(max(|e| - epsilon, 0)) with the w of the standardised features and e in
-    standard deviations of the target.
+    Minimises w.w / 2 + C mean(max(|e| - epsilon, 0)) with the w of the standardised
+    features and e in standard deviations of the target.
 
     Parameters
     ----------
     C : float or None
-        Weight of the errors, by the mean over samples; 0 adds nothing to the reference ship. None: 1, or by
-        `identify` the strongest regularisation nearly as good as the best on trials held out.
+        Weight of the errors, by the mean over samples; 0 adds nothing to the reference
+        ship. None: 1, or by `identify` the strongest regularisation nearly as good as
+        the best on trials held out.
     epsilon : float or None
-        The insensitive band in [0, 1], standard deviations of the target. None: 0.1, or by `identify` from a
-        pattern search.
+        The insensitive band in [0, 1], standard deviations of the target. None: 0.1, or
+        by `identify` from a pattern search.
     objective : {"rmse", "correlation"}
-        What that search compares of simulated and measured heading; "correlation" as in the paper, which
-        is blind to scale and offset.
+        What that search compares of simulated and measured heading; "correlation" as in
+        the paper, which is blind to scale and offset.
     regression : {"svr", "ls-svm"}
         Epsilon-SVR, or the LS-SVM that the paper's Lagrangian is of, which has no band.
     free_constant : bool
-        Whether `identify` leaves the constant unpenalised, as the paper does. By default it is penalised like
-        the other terms, so that the weight leads from the bare reference ship to the free fit in small steps.
+        Whether `identify` leaves the constant unpenalised, as the paper does. By
+        default it is penalised like the other terms, so that the weight leads from the
+        bare reference ship to the free fit in small steps.
     folds : {"trials", "largest-rudder"}
-        What `identify` chooses the weight by: each trial held out in turn (of a single one, pieces), or the
-        trials of the largest rudder together, for models that are to turn harder than any trial.
+        What `identify` chooses the weight by: each trial held out in turn (of a single
+        one, pieces), or the trials of the largest rudder together, for models that are
+        to turn harder than any trial.
     constant : int or None
-        Column that is a free constant, or its integral, by which rows are divided; `identify` finds it.
+        Column that is a free constant, or its integral, by which rows are divided;
+        `identify` finds it.
 
     Attributes
     ----------
     coef_ : array of shape (n_features,)
         Of the features as given.
     inverse_moment_, covariance_ : array of shape (n_features, n_features)
-        Of the ridge regression of the same strength, at C = 0 of the weakest: an SVR has none of its own.
+        Of the ridge regression of the same strength, at C = 0 of the weakest: an SVR
+        has none of its own.
     n_features_in_ : int
         Number of features.
     """
@@ -93,7 +103,12 @@ class RMSVM(LinearRegressor):
         if self.C is not None:
             check_number(self.C, "C", at_least=0.0)
         if self.epsilon is not None:
-            check_number(self.epsilon, "epsilon", at_least=0.0, hint="in standard deviations of the target")
+            check_number(
+                self.epsilon,
+                "epsilon",
+                at_least=0.0,
+                hint="in standard deviations of the target",
+            )
 
     def fit(self, X: ArrayLike, y: ArrayLike) -> Self:
         """Fit to samples of shape (n_samples, n_features) and targets of shape (n_samples,)."""
@@ -103,7 +118,9 @@ class RMSVM(LinearRegressor):
         self._fit(features, target, weight or WEIGHTS[1])
         if weight == NO_CORRECTION:  # its uncertainty is that of the weakest correction
             self.coef_ = np.zeros(features.shape[1])
-        self.covariance_ = float(np.mean((target - features @ self.coef_) ** 2)) * self.inverse_moment_
+        self.covariance_ = (
+            float(np.mean((target - features @ self.coef_) ** 2)) * self.inverse_moment_
+        )
         return self
 
     def _fit(self, X: Floats, y: Floats, weight: float) -> None:
@@ -123,26 +140,37 @@ class RMSVM(LinearRegressor):
         self.coef_[free] = slope * deviation / scale[free]
         if self.constant is not None:
             self.coef_[self.constant] = level + deviation * offset - centre @ self.coef_
-        penalty = np.diag(np.where(free, len(y) / weight * scale**2 * np.mean(duration) ** 2, 0.0))
+        penalty = np.diag(
+            np.where(free, len(y) / weight * scale**2 * np.mean(duration) ** 2, 0.0)
+        )
         self.inverse_moment_ = np.linalg.pinv(X.T @ X + penalty, hermitian=True)
 
-    def _solve(self, Z: Floats, e: Floats, weight: float, band: float) -> tuple[Floats, float]:
+    def _solve(
+        self, Z: Floats, e: Floats, weight: float, band: float
+    ) -> tuple[Floats, float]:
         """Slopes and offset for standardised features and targets."""
         if not Z.shape[1]:
             return np.zeros(0), 0.0
-        has_offset, C, svr = self.constant is not None, weight / len(e), self.regression == "svr"
+        has_offset, C, svr = (
+            self.constant is not None,
+            weight / len(e),
+            self.regression == "svr",
+        )
         if svr and not has_offset:
             return _through_zero(Z, e, C, band), 0.0
         ridge = Ridge(alpha=1.0 / C, fit_intercept=has_offset)
         solver = (SVR(kernel="linear", C=C, epsilon=band) if svr else ridge).fit(Z, e)
-        return np.asarray(solver.coef_, dtype=float).ravel(), float(np.sum(solver.intercept_))
+        return np.asarray(solver.coef_, dtype=float).ravel(), float(
+            np.sum(solver.intercept_)
+        )
 
 
 def _through_zero(Z: Floats, e: Floats, C: float, band: float) -> Floats:
     """Slopes of an epsilon-SVR without offset.
 
-    By coordinate descent, whose time is proportional to the number of samples; where it does not converge, by
-    sequential minimal optimisation of the samples and their mirror image, which makes the offset zero.
+    By coordinate descent, whose time is proportional to the number of samples; where it
+    does not converge, by sequential minimal optimisation of the samples and their
+    mirror image, which makes the offset zero.
     """
     solver = {"dual": True, "tol": 1e-6, "max_iter": MOST_SWEEPS, "random_state": 0}
     quick = LinearSVR(C=C, epsilon=band, fit_intercept=False, **solver)
@@ -150,24 +178,28 @@ def _through_zero(Z: Floats, e: Floats, C: float, band: float) -> Floats:
         try:
             return np.asarray(quick.fit(Z, e).coef_, dtype=float)
         except ConvergenceWarning:
-            both = SVR(kernel="linear", C=0.5 * C, epsilon=band).fit(np.vstack([Z, -Z]), np.append(e, -e))
+            both = SVR(kernel="linear", C=0.5 * C, epsilon=band).fit(
+                np.vstack([Z, -Z]), np.append(e, -e)
+            )
             return np.asarray(both.coef_, dtype=float).ravel()
 
 
 def fit_rm_svm(make: Callable[[], Estimator], task: FitTask) -> Estimators:
     """Fit the corrections of all equations, with weight and insensitive bands chosen where not given.
 
-    `make`: makes an unfitted `RMSVM` with the settings asked for; `task`: its model is the bare reference
-    ship as a model of the target. Raises InputError for a model without a reference ship.
+    `make`: makes an unfitted `RMSVM` with the settings asked for; `task`: its model is
+    the bare reference ship as a model of the target. Raises InputError for a model
+    without a reference ship.
     """
     asked = make()
     assert isinstance(asked, RMSVM)
     asked.check()
     if not isinstance(task.blank.table, GreyBox):
         raise InputError(
-            f"method: 'rm-svm' found with structure {task.blank.structure!r}, expected structure 'grey-box', "
-            "which has a reference ship, with a reference_model: 'auto', a shipped model's name or a model "
-            "file; or choose another method, such as 'tls-svm'"
+            f"method: 'rm-svm' found with structure {task.blank.structure!r}, expected"
+            " structure 'grey-box', which has a reference ship, with a"
+            " reference_model: 'auto', a shipped model's name or a model file; or"
+            " choose another method, such as 'tls-svm'"
         )
     tuner, found = _Tuner(asked, task), dict[str, Estimator]()
     weight = tuner.weight() if asked.C is None else float(asked.C)
@@ -184,7 +216,12 @@ class _Tuner:
     """Fits with different settings, and simulations with what they give."""
 
     def __init__(self, asked: RMSVM, task: FitTask) -> None:
-        self.asked, self.samples, self.blank, self.trials = asked, task.samples, task.blank, task.trials
+        self.asked, self.samples, self.blank, self.trials = (
+            asked,
+            task.samples,
+            task.blank,
+            task.trials,
+        )
         self.thin = max(1, -(-len(task.samples) // MOST_ROWS))
         self.everything = np.ones(len(task.samples), dtype=bool)
         band = FIRST_BAND if asked.epsilon is None else asked.epsilon
@@ -196,9 +233,14 @@ class _Tuner:
         key = (equation, weight, band, rows.tobytes())
         if key not in self._known:
             names = [term.name for term in self.blank.table.terms(equation)]
-            constant = names.index("0") if self.asked.free_constant and "0" in names else None
+            constant = (
+                names.index("0") if self.asked.free_constant and "0" in names else None
+            )
             used = np.flatnonzero(rows)[:: self.thin]
-            X, y = self.samples.features[equation][used], self.samples.targets[equation][used]
+            X, y = (
+                self.samples.features[equation][used],
+                self.samples.targets[equation][used],
+            )
             chosen = {"C": weight, "epsilon": band, "constant": constant}
             self._known[key] = RMSVM(**self.asked.get_params() | chosen).fit(X, y)
         return self._known[key]
@@ -206,32 +248,48 @@ class _Tuner:
     def model(self, weight: float, bands: Sequence[float], rows: Flags) -> ShipModel:
         """The grey box with the corrections fitted to some of the rows."""
         equations = zip(self.samples.features, bands, strict=True)
-        coefficients = {q: self.fitted(q, weight, band, rows).coef_ for q, band in equations}
+        coefficients = {
+            q: self.fitted(q, weight, band, rows).coef_ for q, band in equations
+        }
         return self.blank.with_accelerations(coefficients)
 
     def weight(self) -> float:
         """The least weight of the errors nearly as good as the best on what is held out.
 
-        Simulated headings are compared, not accelerations: collinear terms hardly change these. Where it
-        makes no difference the reference ship is to be believed, because the hard turn is in no zigzag.
+        Simulated headings are compared, not accelerations: collinear terms hardly
+        change these. Where it makes no difference the reference ship is to be believed,
+        because the hard turn is in no zigzag.
         """
         folds = list(held_out_rows(self.trials, self.samples, self.asked.folds))
 
         def error(weight: float) -> float:
-            models = ((self.model(weight, self.first_bands, rows), held) for rows, held in folds)
-            return float(np.mean([heading_error(model, held, "rmse") for model, held in models]))
+            models = (
+                (self.model(weight, self.first_bands, rows), held)
+                for rows, held in folds
+            )
+            return float(
+                np.mean([heading_error(model, held, "rmse") for model, held in models])
+            )
 
         return float(most_regularised(WEIGHTS, [error(weight) for weight in WEIGHTS]))
 
     def bands(self, weight: float) -> tuple[list[float], SearchResult | None]:
         """The insensitive bands, by a pattern search on the simulated heading of the trials."""
         first = self.first_bands
-        if self.asked.epsilon is not None or weight == NO_CORRECTION or self.asked.regression == "ls-svm":
+        if (
+            self.asked.epsilon is not None
+            or weight == NO_CORRECTION
+            or self.asked.regression == "ls-svm"
+        ):
             return first, None
 
         def error(bands: Floats) -> float:
             model = self.model(weight, bands.tolist(), self.everything)
-            return float(np.mean([heading_error(model, t, self.asked.objective) for t in self.trials]))
+            return float(
+                np.mean(
+                    [heading_error(model, t, self.asked.objective) for t in self.trials]
+                )
+            )
 
         search = pattern_search(error, first, np.zeros(len(first)), np.ones(len(first)))
         return search.x.tolist(), search
@@ -240,14 +298,19 @@ class _Tuner:
 def most_regularised(choices: Sequence[Choice], errors: Sequence[float]) -> Choice:
     """The first of choices, the most regularised first, whose error is nearly the least, if any is finite."""
     allowed = ERROR_TOLERANCE * min(errors)
-    found = (choice for choice, error in zip(choices, errors, strict=True) if error <= allowed)
+    found = (
+        choice
+        for choice, error in zip(choices, errors, strict=True)
+        if error <= allowed
+    )
     return next(found, choices[0])
 
 
 def heading_error(model: ShipModel, trial: Trial, objective: str) -> float:
     """How far the heading of an open-loop simulation is from the measured one.
 
-    Root mean square, rad ("rmse"), or 1 less Pearson's correlation; infinite where the model runs away.
+    Root mean square, rad ("rmse"), or 1 less Pearson's correlation; infinite where the
+    model runs away.
     """
     if (prediction := predict(model, trial)) is None:
         return np.inf

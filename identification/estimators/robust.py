@@ -6,10 +6,17 @@ import numpy as np
 
 from shipgym.arrays import Floats
 
-INNER, OUTER = 2.5, 3.0  # of the scale of the residuals; full weight up to the first, least from the second
+INNER, OUTER = (
+    2.5,
+    3.0,
+)  # of the scale of the residuals; full weight up to the first, least from the second
 LEAST_WEIGHT = 1e-4
-MAD = 1.4826  # standard deviation by median absolute deviation, of a normal distribution
-ROUNDING = 64 * np.finfo(float).eps  # of the largest target; residuals below it are not worth weighting
+MAD = (
+    1.4826  # standard deviation by median absolute deviation, of a normal distribution
+)
+ROUNDING = (
+    64 * np.finfo(float).eps
+)  # of the largest target; residuals below it are not worth weighting
 MOST_ROUNDS = 50
 SETTLED = 1e-3  # change of a weight
 
@@ -17,8 +24,8 @@ SETTLED = 1e-3  # change of a weight
 def hampel_weights(residuals: Floats, largest: float) -> Floats:
     """Weights of samples by their residuals (Suykens et al. 2002, Neurocomputing 48, eq. 14).
 
-    The scale is estimated by the median absolute deviation; residuals of the rounding of the `largest` target
-    all have the weight 1.
+    The scale is estimated by the median absolute deviation; residuals of the rounding
+    of the `largest` target all have the weight 1.
     """
     scale = MAD * float(np.median(np.abs(residuals - np.median(residuals))))
     if scale <= ROUNDING * largest:
@@ -27,11 +34,13 @@ def hampel_weights(residuals: Floats, largest: float) -> Floats:
     return np.clip(ramp, LEAST_WEIGHT, 1.0)
 
 
-def fit_weighted(fit: Callable[[Floats | None], Floats], y: Floats, robust: bool) -> Floats:
+def fit_weighted(
+    fit: Callable[[Floats | None], Floats], y: Floats, robust: bool
+) -> Floats:
     """Fit; if robust weight the samples by their residuals and fit again until the weights converge.
 
-    `fit` takes weights, None for equal ones, and returns the residuals. Returns the weights of the last fit;
-    after 50 rounds without settling the last ones are taken.
+    `fit` takes weights, None for equal ones, and returns the residuals. Returns the
+    weights of the last fit; after 50 rounds without settling the last ones are taken.
     """
     residuals = fit(None)
     if not robust:

@@ -11,7 +11,8 @@ from threadpoolctl import ThreadpoolController  # type: ignore[import-untyped]
 def single_threaded() -> Iterator[None]:
     """Context, and decorator, in which the linear algebra libraries use one thread.
 
-    A singular value decomposition of 6000 x 15 takes 4 ms so, and up to 160 ms on two busy cores.
+    A singular value decomposition of 6000 x 15 takes 4 ms so, and up to 160 ms on two
+    busy cores.
     """
     with _controller().limit(limits=1, user_api="blas"):
         yield
@@ -19,4 +20,6 @@ def single_threaded() -> Iterator[None]:
 
 @cache
 def _controller() -> ThreadpoolController:
-    return ThreadpoolController()  # looks through the loaded libraries, which takes 20 ms
+    return (
+        ThreadpoolController()
+    )  # looks through the loaded libraries, which takes 20 ms

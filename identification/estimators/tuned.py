@@ -9,10 +9,20 @@ from sklearn.base import clone
 
 from identification.estimators.decomposition import decompose
 from identification.estimators.estimator import Estimator, Estimators, FitTask
-from identification.estimators.linear import LinearRegressor, check_weight, settings, validated
+from identification.estimators.linear import (
+    LinearRegressor,
+    check_weight,
+    settings,
+    validated,
+)
 from identification.estimators.lssvm import LSSVM
 from identification.search import get_optimiser
-from identification.search.objectives import ErrorOfC, held_out_error, time_blocks, training_error
+from identification.search.objectives import (
+    ErrorOfC,
+    held_out_error,
+    time_blocks,
+    training_error,
+)
 from identification.search.search import Optimiser, SearchResult
 from identification.validation.prediction import predict
 from shipgym import InputError, ShipModel, Trial
@@ -31,11 +41,12 @@ class TunedLSSVM(LinearRegressor):
     Parameters
     ----------
     optimiser : {"abc", "pso", "grid", "de"}, mapping or Optimiser
-        Artificial bee colony, particle swarm, grid or differential evolution; with its settings as
-        `{"name": "abc", "rounds": 60}`.
+        Artificial bee colony, particle swarm, grid or differential evolution; with its
+        settings as `{"name": "abc", "rounds": 60}`.
     objective : {"k-fold", "training", "free-running"}
-        Error on held-out blocks of time; error on the fitted samples, as in the thesis, whose
-        optimum is the upper bound; error of simulated trials (through `identify` only).
+        Error on held-out blocks of time; error on the fitted samples, as in the thesis,
+        whose optimum is the upper bound; error of simulated trials (through `identify`
+        only).
     bounds : tuple of float
         Least and largest C.
     folds : int or "trials"
@@ -43,12 +54,13 @@ class TunedLSSVM(LinearRegressor):
     seed : int
         Of the search.
     scale, fit_intercept, robust
-        As of `LSSVM`. With `robust` the blocks are weighted as in the fit with the largest C.
+        As of `LSSVM`. With `robust` the blocks are weighted as in the fit with the
+        largest C.
 
     Attributes
     ----------
-    coef_, intercept_, singular_values_, covariance_, inverse_moment_, noise_variance_, weights_,
-    n_features_in_
+    coef_, intercept_, singular_values_, covariance_, inverse_moment_, noise_variance_,
+    weights_, n_features_in_
         As of `LSSVM`.
     C_ : float
         The weight of the errors that was found.
@@ -70,14 +82,16 @@ class TunedLSSVM(LinearRegressor):
     def fit(self, X: ArrayLike, y: ArrayLike, groups: ArrayLike | None = None) -> Self:
         """Search for C and fit to samples of shape (n_samples, n_features), in the order of time.
 
-        Targets have the shape (n_samples,), as have `groups`: the trial of each sample, for folds="trials".
+        Targets have the shape (n_samples,), as have `groups`: the trial of each sample,
+        for folds="trials".
         """
         check_choice(self.objective, OBJECTIVES, "objective")
         check_whole(self.seed, "seed", at_least=0)
         if self.objective == "free-running":
             raise InputError(
-                "objective: 'free-running' found, expected 'k-fold' or 'training': samples alone cannot be "
-                "simulated; use identify(..., objective='free-running')"
+                "objective: 'free-running' found, expected 'k-fold' or 'training':"
+                " samples alone cannot be simulated; use identify(...,"
+                " objective='free-running')"
             )
         optimiser, bounds = get_optimiser(self.optimiser), self.log_bounds()
         X, y = validated(self, X, y)
@@ -90,12 +104,14 @@ class TunedLSSVM(LinearRegressor):
             low, high = self.bounds
         except (TypeError, ValueError):
             raise InputError(
-                f"bounds: {self.bounds!r} found, expected the least and the largest C, such as (0.01, 1e12)"
+                f"bounds: {self.bounds!r} found, expected the least and the largest C,"
+                " such as (0.01, 1e12)"
             ) from None
         low, high = check_weight(low, "bounds"), check_weight(high, "bounds")
         if not low < high < np.inf:
             raise InputError(
-                f"bounds: {(low, high)} found, expected a least C and a finite one that is larger"
+                f"bounds: {(low, high)} found, expected a least C and a finite one that"
+                " is larger"
             )
         return float(np.log10(low)), float(np.log10(high))
 
@@ -104,15 +120,21 @@ class TunedLSSVM(LinearRegressor):
         X, y = validated(self, X, y)
         self.C_, self.search_ = 10.0 ** float(search.x[0]), search
         fitted = vars(self._estimator(self.C_).fit(X, y))
-        self.__dict__.update({name: value for name, value in fitted.items() if name.endswith("_")})
+        self.__dict__.update(
+            {name: value for name, value in fitted.items() if name.endswith("_")}
+        )
         found = {"value": search.value, "evaluations": search.evaluations}
         self.chosen_ = {"C": self.C_, "objective": self.objective, **found}
         return self
 
     def _estimator(self, C: float) -> LSSVM:
-        return LSSVM(C=C, scale=self.scale, fit_intercept=self.fit_intercept, robust=self.robust)
+        return LSSVM(
+            C=C, scale=self.scale, fit_intercept=self.fit_intercept, robust=self.robust
+        )
 
-    def _objective(self, X: Floats, y: Floats, groups: ArrayLike | None, loosest: LSSVM) -> ErrorOfC:
+    def _objective(
+        self, X: Floats, y: Floats, groups: ArrayLike | None, loosest: LSSVM
+    ) -> ErrorOfC:
         weights = loosest.fit(X, y).weights_ if self.robust else None
         if self.objective == "training":
             return training_error(X, y, self.scale, self.fit_intercept, weights)
@@ -127,18 +149,29 @@ def fit_tuned(make: Callable[[], Estimator], task: FitTask) -> Estimators:
     assert isinstance(template, TunedLSSVM)
     if template.objective == "free-running":
         return _fit_free_running(template, task)
-    return {q: clone(template).fit(X, samples.targets[q], samples.trial) for q, X in samples.features.items()}
+    return {
+        q: clone(template).fit(X, samples.targets[q], samples.trial)
+        for q, X in samples.features.items()
+    }
 
 
 def free_running_error(model: ShipModel, trials: Sequence[Trial]) -> float:
     """Mean squared error of open-loop predictions, each channel relative to its variance in the trial.
 
-    0 for a perfect model, 1 for one that predicts the mean; 1e3 for each trial that ran away.
+    0 for a perfect model, 1 for one that predicts the mean; 1e3 for each trial that ran
+    away.
     """
     errors = []
     for trial in trials:
-        run, motion = predict(model, trial), [c for c in COMPARED if np.ptp(trial[c]) > 0.0]
-        ratios = [np.mean((run[c] - trial[c]) ** 2) / np.var(trial[c]) for c in motion] if run else [RAN_AWAY]
+        run, motion = (
+            predict(model, trial),
+            [c for c in COMPARED if np.ptp(trial[c]) > 0.0],
+        )
+        ratios = (
+            [np.mean((run[c] - trial[c]) ** 2) / np.var(trial[c]) for c in motion]
+            if run
+            else [RAN_AWAY]
+        )
         errors.append(np.mean(ratios))
     return float(np.mean(np.minimum(errors, RAN_AWAY)))
 
@@ -159,10 +192,17 @@ def _fit_free_running(settings: TunedLSSVM, task: FitTask) -> Estimators:
             q: fit.coefficients(fit.filters(10.0**exponent, len(fit.singular_values)))
             for (q, fit), exponent in zip(whitened.items(), log_c, strict=True)
         }
-        return free_running_error(task.blank.with_accelerations(accelerations), task.trials)
+        return free_running_error(
+            task.blank.with_accelerations(accelerations), task.trials
+        )
 
-    optimiser, bounds = get_optimiser(settings.optimiser), [settings.log_bounds()] * len(whitened)
-    search = optimiser.minimise(lambda xs: np.array([error(x) for x in xs]), bounds, settings.seed)
+    optimiser, bounds = (
+        get_optimiser(settings.optimiser),
+        [settings.log_bounds()] * len(whitened),
+    )
+    search = optimiser.minimise(
+        lambda xs: np.array([error(x) for x in xs]), bounds, settings.seed
+    )
     return {
         q: clone(settings).fit_with(X, samples.targets[q], search.of(k))
         for k, (q, X) in enumerate(samples.features.items())

@@ -10,7 +10,11 @@ import numpy as np
 from identification.estimators.estimator import Estimator
 from identification.estimators.methods import METHODS, fit_all
 from identification.regression.samples import Samples, build_samples
-from identification.simulation_error.similarity import AUTO, check_alike, select_reference
+from identification.simulation_error.similarity import (
+    AUTO,
+    check_alike,
+    select_reference,
+)
 from identification.validation.prediction import predict, trial_metrics
 from shipgym import InputError, Particulars, ShipModel, Trial
 from shipgym.arrays import Floats
@@ -26,9 +30,13 @@ class _OwnAccelerations:
     def __getattr__(self, name: str) -> Any:
         return getattr(self._box, name)
 
-    def features(self, equation: str, channels: Any, particulars: Particulars, shaft_speed: float) -> Floats:
+    def features(
+        self, equation: str, channels: Any, particulars: Particulars, shaft_speed: float
+    ) -> Floats:
         """Shape (n_samples, 1)."""
-        return self._box.converted_accelerations(channels, particulars, shaft_speed)[equation][:, None]
+        return self._box.converted_accelerations(channels, particulars, shaft_speed)[
+            equation
+        ][:, None]
 
 
 def chosen_box(
@@ -36,21 +44,29 @@ def chosen_box(
 ) -> tuple[GreyBox, dict[str, float]]:
     """The grey box of a reference ship, and the correlations of the candidates where she was not named.
 
-    `reference`: a model, its name or file; "auto" chooses the one most like the target by `select_reference`;
-    the target's trials tell whether its shaft speed and roll are known.
+    `reference`: a model, its name or file; "auto" chooses the one most like the target
+    by `select_reference`; the target's trials tell whether its shaft speed and roll are
+    known.
     """
     if reference is None:
         raise InputError(
-            "reference_model: None found, expected the name of a reference ship, a model file, or 'auto': a "
-            "grey box is a reference ship plus a table of terms"
+            "reference_model: None found, expected the name of a reference ship, a"
+            " model file, or 'auto': a grey box is a reference ship plus a table of"
+            " terms"
         )
-    recorded = set.intersection(*(set(trial.channels) for trial in trials)) if trials else set()
+    recorded = (
+        set.intersection(*(set(trial.channels) for trial in trials))
+        if trials
+        else set()
+    )
     found: dict[str, float] = {}
     if reference == AUTO:
         with suppress(InputError):  # too little may be known to estimate the rest
             particulars = particulars.completed()
         reference, found = select_reference(particulars, recorded)
-        check_alike(reference, found[reference], 'choose structure "abkowitz" or "cubic"')
+        check_alike(
+            reference, found[reference], 'choose structure "abkowitz" or "cubic"'
+        )
     box = grey_box(reference)
     return replace(box, shaft=box.shaft and "n" in recorded), found
 
@@ -63,7 +79,13 @@ def explained_samples(
     For models that were not fitted by regression; `sampling` as in `build_samples`.
     """
     table: Any = _OwnAccelerations(grey_box(model, shaft=True))
-    own = build_samples(trials, table, model.particulars, shaft_speed=model.service_shaft_speed, **sampling)
+    own = build_samples(
+        trials,
+        table,
+        model.particulars,
+        shaft_speed=model.service_shaft_speed,
+        **sampling,
+    )
     estimators = fit_all(METHODS["ls"].estimator, own)
     for estimator in estimators.values():
         estimator.coef_ = np.ones(1)
@@ -73,8 +95,13 @@ def explained_samples(
 def bare_metrics(model: ShipModel, trials: Sequence[Trial]) -> dict[str, Any]:
     """Name of the reference ship of a grey box, and how well she alone predicts trials (`trial_metrics`)."""
     assert isinstance(model.table, GreyBox)
-    bare = replace(model, coefficients=dict.fromkeys(model.coefficients, 0.0), covariance=None)
+    bare = replace(
+        model, coefficients=dict.fromkeys(model.coefficients, 0.0), covariance=None
+    )
     return {
         "name": model.table.ship.name,
-        "trials": {trial.name: trial_metrics(bare, trial, predict(bare, trial)) for trial in trials},
+        "trials": {
+            trial.name: trial_metrics(bare, trial, predict(bare, trial))
+            for trial in trials
+        },
     }

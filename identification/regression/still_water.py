@@ -19,40 +19,68 @@ NEEDED = {"psi", "u", "v", "r", "delta"}
 COLUMNS = ("current_north", "current_east")
 CONTRADICTION = 0.1  # m/s between a current in columns and one that is given
 SIGNIFICANT = 0.01  # probability below which a current differs from zero
-APART = 1e-6  # the same of the currents of trials from each other, whose covariance is of few blocks
+# the same of the currents of trials from each other, whose covariance is of few blocks
+APART = 1e-6
 UNCERTAIN = 0.05  # standard error by service speed beyond which a current is not known
-ONE_HEADING = 0.85  # length of the mean unit vector of the headings, beyond which speed hides the current
-SHORTEST = 5.0  # ship lengths at service speed that a trial lasts from which a current is estimated
+# length of the mean unit vector of the headings, beyond which speed hides the current
+ONE_HEADING = 0.85
+# ship lengths at service speed that a trial lasts from which a current is estimated
+SHORTEST = 5.0
 REMEDY = (
-    "add a turn of a whole circle, or runs on other headings at the same shaft speed, give the current "
-    '(current = { north = 0.2, east = -0.1 }, m/s), or take none out (current = "none")'
+    "add a turn of a whole circle, or runs on other headings at the same shaft speed,"
+    " give the current (current = { north = 0.2, east = -0.1 }, m/s), or take none out"
+    ' (current = "none")'
 )
 
 
 def in_still_water(
-    trials: Sequence[Trial], options: Options, particulars: Particulars | Mapping[str, Any] | None
+    trials: Sequence[Trial],
+    options: Options,
+    particulars: Particulars | Mapping[str, Any] | None,
 ) -> tuple[list[Trial], dict[str, Any]]:
     """The trials without current and with the accelerations by wind, and what was found, for the provenance.
 
-    Trials that are skipped keep both; of those whose velocities are through the water a current in columns is
-    taken out of the track.
+    Trials that are skipped keep both; of those whose velocities are through the water a
+    current in columns is taken out of the track.
     """
     if isinstance(options.current, str):
         check_choice(options.current, OPTIONS["current"].choices, "current")
-    ship = Particulars.from_mapping(particulars) if isinstance(particulars, Mapping) else particulars
+    ship = (
+        Particulars.from_mapping(particulars)
+        if isinstance(particulars, Mapping)
+        else particulars
+    )
     if ship is None:
         return list(trials), {}
-    used = {trial.name: trial for trial in trials if trial.use != "skip" and trial.kind != "captive"}
+    used = {
+        trial.name: trial
+        for trial in trials
+        if trial.use != "skip" and trial.kind != "captive"
+    }
     remarks: list[str] = []
     found = _with_wind(used, ship, options.wind, remarks)
-    windy = {t.name: float(t["wind_speed"].mean()) for t in found.values() if "wind_udot" in t}
-    report: dict[str, Any] = {"wind": {"option": options.wind, "mean_speeds": windy}} if windy else {}
-    starts = [np.hypot(*over_ground(t))[0] for t in found.values() if {"u", "v"} <= t.channels.keys()]
+    windy = {
+        t.name: float(t["wind_speed"].mean())
+        for t in found.values()
+        if "wind_udot" in t
+    }
+    report: dict[str, Any] = (
+        {"wind": {"option": options.wind, "mean_speeds": windy}} if windy else {}
+    )
+    starts = [
+        np.hypot(*over_ground(t))[0]
+        for t in found.values()
+        if {"u", "v"} <= t.channels.keys()
+    ]
     speed = ship.speed or float(np.median(starts or [0.0]))
     if options.current != "none" and speed > 0.0:
-        report["currents"] = _take_out_current(found, ship.length, speed, options.current, remarks)
+        report["currents"] = _take_out_current(
+            found, ship.length, speed, options.current, remarks
+        )
     report["sea_remarks"] = remarks
-    return [found.get(t.name, t) for t in trials], {name: part for name, part in report.items() if part}
+    return [found.get(t.name, t) for t in trials], {
+        name: part for name, part in report.items() if part
+    }
 
 
 def _with_wind(
@@ -62,7 +90,9 @@ def _with_wind(
     if option in ("none", "constant"):
         return dict(trials)
     try:
-        found = {name: measured_wind(trial, ship, option) for name, trial in trials.items()}
+        found = {
+            name: measured_wind(trial, ship, option) for name, trial in trials.items()
+        }
     except InputError as error:
         if option != "auto":
             raise
@@ -70,37 +100,63 @@ def _with_wind(
         return dict(trials)
     if option != "auto" and not any("wind_udot" in trial for trial in found.values()):
         raise InputError(
-            f"wind: {option!r} found, but no trial has the columns wind_speed and wind_from beside psi, u "
-            'and v; name them in [columns], or take wind = "constant"'
+            f"wind: {option!r} found, but no trial has the columns wind_speed and"
+            " wind_from beside psi, u and v; name them in [columns], or take wind ="
+            ' "constant"'
         )
     return found
 
 
 def _take_out_current(
-    found: dict[str, Trial], length: float, speed: float, option: Any, remarks: list[str]
+    found: dict[str, Trial],
+    length: float,
+    speed: float,
+    option: Any,
+    remarks: list[str],
 ) -> dict[str, Any]:
     """Take the current out of trials, by name, where it is known or asked for; what is known of each."""
-    open_ = [t for t in found.values() if t.over_ground and t.use == "fit" and "psi" in t]
-    one_heading = open_ and abs(np.exp(1j * np.concatenate([t["psi"] for t in open_])).mean()) > ONE_HEADING
+    open_ = [
+        t for t in found.values() if t.over_ground and t.use == "fit" and "psi" in t
+    ]
+    one_heading = (
+        open_
+        and abs(np.exp(1j * np.concatenate([t["psi"] for t in open_])).mean())
+        > ONE_HEADING
+    )
     rows, doubts = dict[str, Any](), dict[str, list[str]]()
-    for trial, current, covariance, source in _currents(list(found.values()), length, speed, option):
+    for trial, current, covariance, source in _currents(
+        list(found.values()), length, speed, option
+    ):
         mean = np.reshape(current, (2, -1)).mean(axis=1)
         row: dict[str, Any] = {"north": float(mean[0]), "east": float(mean[1])}
         row |= {"source": source, "taken_out": True}
         doubt = ""
         if covariance is not None:
             errors = np.sqrt(np.diag(covariance))
-            if one_heading:  # drift by the current and drift by the ship's own neutral helm look alike
+            # drift by the current and drift by the ship's own neutral helm look alike
+            if one_heading:
                 doubt = "the trials keep to one heading"
             else:
-                row |= {"standard_errors": errors.tolist(), "probability": _probability(mean, covariance)}
+                row |= {
+                    "standard_errors": errors.tolist(),
+                    "probability": _probability(mean, covariance),
+                }
                 if errors.max() > UNCERTAIN * speed:
                     doubt = f"its standard error is {errors.max():.2g} m/s"
         if not doubt and np.hypot(*mean) > speed:
-            doubt = f"{np.hypot(*mean):.2g} m/s found, expected less than the ship's speed of {speed:.3g} m/s"
+            doubt = (
+                f"{np.hypot(*mean):.2g} m/s found, expected less than the ship's speed"
+                f" of {speed:.3g} m/s"
+            )
         if doubt and (option != "auto" or covariance is None):
-            remedy = "give it in m/s, towards north and east" if covariance is None else REMEDY
-            raise InputError(f"trial {trial.name!r}: no current can be removed: {doubt}; {remedy}")
+            remedy = (
+                "give it in m/s, towards north and east"
+                if covariance is None
+                else REMEDY
+            )
+            raise InputError(
+                f"trial {trial.name!r}: no current can be removed: {doubt}; {remedy}"
+            )
         if doubt:
             doubts.setdefault(doubt, []).append(PurePath(trial.name).name)
         if doubt or (option == "auto" and row.get("probability", 0.0) > SIGNIFICANT):
@@ -118,8 +174,8 @@ def _currents(
 ) -> Iterator[tuple[Trial, Floats, Floats | None, str]]:
     """Each trial whose current is known or can be estimated, with it, its covariance and its source.
 
-    The trials to fit have one current unless they contradict it or are asked one by one. That of a trial held
-    out is theirs, or is found by their coefficients.
+    The trials to fit have one current unless they contradict it or are asked one by
+    one. That of a trial held out is theirs, or is found by their coefficients.
     """
     unknown = []
     for trial in trials:
@@ -141,7 +197,12 @@ def _currents(
         if not shared and trial.use != "fit":
             own = estimate_current([trial], length, speed, True, found.coefficients)
         part = slice(k, k + 2)
-        yield trial, own.mean[part], own.covariance[part, part], "all trials" if shared else "trial"
+        yield (
+            trial,
+            own.mean[part],
+            own.covariance[part, part],
+            "all trials" if shared else "trial",
+        )
 
 
 def _known(trial: Trial, option: Any) -> Floats | None:
@@ -149,16 +210,25 @@ def _known(trial: Trial, option: Any) -> Floats | None:
     given = None
     if isinstance(option, Mapping):
         check_keys(option, ("north", "east"), "current", ("north", "east"))
-        given = np.array([check_number(option[k], f"current {k}", hint="in m/s") for k in ("north", "east")])
+        given = np.array(
+            [
+                check_number(option[k], f"current {k}", hint="in m/s")
+                for k in ("north", "east")
+            ]
+        )
     if not trial.channels.keys() >= set(COLUMNS):
         return given if trial.over_ground else None
     columns = np.array([trial[name] for name in COLUMNS])
     north, east = columns.mean(axis=1)
-    if given is not None and np.hypot(north - given[0], east - given[1]) > CONTRADICTION:
+    if (
+        given is not None
+        and np.hypot(north - given[0], east - given[1]) > CONTRADICTION
+    ):
         raise InputError(
-            f"trial {trial.name!r}: columns current_north and current_east have means of {north:.2f} and "
-            f"{east:.2f} m/s, current = {{ north = {given[0]:g}, east = {given[1]:g} }} was given, expected "
-            "them to agree; leave one of them out"
+            f"trial {trial.name!r}: columns current_north and current_east have means"
+            f" of {north:.2f} and {east:.2f} m/s, current = {{ north = {given[0]:g},"
+            f" east = {given[1]:g} }} was given, expected them to agree; leave one of"
+            " them out"
         )
     return columns
 
@@ -171,9 +241,13 @@ def _probability(mean: Floats, covariance: Floats) -> float:
 def through_water(trial: Trial, north: Any, east: Any) -> Trial:
     """The trial without a current, m/s, each a number or of shape (n_samples,).
 
-    Its track starts where it did; velocities over ground, but for one logged, become those through the water.
+    Its track starts where it did; velocities over ground, but for one logged, become
+    those through the water.
     """
-    north, east = (np.broadcast_to(np.asarray(part, dtype=float), trial.t.shape) for part in (north, east))
+    north, east = (
+        np.broadcast_to(np.asarray(part, dtype=float), trial.t.shape)
+        for part in (north, east)
+    )
     channels = dict(zip(COLUMNS, (north, east), strict=True))
     for name, speed in (("x", north), ("y", east)):
         if name in trial:

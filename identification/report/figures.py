@@ -10,10 +10,23 @@ from identification.fit import Fit
 from identification.report.predictions import overview_figure, prediction_figure
 from identification.search.search import BAND, LOG_C
 from identification.uncertainty.covariance import residuals
-from identification.validation.diagnostics import autocorrelation, cross_correlation, without_overlap
+from identification.validation.diagnostics import (
+    autocorrelation,
+    cross_correlation,
+    without_overlap,
+)
 from identification.validation.warnings import EQUATIONS
 from shipgym.arrays import Floats
-from shipgym.plots import Panel, axis, compact, graph_objects, line, panels, points, translucent
+from shipgym.plots import (
+    Panel,
+    axis,
+    compact,
+    graph_objects,
+    line,
+    panels,
+    points,
+    translucent,
+)
 from shipgym.plots.style import LIMIT, MEASURED, MODEL, MUTED, PALETTE, Figure
 
 UNITS = {"u": "m/s²", "v": "m/s²", "r": "deg/s²", "p": "deg/s²"}
@@ -26,11 +39,16 @@ SHOWN = (-1.5, 3.5)  # of an interval, by the size of the coefficient
 def all_figures(fit: Fit) -> dict[str, Figure]:
     """Every figure of a fit by its name; see `IdentificationResult.plots`."""
     found = regression_figures(fit) | {"coefficients": coefficients_figure(fit)}
-    overview = overview_figure([trial for trial in fit.trials if trial.use == "fit"], fit.predictions)
+    overview = overview_figure(
+        [trial for trial in fit.trials if trial.use == "fit"], fit.predictions
+    )
     if overview is not None:
         found["trials"] = overview
     held = [trial for trial in fit.trials if trial.use == "validate"]
-    return found | {f"prediction: {t.name}": prediction_figure(t, fit.predictions[t.name]) for t in held}
+    return found | {
+        f"prediction: {t.name}": prediction_figure(t, fit.predictions[t.name])
+        for t in held
+    }
 
 
 def regression_figures(fit: Fit) -> dict[str, Figure]:
@@ -55,17 +73,42 @@ def fit_figure(fit: Fit) -> Figure:
         windows = np.arange(len(measured) + len(breaks))
         lines = [  # with gaps between the trials
             line(windows, np.insert(measured, breaks, np.nan), "trials", MEASURED, 1.2),
-            line(windows, np.insert(explained, breaks, np.nan), "regression", MODEL, 1.7),
+            line(
+                windows, np.insert(explained, breaks, np.nan), "regression", MODEL, 1.7
+            ),
         ]
-        ends = [min(measured.min(), explained.min()), max(measured.max(), explained.max())]
+        ends = [
+            min(measured.min(), explained.min()),
+            max(measured.max(), explained.max()),
+        ]
         cloud = [
-            points(explained, measured, "", translucent(MODEL, 0.35), 4, showlegend=False, hoverinfo="skip"),
+            points(
+                explained,
+                measured,
+                "",
+                translucent(MODEL, 0.35),
+                4,
+                showlegend=False,
+                hoverinfo="skip",
+            ),
             line(ends, ends, "equal", MUTED, 1.0, showlegend=False),
         ]
-        shown.append(Panel(lines, "window, trial after trial", axis(f"{EQUATIONS[q]}, {UNITS[q]}", nticks=5)))
+        shown.append(
+            Panel(
+                lines,
+                "window, trial after trial",
+                axis(f"{EQUATIONS[q]}, {UNITS[q]}", nticks=5),
+            )
+        )
         shown.append(Panel(cloud, axis("regression", nticks=4), axis(nticks=5)))
-    grid = {"column_widths": [0.7, 0.3], "horizontal_spacing": 0.1, "vertical_spacing": 0.48 / len(shown)}
-    return panels(shown, 95 * len(shown) + 80, 2, outer=True, grid=grid, hovermode="closest")
+    grid = {
+        "column_widths": [0.7, 0.3],
+        "horizontal_spacing": 0.1,
+        "vertical_spacing": 0.48 / len(shown),
+    }
+    return panels(
+        shown, 95 * len(shown) + 80, 2, outer=True, grid=grid, hovermode="closest"
+    )
 
 
 def residual_figure(fit: Fit) -> Figure:
@@ -74,7 +117,10 @@ def residual_figure(fit: Fit) -> Figure:
     rudder, lags = rudder_at_windows(fit), np.arange(-LAGS, LAGS + 1)
     bound, shown = NORMAL_95 / np.sqrt(len(rows)), []
     for k, q in enumerate(fit.estimators):
-        own, title = autocorrelation(errors[q][rows], LAGS), "" if k else "with themselves"
+        own, title = (
+            autocorrelation(errors[q][rows], LAGS),
+            "" if k else "with themselves",
+        )
         shown.append(_bars(np.arange(1, len(own) + 1), own, bound, EQUATIONS[q], title))
         if rudder is not None:
             found = cross_correlation(errors[q][rows], rudder[rows], lags)
@@ -82,18 +128,29 @@ def residual_figure(fit: Fit) -> Figure:
     columns = 1 if rudder is None else 2
     grid = {"horizontal_spacing": 0.1, "vertical_spacing": 0.24 / len(fit.estimators)}
     height = 170 * len(fit.estimators) + 100
-    return panels(shown, height, columns, outer=True, grid=grid, hovermode="closest", bargap=0.5)
+    return panels(
+        shown, height, columns, outer=True, grid=grid, hovermode="closest", bargap=0.5
+    )
 
 
-def _bars(lags: NDArray[Any], values: Any, bound: float, beside: str, title: str) -> Panel:
+def _bars(
+    lags: NDArray[Any], values: Any, bound: float, beside: str, title: str
+) -> Panel:
     """Correlations by their lags, with the bounds of white noise."""
     hover, ends = "lag %{x}: %{y:.2f}<extra></extra>", [lags[0] - 0.5, lags[-1] + 0.5]
     style = {"marker": {"color": MODEL}, "showlegend": False, "hovertemplate": hover}
     bars = graph_objects().Bar(x=lags, y=compact(values), **style)
     name = "95 % bounds of white noise"
-    bounds = [line(ends, [at, at], name, LIMIT, 1.2, line_dash="dash") for at in (-bound, bound)]
-    largest = min(max(1.1 * float(np.max(np.abs(values), initial=0.0)), 3.0 * bound), 1.05)
-    return Panel([bars, *bounds], "lag, windows", axis(beside, range=[-largest, largest]), title)
+    bounds = [
+        line(ends, [at, at], name, LIMIT, 1.2, line_dash="dash")
+        for at in (-bound, bound)
+    ]
+    largest = min(
+        max(1.1 * float(np.max(np.abs(values), initial=0.0)), 3.0 * bound), 1.05
+    )
+    return Panel(
+        [bars, *bounds], "lag, windows", axis(beside, range=[-largest, largest]), title
+    )
 
 
 def rudder_at_windows(fit: Fit) -> Floats | None:
@@ -110,8 +167,14 @@ def rudder_at_windows(fit: Fit) -> Floats | None:
 
 def truncated(fit: Fit) -> dict[str, TruncatedLSSVM]:
     """The estimators, by equation, that chose or were given a rank."""
-    own = {q: one for q, one in fit.estimators.items() if isinstance(one, TruncatedLSSVM)}
-    return {q: one for q, one in own.items() if one.selection != "full" or one.rank is not None}
+    own = {
+        q: one for q, one in fit.estimators.items() if isinstance(one, TruncatedLSSVM)
+    }
+    return {
+        q: one
+        for q, one in own.items()
+        if one.selection != "full" or one.rank is not None
+    }
 
 
 def l_curve_figure(fit: Fit) -> Figure:
@@ -125,18 +188,37 @@ def l_curve_figure(fit: Fit) -> Figure:
         mark = {"color": MUTED, "size": 5}
         chosen = {"hoverinfo": "skip", "cliponaxis": False}
         traces = [
-            line(x, y, "rank 1, 2, ...", MUTED, 1.2, "lines+markers", marker=mark, **hover),
-            points(x[rank - 1 : rank], y[rank - 1 : rank], "chosen", LIMIT, 9, **chosen),
+            line(
+                x,
+                y,
+                "rank 1, 2, ...",
+                MUTED,
+                1.2,
+                "lines+markers",
+                marker=mark,
+                **hover,
+            ),
+            points(
+                x[rank - 1 : rank], y[rank - 1 : rank], "chosen", LIMIT, 9, **chosen
+            ),
         ]
-        axes = _logarithmic("norm of the residuals", x), _logarithmic("norm of the solution", y)
+        axes = (
+            _logarithmic("norm of the residuals", x),
+            _logarithmic("norm of the solution", y),
+        )
         shown.append(Panel(traces, *axes, f"{EQUATIONS[q]}: rank {rank} of {len(x)}"))
     grid = {"horizontal_spacing": 0.09}
-    return panels(shown, 360, len(shown), outer=True, grid=grid, left=70, hovermode="closest")
+    return panels(
+        shown, 360, len(shown), outer=True, grid=grid, left=70, hovermode="closest"
+    )
 
 
 def _logarithmic(title: str, values: NDArray[np.float32]) -> dict[str, Any]:
     """An axis in decades, or in steps of 1, 2, 5 where there are few."""
-    few = float(np.log10(values.max() / max(values.min(), np.finfo(np.float32).tiny))) < 2.0
+    few = (
+        float(np.log10(values.max() / max(values.min(), np.finfo(np.float32).tiny)))
+        < 2.0
+    )
     return axis(title, type="log", dtick="D2" if few else 1, tickformat="~g")
 
 
@@ -144,7 +226,9 @@ def search_figure(fit: Fit) -> Figure:
     """What a search had found after each of its rounds: objective, and weight C or insensitive band."""
     searches = {EQUATIONS.get(q, q): search for q, search in fit.searches.items()}
     logarithmic = all(search.variable == LOG_C for search in searches.values())
-    common = len({id(search.history) for search in searches.values()}) == 1  # one search for all
+    common = (
+        len({id(search.history) for search in searches.values()}) == 1
+    )  # one search for all
     objectives, best = list[Any](), list[Any]()
     for (name, search), colour in zip(searches.items(), PALETTE, strict=False):
         rounds = np.arange(len(search.history))
@@ -155,9 +239,13 @@ def search_figure(fit: Fit) -> Figure:
         best.append(line(rounds, values, name, colour))
     round_axis = axis("round", rangemode="tozero")
     own = axis(type="log", tickformat=".0e") if logarithmic else axis(range=[0.0, 1.0])
-    left = Panel(objectives, round_axis, axis(), "best objective, relative to the final one")
+    left = Panel(
+        objectives, round_axis, axis(), "best objective, relative to the final one"
+    )
     right = Panel(best, round_axis, own, "best C" if logarithmic else f"best {BAND}")
-    return panels([left, right], 340, 2, grid={"horizontal_spacing": 0.1}, hovermode="closest")
+    return panels(
+        [left, right], 340, 2, grid={"horizontal_spacing": 0.1}, hovermode="closest"
+    )
 
 
 def coefficients_figure(fit: Fit) -> Figure:
@@ -165,25 +253,53 @@ def coefficients_figure(fit: Fit) -> Figure:
     names, shown = list(fit.coefficients), []
     values = np.array(list(fit.coefficients.values()))
     errors = np.array(list(fit.standard_errors.values()))
-    half = NORMAL_95 * np.nan_to_num(errors) / np.where(values == 0.0, 1.0, np.abs(values))
+    half = (
+        NORMAL_95 * np.nan_to_num(errors) / np.where(values == 0.0, 1.0, np.abs(values))
+    )
     significant = (half < 1.0) & (values != 0.0)
     columns = 1 if len(names) < 12 else 2
     rows = -(-len(names) // columns)
-    shares = axis("per cent of the estimate", range=[-130, 330], zeroline=True, zerolinecolor=LIMIT)
+    shares = axis(
+        "per cent of the estimate",
+        range=[-130, 330],
+        zeroline=True,
+        zerolinecolor=LIMIT,
+    )
     for first in range(0, columns * rows, rows):
         places = np.arange(first, min(first + rows, len(names)))
         traces = []
-        for sure, name, colour in ((True, "significant", MODEL), (False, "not significant", "#b3bcc7")):
+        for sure, name, colour in (
+            (True, "significant", MODEL),
+            (False, "not significant", "#b3bcc7"),
+        ):
             own = places[significant[places] == sure]
             centre = np.sign(values[own]) ** 2
-            low, high = (np.clip(centre + side * half[own], *SHOWN) for side in (-1.0, 1.0))
-            ends = {"array": compact(100.0 * (high - centre)), "arrayminus": compact(100.0 * (centre - low))}
-            bars = {"type": "data", "symmetric": False, **ends, "color": colour, "thickness": 1.8, "width": 3}
+            low, high = (
+                np.clip(centre + side * half[own], *SHOWN) for side in (-1.0, 1.0)
+            )
+            ends = {
+                "array": compact(100.0 * (high - centre)),
+                "arrayminus": compact(100.0 * (centre - low)),
+            }
+            bars = {
+                "type": "data",
+                "symmetric": False,
+                **ends,
+                "color": colour,
+                "thickness": 1.8,
+                "width": 3,
+            }
             told = [f"{names[i]}: ± {100.0 * half[i]:.3g} %" for i in own]
-            dots = points(100.0 * centre, own - first, name, colour, error_x=bars, text=told)
+            dots = points(
+                100.0 * centre, own - first, name, colour, error_x=bars, text=told
+            )
             traces.append(dots.update(hovertemplate="%{text}<extra></extra>"))
         marks = [names[i] for i in places]
-        labels = axis(tickvals=list(range(len(marks))), ticktext=marks, range=[rows - 0.5, -0.5])
+        labels = axis(
+            tickvals=list(range(len(marks))), ticktext=marks, range=[rows - 0.5, -0.5]
+        )
         shown.append(Panel(traces, shares, labels))
     grid = {"horizontal_spacing": 0.16}
-    return panels(shown, 20 * rows + 110, columns, grid=grid, left=84, hovermode="closest")
+    return panels(
+        shown, 20 * rows + 110, columns, grid=grid, left=84, hovermode="closest"
+    )

@@ -14,7 +14,9 @@ from shipgym.trials.navigation import rotate_to_body
 RUDDER = "#9aa5b1"
 
 
-def overview_figure(trials: Sequence[Trial], predictions: Mapping[str, Trial | None]) -> Figure | None:
+def overview_figure(
+    trials: Sequence[Trial], predictions: Mapping[str, Trial | None]
+) -> Figure | None:
     """Heading and rudder of the trials, one panel each, with the model's open-loop simulation.
 
     None where a trial has no heading or no rudder.
@@ -26,10 +28,23 @@ def overview_figure(trials: Sequence[Trial], predictions: Mapping[str, Trial | N
         start, found = trial["psi"][0], predictions.get(trial.name)
         lines = [
             line(trial.t, np.degrees(trial["delta"]), "rudder", RUDDER, 1.2),
-            line(trial.t, np.degrees(trial["psi"] - start), "heading change, measured", MEASURED, 1.5),
+            line(
+                trial.t,
+                np.degrees(trial["psi"] - start),
+                "heading change, measured",
+                MEASURED,
+                1.5,
+            ),
         ]
         if found is not None:
-            lines.append(line(found.t, np.degrees(found["psi"] - start), "heading change, model", MODEL))
+            lines.append(
+                line(
+                    found.t,
+                    np.degrees(found["psi"] - start),
+                    "heading change, model",
+                    MODEL,
+                )
+            )
         shown.append(Panel(lines, "time, s", "deg", PurePath(trial.name).name))
     return panels(shown, 230 * -(-len(shown) // 2) + 80, 2, outer=True)
 
@@ -45,7 +60,13 @@ def prediction_figure(measured: Trial, predicted: Trial | None) -> Figure:
             for run, *style in _runs(measured, None if given else predicted)
             if channel in measured.channels
         ]
-        shown.append(Panel(lines, "time, s" if k > 2 else "", "rudder (given), deg" if given else title))
+        shown.append(
+            Panel(
+                lines,
+                "time, s" if k > 2 else "",
+                "rudder (given), deg" if given else title,
+            )
+        )
     if {"x", "y"} <= measured.channels.keys():
         shown.append(_paths(measured, predicted))
     return panels(shown, 600, 2, grid={"vertical_spacing": 0.1}, hovermode="closest")
@@ -61,7 +82,9 @@ def _paths(measured: Trial, predicted: Trial | None) -> Panel:
     """The paths along and across the first course; a turning circle to one scale."""
     start, turning, lines = measured["psi"][:1], measured.kind == "turning-circle", []
     for run, *style in _runs(measured, predicted):
-        way = rotate_to_body(run["x"] - measured["x"][0], run["y"] - measured["y"][0], start)
+        way = rotate_to_body(
+            run["x"] - measured["x"][0], run["y"] - measured["y"][0], start
+        )
         lines.append(line(*(way[::-1] if turning else way), *style))
     ahead, aside = "along the first course, m", "to starboard, m"
     if turning:

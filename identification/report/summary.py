@@ -8,7 +8,11 @@ from rich.table import Table
 from identification.fit import Fit
 from identification.report.sea import sea_sentences
 from identification.text import as_text, lined_table
-from identification.validation.warnings import EQUATIONS, exactly_collinear, undetermined
+from identification.validation.warnings import (
+    EQUATIONS,
+    exactly_collinear,
+    undetermined,
+)
 from shipgym import ShipModel
 from shipgym.ships.particulars import ADDED_MASSES
 
@@ -18,30 +22,49 @@ PRIME = 1e-5
 
 def summary_table(fit: Fit) -> str:
     """Coefficients with standard error and t, inertia with what was estimated, and the verdict."""
-    verdict = "stable" if fit.stable else "NOT STABLE: its predictions run away and are not to be used"
+    verdict = (
+        "stable"
+        if fit.stable
+        else "NOT STABLE: its predictions run away and are not to be used"
+    )
     provenance = fit.model.provenance or {}
     shown = [
-        f"{fit.model.name}: {provenance.get('structure')} by {provenance.get('method')}, "
-        f"{provenance.get('samples')} samples; {verdict} ({provenance.get('guard', {}).get('decision')})",
-        kernel_text(provenance["kernel"]) if "kernel" in provenance else _coefficients(fit),
+        (
+            f"{fit.model.name}: {provenance.get('structure')} by"
+            f" {provenance.get('method')}, {provenance.get('samples')} samples;"
+            f" {verdict} ({provenance.get('guard', {}).get('decision')})"
+        ),
+        (
+            kernel_text(provenance["kernel"])
+            if "kernel" in provenance
+            else _coefficients(fit)
+        ),
         _inertia(fit),
         _equations(fit),
     ]
     if "model_error" in provenance:
         error = provenance["model_error"]
-        shown.append(f"Standard errors are scaled by {error['factor']:.2g} for model error ({error['how']}).")
+        shown.append(
+            f"Standard errors are scaled by {error['factor']:.2g} for model error"
+            f" ({error['how']})."
+        )
     shown += sea_sentences(provenance) + undetermined(fit) + exactly_collinear(fit)
-    return as_text(*shown, *([_against_reference(fit)] if "reference" in fit.metrics else []))
+    return as_text(
+        *shown, *([_against_reference(fit)] if "reference" in fit.metrics else [])
+    )
 
 
 def kernel_text(report: dict[str, Any]) -> str:
     """What was added to the reference ship, whose weights tell a reader nothing."""
     errors = report["heading_errors_held_out"].items()
-    told = [f"{name} " + ("ran away" if e is None else f"{degrees(e):.2g} deg") for name, e in errors]
+    told = [
+        f"{name} " + ("ran away" if e is None else f"{degrees(e):.2g} deg")
+        for name, e in errors
+    ]
     return (
-        f"Kernel: {report['centres']} radial basis functions of length {report['length']:g} in "
-        f"{report['features']} features an equation, C {report['C']:g}; heading held out, rms: "
-        f"{', '.join(told)}"
+        f"Kernel: {report['centres']} radial basis functions of length"
+        f" {report['length']:g} in {report['features']} features an equation, C"
+        f" {report['C']:g}; heading held out, rms: {', '.join(told)}"
     )
 
 
@@ -52,7 +75,10 @@ def are_derivatives(model: ShipModel) -> bool:
 
 def _coefficients(fit: Fit) -> Table:
     structure = fit.model.dynamics
-    title, unit = f"Coefficients of {structure.quantity}s, {structure.normalisation} units", 1.0
+    title, unit = (
+        f"Coefficients of {structure.quantity}s, {structure.normalisation} units",
+        1.0,
+    )
     if are_derivatives(fit.model):
         title, unit = "Hydrodynamic derivatives, prime system, 1e-5", PRIME
     table = lined_table(title, "name", ">value", ">standard error", ">t")
@@ -84,10 +110,16 @@ def _inertia(fit: Fit) -> Table:
 
 def _equations(fit: Fit) -> Table:
     headings = ("rows", "terms", "rank", "condition", "R2", "residual rms")
-    table = lined_table("Fit of the equations", "equation", *(f">{heading}" for heading in headings))
+    table = lined_table(
+        "Fit of the equations", "equation", *(f">{heading}" for heading in headings)
+    )
     for name, found in fit.diagnostics.items():
         counts = (str(count) for count in (found.samples, found.terms, found.rank))
-        quality = f"{found.condition_number:.0f}", f"{found.r_squared:.5f}", f"{found.residual_rms:.2e}"
+        quality = (
+            f"{found.condition_number:.0f}",
+            f"{found.r_squared:.5f}",
+            f"{found.residual_rms:.2e}",
+        )
         table.add_row(EQUATIONS.get(name, name), *counts, *quality)
     return table
 
@@ -95,10 +127,15 @@ def _equations(fit: Fit) -> Table:
 def _against_reference(fit: Fit) -> Table:
     """The heading of each trial as predicted, and as the bare reference ship predicts it."""
     reference = fit.metrics["reference"]
-    title = f"Open-loop heading, root mean square error, beside the bare reference ship '{reference['name']}'"
+    title = (
+        "Open-loop heading, root mean square error, beside the bare reference ship"
+        f" '{reference['name']}'"
+    )
     table = lined_table(title, "trial", "use", ">model, deg", ">reference, deg")
     for name, metrics in fit.metrics["trials"].items():
-        errors = (found["rmse"]["psi"] for found in (metrics, reference["trials"][name]))
+        errors = (
+            found["rmse"]["psi"] for found in (metrics, reference["trials"][name])
+        )
         shown = ("ran away" if e is None else f"{degrees(e):.2f}" for e in errors)
         table.add_row(name, metrics["use"], *shown)
     return table

@@ -10,35 +10,52 @@ from identification.search.optimisers import (
     DifferentialEvolution,
     GridSearch,
     ParticleSwarm,
-)  # fmt: skip
+)
 from identification.search.search import Objective, Optimiser, SearchResult
 from shipgym import InputError
 from shipgym.checks import check_choice
 
 __all__ = [
-    "OPTIMISERS", "ArtificialBeeColony", "DifferentialEvolution", "GridSearch", "Optimiser",
-    "ParticleSwarm", "SearchResult", "get_optimiser", "minimise",
-]  # fmt: skip
+    "OPTIMISERS",
+    "ArtificialBeeColony",
+    "DifferentialEvolution",
+    "GridSearch",
+    "Optimiser",
+    "ParticleSwarm",
+    "SearchResult",
+    "get_optimiser",
+    "minimise",
+]
 
 OPTIMISERS: dict[str, Callable[..., Optimiser]] = {
-    "abc": ArtificialBeeColony, "pso": ParticleSwarm, "grid": GridSearch, "de": DifferentialEvolution,
-}  # fmt: skip
+    "abc": ArtificialBeeColony,
+    "pso": ParticleSwarm,
+    "grid": GridSearch,
+    "de": DifferentialEvolution,
+}
 
 
 def get_optimiser(optimiser: str | Mapping[str, Any] | Optimiser) -> Optimiser:
     """An optimiser by name, as a table with settings, `{"name": "abc", "rounds": 60}`, or as given."""
     if hasattr(optimiser, "minimise"):
         return cast(Optimiser, optimiser)
-    settings = dict(optimiser) if isinstance(optimiser, Mapping) else {"name": optimiser}
+    settings = (
+        dict(optimiser) if isinstance(optimiser, Mapping) else {"name": optimiser}
+    )
     name = check_choice(settings.pop("name", None), OPTIMISERS, "optimiser")
     try:
         return OPTIMISERS[name](**settings)
     except TypeError as error:
-        raise InputError(f"optimiser: {', '.join(settings)} found for {name!r}: {error}") from None
+        raise InputError(
+            f"optimiser: {', '.join(settings)} found for {name!r}: {error}"
+        ) from None
 
 
 def minimise(
-    objective: Objective, bounds: ArrayLike, seed: int = 0, optimiser: str | Optimiser = "abc"
+    objective: Objective,
+    bounds: ArrayLike,
+    seed: int = 0,
+    optimiser: str | Optimiser = "abc",
 ) -> SearchResult:
     """Minimise an objective within a box by any optimiser.
 
@@ -47,7 +64,8 @@ def minimise(
     Parameters
     ----------
     objective : callable
-        Values, shape (n_candidates,), of candidates of shape (n_candidates, n_dimensions).
+        Values, shape (n_candidates,), of candidates of shape (n_candidates,
+        n_dimensions).
     bounds : array-like of shape (n_dimensions, 2)
         Lower and upper bound of each dimension.
     seed : int

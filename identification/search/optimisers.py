@@ -16,8 +16,8 @@ LARGEST = 1e150  # value of a candidate that SciPy is told
 class GridSearch(Optimiser):
     """Evenly spaced candidates, then finer ones around the best.
 
-    With the logarithm of C as the variable this is cross-validation over a logarithmic grid (Zhu 2018,
-    section 5.3.1).
+    With the logarithm of C as the variable this is cross-validation over a logarithmic
+    grid (Zhu 2018, section 5.3.1).
 
     Parameters
     ----------
@@ -30,16 +30,25 @@ class GridSearch(Optimiser):
     points: int = 29
     refinements: int = 1
 
-    def _search(self, record: Recorder, low: Floats, high: Floats, rng: np.random.Generator) -> None:
+    def _search(
+        self, record: Recorder, low: Floats, high: Floats, rng: np.random.Generator
+    ) -> None:
         points = check_whole(self.points, "points", at_least=3, at_most=MOST)
         check_whole(self.refinements, "refinements", at_least=0, at_most=MOST)
         first, last = low, high
         for _ in range(self.refinements + 1):
             axes = [np.linspace(a, b, points) for a, b in zip(first, last, strict=True)]
-            record(np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, len(low)))
+            record(
+                np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(
+                    -1, len(low)
+                )
+            )
             record.end_round()
             step = (last - first) / (points - 1)
-            first, last = np.maximum(record.x - step, low), np.minimum(record.x + step, high)
+            first, last = (
+                np.maximum(record.x - step, low),
+                np.minimum(record.x + step, high),
+            )
 
 
 @dataclass(frozen=True)
@@ -53,8 +62,8 @@ class ParticleSwarm(Optimiser):
     rounds : int
         Moves of the whole swarm.
     inertia : float
-        Share of the velocity that is kept. With 0.7298 and twice 1.49618 a particle converges (Clerc &
-        Kennedy 2002).
+        Share of the velocity that is kept. With 0.7298 and twice 1.49618 a particle
+        converges (Clerc & Kennedy 2002).
     own, common : float
         Pull towards the best place of the particle and of the swarm.
     """
@@ -65,7 +74,9 @@ class ParticleSwarm(Optimiser):
     own: float = 1.49618
     common: float = 1.49618
 
-    def _search(self, record: Recorder, low: Floats, high: Floats, rng: np.random.Generator) -> None:
+    def _search(
+        self, record: Recorder, low: Floats, high: Floats, rng: np.random.Generator
+    ) -> None:
         n = check_whole(self.particles, "particles", at_least=1, at_most=MOST)
         check_whole(self.rounds, "rounds", at_least=1, at_most=MOST)
         place, values = _start(record, n, low, high, rng)
@@ -79,7 +90,9 @@ class ParticleSwarm(Optimiser):
             place = place + velocity
             outside = (place < low) | (place > high)
             place = np.clip(place, low, high)
-            velocity[outside] = 0.0  # a particle at a wall does not go on pushing against it
+            velocity[outside] = (
+                0.0  # a particle at a wall does not go on pushing against it
+            )
             found = record(place)
             better = found < values
             best[better], values[better] = place[better], found[better]
@@ -101,31 +114,43 @@ class DifferentialEvolution(Optimiser):
     members: int = 20
     rounds: int = 60
 
-    def _search(self, record: Recorder, low: Floats, high: Floats, rng: np.random.Generator) -> None:
+    def _search(
+        self, record: Recorder, low: Floats, high: Floats, rng: np.random.Generator
+    ) -> None:
         from scipy.optimize import Bounds, differential_evolution
 
         check_whole(self.members, "members", at_least=5, at_most=MOST)
         check_whole(self.rounds, "rounds", at_least=1, at_most=MOST)
 
         def of_columns(x: Any, /) -> Any:
-            # a column for each candidate; SciPy takes no infinite values, and squares them
+            # a column for each candidate; SciPy takes no infinite values, and squares
+            # them
             return np.minimum(record(np.atleast_2d(x.T)), LARGEST)
 
         differential_evolution(
-            of_columns, Bounds(low, high), maxiter=self.rounds, popsize=self.members, tol=0.0, atol=0.0,
-            rng=rng, polish=False, vectorized=True, updating="deferred",
+            of_columns,
+            Bounds(low, high),
+            maxiter=self.rounds,
+            popsize=self.members,
+            tol=0.0,
+            atol=0.0,
+            rng=rng,
+            polish=False,
+            vectorized=True,
+            updating="deferred",
             callback=lambda intermediate_result: record.end_round(),
-        )  # fmt: skip
+        )
 
 
 @dataclass(frozen=True)
 class ArtificialBeeColony(Optimiser):
     """Artificial bee colony (Karaboga 2005; Zhu 2018, section 5.3.3).
 
-    Employed bees move each food source along one dimension towards or away from another; onlookers do the
-    same to sources drawn by their fitness; a source that did not improve for too long is left and
-    drawn again. All bees of a stage move at once, from the same sources, so that the objective is
-    evaluated for a batch of candidates; of several onlookers at one source the best counts.
+    Employed bees move each food source along one dimension towards or away from
+    another; onlookers do the same to sources drawn by their fitness; a source that did
+    not improve for too long is left and drawn again. All bees of a stage move at once,
+    from the same sources, so that the objective is evaluated for a batch of candidates;
+    of several onlookers at one source the best counts.
 
     Parameters
     ----------
@@ -141,7 +166,9 @@ class ArtificialBeeColony(Optimiser):
     rounds: int = 30
     limit: int = 20
 
-    def _search(self, record: Recorder, low: Floats, high: Floats, rng: np.random.Generator) -> None:
+    def _search(
+        self, record: Recorder, low: Floats, high: Floats, rng: np.random.Generator
+    ) -> None:
         n = check_whole(self.sources, "sources", at_least=2, at_most=MOST)
         check_whole(self.rounds, "rounds", at_least=1, at_most=MOST)
         check_whole(self.limit, "limit", at_least=1, at_most=MOST)
@@ -149,7 +176,11 @@ class ArtificialBeeColony(Optimiser):
         idle = np.zeros(n, dtype=np.int64)
         for _ in range(self.rounds):
             for onlookers in (False, True):
-                chosen = _chances(values).searchsorted(rng.random(n), "right") if onlookers else np.arange(n)
+                chosen = (
+                    _chances(values).searchsorted(rng.random(n), "right")
+                    if onlookers
+                    else np.arange(n)
+                )
                 moved = np.minimum(np.maximum(_moved(sources, chosen, rng), low), high)
                 _settle(sources, values, idle, chosen, moved, record(moved))
             left = np.flatnonzero(idle > self.limit)
@@ -189,7 +220,9 @@ def _moved(sources: Floats, chosen: Integers, rng: np.random.Generator) -> Float
 
 def _chances(values: Floats) -> Floats:
     """Cumulative chance of each source to be chosen, by its fitness."""
-    fitness = np.where(values >= 0.0, 1.0 / (1.0 + np.maximum(values, 0.0)), 1.0 - values)
+    fitness = np.where(
+        values >= 0.0, 1.0 / (1.0 + np.maximum(values, 0.0)), 1.0 - values
+    )
     chances = fitness.cumsum()
     if not 0.0 < chances[-1] < np.inf:
         chances = np.arange(1.0, len(values) + 1.0)
@@ -198,12 +231,19 @@ def _chances(values: Floats) -> Floats:
 
 
 def _settle(
-    sources: Floats, values: Floats, idle: Integers, chosen: Integers, moved: Floats, found: Floats
+    sources: Floats,
+    values: Floats,
+    idle: Integers,
+    chosen: Integers,
+    moved: Floats,
+    found: Floats,
 ) -> None:
     """Take the best move of each chosen source where it improves; count the tries of those that do not."""
     idle += np.bincount(chosen, minlength=len(values))
     better = np.flatnonzero(found < values[chosen])
-    better = better[np.argsort(-found[better], kind="stable")]  # of several at one source the best is last
+    better = better[
+        np.argsort(-found[better], kind="stable")
+    ]  # of several at one source the best is last
     improved = chosen[better]
     sources[improved], values[improved] = moved[better], found[better]
     idle[improved] = 0

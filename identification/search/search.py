@@ -14,7 +14,8 @@ from shipgym.arrays import Floats
 LOG_C, BAND = "log10 C", "insensitive band"  # what searches look for
 MOST = 100_000  # particles, rounds and the like of a search
 
-#: Values of candidates, an array of shape (n_candidates, n_dimensions) -> (n_candidates,).
+#: Values of candidates, an array of shape (n_candidates, n_dimensions) ->
+#: (n_candidates,).
 Objective = Callable[[Floats], Floats]
 
 
@@ -47,7 +48,12 @@ class SearchResult:
 
     def of(self, dimension: int, variable: str = LOG_C) -> Self:
         """What was found of one dimension."""
-        return replace(self, x=self.x[[dimension]], course=self.course[:, [dimension]], variable=variable)
+        return replace(
+            self,
+            x=self.x[[dimension]],
+            course=self.course[:, [dimension]],
+            variable=variable,
+        )
 
 
 @dataclass(eq=False)
@@ -66,8 +72,8 @@ class Recorder:
         values = np.array(self.objective(candidates), dtype=float)
         if values.shape != (len(candidates),):
             raise InputError(
-                f"objective: values of shape {values.shape} found for {len(candidates)} candidates, "
-                "expected one value for each row"
+                f"objective: values of shape {values.shape} found for {len(candidates)}"
+                " candidates, expected one value for each row"
             )
         values[np.isnan(values)] = np.inf
         self.evaluations += len(candidates)
@@ -90,18 +96,22 @@ class Recorder:
 class Optimiser(ABC):
     """Minimises an objective within a box."""
 
-    def minimise(self, objective: Objective, bounds: ArrayLike, seed: int = 0) -> SearchResult:
+    def minimise(
+        self, objective: Objective, bounds: ArrayLike, seed: int = 0
+    ) -> SearchResult:
         """Minimise an objective; arguments and errors are those of `identification.minimise`.
 
-        The objective gives values, shape (n_candidates,), of candidates of shape (n_candidates,
-        n_dimensions); the bounds have shape (n_dimensions, 2).
+        The objective gives values, shape (n_candidates,), of candidates of shape
+        (n_candidates, n_dimensions); the bounds have shape (n_dimensions, 2).
         """
         record = Recorder(objective)
         self._search(record, *check_bounds(bounds), np.random.default_rng(seed))
         return record.result()
 
     @abstractmethod
-    def _search(self, record: Recorder, low: Floats, high: Floats, rng: np.random.Generator) -> None:
+    def _search(
+        self, record: Recorder, low: Floats, high: Floats, rng: np.random.Generator
+    ) -> None:
         """Evaluate candidates by `record`, which is told the end of each round."""
 
 
@@ -110,13 +120,18 @@ def check_bounds(bounds: ArrayLike) -> tuple[Floats, Floats]:
     try:
         box = np.asarray(bounds, dtype=float)
     except (TypeError, ValueError):
-        told = f"bounds: {bounds!r} found, expected numbers, a lower and an upper for each"
+        told = (
+            f"bounds: {bounds!r} found, expected numbers, a lower and an upper for each"
+        )
         raise InputError(told) from None
     if box.ndim != 2 or box.shape[1] != 2 or not len(box):
         raise InputError(
-            f"bounds: shape {box.shape} found, expected a lower and an upper bound for each dimension, "
-            "such as [(-2, 12)]"
+            f"bounds: shape {box.shape} found, expected a lower and an upper bound for"
+            " each dimension, such as [(-2, 12)]"
         )
     if not np.all(np.isfinite(box)) or not np.all(box[:, 0] < box[:, 1]):
-        raise InputError(f"bounds: {box.tolist()} found, expected finite numbers, the lower one first")
+        raise InputError(
+            f"bounds: {box.tolist()} found, expected finite numbers, the lower one"
+            " first"
+        )
     return box[:, 0], box[:, 1]

@@ -1,7 +1,8 @@
 """A measured zigzag sailed again by a model, its rudder reversed at the headings at which it was reversed.
 
-Open loop, a tenth of a degree of neutral helm moves the second overshoot of a 10/10 zigzag by two degrees,
-because the rudder is reversed when the measured ship got there, not the simulated one.
+Open loop, a tenth of a degree of neutral helm moves the second overshoot of a 10/10
+zigzag by two degrees, because the rudder is reversed when the measured ship got there,
+not the simulated one.
 """
 
 from functools import lru_cache
@@ -18,19 +19,25 @@ from shipgym.ships.manoeuvring_model import checked_orders, two_commands
 from shipgym.ships.simulate import Conditions, Passage
 
 STEP = 0.02  # of the time to sail one ship length
-LONGEST_LEG = 2.0  # times the measured one; a heading that is not reached by then is never reached
+# times the measured one; a heading that is not reached by then is never reached
+LONGEST_LEG = 2.0
 
 
 def closed_loop(model: ShipModel, trial: Trial) -> Trial | None:
     """A zigzag with the measured rudder angles, reversed at the measured headings by the model's gear.
 
-    None where the model runs away or a heading is never reached, without a reversal, and for a model whose
-    state is not recorded.
+    None where the model runs away or a heading is never reached, without a reversal,
+    and for a model whose state is not recorded.
     """
     if not set(model.state_names) <= {*trial.channels, "x", "y"}:
         return None
-    begun, passage = with_start(model, trial), Passage(model, Conditions(), STEP * model.travel_time)
-    state = np.array([begun[c][0] if c in trial.channels else 0.0 for c in model.state_names])
+    begun, passage = (
+        with_start(model, trial),
+        Passage(model, Conditions(), STEP * model.travel_time),
+    )
+    state = np.array(
+        [begun[c][0] if c in trial.channels else 0.0 for c in model.state_names]
+    )
     t, states, orders = trial.t[:1], state[None], []
     for leg in _legs(trial):
         try:
@@ -43,7 +50,13 @@ def closed_loop(model: ShipModel, trial: Trial) -> Trial | None:
         orders += [leg.order] * len(times)
     channels = dict(zip(model.state_names, states.T, strict=True))
     channels["delta_command"] = np.array([*orders, orders[-1]])
-    return Trial(t, channels, name=trial.name, kind=trial.kind, length=model.particulars["length"])
+    return Trial(
+        t,
+        channels,
+        name=trial.name,
+        kind=trial.kind,
+        length=model.particulars["length"],
+    )
 
 
 class Leg(NamedTuple):
@@ -51,7 +64,9 @@ class Leg(NamedTuple):
 
     order: float  # rudder angle, rad
     duration: float  # s, as measured
-    target: float | None  # the heading at which it ends, rad; None where it ends by the clock
+    target: (
+        float | None
+    )  # the heading at which it ends, rad; None where it ends by the clock
 
 
 @lru_cache(maxsize=16)  # every model drawn sails the same trials
@@ -62,19 +77,29 @@ def _legs(trial: Trial) -> tuple[Leg, ...]:
     for leg, (begin, end) in enumerate(pairwise(edges)):
         held = (trial.t >= 0.25 * begin + 0.75 * end) & (trial.t <= end)
         if end > begin and held.any():
-            target = float(np.interp(end, trial.t, trial["psi"])) if 1 <= leg <= len(turns) else None
+            target = (
+                float(np.interp(end, trial.t, trial["psi"]))
+                if 1 <= leg <= len(turns)
+                else None
+            )
             found.append(Leg(float(np.median(delta[held])), end - begin, target))
     return tuple(found)
 
 
-def _sail(passage: Passage, trial: Trial, state: Floats, leg: Leg, begin: float) -> tuple[Floats, Floats]:
+def _sail(
+    passage: Passage, trial: Trial, state: Floats, leg: Leg, begin: float
+) -> tuple[Floats, Floats]:
     """Times and states of a leg that begins at some time; none where its target is not reached."""
     model, dt, target = passage.model, passage.dt, leg.target
-    count = max(int(np.ceil(leg.duration * (1.0 if target is None else LONGEST_LEG) / dt)), 2)
+    count = max(
+        int(np.ceil(leg.duration * (1.0 if target is None else LONGEST_LEG) / dt)), 2
+    )
     t = begin + dt * np.arange(count + 1, dtype=float)
     commands = np.tile(model.service_command, (count, 1))
     approach = target is None and begin == trial.t[0]  # with whatever helm there was
-    commands[:, 0] = np.interp(t[:-1], trial.t, rudder(trial)) if approach else leg.order
+    commands[:, 0] = (
+        np.interp(t[:-1], trial.t, rudder(trial)) if approach else leg.order
+    )
     if "n" in model.command_names and "n" in trial.channels:
         commands[:, 1] = np.interp(t[:-1], trial.t, trial["n"])
     sailed = passage.states(state, count)
@@ -85,7 +110,14 @@ def _sail(passage: Passage, trial: Trial, state: Floats, leg: Leg, begin: float)
     beyond = np.flatnonzero((psi - target) * np.sign(target - psi[0]) >= 0.0)
     if not len(beyond) or beyond[0] == 0:
         return np.empty(0), sailed[:0]
-    k = int(beyond[0])  # the state between two steps is straight enough: a step is a fiftieth of a length
+    k = int(
+        beyond[0]
+        # the state between two steps is straight enough: a step is a fiftieth of a
+        # length
+    )
     part = float((target - psi[k - 1]) / (psi[k] - psi[k - 1]))
-    t[k], sailed[k] = t[k - 1] + part * dt, (1.0 - part) * sailed[k - 1] + part * sailed[k]
+    t[k], sailed[k] = (
+        t[k - 1] + part * dt,
+        (1.0 - part) * sailed[k - 1] + part * sailed[k],
+    )
     return t[1 : k + 1], sailed[1 : k + 1]

@@ -21,7 +21,8 @@ MOST_RUDDER = np.radians(3.0)  # unless it moves more than this
 SHORTEST_STEP = 1e-4  # of the median time step; a shorter one is a row written twice
 MEDIAN_WIDTH = 5  # samples; shorter excursions of a rudder are outliers
 COLLINEAR = 0.98  # correlation of two features
-JITTER = 1e-12  # of a correlation matrix, so that exact collinearity shows as a large inflation
+# of a correlation matrix, so that exact collinearity shows as a large inflation
+JITTER = 1e-12
 MOTIONS = {"u": "surge speed", "v": "sway speed", "r": "yaw rate", "p": "roll rate"}
 
 
@@ -33,13 +34,17 @@ class EquationDiagnostics:
     samples: int
     terms: int
     rank: int  # directions that were kept
-    #: largest by smallest singular value of the features, each scaled to a root mean square of 1
+    #: largest by smallest singular value of the features, each scaled to a root mean
+    #: square of 1
     condition_number: float
     r_squared: float  # share of the change of velocity that is explained
-    residual_rms: float  # root mean square of what is left of the change of velocity over a window, SI units
+    # root mean square of what is left of the change of velocity over a window, SI units
+    residual_rms: float
     #: of the residuals at lags of 1 to 10 windows, without overlap
     residual_autocorrelation: tuple[float, ...]
-    variance_inflation: dict[str, float]  # by term: how much the others increase its variance
+    variance_inflation: dict[
+        str, float
+    ]  # by term: how much the others increase its variance
     #: pairs of terms with a correlation beyond 0.98, and the correlation
     collinear_pairs: tuple[tuple[str, str, float], ...]
     dropped: tuple[tuple[str, ...], ...]  # terms that make up each dropped direction
@@ -53,21 +58,28 @@ def check_trials(trials: Sequence[Trial], structure: Structure) -> None:
     """Refuse no trial, a missing channel, times that nearly coincide, and rudders that never move."""
     if structure.captive:
         raise InputError(
-            f"structure: '{structure.name}' found, which is identified from captive tests with the channels "
-            "X, Y, N, expected one for free-running trials; use identification.identify_forces"
+            f"structure: '{structure.name}' found, which is identified from captive"
+            " tests with the channels X, Y, N, expected one for free-running trials;"
+            " use identification.identify_forces"
         )
     if not trials:
         raise InputError(
-            'trials: none is marked use = "fit", expected at least one; mark the trials to identify from'
+            'trials: none is marked use = "fit", expected at least one; mark the trials'
+            " to identify from"
         )
     for trial in trials:
         for channel in structure.required_channels:
             if channel not in trial:
                 raise InputError(
-                    f"trial {trial.name!r}: channel {channel!r} is missing, structure {structure.name!r} "
-                    f"needs {', '.join(structure.required_channels)}; name its column, or leave the trial "
-                    'out (use = "skip")'
-                    + ("; nomoto, norrbin and nomoto2 take the speed of [ship]" if channel == "u" else "")
+                    f"trial {trial.name!r}: channel {channel!r} is missing, structure"
+                    f" {structure.name!r} needs"
+                    f" {', '.join(structure.required_channels)}; name its column, or"
+                    ' leave the trial out (use = "skip")'
+                    + (
+                        "; nomoto, norrbin and nomoto2 take the speed of [ship]"
+                        if channel == "u"
+                        else ""
+                    )
                 )
         _check_steps(trial)
     if not structure.has_rudder:
@@ -76,9 +88,9 @@ def check_trials(trials: Sequence[Trial], structure: Structure) -> None:
     if len(still) == len(trials):
         angle = np.degrees(np.median(still[0]["delta"]))
         raise InputError(
-            f"trial {still[0].name!r}: the rudder stays at {angle:.2f} deg throughout, expected it to move: "
-            "nothing is excited and these coefficients cannot be identified; add a trial in which the "
-            "rudder moves, such as a zigzag"
+            f"trial {still[0].name!r}: the rudder stays at {angle:.2f} deg throughout,"
+            " expected it to move: nothing is excited and these coefficients cannot be"
+            " identified; add a trial in which the rudder moves, such as a zigzag"
         )
 
 
@@ -87,8 +99,9 @@ def _check_steps(trial: Trial) -> None:
     k, usual = int(np.argmin(steps)), float(np.median(steps))
     if steps[k] < SHORTEST_STEP * usual:
         raise InputError(
-            f"trial {trial.name!r}: samples at {trial.t[k]:.12g} and {trial.t[k + 1]:.12g} s are only "
-            f"{steps[k]:.2g} s apart, expected a step near the usual {usual:.3g} s; remove the repeated row"
+            f"trial {trial.name!r}: samples at {trial.t[k]:.12g} and"
+            f" {trial.t[k + 1]:.12g} s are only {steps[k]:.2g} s apart, expected a step"
+            f" near the usual {usual:.3g} s; remove the repeated row"
         )
 
 
@@ -100,22 +113,25 @@ def _is_still(t: Floats, delta: Floats) -> bool:
     return bool(np.ptp(medians) < max(LEAST_RUDDER, scatter))
 
 
-def check_samples(samples: Samples, trials: Sequence[Trial], structure: Structure) -> None:
+def check_samples(
+    samples: Samples, trials: Sequence[Trial], structure: Structure
+) -> None:
     """Refuse a regression with fewer rows than terms, or of a motion that never changes."""
     for q, change in samples.targets.items():
         if not np.any(change):
             raise InputError(
-                f"trial {trials[0].name!r}: channel {q!r} never changes, in none of the {len(trials)} trials "
-                f"to fit, expected the {MOTIONS.get(q, q)} to be excited and measured; leave the column out "
-                "if it was not measured, or choose a structure without that equation"
+                f"trial {trials[0].name!r}: channel {q!r} never changes, in none of the"
+                f" {len(trials)} trials to fit, expected the {MOTIONS.get(q, q)} to be"
+                " excited and measured; leave the column out if it was not measured,"
+                " or choose a structure without that equation"
             )
     terms = max(len(structure.regression_names(q)) for q in structure.regressed)
     if len(samples) <= terms:
         shortest = min(trials, key=len)
         raise InputError(
-            f"trial {shortest.name!r}: {len(shortest)} samples found, in all {len(samples)} rows for {terms} "
-            "coefficients in one equation, expected several times as many; add trials, longer or sampled "
-            "more often"
+            f"trial {shortest.name!r}: {len(shortest)} samples found, in all"
+            f" {len(samples)} rows for {terms} coefficients in one equation, expected"
+            " several times as many; add trials, longer or sampled more often"
         )
 
 
@@ -132,15 +148,20 @@ def diagnose(
         scaled, condition = scaled_features(features)
         groups = getattr(estimator, "collinear_groups_", ())
         found[q] = EquationDiagnostics(
-            samples=len(target), terms=len(names), condition_number=condition,
+            samples=len(target),
+            terms=len(names),
+            condition_number=condition,
             rank=int(getattr(estimator, "rank_", min(features.shape))),
-            r_squared=1.0 - float(error @ error) / max(float(target @ target), np.finfo(float).tiny),
+            r_squared=1.0
+            - float(error @ error) / max(float(target @ target), np.finfo(float).tiny),
             residual_rms=float(np.sqrt(np.mean(error**2))),
             residual_autocorrelation=autocorrelation(error[apart], 10),
-            variance_inflation=dict(zip(names, variance_inflation(scaled).tolist(), strict=True)),
+            variance_inflation=dict(
+                zip(names, variance_inflation(scaled).tolist(), strict=True)
+            ),
             collinear_pairs=_collinear_pairs(scaled, names),
             dropped=tuple(tuple(names[i] for i in group) for group in groups),
-        )  # fmt: skip
+        )
     return found
 
 
@@ -149,7 +170,9 @@ def scaled_features(features: Floats) -> tuple[Floats, float]:
     size = np.sqrt(np.mean(features**2, axis=0))
     scaled = features / np.where(size > 0.0, size, 1.0)
     singular = np.linalg.svd(scaled, compute_uv=False)
-    return scaled, float(singular[0] / max(singular[-1], np.finfo(float).eps * singular[0]))
+    return scaled, float(
+        singular[0] / max(singular[-1], np.finfo(float).eps * singular[0])
+    )
 
 
 def autocorrelation(values: Floats, lags: int) -> tuple[float, ...]:
@@ -158,35 +181,48 @@ def autocorrelation(values: Floats, lags: int) -> tuple[float, ...]:
     power = float(centred @ centred)
     if power == 0.0:
         return ()
-    return tuple(float(centred[k:] @ centred[:-k]) / power for k in range(1, min(lags + 1, len(values))))
+    return tuple(
+        float(centred[k:] @ centred[:-k]) / power
+        for k in range(1, min(lags + 1, len(values)))
+    )
 
 
 def cross_correlation(first: Floats, second: Floats, lags: Integers) -> Floats:
     """Correlation, shape (n_lags,), of one series with another at the same times that is shifted.
 
-    Lags are samples by which the first comes after the second. 0 for a constant or shorter series.
+    Lags are samples by which the first comes after the second. 0 for a constant or
+    shorter series.
     """
     a, b = first - first.mean(), second - second.mean()
     power = float(np.sqrt((a @ a) * (b @ b)))
     shifted = correlate(a, b, method="fft") / (power or 1.0)
-    return np.where(np.abs(lags) < len(a), shifted.take(lags + len(a) - 1, mode="clip"), 0.0)
+    return np.where(
+        np.abs(lags) < len(a), shifted.take(lags + len(a) - 1, mode="clip"), 0.0
+    )
 
 
 def variance_inflation(scaled: Floats) -> Floats:
     """Factor by which the other features increase the variance of each coefficient.
 
-    Features have a root mean square of 1; of exactly collinear ones it is large, up to 1e12.
+    Features have a root mean square of 1; of exactly collinear ones it is large, up to
+    1e12.
     """
     moment = scaled.T @ scaled / len(scaled)
-    return np.diag(np.linalg.inv(moment + JITTER * np.eye(len(moment)))) * np.diag(moment)
+    return np.diag(np.linalg.inv(moment + JITTER * np.eye(len(moment)))) * np.diag(
+        moment
+    )
 
 
 def without_overlap(samples: Samples) -> Integers:
     """Rows whose windows do not overlap."""
-    return np.arange(0, len(samples), int(np.ceil(samples.window / max(samples.window // 2, 1))))
+    return np.arange(
+        0, len(samples), int(np.ceil(samples.window / max(samples.window // 2, 1)))
+    )
 
 
-def _collinear_pairs(scaled: Floats, names: Sequence[str]) -> tuple[tuple[str, str, float], ...]:
+def _collinear_pairs(
+    scaled: Floats, names: Sequence[str]
+) -> tuple[tuple[str, str, float], ...]:
     moment = scaled.T @ scaled / len(scaled)
     pairs = np.argwhere(np.triu(np.abs(moment) > COLLINEAR, k=1)).tolist()
     return tuple((names[i], names[j], float(moment[i, j])) for i, j in pairs)

@@ -27,18 +27,26 @@ def predict(model: ShipModel, trial: Trial) -> Trial | None:
         return None
 
 
-def trial_metrics(model: ShipModel, trial: Trial, prediction: Trial | None) -> dict[str, Any]:
+def trial_metrics(
+    model: ShipModel, trial: Trial, prediction: Trial | None
+) -> dict[str, Any]:
     """Errors of a prediction and the indices of measurement and prediction by the same function.
 
-    Returns `use`, `diverged`, `rmse` (SI; by channel) and for each index `measured` and `predicted`, of
-    overshoots also `closed_loop` (the rudder reversed at the measured headings), None where the manoeuvre has
-    no such index or never got there.
+    Returns `use`, `diverged`, `rmse` (SI; by channel) and for each index `measured` and
+    `predicted`, of overshoots also `closed_loop` (the rudder reversed at the measured
+    headings), None where the manoeuvre has no such index or never got there.
     """
     errors: dict[str, float | None] = dict.fromkeys(COMPARED)
     if prediction is not None:
         for channel in [name for name in COMPARED if name in trial]:
-            errors[channel] = float(np.sqrt(np.mean((prediction[channel] - trial[channel]) ** 2)))
-    metrics: dict[str, Any] = {"use": trial.use, "diverged": prediction is None, "rmse": errors}
+            errors[channel] = float(
+                np.sqrt(np.mean((prediction[channel] - trial[channel]) ** 2))
+            )
+    metrics: dict[str, Any] = {
+        "use": trial.use,
+        "diverged": prediction is None,
+        "rmse": errors,
+    }
     metrics |= dict.fromkeys((*ZIGZAG, *TURNING))
     read, zigzag = index_reader(model, trial), trial.kind == "zigzag"
     measured = None if read is None else read(trial)
@@ -46,13 +54,19 @@ def trial_metrics(model: ShipModel, trial: Trial, prediction: Trial | None) -> d
         return metrics
     runs = {"measured": measured, "predicted": read(prediction)}
     if zigzag:
-        runs["closed_loop"] = None if prediction is None else read(closed_loop(model, trial))
+        runs["closed_loop"] = (
+            None if prediction is None else read(closed_loop(model, trial))
+        )
     for name in ZIGZAG if zigzag else TURNING:
-        metrics[name] = {kind: getattr(found, name, None) for kind, found in runs.items()}
+        metrics[name] = {
+            kind: getattr(found, name, None) for kind, found in runs.items()
+        }
     return metrics
 
 
-def index_reader(model: ShipModel, trial: Trial) -> Callable[[Trial | None], Any] | None:
+def index_reader(
+    model: ShipModel, trial: Trial
+) -> Callable[[Trial | None], Any] | None:
     """From a run of the trial's manoeuvre to its indices, or None; None for other manoeuvres.
 
     Runs have none where a channel such as the position is missing.
@@ -64,7 +78,11 @@ def index_reader(model: ShipModel, trial: Trial) -> Callable[[Trial | None], Any
         try:
             if run is None:
                 return None
-            return turning_indices(run, length) if heading is None else zigzag_indices(run, length, heading)
+            return (
+                turning_indices(run, length)
+                if heading is None
+                else zigzag_indices(run, length, heading)
+            )
         except InputError:
             return None
 

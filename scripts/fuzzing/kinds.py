@@ -1,7 +1,8 @@
 """The kinds of files that are read, a line each in `KINDS`.
 
-A new reader joins with a line: its name, the function that reads a path, and what is done with the result,
-so that a field which nobody checked fails here. Small sound files of the kind go into `tests/corpus/NAME`.
+A new reader joins with a line: its name, the function that reads a path, and what is
+done with the result, so that a field which nobody checked fails here. Small sound files
+of the kind go into `tests/corpus/NAME`.
 """
 
 from __future__ import annotations
@@ -68,7 +69,9 @@ def use_agent(agent: Any) -> None:
             action, state = agent.predict(seen, state, np.array([False, True, False]))
         if action.shape[0] != 3 or not np.all(np.abs(action) <= 1.0):
             raise AssertionError(f"commands {action.tolist()}")
-    written(agent.file_fields()[0] if hasattr(agent, "file_fields") else agent.to_dict())
+    written(
+        agent.file_fields()[0] if hasattr(agent, "file_fields") else agent.to_dict()
+    )
     if hasattr(agent, "loop"):
         with np.errstate(all="ignore"):
             agent.loop()
@@ -102,7 +105,9 @@ def use_plan(plan: Plan) -> None:
 def use_ship(trials: list[Trial]) -> None:
     """All channels are finite."""
     for trial in trials:
-        if not all(np.isfinite(values).all() for values in (trial.t, *trial.channels.values())):
+        if not all(
+            np.isfinite(values).all() for values in (trial.t, *trial.channels.values())
+        ):
             raise AssertionError(f"{trial.name}: not finite")
 
 
@@ -114,7 +119,9 @@ def read_run(path: Path) -> Plan:
 
 def read_suite(path: Path) -> Any:
     """A suite from its text."""
-    return parse_suite(read_bytes(path, "suite", LARGEST_TOML).decode("utf-8", "replace"), path.name)
+    return parse_suite(
+        read_bytes(path, "suite", LARGEST_TOML).decode("utf-8", "replace"), path.name
+    )
 
 
 def read_settings(path: Path) -> Any:
@@ -148,7 +155,9 @@ def training() -> Any:
 
     torch.set_num_threads(1)
     vars(trainings)["N_EVALUATIONS"] = 1
-    with warnings.catch_warnings(action="ignore"):  # random numbers in plain Python overflow, as they should
+    with warnings.catch_warnings(
+        action="ignore"
+    ):  # random numbers in plain Python overflow, as they should
         return trainings._Training(read_plan(CORPUS / "run" / "ppo"), None, None, None)
 
 
@@ -192,8 +201,15 @@ def part_job() -> tuple[Contestant, BenchmarkTask, str]:
 def keep_part(folder: Path) -> None:
     """What a benchmark that goes on finds."""
     costs = {"cost": np.array([1.0, 2.0, 3.0]), "success": np.array([1.0, 0.0, np.nan])}
-    run = {"episodes": costs, "failure": "", "seconds_per_action": 1e-6, "policy_sha256": None}
-    KeptResults(folder, run_job).save(part_job()[2], {"value": pack({"refused": "", "runs": [run, run]})})
+    run = {
+        "episodes": costs,
+        "failure": "",
+        "seconds_per_action": 1e-6,
+        "policy_sha256": None,
+    }
+    KeptResults(folder, run_job).save(
+        part_job()[2], {"value": pack({"refused": "", "runs": [run, run]})}
+    )
 
 
 def read_part(path: Path) -> Any:
@@ -221,13 +237,19 @@ def read_zip(path: Path) -> Any:
 def read_policy(path: Path) -> Any:
     """A policy; one for all ships as it is made for one."""
     agent = read_agent(path)
-    return agent.for_ship(load_model("container-abc-lssvr")) if isinstance(agent, OneForAll) else agent
+    return (
+        agent.for_ship(load_model("container-abc-lssvr"))
+        if isinstance(agent, OneForAll)
+        else agent
+    )
 
 
 def read_bridge(path: Path) -> Helm:
     """A helm that was told the bytes of a line, and steers by what it understood."""
     helm = Helm(pid(), 0.5, Limits(silence_s=1e9))
-    Line(lambda text: helm.hear(text, 0.0), set()).data_received(read_bytes(path, "log", LARGEST_TOML))
+    Line(lambda text: helm.hear(text, 0.0), set()).data_received(
+        read_bytes(path, "log", LARGEST_TOML)
+    )
     for now in range(4):
         helm.watch(1.0, float(now))
         helm.steer(float(now))
@@ -250,7 +272,13 @@ def use_route(route: Route) -> None:
 KINDS = (
     Kind("bridge", read_bridge, use_helm, slow=2),
     Kind("route", lambda path: Route.from_csv(path, 500.0), use_route),
-    Kind("ship-file", lambda path: ShipFile.load(path).trials(), use_ship, main="ship.toml", slow=3),
+    Kind(
+        "ship-file",
+        lambda path: ShipFile.load(path).trials(),
+        use_ship,
+        main="ship.toml",
+        slow=3,
+    ),
     Kind("trial", lambda path: [Trial.from_csv(path)], use_ship),
     Kind("log", lambda path: [guess_trial(path).trial], use_ship, slow=4),
     Kind("model", ShipModel.load, use_model, slow=2),

@@ -2,7 +2,8 @@
 
 PYTHONPATH=scripts python -m fuzzing.make_corpus    into tests/corpus
 
-Files that are there stay as they are: the corpus also says that what was written once can still be read.
+Files that are there stay as they are: the corpus also says that what was written once
+can still be read.
 """
 
 from __future__ import annotations
@@ -34,7 +35,14 @@ CORPUS = Path(__file__).parents[2] / "tests" / "corpus"
 EXAMPLE = Path(shipgym.__file__).parent / "examples" / "mariner"
 ROWS = 40  # of a trial
 COASTER = Particulars(
-    length=28.9, beam=9.6, draught=2.7, mass=417e3, speed=5.0, xg=-0.5, yaw_gyradius=7.2, water_density=1025.0
+    length=28.9,
+    beam=9.6,
+    draught=2.7,
+    mass=417e3,
+    speed=5.0,
+    xg=-0.5,
+    yaw_gyradius=7.2,
+    water_density=1025.0,
 )
 
 
@@ -42,7 +50,11 @@ def trials(folder: Path) -> None:
     """The example's ship file with the beginning of two of its trials."""
     ship = folder / "ship-file" / "mariner"
     ship.mkdir(parents=True)
-    text = (EXAMPLE / "ship.toml").read_text().partition('[[trials]]\nfile = "zigzag_15_15.csv"')[0]
+    text = (
+        (EXAMPLE / "ship.toml")
+        .read_text()
+        .partition('[[trials]]\nfile = "zigzag_15_15.csv"')[0]
+    )
     (ship / "ship.toml").write_text(text)
     for name in ("zigzag_20_20.csv", "zigzag_35_30_port.csv"):
         lines = (EXAMPLE / name).read_text().splitlines(keepends=True)
@@ -50,8 +62,13 @@ def trials(folder: Path) -> None:
     trial = ShipFile.load(ship / "ship.toml").trials()[0]
     (folder / "trial").mkdir()
     trial.to_csv(folder / "trial" / "own.csv")
-    rows = [f"{0.5 * k};{0.1 * k:.2f};0,0{k % 5};{np.sin(k):.3f}".replace(".", ",") for k in range(ROWS)]
-    (folder / "trial" / "semicolons.csv").write_text("\n".join(["t;psi;r;delta", *rows]))
+    rows = [
+        f"{0.5 * k};{0.1 * k:.2f};0,0{k % 5};{np.sin(k):.3f}".replace(".", ",")
+        for k in range(ROWS)
+    ]
+    (folder / "trial" / "semicolons.csv").write_text(
+        "\n".join(["t;psi;r;delta", *rows])
+    )
 
 
 def logs(folder: Path) -> None:
@@ -63,29 +80,44 @@ def logs(folder: Path) -> None:
     folder.joinpath("log").mkdir()
     t = np.arange(ROWS)
     psi = 30.0 + 10.0 * np.sin(0.1 * t)
-    frame = pd.DataFrame({
-        "time": [f"2024-05-31T09:30:{k:02d}Z" for k in t], "lat": [f"57°{41.0 + 0.003 * k:.4f}'N" for k in t],
-        "lon": [f"011°{44.0 + 0.003 * k:.4f}'E" for k in t], "psi [deg]": psi.round(1),
-        "sog [kn]": np.where(t % 2, np.nan, 13.1), "cog [deg]": np.where(t % 2, np.nan, psi.round(1) + 2.0),
-        "rudder [deg]": (10.0 * np.cos(0.1 * t)).round(1),
-    })  # fmt: skip
+    frame = pd.DataFrame(
+        {
+            "time": [f"2024-05-31T09:30:{k:02d}Z" for k in t],
+            "lat": [f"57°{41.0 + 0.003 * k:.4f}'N" for k in t],
+            "lon": [f"011°{44.0 + 0.003 * k:.4f}'E" for k in t],
+            "psi [deg]": psi.round(1),
+            "sog [kn]": np.where(t % 2, np.nan, 13.1),
+            "cog [deg]": np.where(t % 2, np.nan, psi.round(1) + 2.0),
+            "rudder [deg]": (10.0 * np.cos(0.1 * t)).round(1),
+        }
+    )
     frame.to_csv(folder / "log" / "bridge.csv", index=False)
     frame.to_excel(folder / "log" / "bridge.xlsx", index=False)
     frame.to_parquet(folder / "log" / "bridge.parquet")
     savemat(
-        folder / "log" / "bridge.mat", {"t": t, "psi": np.radians(psi), "r": np.gradient(np.radians(psi))}
+        folder / "log" / "bridge.mat",
+        {"t": t, "psi": np.radians(psi), "r": np.gradient(np.radians(psi))},
     )
-    places = [f"57{41.0 + 0.003 * k:07.4f},N,01144.0000,E,13.1,{psi[k] + 2.0:.1f},310524" for k in t]
+    places = [
+        f"57{41.0 + 0.003 * k:07.4f},N,01144.0000,E,13.1,{psi[k] + 2.0:.1f},310524"
+        for k in t
+    ]
     fields = [
         sentence
         for k in t
         for sentence in (
             ("GP", "RMC", f"0930{k:02d},A,{places[k]},,,A"),
-            ("HE", "HDT", f"{psi[k]:.1f},T"), ("TI", "ROT", "3.0,A"), ("RI", "RSA", f"{k % 7:.1f},A,,"),
-            ("WI", "MWV", "030.0,R,10.0,M,A"), ("VW", "VHW", ",T,,M,13.6,N,,K"),
+            ("HE", "HDT", f"{psi[k]:.1f},T"),
+            ("TI", "ROT", "3.0,A"),
+            ("RI", "RSA", f"{k % 7:.1f},A,,"),
+            ("WI", "MWV", "030.0,R,10.0,M,A"),
+            ("VW", "VHW", ",T,,M,13.6,N,,K"),
         )
-    ]  # fmt: skip
-    lines = [str(pynmea2.GGA(talker, kind, tuple(text.split(",")))) for talker, kind, text in fields]
+    ]
+    lines = [
+        str(pynmea2.GGA(talker, kind, tuple(text.split(","))))
+        for talker, kind, text in fields
+    ]
     (folder / "log" / "bridge.nmea").write_text("\r\n".join(lines) + "\r\n")
 
 
@@ -112,7 +144,10 @@ def network(*sizes: int) -> Network:
     random = np.random.default_rng(0)
     return Network(
         tuple(
-            (random.normal(0, 0.3, (b, a)).astype(np.float32), random.normal(0, 0.1, b).astype(np.float32))
+            (
+                random.normal(0, 0.3, (b, a)).astype(np.float32),
+                random.normal(0, 0.1, b).astype(np.float32),
+            )
             for a, b in pairwise(sizes)
         )
     )
@@ -155,7 +190,14 @@ def sb3(folder: Path) -> None:
 
     folder.joinpath("sb3").mkdir()
     ships = shipgym.ShipVecEnv("shipgym/CourseKeeping-v0", 2, model="mariner", seed=0)
-    agent = PPO("MlpPolicy", ships, n_steps=8, batch_size=8, seed=0, policy_kwargs={"net_arch": [4]})
+    agent = PPO(
+        "MlpPolicy",
+        ships,
+        n_steps=8,
+        batch_size=8,
+        seed=0,
+        policy_kwargs={"net_arch": [4]},
+    )
     agent.learn(16).save(folder / "sb3" / "ppo.zip")
 
 
@@ -164,30 +206,51 @@ def one_for_all() -> OneForAll:
     task = Task.of("PathFollowing-v1")
     told = context(shipgym.load_model("container-abc-lssvr"), task)
     names = tuple(one.name for one in task.observed(SHIP))
-    fleet = np.stack([told, np.ones(len(CONTEXT)), told - 1.0, told + 1.0], axis=1).round(4)
-    return OneForAll(network(len(names) + 1 + len(CONTEXT), 4, 1), names, fleet, 0.4, 0.5)
+    fleet = np.stack(
+        [told, np.ones(len(CONTEXT)), told - 1.0, told + 1.0], axis=1
+    ).round(4)
+    return OneForAll(
+        network(len(names) + 1 + len(CONTEXT), 4, 1), names, fleet, 0.4, 0.5
+    )
 
 
 def episode(folder: Path) -> None:
     """A few steps along a path."""
     n = 6
     names = ("x", "y", "psi", "u", "v", "r", "delta")
-    states = {name: np.linspace(0.1, 1.0 / 3.0, n + 1) + k for k, name in enumerate(names)}
+    states = {
+        name: np.linspace(0.1, 1.0 / 3.0, n + 1) + k for k, name in enumerate(names)
+    }
     made = Episode(
-        environment="shipgym/PathFollowing-v0", model="mariner", dt=0.5, length=160.93, beam=23.17,
-        rudder_limit=0.7, states=states, commands={"delta": np.full(n, 0.1)}, actions=np.full((n, 1), 0.1),
-        rewards=-np.ones(n), reward_parts={"reward_heading": -np.ones(n)},
-        info={"cross_track": np.linspace(0.0, 1.0, n + 1)}, corridor=60.0,
+        environment="shipgym/PathFollowing-v0",
+        model="mariner",
+        dt=0.5,
+        length=160.93,
+        beam=23.17,
+        rudder_limit=0.7,
+        states=states,
+        commands={"delta": np.full(n, 0.1)},
+        actions=np.full((n, 1), 0.1),
+        rewards=-np.ones(n),
+        reward_parts={"reward_heading": -np.ones(n)},
+        info={"cross_track": np.linspace(0.0, 1.0, n + 1)},
+        corridor=60.0,
         waypoints=np.array([[0.0, 0.0], [1000.0, 1.0 / 3.0]]),
-        arguments={"model": "mariner", "sea": {"wind": None}}, seed=7, number=3, truncated=True, success=True,
-    )  # fmt: skip
+        arguments={"model": "mariner", "sea": {"wind": None}},
+        seed=7,
+        number=3,
+        truncated=True,
+        success=True,
+    )
     folder.joinpath("episode").mkdir()
     made.save(folder / "episode" / "path.json")
 
 
 def results(folder: Path) -> None:
     """A benchmark of two controllers."""
-    made = agents.benchmark("pid,lq", tasks=["mariner-calm", "mariner-current"], episodes=3)
+    made = agents.benchmark(
+        "pid,lq", tasks=["mariner-calm", "mariner-current"], episodes=3
+    )
     folder.joinpath("results").mkdir()
     made.save(folder / "results" / "two")
 
@@ -195,9 +258,15 @@ def results(folder: Path) -> None:
 def run(folder: Path) -> None:
     """The folder of a training in the midst of it."""
     settings = {
-        "base": "none", "ships": 2, "n_steps": 8, "batch_size": 8, "n_epochs": 1, "total_steps": 32,
-        "net_arch": [4], "evaluate_every": 16,
-    }  # fmt: skip
+        "base": "none",
+        "ships": 2,
+        "n_steps": 8,
+        "batch_size": 8,
+        "n_epochs": 1,
+        "total_steps": 32,
+        "net_arch": [4],
+        "evaluate_every": 16,
+    }
     options = {"episode_steps": 20, "change_interval_steps": 10, "sea": "slight"}
     vars(training)["N_EVALUATIONS"] = 2
     target = folder / "run" / "ppo"
@@ -214,17 +283,33 @@ def texts(folder: Path) -> None:
     text = (FOLDER / "shipgym-v1.toml").read_text()
     names = ("mariner-calm", "mariner-rough", "container-path")
     tables = ["[tasks." + part for part in text.split("\n[tasks.")[1:]]
-    chosen = [one for one in tables if one.startswith(tuple(f"[tasks.{name}" for name in names))]
-    (folder / "suite" / "three.toml").write_text('name = "three"\n\n' + "\n".join(chosen))
+    chosen = [
+        one
+        for one in tables
+        if one.startswith(tuple(f"[tasks.{name}" for name in names))
+    ]
+    (folder / "suite" / "three.toml").write_text(
+        'name = "three"\n\n' + "\n".join(chosen)
+    )
     folder.joinpath("settings").mkdir()
     (folder / "settings" / "ppo.toml").write_text(
-        'gamma = 0.98\nnet_arch = [64, 64]\nlog_std_end = "learned"\nbase = "lq"\nauthority = 0.5\n'
+        'gamma = 0.98\nnet_arch = [64, 64]\nlog_std_end = "learned"\nbase ='
+        ' "lq"\nauthority = 0.5\n'
     )
 
 
 MAKERS: tuple[Callable[[Path], None], ...] = (
-    trials, logs, models, controllers, policies, sb3, episode, results, run, texts,
-)  # fmt: skip
+    trials,
+    logs,
+    models,
+    controllers,
+    policies,
+    sb3,
+    episode,
+    results,
+    run,
+    texts,
+)
 SHIP: ShipModel = shipgym.load_model("mariner")
 
 if __name__ == "__main__":

@@ -48,7 +48,12 @@ class Worker:
     def spent(self) -> float:
         """Processor time of the process, s."""
         try:
-            numbers = Path(f"/proc/{self.process.pid}/stat").read_text().rpartition(")")[2].split()
+            numbers = (
+                Path(f"/proc/{self.process.pid}/stat")
+                .read_text()
+                .rpartition(")")[2]
+                .split()
+            )
         except OSError:
             return 0.0
         return (int(numbers[11]) + int(numbers[12])) / os.sysconf("SC_CLK_TCK")
@@ -60,7 +65,9 @@ def chunks(kinds: Iterable[Kind], inputs: int) -> deque[Chunk]:
     for kind in kinds:
         count = max(1, inputs // kind.slow)
         size = max(10, CHUNK // kind.slow)
-        found += [Chunk(kind.name, k, min(k + size, count)) for k in range(0, count, size)]
+        found += [
+            Chunk(kind.name, k, min(k + size, count)) for k in range(0, count, size)
+        ]
     return deque(sorted(found, key=lambda chunk: chunk.first))
 
 
@@ -112,7 +119,9 @@ def _start(kinds: dict[str, Kind], scratch: Path, seed: int) -> Worker:
     ours, theirs = PROCESSES.Pipe()
     at = PROCESSES.Value("q", -1, lock=False)
     folder = Path(tempfile.mkdtemp(dir=scratch))
-    process = PROCESSES.Process(target=_work, args=(kinds, folder, seed, theirs, at), daemon=True)
+    process = PROCESSES.Process(
+        target=_work, args=(kinds, folder, seed, theirs, at), daemon=True
+    )
     process.start()
     theirs.close()
     return Worker(process, ours, at)
@@ -133,7 +142,9 @@ def _answer(worker: Worker, ready: bool) -> Report | None:
             report: Report = worker.pipe.recv()
         except (EOFError, ConnectionResetError):
             worker.process.join()
-            if worker.process.exitcode == 0:  # it had grown too large, and never saw this chunk
+            if (
+                worker.process.exitcode == 0
+            ):  # it had grown too large, and never saw this chunk
                 return Report(chunk.kind)
             return _lost(worker, f"process died with {worker.process.exitcode}")
         worker.chunk = None
@@ -141,7 +152,10 @@ def _answer(worker: Worker, ready: bool) -> Report | None:
     at = worker.at.value
     if at != worker.seen[0]:
         worker.seen = (at, time.monotonic(), worker.spent())
-    elif worker.spent() - worker.seen[2] > STUCK_S or time.monotonic() - worker.seen[1] > LOST_S:
+    elif (
+        worker.spent() - worker.seen[2] > STUCK_S
+        or time.monotonic() - worker.seen[1] > LOST_S
+    ):
         return _lost(worker, "stuck where no signal is heard")
     return None
 
@@ -160,7 +174,9 @@ def _lost(worker: Worker, what: str) -> Report:
     return report
 
 
-def _work(kinds: dict[str, Kind], folder: Path, seed: int, pipe: Connection, at: Any) -> None:
+def _work(
+    kinds: dict[str, Kind], folder: Path, seed: int, pipe: Connection, at: Any
+) -> None:
     """Read chunks until there are no more."""
     readers: dict[str, Reader] = {}
 

@@ -25,12 +25,16 @@ PACKAGES = ("shipgym", "identification", "agents")
 SCRATCH = Path("/dev/shm") if Path("/dev/shm").is_dir() else None  # files in memory
 
 LONGEST_S = 2.0  # processor time of one input
-LONGEST_WAIT_S = 300.0  # by the clock, on whatever busy machine: a pipe that nobody writes to
+LONGEST_WAIT_S = (
+    300.0  # by the clock, on whatever busy machine: a pipe that nobody writes to
+)
 MOST_MEMORY = 2**30  # bytes more than the process had before
 LONGEST_MESSAGE = 5_000  # characters of a refusal
 EDITS = (1, 1, 1, 1, 1, 2, 2, 2, 3, 5)  # changes of an input
 SPECIAL_SHARE = 0.002  # of changes: what stands there is no file
-KEPT_HASH = 0.8  # share of inputs whose hash is put right, so that what is behind it is read
+KEPT_HASH = (
+    0.8  # share of inputs whose hash is put right, so that what is behind it is read
+)
 
 
 @dataclass(frozen=True)
@@ -40,7 +44,8 @@ class Kind:
     Attributes
     ----------
     name : str
-        Of the kind and of its folder in the corpus. A file there is a seed, and so is a folder with `main`.
+        Of the kind and of its folder in the corpus. A file there is a seed, and so is a
+        folder with `main`.
     read : callable
         The reader; it takes the path.
     use : callable, optional
@@ -119,7 +124,9 @@ class Seed:
     folder: Path
     main: str
     files: Mapping[str, bytes]
-    spoilt: set[str] = field(default_factory=set)  # that are not as they should be on disk
+    spoilt: set[str] = field(
+        default_factory=set
+    )  # that are not as they should be on disk
     odd: set[str] = field(default_factory=set)  # where something else than a file is
 
     def put(self, files: Mapping[str, bytes | str]) -> None:
@@ -149,7 +156,16 @@ class Seed:
             path.symlink_to(content)
 
 
-SPECIAL = ("folder", "pipe", "nothing", "/dev/zero", "/dev/null", "/proc/self/mem", "nowhere", ".")
+SPECIAL = (
+    "folder",
+    "pipe",
+    "nothing",
+    "/dev/zero",
+    "/dev/null",
+    "/proc/self/mem",
+    "nowhere",
+    ".",
+)
 
 
 def _remove(path: Path) -> None:
@@ -177,7 +193,9 @@ class Reader:
             if self.kind.use is not None:
                 self.kind.use(found)
 
-    def run(self, first: int, last: int, skip: frozenset[int], tell: Callable[[int], None]) -> Report:
+    def run(
+        self, first: int, last: int, skip: frozenset[int], tell: Callable[[int], None]
+    ) -> Report:
         """Read inputs by their numbers; `tell` is called with each before it is read."""
         report = Report(self.kind.name)
         _forget_peak()
@@ -231,7 +249,9 @@ class Reader:
             return error
         return None
 
-    def _minimal(self, index: int, one: Seed, edits: list[int], error: BaseException, what: str) -> Finding:
+    def _minimal(
+        self, index: int, one: Seed, edits: list[int], error: BaseException, what: str
+    ) -> Finding:
         """The fault with as few changes as bring it about."""
         for edit in list(edits):
             fewer = [other for other in edits if other != edit]
@@ -245,7 +265,9 @@ class Reader:
             for name, content in whole.items()
         }
         trace = "".join(traceback.format_exception(error)[-12:])
-        told = tuple(f"{name}: {one if isinstance(one, str) else one()}" for name, one in said)
+        told = tuple(
+            f"{name}: {one if isinstance(one, str) else one()}" for name, one in said
+        )
         return Finding(self.kind.name, what, str(error)[:300], index, told, kept, trace)
 
 
@@ -257,7 +279,11 @@ def _seeds(kind: Kind, scratch: Path) -> Iterator[Seed]:
         source.mkdir(parents=True)
         kind.prepare(source)
     for entry in sorted(source.iterdir()):
-        paths = sorted(path for path in entry.rglob("*") if path.is_file()) if entry.is_dir() else [entry]
+        paths = (
+            sorted(path for path in entry.rglob("*") if path.is_file())
+            if entry.is_dir()
+            else [entry]
+        )
         base = entry if entry.is_dir() else entry.parent
         files = {str(path.relative_to(base)): path.read_bytes() for path in paths}
         folder = scratch / entry.stem
@@ -288,9 +314,13 @@ def _edited(one: Seed, edits: list[int]) -> tuple[dict[str, bytes | str], list[A
     return files, said
 
 
-def _mend(one: Seed, files: dict[str, bytes | str], name: str, before: bytes, after: bytes) -> None:
+def _mend(
+    one: Seed, files: dict[str, bytes | str], name: str, before: bytes, after: bytes
+) -> None:
     """Put the hash of a changed file where that of the file before stands."""
-    old, new = (hashlib.sha256(content).hexdigest().encode() for content in (before, after))
+    old, new = (
+        hashlib.sha256(content).hexdigest().encode() for content in (before, after)
+    )
     for other in one.files:
         text = files.get(other, one.files[other])
         if other != name and isinstance(text, bytes) and old in text:
@@ -300,11 +330,20 @@ def _mend(one: Seed, files: dict[str, bytes | str], name: str, before: bytes, af
 def _site(error: BaseException) -> str:
     """Type of an exception and the place in the project, or in what it calls, that it came from."""
     frames = traceback.extract_tb(error.__traceback__)
-    own = [frame for frame in frames if any(f"/{package}/" in frame.filename for package in PACKAGES)]
+    own = [
+        frame
+        for frame in frames
+        if any(f"/{package}/" in frame.filename for package in PACKAGES)
+    ]
     frame = own[-1] if own else frames[-1]
     path = Path(frame.filename)
     name = next(
-        (str(Path(*path.parts[k:])) for k, part in enumerate(path.parts) if part in PACKAGES), path.name
+        (
+            str(Path(*path.parts[k:]))
+            for k, part in enumerate(path.parts)
+            if part in PACKAGES
+        ),
+        path.name,
     )
     return f"{type(error).__name__} in {name}:{frame.lineno} {frame.name}"
 
@@ -339,10 +378,15 @@ def _guarded() -> Iterator[None]:
 
     def stop(number: int, frame: Any) -> None:
         raise HangError(
-            f"more than {LONGEST_S} s" if number == signal.SIGPROF else f"waits for {LONGEST_WAIT_S} s"
+            f"more than {LONGEST_S} s"
+            if number == signal.SIGPROF
+            else f"waits for {LONGEST_WAIT_S} s"
         )
 
-    before = [(number, signal.signal(number, stop)) for number in (signal.SIGPROF, signal.SIGALRM)]
+    before = [
+        (number, signal.signal(number, stop))
+        for number in (signal.SIGPROF, signal.SIGALRM)
+    ]
     try:
         yield
     finally:

@@ -16,20 +16,120 @@ RAW = "@@raw:"  # begins a text that stands in the file without quotes, such as 
 _RAW_TEXT = re.compile(rf'"{RAW}([^"\\]*(?:\\.[^"\\]*)*)"')
 
 NUMBERS: tuple[Any, ...] = (
-    0, -0.0, 1, -1, 2, 3, 0.5, 1e-9, 1e-300, 5e-324, 1e9, 1e300, 1.7976931348623157e308, -1e308, 1e16, 255,
-    256, 2**31, 2**32, 2**53 + 1, 2**63 - 1, 2**63, -(2**63) - 1, 2**64, 10**30, f"{RAW}1{'0' * 399}",
-    f"{RAW}1{'0' * 5000}", f"{RAW}NaN", f"{RAW}Infinity", f"{RAW}-Infinity", f"{RAW}1e999", f"{RAW}nan",
-    f"{RAW}inf", f"{RAW}0x10", f"{RAW}01", f"{RAW}1_000",
-)  # fmt: skip
+    0,
+    -0.0,
+    1,
+    -1,
+    2,
+    3,
+    0.5,
+    1e-9,
+    1e-300,
+    5e-324,
+    1e9,
+    1e300,
+    1.7976931348623157e308,
+    -1e308,
+    1e16,
+    255,
+    256,
+    2**31,
+    2**32,
+    2**53 + 1,
+    2**63 - 1,
+    2**63,
+    -(2**63) - 1,
+    2**64,
+    10**30,
+    f"{RAW}1{'0' * 399}",
+    f"{RAW}1{'0' * 5000}",
+    f"{RAW}NaN",
+    f"{RAW}Infinity",
+    f"{RAW}-Infinity",
+    f"{RAW}1e999",
+    f"{RAW}nan",
+    f"{RAW}inf",
+    f"{RAW}0x10",
+    f"{RAW}01",
+    f"{RAW}1_000",
+)
 TEXTS = (
-    "", " ", "\n", "x\ny", "\t", '"', "'", '"""', "'''", '"""\nimport os\n', "\\", "\\n", "\0", "a\0b",
-    "\ud800", "\udfff x", "\x1b[31mred", "\u202e", "é", "船", "😀", "a" * 300, "b" * 20_000, "/dev/zero",
-    "/dev/null", "/", ".", "..", "../../etc/passwd", "/proc/self/mem", "C:\\x", "file:///etc/passwd",
-    "http://127.0.0.1/", "os:system", "os", "builtins:exec", "__class__", "__import__('os')", "{0}", "{name}",
-    "%s", "%(x)s", "$(id)", "`id`", "<script>", "[bold]", "[/]", "NaN", "nan", "inf", "1e999", "1", "0",
-    "true", "null", "None", "٣", "1,5", "mariner", "lq", "pid", "auto", "calm", "rough", "grey-box", "prime",
-    "si", "2026-01-01", "2026-01-01T00:00:00Z", "=1+1", "a.b", "a[0]", "#", ";", ",",
-)  # fmt: skip
+    "",
+    " ",
+    "\n",
+    "x\ny",
+    "\t",
+    '"',
+    "'",
+    '"""',
+    "'''",
+    '"""\nimport os\n',
+    "\\",
+    "\\n",
+    "\0",
+    "a\0b",
+    "\ud800",
+    "\udfff x",
+    "\x1b[31mred",
+    "\u202e",
+    "é",
+    "船",
+    "😀",
+    "a" * 300,
+    "b" * 20_000,
+    "/dev/zero",
+    "/dev/null",
+    "/",
+    ".",
+    "..",
+    "../../etc/passwd",
+    "/proc/self/mem",
+    "C:\\x",
+    "file:///etc/passwd",
+    "http://127.0.0.1/",
+    "os:system",
+    "os",
+    "builtins:exec",
+    "__class__",
+    "__import__('os')",
+    "{0}",
+    "{name}",
+    "%s",
+    "%(x)s",
+    "$(id)",
+    "`id`",
+    "<script>",
+    "[bold]",
+    "[/]",
+    "NaN",
+    "nan",
+    "inf",
+    "1e999",
+    "1",
+    "0",
+    "true",
+    "null",
+    "None",
+    "٣",
+    "1,5",
+    "mariner",
+    "lq",
+    "pid",
+    "auto",
+    "calm",
+    "rough",
+    "grey-box",
+    "prime",
+    "si",
+    "2026-01-01",
+    "2026-01-01T00:00:00Z",
+    "=1+1",
+    "a.b",
+    "a[0]",
+    "#",
+    ";",
+    ",",
+)
 
 
 def scalar(random: Random) -> Node:
@@ -50,9 +150,15 @@ def node(random: Random) -> Node:
     if chance < 0.77:
         return [scalar(random) for _ in range(random.randrange(4))]
     if chance < 0.84:
-        return {str(random.choice(TEXTS)): scalar(random) for _ in range(random.randrange(3))}
+        return {
+            str(random.choice(TEXTS)): scalar(random)
+            for _ in range(random.randrange(3))
+        }
     if chance < 0.9:
-        return [[scalar(random) for _ in range(random.randrange(3))] for _ in range(random.randrange(3))]
+        return [
+            [scalar(random) for _ in range(random.randrange(3))]
+            for _ in range(random.randrange(3))
+        ]
     if chance < 0.94:
         return [0.5] * random.choice((10, 10, 10, 100, 100, 100, 1000, 1000, 10_000))
     return deep(random, scalar(random))
@@ -60,7 +166,9 @@ def node(random: Random) -> Node:
 
 def deep(random: Random, inner: Node) -> Node:
     """A value in many lists or tables."""
-    depth = random.choice((2, 2, 5, 5, 18, 19, 20, 21, 50, 900, random.choice((900, 5_000, 100_000))))
+    depth = random.choice(
+        (2, 2, 5, 5, 18, 19, 20, 21, 50, 900, random.choice((900, 5_000, 100_000)))
+    )
     if depth < 60:
         for _ in range(depth):
             inner = [inner] if random.random() < 0.5 else {"a": inner}
@@ -72,8 +180,14 @@ def deep(random: Random, inner: Node) -> Node:
 def somewhere(random: Random, root: Node) -> Path:
     """A place in nested values, those near the root more often."""
     path: list[Any] = []
-    while isinstance(root, dict | list) and root and (not path or random.random() < 0.8):
-        key = random.choice(list(root)) if isinstance(root, dict) else random.randrange(len(root))
+    while (
+        isinstance(root, dict | list) and root and (not path or random.random() < 0.8)
+    ):
+        key = (
+            random.choice(list(root))
+            if isinstance(root, dict)
+            else random.randrange(len(root))
+        )
         path.append(key)
         root = root[key]
     return tuple(path)
@@ -121,9 +235,21 @@ def _retyped(random: Random, root: Node, path: Path) -> Node:
                 value[0] if value else 0,
             ]
         elif isinstance(value, str):
-            kinds += [list(value), value.encode().hex(), len(value), value.upper(), value + " ", f" {value}"]
+            kinds += [
+                list(value),
+                value.encode().hex(),
+                len(value),
+                value.upper(),
+                value + " ",
+                f" {value}",
+            ]
         elif value is not None:
-            kinds += [str(value), bool(value), int(value) if abs(value) < 1e15 else 0, float(value)]
+            kinds += [
+                str(value),
+                bool(value),
+                int(value) if abs(value) < 1e15 else 0,
+                float(value),
+            ]
         return random.choice(kinds)
 
     return changed(root, path, other)
@@ -152,7 +278,13 @@ def _renamed(random: Random, root: Node, path: Path) -> Node:
             return parent
         old = random.choice(list(parent))
         new = random.choice(
-            (old.upper(), old + "s", old[:-1], random.choice(TEXTS), random.choice(list(parent)))
+            (
+                old.upper(),
+                old + "s",
+                old[:-1],
+                random.choice(TEXTS),
+                random.choice(list(parent)),
+            )
         )
         return {new if key == old else key: value for key, value in parent.items()}
 
@@ -179,10 +311,15 @@ def _repeated(random: Random, root: Node, path: Path) -> Node:
         times = random.choice((2, 2, 2, 3, 20, 1000))
         if isinstance(parent, list):
             return [
-                one for k, value in enumerate(parent) for one in [value] * (times if k == path[-1] else 1)
+                one
+                for k, value in enumerate(parent)
+                for one in [value] * (times if k == path[-1] else 1)
             ]
         if isinstance(parent, dict):
-            return {**parent, f"{path[-1]}{random.choice((RAW, ' ', '2', '.x'))}": parent[path[-1]]}
+            return {
+                **parent,
+                f"{path[-1]}{random.choice((RAW, ' ', '2', '.x'))}": parent[path[-1]],
+            }
         return parent
 
     return changed(root, path[:-1], repeat) if path else root
@@ -192,7 +329,9 @@ def _swapped(random: Random, root: Node, path: Path) -> Node:
     other = somewhere(random, root)
     one, two = at(root, path), at(root, other)
     if path[: len(other)] == other or other[: len(path)] == path:
-        return changed(root, path, lambda _: two)  # one within the other: nested in itself
+        return changed(
+            root, path, lambda _: two
+        )  # one within the other: nested in itself
     return changed(changed(root, path, lambda _: two), other, lambda _: one)
 
 
@@ -202,7 +341,9 @@ def _shuffled(random: Random, root: Node, path: Path) -> Node:
             items = list(parent.items())
             random.shuffle(items)
             return dict(items)
-        return random.sample(parent, len(parent)) if isinstance(parent, list) else parent
+        return (
+            random.sample(parent, len(parent)) if isinstance(parent, list) else parent
+        )
 
     return changed(root, path[:-1] if path else path, shuffle)
 
@@ -215,15 +356,26 @@ def _emptied(random: Random, root: Node, path: Path) -> Node:
 
 
 def _nested(random: Random, root: Node, path: Path) -> Node:
-    return changed(root, path, lambda value: deep(random, value if isinstance(value, int) else 1))
+    return changed(
+        root, path, lambda value: deep(random, value if isinstance(value, int) else 1)
+    )
 
 
-#: By name; those that most often reach what lies behind the first check come several times.
+#: By name; those that most often reach what lies behind the first check come several
+#: times.
 CHANGES: tuple[tuple[str, Callable[[Random, Node, Path], Node]], ...] = (
-    *(("number", _number),) * 6, *(("replace", _replaced),) * 5, *(("retype", _retyped),) * 2,
-    ("delete", _without), ("rename", _renamed), ("add", _added), ("repeat", _repeated), ("swap", _swapped),
-    ("shuffle", _shuffled), ("empty", _emptied), ("nest", _nested),
-)  # fmt: skip
+    *(("number", _number),) * 6,
+    *(("replace", _replaced),) * 5,
+    *(("retype", _retyped),) * 2,
+    ("delete", _without),
+    ("rename", _renamed),
+    ("add", _added),
+    ("repeat", _repeated),
+    ("swap", _swapped),
+    ("shuffle", _shuffled),
+    ("empty", _emptied),
+    ("nest", _nested),
+)
 
 
 def mutated(random: Random, root: Node) -> tuple[Node, Callable[[], str]]:
@@ -273,11 +425,19 @@ def _key(key: str) -> str:
 
 def _toml(value: Node) -> str:
     if isinstance(value, dict):
-        return "{" + ", ".join(f"{_key(key)} = {_toml(one)}" for key, one in value.items()) + "}"
+        return (
+            "{"
+            + ", ".join(f"{_key(key)} = {_toml(one)}" for key, one in value.items())
+            + "}"
+        )
     if isinstance(value, list):
         return "[" + ", ".join(map(_toml, value)) + "]"
     if isinstance(value, str):
-        return value[len(RAW) :] if value.startswith(RAW) else json.dumps(value, ensure_ascii=False)
+        return (
+            value[len(RAW) :]
+            if value.startswith(RAW)
+            else json.dumps(value, ensure_ascii=False)
+        )
     if value is None or isinstance(value, bool):
         return json.dumps(value)
     return repr(value)
@@ -285,5 +445,14 @@ def _toml(value: Node) -> str:
 
 def float_bytes(random: Random) -> bytes:
     """A number in single precision that a file of weights should not hold, or might."""
-    bits = random.choice((0x7FC00000, 0x7F800000, 0xFF800000, 0x7F7FFFFF, 0x00000001, random.getrandbits(32)))
+    bits = random.choice(
+        (
+            0x7FC00000,
+            0x7F800000,
+            0xFF800000,
+            0x7F7FFFFF,
+            0x00000001,
+            random.getrandbits(32),
+        )
+    )
     return struct.pack("<I", bits)

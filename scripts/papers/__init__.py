@@ -1,7 +1,8 @@
 """The papers' cases, run again: what they print, what comes out their way, and what is best.
 
-One file or folder per paper. Each has a `PAPER`: a citation and a function that yields the rows of its
-tables. Beside them stand two comparators, and Zhu's requirements R1 to R8, in the same form.
+One file or folder per paper. Each has a `PAPER`: a citation and a function that yields
+the rows of its tables. Beside them stand two comparators, and Zhu's requirements R1 to
+R8, in the same form.
 """
 
 from __future__ import annotations

@@ -1,9 +1,10 @@
 """Cao et al. 2015: the Mariner's 40 derivatives from one 15/15 zigzag, by sample structure.
 
-500 s simulated with classical Runge-Kutta at 0.1 s and sampled at 0.5 s, no noise; LS-SVM with C = 4e6, 6e8
-and 6e8. The paper's columns hold r; with r L in its place, and the other columns as they are, its errors come
-out, and without it they do not, so that its C must be meant for these. The random series that the paper adds
-against collinearity are not printed.
+500 s simulated with classical Runge-Kutta at 0.1 s and sampled at 0.5 s, no noise;
+LS-SVM with C = 4e6, 6e8 and 6e8. The paper's columns hold r; with r L in its place, and
+the other columns as they are, its errors come out, and without it they do not, so that
+its C must be meant for these. The random series that the paper adds against
+collinearity are not printed.
 """
 
 from __future__ import annotations
@@ -31,50 +32,79 @@ C = {"u": 4e6, "v": 6e8, "r": 6e8}
 SEED = 2015
 WITHIN = 1.0  # aim: error of a coefficient, %
 OF_SPAN = 0.1  # aim: rms error of a predicted trajectory, % of its span
-ACCEPTABLE, CLOSE = 15.0, 5.0  # %: error of a derivative; rms error of a predicted channel, of its span
+ACCEPTABLE, CLOSE = (
+    15.0,
+    5.0,
+)  # %: error of a derivative; rms error of a predicted channel, of its span
 LINEAR = ("X_u", "Y_v", "Y_r", "Y_d", "N_v", "N_r", "N_d")
 LARGEST = f"largest error of {', '.join(LINEAR)}, %"
 COUNT = f"of the {40 - len(LINEAR)} other derivatives those within {ACCEPTABLE:g} %"
 RANKS = "rank correlation of a derivative's error with its effect on the 15/15"
 STRUCTURES = {"integral": "integral", "euler": "Euler"}
 
-#: Errors of Tables 2 to 7, %, in the order of the structure's terms (the printed column heads of the second
-#: rows of Tables 3, 4, 6 and 7 repeat others by mistake; the values show which terms they are).
+#: Errors of Tables 2 to 7, %, in the order of the structure's terms (the printed column
+#: heads of the second rows of Tables 3, 4, 6 and 7 repeat others by mistake; the values
+#: show which terms they are).
 PRINTED: dict[str, dict[str, str]] = {
     "integral": {
         "u": "u 0 uu 1 uuu 1 vv 0 rr 2 dd 0 udd 1 vr 0 vd 0 uvd 3",
-        "v": "0 1 0u 6 0uu 75 v 0 r 0 d 0 vvv 3 ddd 11 vvr 1 vvd 2 vdd 156 ud 1 uv 1 ur 1 uud 7",
-        "r": "0 0 0u 1 0uu 24 v 0 r 0 d 0 vvv 5 ddd 12 vvr 1 vvd 1 vdd 14 ud 0 uv 0 ur 0 uud 0",
+        "v": (
+            "0 1 0u 6 0uu 75 v 0 r 0 d 0 vvv 3 ddd 11 vvr 1 vvd 2 vdd 156 ud 1 uv 1 ur"
+            " 1 uud 7"
+        ),
+        "r": (
+            "0 0 0u 1 0uu 24 v 0 r 0 d 0 vvv 5 ddd 12 vvr 1 vvd 1 vdd 14 ud 0 uv 0 ur 0"
+            " uud 0"
+        ),
     },
     "euler": {
         "u": "u 2 uu 89 uuu 219 vv 9 rr 16 dd 1 udd 6 vr 2 vd 4 uvd 11",
-        "v": "0 36 0u 664 0uu 9038 v 2 r 6 d 3 vvv 32 ddd 37 vvr 12 vvd 112 vdd 21978 ud 38 uv 23"
-        " ur 18 uud 472",
-        "r": "0 28 0u 436 0uu 5855 v 12 r 1 d 1 vvv 88 ddd 38 vvr 20 vvd 125 vdd 3318 ud 45 uv 66 ur 44"
-        " uud 486",
+        "v": (
+            "0 36 0u 664 0uu 9038 v 2 r 6 d 3 vvv 32 ddd 37 vvr 12 vvd 112 vdd 21978 ud"
+            " 38 uv 23 ur 18 uud 472"
+        ),
+        "r": (
+            "0 28 0u 436 0uu 5855 v 12 r 1 d 1 vvv 88 ddd 38 vvr 20 vvd 125 vdd 3318 ud"
+            " 45 uv 66 ur 44 uud 486"
+        ),
     },
-}  # fmt: skip
-TABLES = {("integral", "u"): 2, ("integral", "v"): 3, ("integral", "r"): 4,
-          ("euler", "u"): 5, ("euler", "v"): 6, ("euler", "r"): 7}  # fmt: skip
+}
+TABLES = {
+    ("integral", "u"): 2,
+    ("integral", "v"): 3,
+    ("integral", "r"): 4,
+    ("euler", "u"): 5,
+    ("euler", "v"): 6,
+    ("euler", "r"): 7,
+}
 FORCES = {"u": "X", "v": "Y", "r": "N"}
 
 #: That the paper predicts, at the steps of the simulation.
 MANOEUVRES: dict[str, Callable[[ShipModel], Trial]] = {
     "25/25 zigzag": lambda ship: zigzag(ship, 25, 25, duration=800, dt=0.1),
-    "30 deg turning circle": lambda ship: turning_circle(ship, 30, duration=800, dt=0.1),
+    "30 deg turning circle": lambda ship: turning_circle(
+        ship, 30, duration=800, dt=0.1
+    ),
 }
 
 
 def sampled_zigzag() -> Trial:
     """The paper's trial: what it samples of the simulation."""
     trial = zigzag(load_model("mariner"), 15, 15, duration=500, dt=0.1, switch="step")
-    channels = {name: trial[name][::5] for name in ("x", "y", "psi", "u", "v", "r", "delta")}
-    return Trial(trial.t[::5], channels, name="zigzag 15/15", kind="zigzag", length=trial.length)
+    channels = {
+        name: trial[name][::5] for name in ("x", "y", "psi", "u", "v", "r", "delta")
+    }
+    return Trial(
+        trial.t[::5], channels, name="zigzag 15/15", kind="zigzag", length=trial.length
+    )
 
 
 @cache
 def as_printed(
-    samples: str, excitation: float = 0.0, by_length: bool = True, intercept: bool = True
+    samples: str,
+    excitation: float = 0.0,
+    by_length: bool = True,
+    intercept: bool = True,
 ) -> ShipModel:
     """The Mariner as the paper identifies it.
 
@@ -83,9 +113,10 @@ def as_printed(
     samples : {"integral", "euler"}
         ISSI or ESSI.
     excitation : float
-        Standard deviation of the random series added to the target and to the state among the inputs (Luo &
-        Zou 2009), as a part of the target's range. The paper's series are not printed. Without them the
-        coefficient of the state is 1, as it should come out.
+        Standard deviation of the random series added to the target and to the state
+        among the inputs (Luo & Zou 2009), as a part of the target's range. The paper's
+        series are not printed. Without them the coefficient of the state is 1, as it
+        should come out.
     by_length : bool
         Whether the columns hold r L, and not r as in the paper.
     intercept : bool
@@ -97,7 +128,9 @@ def as_printed(
     """
     ship = load_model("mariner")
     table, trial = ship.table, sampled_zigzag()
-    regression = build_samples([trial], table, ship.particulars, samples, window=1, smooth=False)
+    regression = build_samples(
+        [trial], table, ship.particulars, samples, window=1, smooth=False
+    )
     random = np.random.default_rng(SEED)
     theta = []
     for q in table.equations:
@@ -107,23 +140,38 @@ def as_printed(
         if excitation > 0.0:
             series = excitation * np.ptp(trial[q]) * random.standard_normal(len(target))
             state = trial[q][:-1] - trial[q][0]
-            features, target = np.column_stack([features, state + series]), state + target + series
-        estimator = LSSVM(C=C[q], scale=False, fit_intercept=intercept).fit(features, target)
+            features, target = (
+                np.column_stack([features, state + series]),
+                state + target + series,
+            )
+        estimator = LSSVM(C=C[q], scale=False, fit_intercept=intercept).fit(
+            features, target
+        )
         theta.append(estimator.coef_[: len(lengths)] * lengths)
-    values = np.linalg.solve(table.acceleration_matrix(ship.particulars), np.concatenate(theta))
-    return replace(ship, coefficients=dict(zip(table.coefficient_names, values.tolist(), strict=True)))
+    values = np.linalg.solve(
+        table.acceleration_matrix(ship.particulars), np.concatenate(theta)
+    )
+    return replace(
+        ship,
+        coefficients=dict(zip(table.coefficient_names, values.tolist(), strict=True)),
+    )
 
 
 @cache
 def at_best() -> ShipModel:
     """The Mariner as this package identifies it from the same samples."""
-    return identify([sampled_zigzag()], particulars=load_model("mariner").particulars).model
+    return identify(
+        [sampled_zigzag()], particulars=load_model("mariner").particulars
+    ).model
 
 
 def errors(model: ShipModel) -> dict[str, float]:
     """How far off each coefficient is, %."""
     truth = load_model("mariner").coefficients
-    return {name: 100.0 * abs(model.coefficients[name] / value - 1.0) for name, value in truth.items()}
+    return {
+        name: 100.0 * abs(model.coefficients[name] / value - 1.0)
+        for name, value in truth.items()
+    }
 
 
 def printed_errors(samples: str, equation: str) -> Mapping[str, float]:
@@ -161,7 +209,9 @@ def prediction_rows() -> Iterator[Row]:
         for figure, (name, run) in zip(numbers, MANOEUVRES.items(), strict=True):
             truth = run(load_model("mariner"))
             for channel in ("u", "v", "r", "psi", "x", "y"):
-                theirs, best = (off(run(model), truth, channel) for model in (ours, at_best()))
+                theirs, best = (
+                    off(run(model), truth, channel) for model in (ours, at_best())
+                )
                 yield Row(
                     f"Figures {figure}",
                     f"{name}, {channel}: rms error, % of span",
@@ -176,7 +226,11 @@ def prediction_rows() -> Iterator[Row]:
 
 def off(trial: Trial, truth: Trial, channel: str) -> float:
     """Root mean square error of a channel, % of its span."""
-    return float(100.0 * np.sqrt(np.mean((trial[channel] - truth[channel]) ** 2)) / np.ptp(truth[channel]))
+    return float(
+        100.0
+        * np.sqrt(np.mean((trial[channel] - truth[channel]) ** 2))
+        / np.ptp(truth[channel])
+    )
 
 
 def column_rows() -> Iterator[Row]:
@@ -184,42 +238,70 @@ def column_rows() -> Iterator[Row]:
     for samples, table in (("integral", 2), ("euler", 5)):
         found = errors(as_printed(samples, by_length=False))["X_rr"]
         yield Row(
-            f"Table {table}", "X_rr with r and not r L in the columns: error, %",
-            printed_errors(samples, "u")["X_rr"], found, None,
-            note="with the printed columns the penalty holds back what multiplies the small r",
-        )  # fmt: skip
+            f"Table {table}",
+            "X_rr with r and not r L in the columns: error, %",
+            printed_errors(samples, "u")["X_rr"],
+            found,
+            None,
+            note=(
+                "with the printed columns the penalty holds back what multiplies the"
+                " small r"
+            ),
+        )
     without = errors(as_printed("integral", intercept=False))
     for table, equation, name in ((3, "v", "Y_0"), (4, "r", "N_0")):
         yield Row(
-            f"Table {table}", f"{name} without the constant b: error, %",
-            printed_errors("integral", equation)[name], without[name], None,
-            note="the paper's b: 0 in truth, and nearly the same column as that of Y_0 or N_0",
-        )  # fmt: skip
+            f"Table {table}",
+            f"{name} without the constant b: error, %",
+            printed_errors("integral", equation)[name],
+            without[name],
+            None,
+            note=(
+                "the paper's b: 0 in truth, and nearly the same column as that of Y_0"
+                " or N_0"
+            ),
+        )
 
 
 def summary_rows() -> Iterator[Row]:
     """What the paper concludes of its tables as a whole, counted."""
     for samples, structure in STRUCTURES.items():
-        printed = {name: value for q in FORCES for name, value in printed_errors(samples, q).items()}
+        printed = {
+            name: value
+            for q in FORCES
+            for name, value in printed_errors(samples, q).items()
+        }
         found, best = errors(as_printed(samples)), errors(at_best())
         measures: dict[str, Callable[[Mapping[str, float]], float]] = {
             LARGEST: lambda values: max(values[name] for name in LINEAR),
             COUNT: lambda values: sum(
-                error <= ACCEPTABLE for name, error in values.items() if name not in LINEAR
+                error <= ACCEPTABLE
+                for name, error in values.items()
+                if name not in LINEAR
             ),
             "largest error of all, %": lambda values: max(values.values()),
         }
         for what, measure in measures.items():
             values = [float(measure(one)) for one in (printed, found, best)]
-            yield Row("Section 4", f"{structure}: {what}", values[0], values[1], values[2])
-    effects = sensitivity(load_model("mariner"), lambda ship: zigzag(ship, 15, 15, duration=500, dt=0.1))
+            yield Row(
+                "Section 4", f"{structure}: {what}", values[0], values[1], values[2]
+            )
+    effects = sensitivity(
+        load_model("mariner"), lambda ship: zigzag(ship, 15, 15, duration=500, dt=0.1)
+    )
     for samples, structure in STRUCTURES.items():
         found = errors(as_printed(samples))
-        ranks = spearmanr([effects[name] for name in found], list(found.values())).statistic
+        ranks = spearmanr(
+            [effects[name] for name in found], list(found.values())
+        ).statistic
         yield Row(
-            "Section 4", f"{structure}: {RANKS}", None, float(ranks), None,
+            "Section 4",
+            f"{structure}: {RANKS}",
+            None,
+            float(ranks),
+            None,
             note="-1: the less a derivative does, the worse it is found",
-        )  # fmt: skip
+        )
 
 
 def rows() -> Iterator[Row]:
@@ -234,7 +316,10 @@ def _summary(structure: str, what: str) -> str:
     return f"Section 4: {structure}: {what}"
 
 
-_ZIGZAG, _TURN = "25/25 zigzag, psi: rms error, % of span", "30 deg turning circle, y: rms error, % of span"
+_ZIGZAG, _TURN = (
+    "25/25 zigzag, psi: rms error, % of span",
+    "30 deg turning circle, y: rms error, % of span",
+)
 CONCLUSIONS = (
     Conclusion(
         "The linear derivatives are found accurately by either sample structure",
@@ -243,16 +328,21 @@ CONCLUSIONS = (
         f"accurate: within {ACCEPTABLE:g} %, as the printed ones are",
     ),
     Conclusion(
-        "Most of the others are acceptable by the integral structure, and badly off by Euler's",
+        "Most of the others are acceptable by the integral structure, and badly off by"
+        " Euler's",
         tuple(_summary(structure, COUNT) for structure in STRUCTURES.values()),
         lambda integral, euler: integral.as_paper > 16 > euler.as_paper,
         f"most: more than 16 of 33; acceptable: within {ACCEPTABLE:g} %",
     ),
     Conclusion(
         "Some are always far off, but far less so by the integral structure",
-        tuple(_summary(structure, "largest error of all, %") for structure in STRUCTURES.values()),
+        tuple(
+            _summary(structure, "largest error of all, %")
+            for structure in STRUCTURES.values()
+        ),
         lambda integral, euler: ACCEPTABLE < integral.as_paper < 0.1 * euler.as_paper,
-        "far less: by a factor of ten; \"always\" is a matter of the quadrature: at best none is",
+        'far less: by a factor of ten; "always" is a matter of the quadrature: at best'
+        " none is",
     ),
     Conclusion(
         "All derivatives are identified with high precision (abstract)",
@@ -284,19 +374,21 @@ CONCLUSIONS = (
         lambda run: run.as_paper > CLOSE,
         f"accurately: rms error below {CLOSE:g} % of the span",
     ),
-)  # fmt: skip
+)
 PAPER = Paper(
     "cao2015",
-    "Cao, Zhuang, Xu, Yin, Zou, Yu, Xiao & Yang 2015, Parametric estimation of ship maneuvering motion with "
-    "integral sample structure for identification",
+    "Cao, Zhuang, Xu, Yin, Zou, Yu, Xiao & Yang 2015, Parametric estimation of ship"
+    " maneuvering motion with integral sample structure for identification",
     "Mariner, 15/15 zigzag, 1000 samples of 0.5 s without noise: all 40 derivatives.",
     rows,
     conclusions=CONCLUSIONS,
     figures=(
         (
             "reproduction_cao2015.png",
-            "The 25/25 zigzag and the 30 deg turning circle, predicted by what each sample structure finds "
-            "in one 15/15 zigzag (figures 4, 6, 8 and 10)",
+            (
+                "The 25/25 zigzag and the 30 deg turning circle, predicted by what each"
+                " sample structure finds in one 15/15 zigzag (figures 4, 6, 8 and 10)"
+            ),
         ),
     ),
 )

@@ -1,8 +1,9 @@
 """Two methods of others beside ours on the papers' cases: an extended Kalman filter and a neural network.
 
-The filter carries the coefficients as states that do not change and starts them from zero. The network learns
-the change of the velocities over a sample from velocities and rudder, and is stepped. The settings of both
-were fixed beforehand, not chosen by what they are evaluated on.
+The filter carries the coefficients as states that do not change and starts them from
+zero. The network learns the change of the velocities over a sample from velocities and
+rudder, and is stepped. The settings of both were fixed beforehand, not chosen by what
+they are evaluated on.
 """
 
 from __future__ import annotations
@@ -30,11 +31,18 @@ from shipgym.ships import load_model
 from shipgym.trials.trial import Trial
 
 Floats = NDArray[np.float64]
-Rate = Callable[[Floats, Floats, float], Floats]  # of states and coefficients, shape (n, runs), and a rudder
+Rate = Callable[
+    [Floats, Floats, float], Floats
+]  # of states and coefficients, shape (n, runs), and a rudder
 
-STARTS = (10.0, 1.0, 0.01)  # deviation of the coefficients at the start, in parts of a usual size
+STARTS = (
+    10.0,
+    1.0,
+    0.01,
+)  # deviation of the coefficients at the start, in parts of a usual size
 START = STARTS[0]
-EXACT = 1e-3  # measurement noise where there is none, in parts of a channel's root mean square
+# measurement noise where there is none, in parts of a channel's root mean square
+EXACT = 1e-3
 STEP = 1e-6  # of the differences, in parts of a deviation
 
 #: Names of the turning indices, and where `turning_indices` has them.
@@ -47,7 +55,12 @@ SEEDS = range(3)
 
 
 def kalman_history(
-    rate: Rate, measured: Floats, delta: Floats, interval: float, noise: Floats, deviation: Floats
+    rate: Rate,
+    measured: Floats,
+    delta: Floats,
+    interval: float,
+    noise: Floats,
+    deviation: Floats,
 ) -> Floats:
     """Coefficients after each sample, by an extended Kalman filter that estimates them with the states.
 
@@ -108,7 +121,9 @@ def nomoto_history(structure: str, start: float = START) -> Floats:
     def rate(x: Floats, theta: Floats, rudder: float) -> Floats:
         yaw = x[1]
         terms = [yaw, rudder] if structure == "nomoto" else [yaw, yaw**3, rudder]
-        return np.array([yaw, sum(c * term for c, term in zip(theta, terms, strict=True))])
+        return np.array(
+            [yaw, sum(c * term for c, term in zip(theta, terms, strict=True))]
+        )
 
     noise = np.array([song2020.NOISE["psi"], song2020.NOISE["r"]])
     size = np.sqrt(np.mean((0.1 * r) ** 2))  # a yaw rate that changes in 10 s
@@ -121,7 +136,9 @@ def nomoto_history(structure: str, start: float = START) -> Floats:
 def mariner_history(start: float = START) -> Floats:
     """The six parameters of Table 7.3.2 from the noisy record (`recursive_start.zigzag_trial`)."""
     trial, length = recursive_start.zigzag_trial(noisy=True), recursive_start.LENGTH
-    units = np.array([1 / length, 1.0, 1 / length, 1 / length**2, 1 / length, 1 / length**2])[:, None]
+    units = np.array(
+        [1 / length, 1.0, 1 / length, 1 / length**2, 1 / length, 1 / length**2]
+    )[:, None]
 
     def rate(x: Floats, theta: Floats, rudder: float) -> Floats:
         v, r = x
@@ -132,7 +149,14 @@ def mariner_history(start: float = START) -> Floats:
 
     measured = np.column_stack([trial["v"], trial["r"]])
     noise = EXACT * np.sqrt(np.mean(measured**2, axis=0))
-    return kalman_history(rate, measured, -trial["delta"], recursive_start.INTERVAL, noise, np.full(6, start))
+    return kalman_history(
+        rate,
+        measured,
+        -trial["delta"],
+        recursive_start.INTERVAL,
+        noise,
+        np.full(6, start),
+    )
 
 
 class Network(NamedTuple):
@@ -158,9 +182,18 @@ class Network(NamedTuple):
 
 def trained(trials: Sequence[Trial], states: Sequence[str], seed: int) -> Network:
     """A network of two hidden layers on the changes of some velocities over a sample."""
-    X = np.concatenate([np.column_stack([trial[c] for c in (*states, "delta")])[:-1] for trial in trials])
-    Y = np.concatenate([np.diff([trial[c] for c in states], axis=1).T for trial in trials])
-    (mean, size), (middle, change) = ((values.mean(axis=0), values.std(axis=0)) for values in (X, Y))
+    X = np.concatenate(
+        [
+            np.column_stack([trial[c] for c in (*states, "delta")])[:-1]
+            for trial in trials
+        ]
+    )
+    Y = np.concatenate(
+        [np.diff([trial[c] for c in states], axis=1).T for trial in trials]
+    )
+    (mean, size), (middle, change) = (
+        (values.mean(axis=0), values.std(axis=0)) for values in (X, Y)
+    )
     model = MLPRegressor(
         hidden_layer_sizes=HIDDEN,
         activation="tanh",
@@ -172,7 +205,11 @@ def trained(trials: Sequence[Trial], states: Sequence[str], seed: int) -> Networ
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ConvergenceWarning)
         model.fit((X - mean) / size, (Y - middle) / change)
-    return Network(list(zip(model.coefs_, model.intercepts_, strict=True)), (mean, size), (middle, change))
+    return Network(
+        list(zip(model.coefs_, model.intercepts_, strict=True)),
+        (mean, size),
+        (middle, change),
+    )
 
 
 @cache
@@ -184,7 +221,9 @@ def container_networks() -> tuple[Network, ...]:
 @cache
 def mariner_networks() -> tuple[Network, ...]:
     """The Mariner from one 15/15 zigzag."""
-    return tuple(trained([cao2015.sampled_zigzag()], ("u", "v", "r"), seed) for seed in SEEDS)
+    return tuple(
+        trained([cao2015.sampled_zigzag()], ("u", "v", "r"), seed) for seed in SEEDS
+    )
 
 
 @cache
@@ -200,7 +239,15 @@ def turned(network: Network, turn: Trial) -> Trial:
     u, v = found["u"], found["v"]
     north, east = u * np.cos(psi) - v * np.sin(psi), u * np.sin(psi) + v * np.cos(psi)
     x, y = (cumulative_trapezoid(speed, turn.t, initial=0) for speed in (north, east))
-    channels = dict(turn.channels) | found | {"psi": psi, "x": x + turn["x"][0], "y": y + turn["y"][0]}
+    channels = (
+        dict(turn.channels)
+        | found
+        | {
+            "psi": psi,
+            "x": x + turn["x"][0],
+            "y": y + turn["y"][0],
+        }
+    )
     return Trial(turn.t, channels, name=turn.name, kind=turn.kind, length=turn.length)
 
 
@@ -209,9 +256,14 @@ def sampled_turn(rudder_deg: float) -> Trial:
     target = virtual()
     interval = float(target.trials[0].t[1] - target.trials[0].t[0])
     run = turning_circle(
-        target.ship, rudder_deg, duration=TURN * target.travel, dt=interval / STEPS_PER_SAMPLE
+        target.ship,
+        rudder_deg,
+        duration=TURN * target.travel,
+        dt=interval / STEPS_PER_SAMPLE,
     )
-    channels = {c: run[c][::STEPS_PER_SAMPLE] for c in ("x", "y", "psi", "u", "v", "r", "delta")}
+    channels = {
+        c: run[c][::STEPS_PER_SAMPLE] for c in ("x", "y", "psi", "u", "v", "r", "delta")
+    }
     return Trial(
         run.t[::STEPS_PER_SAMPLE],
         channels,
@@ -227,35 +279,58 @@ def filter_rows() -> Iterator[Row]:
     ends = [recursive_start.errors(mariner_history(start)[-1]) for start in STARTS]
     for k, name in enumerate(recursive_start.NAMES):
         yield Row(
-            "zhu2018, Table 7.3.2", f"{name} by the extended Kalman filter: error, %", None,
-            float(ends[0][k]), float(best[k]),
+            "zhu2018, Table 7.3.2",
+            f"{name} by the extended Kalman filter: error, %",
+            None,
+            float(ends[0][k]),
+            float(best[k]),
             note="the filter's equations are the ship's own, integrated accurately",
-        )  # fmt: skip
+        )
     worst = [float(np.abs(end).max()) for end in ends]
     yield from _start_rows("zhu2018, Table 7.3.2", worst, float(np.abs(best).max()))
     for structure, truth in song2020.TRUTH.items():
         best_found = song2020.errors(song2020.at_best(structure, noisy=True), truth)
         errors = [
             song2020.errors(
-                dict(zip(truth, nomoto_history(structure, start)[-1].tolist(), strict=True)), truth
+                dict(
+                    zip(
+                        truth,
+                        nomoto_history(structure, start)[-1].tolist(),
+                        strict=True,
+                    )
+                ),
+                truth,
             )
             for start in STARTS
         ]
         for name in truth:
             yield Row(
-                f"song2020, Section 3.1, {structure}", f"{name} by the extended Kalman filter: error, %",
-                None, errors[0][name], best_found[name], note="with the noise of instruments",
-            )  # fmt: skip
+                f"song2020, Section 3.1, {structure}",
+                f"{name} by the extended Kalman filter: error, %",
+                None,
+                errors[0][name],
+                best_found[name],
+                note="with the noise of instruments",
+            )
         worst = [max(found.values()) for found in errors]
-        yield from _start_rows(f"song2020, Section 3.1, {structure}", worst, max(best_found.values()))
+        yield from _start_rows(
+            f"song2020, Section 3.1, {structure}", worst, max(best_found.values())
+        )
 
 
 def _start_rows(case: str, worst: Sequence[float], best: float) -> Iterator[Row]:
     for start, error in zip(STARTS, worst, strict=True):
         yield Row(
-            case, f"largest error by the filter, deviation {start:g} at the start, %", None, error, best,
-            note="deviation of the coefficients at the start, at which they are 0, in parts of a usual size",
-        )  # fmt: skip
+            case,
+            f"largest error by the filter, deviation {start:g} at the start, %",
+            None,
+            error,
+            best,
+            note=(
+                "deviation of the coefficients at the start, at which they are 0, in"
+                " parts of a usual size"
+            ),
+        )
 
 
 def network_rows() -> Iterator[Row]:
@@ -263,9 +338,13 @@ def network_rows() -> Iterator[Row]:
     turns = zigzag_trial(20)
     runs = [network.run(turns, ("v", "r")) for network in container_networks()]
     for q in ("v", "r"):
-        what = f"20/20 by a neural network: mean squared error, {EQUATIONS[q]}, {UNITS[q]}"
+        what = (
+            f"20/20 by a neural network: mean squared error, {EQUATIONS[q]}, {UNITS[q]}"
+        )
         errors = [mean_square(run, turns, q) for run in runs]
-        yield _network_row("zhu2018, Tables 7.4.9, 7.4.10", what, errors, best_errors()[q])
+        yield _network_row(
+            "zhu2018, Tables 7.4.9, 7.4.10", what, errors, best_errors()[q]
+        )
     for name, run in cao2015.MANOEUVRES.items():
         truth, best = run(load_model("mariner")), run(cao2015.at_best())
         sampled = every(truth, 5, name)
@@ -273,18 +352,33 @@ def network_rows() -> Iterator[Row]:
         for channel in ("u", "v", "r", "psi"):
             what = f"{name} by a neural network, {channel}: rms error, % of span"
             errors = [cao2015.off(trial, sampled, channel) for trial in found]
-            yield _network_row("cao2015, Figures 3 to 6", what, errors, cao2015.off(best, truth, channel))
+            yield _network_row(
+                "cao2015, Figures 3 to 6",
+                what,
+                errors,
+                cao2015.off(best, truth, channel),
+            )
     ours = our_way(virtual(), same_hull()).model
     for rudder in (HARD, -HARD):
         turn, best_indices = sampled_turn(rudder), virtual().turn_indices(ours, rudder)
         truths = turning_indices(turn, turn.length)
-        indices = [turning_indices(turned(network, turn), turn.length) for network in tanker_networks()]
+        indices = [
+            turning_indices(turned(network, turn), turn.length)
+            for network in tanker_networks()
+        ]
         for index, (words, attribute) in ATTRIBUTES.items():
             truth = getattr(truths, attribute)
-            errors = [100.0 * abs(getattr(found, attribute) / truth - 1.0) for found in indices]
-            what = f"{rudder:+.0f} deg by a neural network: {words}, size of the error, %"
+            errors = [
+                100.0 * abs(getattr(found, attribute) / truth - 1.0)
+                for found in indices
+            ]
+            what = (
+                f"{rudder:+.0f} deg by a neural network: {words}, size of the error, %"
+            )
             best = 100.0 * abs((best_indices[index] or np.nan) / truth - 1.0)
-            yield _network_row("mei2019, Tables 6, 7, MMG model as target", what, errors, best)
+            yield _network_row(
+                "mei2019, Tables 6, 7, MMG model as target", what, errors, best
+            )
 
 
 def _network_row(case: str, what: str, errors: Sequence[float], best: float) -> Row:
@@ -301,31 +395,49 @@ def rows() -> Iterator[Row]:
 _LARGEST = "largest error by the filter, deviation {:g} at the start, %"
 CONCLUSIONS = (
     Conclusion(
-        "What a Kalman filter finds depends on values set beforehand (Zhu 2018, abstract)",
-        tuple(f"song2020, Section 3.1, norrbin: {_LARGEST.format(start)}" for start in STARTS),
-        lambda *found: max(row.as_paper for row in found) > 10.0 * min(row.as_paper for row in found),
+        "What a Kalman filter finds depends on values set beforehand (Zhu 2018,"
+        " abstract)",
+        tuple(
+            f"song2020, Section 3.1, norrbin: {_LARGEST.format(start)}"
+            for start in STARTS
+        ),
+        lambda *found: (
+            max(row.as_paper for row in found)
+            > 10.0 * min(row.as_paper for row in found)
+        ),
         "by a factor of ten",
     ),
     Conclusion(
         "The same for a linear model",
         tuple(f"zhu2018, Table 7.3.2: {_LARGEST.format(start)}" for start in STARTS),
-        lambda *found: max(row.as_paper for row in found) > 10.0 * min(row.as_paper for row in found),
+        lambda *found: (
+            max(row.as_paper for row in found)
+            > 10.0 * min(row.as_paper for row in found)
+        ),
         "but where the start is left open the filter is better than our recursion",
     ),
     Conclusion(
-        "From few data of small rudder angles RM-SVM generalises better than other methods (Mei 2019)",
-        tuple(f"mei2019, Tables 6, 7, MMG model as target: {rudder:+.0f} deg by a neural network: {words}, "
-              "size of the error, %" for rudder in (HARD, -HARD) for words in WORDS.values()),
-        lambda *found: sum(row.best for row in found) < sum(row.as_paper for row in found),
-        "by the mean of the four, beside a network taught the same zigzags; the network's advance to "
-        "starboard is the better one",
+        "From few data of small rudder angles RM-SVM generalises better than other"
+        " methods (Mei 2019)",
+        tuple(
+            f"mei2019, Tables 6, 7, MMG model as target: {rudder:+.0f} deg by a neural"
+            f" network: {words}, size of the error, %"
+            for rudder in (HARD, -HARD)
+            for words in WORDS.values()
+        ),
+        lambda *found: (
+            sum(row.best for row in found) < sum(row.as_paper for row in found)
+        ),
+        "by the mean of the four, beside a network taught the same zigzags; the"
+        " network's advance to starboard is the better one",
     ),
-)  # fmt: skip
+)
 PAPER = Paper(
     "comparators",
     "Two comparators on the papers' cases",
-    "An extended Kalman filter that carries the coefficients as states, and a neural network of two hidden "
-    f"layers of {HIDDEN[0]}; *at best* is ours. Every row is an error: the smaller is the better.",
+    "An extended Kalman filter that carries the coefficients as states, and a neural"
+    f" network of two hidden layers of {HIDDEN[0]}; *at best* is ours. Every row is an"
+    " error: the smaller is the better.",
     rows,
     conclusions=CONCLUSIONS,
     ours="the comparator",

@@ -13,7 +13,8 @@ def dense_dual_solution(
 ) -> tuple[Floats, float]:
     """Coefficients from the dual system as printed, [[0, 1'], [1, X X' + I/C]] [b; alpha] = [0; y].
 
-    O(n^3) in the number of samples and less accurate than `LSSVM`: an oracle for tests and benchmarks.
+    O(n^3) in the number of samples and less accurate than `LSSVM`: an oracle for tests
+    and benchmarks.
 
     Parameters
     ----------
@@ -39,7 +40,9 @@ def dense_dual_solution(
     return X.T @ multipliers, intercept
 
 
-def dense_dual_multipliers(X: ArrayLike, y: ArrayLike, C: float) -> tuple[Floats, float]:
+def dense_dual_multipliers(
+    X: ArrayLike, y: ArrayLike, C: float
+) -> tuple[Floats, float]:
     """Lagrange multipliers of the dual system as printed; by it the errors are multipliers / C.
 
     Parameters
@@ -57,11 +60,14 @@ def dense_dual_multipliers(X: ArrayLike, y: ArrayLike, C: float) -> tuple[Floats
     return solution[1:], float(solution[0])
 
 
-def dense_truncated_solution(X: ArrayLike, y: ArrayLike, C: float, rank: int) -> tuple[Floats, float]:
+def dense_truncated_solution(
+    X: ArrayLike, y: ArrayLike, C: float, rank: int
+) -> tuple[Floats, float]:
     """Coefficients from the dual matrix truncated as printed (Xu 2020, section 3.2).
 
-    Keeps the `rank` largest singular values of the (n + 1, n + 1) matrix; two of them belong to the
-    border, so it answers `TruncatedLSSVM` of two less. An oracle for tests.
+    Keeps the `rank` largest singular values of the (n + 1, n + 1) matrix; two of them
+    belong to the border, so it answers `TruncatedLSSVM` of two less. An oracle for
+    tests.
 
     Parameters
     ----------

@@ -11,14 +11,29 @@ import numpy as np
 from identification.estimators.coefficient_history import coefficient_history
 from identification.estimators.recursive import MultiInnovationLeastSquares
 from identification.validation.prediction import predict
-from papers import cao2015, comparators, get_paper, mei2019, mei2019_targets, song2020, xu2020_rank
-from papers.zhu2018 import container_ship, fits, recursive_start, sample_counts, steering_forms
+from papers import (
+    cao2015,
+    comparators,
+    get_paper,
+    mei2019,
+    mei2019_targets,
+    song2020,
+    xu2020_rank,
+)
+from papers.zhu2018 import (
+    container_ship,
+    fits,
+    recursive_start,
+    sample_counts,
+    steering_forms,
+)
 from shipgym.ships import load_model
 
 WIDTH, DPI = 9.0, 100  # of a figure, inches; dots an inch
 TRUTH = {"color": "black", "lw": 1.6}
 THEIRS, OTHER, OURS, NEURAL = (
-    {"color": colour, "lw": 1.1} for colour in ("tab:red", "tab:orange", "tab:blue", "tab:green")
+    {"color": colour, "lw": 1.1}
+    for colour in ("tab:red", "tab:orange", "tab:blue", "tab:green")
 )
 DASHED = {"ls": "--"}
 
@@ -32,27 +47,42 @@ def cao(axes: Any) -> None:
         "at best": (cao2015.at_best(), OURS | DASHED),
     }
     zigzag, turn = (
-        {label: run(model) for label, (model, _) in models.items()} for run in cao2015.MANOEUVRES.values()
+        {label: run(model) for label, (model, _) in models.items()}
+        for run in cao2015.MANOEUVRES.values()
     )
     for label, (_, style) in models.items():
-        axes[0].plot(zigzag[label].t, np.degrees(zigzag[label]["psi"]), label=label, **style)
+        axes[0].plot(
+            zigzag[label].t, np.degrees(zigzag[label]["psi"]), label=label, **style
+        )
         axes[1].plot(turn[label]["y"], turn[label]["x"], label=label, **style)
-    axes[0].set(title="25/25 zigzag", xlabel="t, s", ylabel="heading, deg", ylim=(-60.0, 60.0))
-    axes[1].set(title="30 deg turning circle", xlabel="y, m", ylabel="x, m", aspect="equal")
+    axes[0].set(
+        title="25/25 zigzag", xlabel="t, s", ylabel="heading, deg", ylim=(-60.0, 60.0)
+    )
+    axes[1].set(
+        title="30 deg turning circle", xlabel="y, m", ylabel="x, m", aspect="equal"
+    )
 
 
 def xu(axes: Any) -> None:
     """Singular values, and errors against rank and noise."""
     ranks = np.arange(1, 39)
-    axes[0].semilogy(ranks, xu2020_rank.decomposition()[1], ".-", label="38 terms", **OTHER)
-    axes[0].semilogy(ranks[:18], xu2020_rank.reduced_values(), ".-", label="18 of Table 11", **OURS)
+    axes[0].semilogy(
+        ranks, xu2020_rank.decomposition()[1], ".-", label="38 terms", **OTHER
+    )
+    axes[0].semilogy(
+        ranks[:18], xu2020_rank.reduced_values(), ".-", label="18 of Table 11", **OURS
+    )
     axes[0].set(title="singular values", xlabel="number")
     colours = ("tab:blue", "tab:green", "tab:orange", "tab:red")
     for noise, colour in zip(xu2020_rank.NOISES, colours, strict=True):
         found = xu2020_rank.errors(noise)
         rank = int(np.median(found.ranks))
-        for axis, values in zip(axes[1:], (found.coefficients, found.forces), strict=True):
-            axis.semilogy(ranks, values, color=colour, lw=1.1, label=f"noise {100 * noise:g} %")
+        for axis, values in zip(
+            axes[1:], (found.coefficients, found.forces), strict=True
+        ):
+            axis.semilogy(
+                ranks, values, color=colour, lw=1.1, label=f"noise {100 * noise:g} %"
+            )
             axis.plot(rank, values[rank - 1], "o", color=colour)
     axes[1].set(title="error of coefficients, relative", xlabel="rank kept")
     axes[2].set(title="error of forces, relative", xlabel="rank kept")
@@ -62,7 +92,9 @@ def recursion(axes: Any) -> None:
     """Two of the Mariner's six parameters, sample by sample."""
     t = np.arange(len(recursive_start.history("RLS"))) * recursive_start.INTERVAL
     styles = {"RLS": OTHER, "LSSVR-RLS": OURS}
-    for axis, name, limits in zip(axes, ("a11", "a22"), ((-1.4, 0.0), (-6.0, 4.0)), strict=True):
+    for axis, name, limits in zip(
+        axes, ("a11", "a22"), ((-1.4, 0.0), (-6.0, 4.0)), strict=True
+    ):
         k = recursive_start.NAMES.index(name)
         for euler in (False, True):
             for method, style in styles.items():
@@ -76,14 +108,20 @@ def recursion(axes: Any) -> None:
 def container(axes: Any) -> None:
     """Sway and yaw rate of the 20/20 zigzag."""
     trial = container_ship.zigzag_trial(20)
-    seven, four = container_ship.as_printed("ABC"), steering_forms.as_printed(steering_forms.CHOSEN)
+    seven, four = (
+        container_ship.as_printed("ABC"),
+        steering_forms.as_printed(steering_forms.CHOSEN),
+    )
     best = predict(container_ship.best_steering(), trial)
     assert best is not None
     runs: dict[str, tuple[Any, Any]] = {
         "container ship": (trial, TRUTH),
         "seven terms, ABC": (fits.steer(seven["v"], seven["r"], trial), OTHER),
         "chosen four, ABC": (fits.steer(four["v"], four["r"], trial), THEIRS),
-        "neural network": (comparators.container_networks()[0].run(trial, ("v", "r")), NEURAL),
+        "neural network": (
+            comparators.container_networks()[0].run(trial, ("v", "r")),
+            NEURAL,
+        ),
         "at best": (best, OURS | DASHED),
     }
     shown = trial.t < 500.0
@@ -100,10 +138,21 @@ def samples(axes: Any) -> None:
     for axis, (q, name) in zip(axes, container_ship.EQUATIONS.items(), strict=True):
         theirs = [sample_counts.learned(count)[0][q] for count in sample_counts.COUNTS]
         best = [sample_counts.learned_best(count)[q] for count in sample_counts.COUNTS]
-        for label, values, style in (("as the thesis", theirs, THEIRS), ("at best", best, OURS)):
-            finite = np.where(np.array(values) < 1e3, values, np.nan)  # the others ran away
+        for label, values, style in (
+            ("as the thesis", theirs, THEIRS),
+            ("at best", best, OURS),
+        ):
+            finite = np.where(
+                np.array(values) < 1e3, values, np.nan
+            )  # the others ran away
             axis.semilogy(counts, finite, ".-", label=label, **style)
-        axis.axhline(sample_counts.WITH_ALL[q], color="black", lw=1.0, label="printed, all samples", **DASHED)
+        axis.axhline(
+            sample_counts.WITH_ALL[q],
+            color="black",
+            lw=1.0,
+            label="printed, all samples",
+            **DASHED,
+        )
         axis.set(title=f"{name}, {container_ship.UNITS[q]}", xlabel="samples")
 
 
@@ -111,19 +160,33 @@ def nomoto(axes: Any) -> None:
     """K and T sample by sample."""
     run, names = song2020.trial("nomoto"), tuple(song2020.TRUTH["nomoto"])
     X, y = song2020.regression("nomoto")
-    least = coefficient_history(run, "nomoto", song2020.PARTICULARS, MultiInnovationLeastSquares())
+    least = coefficient_history(
+        run, "nomoto", song2020.PARTICULARS, MultiInnovationLeastSquares()
+    )
     paths = {
         "SG": (run.t[1:], song2020.gradient_history(X, y)[0], OTHER),
-        "NISG": (run.t[1:], song2020.gradient_history(X, y, omega=song2020.OMEGA)[0], THEIRS),
+        "NISG": (
+            run.t[1:],
+            song2020.gradient_history(X, y, omega=song2020.OMEGA)[0],
+            THEIRS,
+        ),
         "TMILS": (least.t, np.column_stack([least[name] for name in names]), OURS),
-        "extended Kalman filter, noise": (run.t, comparators.nomoto_history("nomoto"), NEURAL),
+        "extended Kalman filter, noise": (
+            run.t,
+            comparators.nomoto_history("nomoto"),
+            NEURAL,
+        ),
     }
-    for label, (t, (c_r, c_d), style) in ((k, (t, path.T, style)) for k, (t, path, style) in paths.items()):
+    for label, (t, (c_r, c_d), style) in (
+        (k, (t, path.T, style)) for k, (t, path, style) in paths.items()
+    ):
         with np.errstate(divide="ignore", invalid="ignore"):
             indices = -c_d / c_r, -1.0 / c_r
         for axis, values in zip(axes, indices, strict=True):
             axis.plot(t, values, label=label, **style)
-    for axis, value, name in zip(axes, (song2020.K, song2020.T), ("K, 1/s", "T, s"), strict=True):
+    for axis, value, name in zip(
+        axes, (song2020.K, song2020.T), ("K, 1/s", "T, s"), strict=True
+    ):
         axis.axhline(value, color="black", lw=1.0, label="truth", **DASHED)
         axis.set(title=name, xlabel="t, s", ylim=(0.0, 2.0 * value))
 
@@ -134,16 +197,29 @@ def turns(axes: Any) -> None:
     models: dict[str, tuple[Any, Any]] = {
         "bare tanker": (target.bare(mei2019_targets.TANKER), OTHER),
         "RM-SVM as the paper": (mei2019_targets.papers_way(target).model, THEIRS),
-        "RM-SVM at best": (mei2019_targets.our_way(target, mei2019_targets.same_hull()).model, OURS | DASHED),
+        "RM-SVM at best": (
+            mei2019_targets.our_way(target, mei2019_targets.same_hull()).model,
+            OURS | DASHED,
+        ),
     }
     for axis, rudder in zip(axes, (mei2019.HARD, -mei2019.HARD), strict=True):
         truth = comparators.sampled_turn(rudder)
         runs: dict[str, tuple[Any, Any]] = {"MMG model": (truth, TRUTH)}
-        runs |= {label: (target.turn(model, rudder), style) for label, (model, style) in models.items()}
-        runs["neural network"] = (comparators.turned(comparators.tanker_networks()[0], truth), NEURAL)
+        runs |= {
+            label: (target.turn(model, rudder), style)
+            for label, (model, style) in models.items()
+        }
+        runs["neural network"] = (
+            comparators.turned(comparators.tanker_networks()[0], truth),
+            NEURAL,
+        )
         for label, (run, style) in runs.items():
-            axis.plot(run["y"] / truth.length, run["x"] / truth.length, label=label, **style)
-        axis.set(title=f"{rudder:+.0f} deg", xlabel="y / L", ylabel="x / L", aspect="equal")
+            axis.plot(
+                run["y"] / truth.length, run["x"] / truth.length, label=label, **style
+            )
+        axis.set(
+            title=f"{rudder:+.0f} deg", xlabel="y / L", ylabel="x / L", aspect="equal"
+        )
 
 
 #: What draws a figure, on how many axes, and the figure's height in inches.
@@ -168,7 +244,9 @@ def draw(name: str, folder: Path) -> list[Path]:
     written = []
     for file, _ in get_paper(name).figures:
         drawn, count, height = FIGURES[file]
-        figure, axes = plt.subplots(1, count, figsize=(WIDTH, height), layout="constrained")
+        figure, axes = plt.subplots(
+            1, count, figsize=(WIDTH, height), layout="constrained"
+        )
         drawn(axes)
         for axis in axes:
             axis.grid(alpha=0.3)
@@ -177,7 +255,9 @@ def draw(name: str, folder: Path) -> list[Path]:
             for axis in axes
             for line, label in zip(*axis.get_legend_handles_labels(), strict=True)
         }
-        figure.legend(named.values(), named, loc="outside lower center", ncols=6, fontsize=8)
+        figure.legend(
+            named.values(), named, loc="outside lower center", ncols=6, fontsize=8
+        )
         figure.savefig(folder / file, dpi=DPI, metadata={"Software": None})
         plt.close(figure)
         written.append(folder / file)

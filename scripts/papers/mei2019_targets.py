@@ -26,20 +26,44 @@ from shipgym.trials.trial import Trial
 Floats = NDArray[np.float64]
 
 TANKER = "tanker"
-CANDIDATES = ("mariner", "container", TANKER, "kvlcc2")  # for the virtual ship: all but herself
-ZIGZAGS = ((10.0, False), (10.0, True), (20.0, False), (20.0, True))  # rudder and heading, port first
+CANDIDATES = (
+    "mariner",
+    "container",
+    TANKER,
+    "kvlcc2",
+)  # for the virtual ship: all but herself
+ZIGZAGS = (
+    (10.0, False),
+    (10.0, True),
+    (20.0, False),
+    (20.0, True),
+)  # rudder and heading, port first
 SHOWN = "20-starboard"  # the zigzag of Table 5 and of figures 6 and 7
 STEPS_PER_SAMPLE = 4
 TURN, ZIGZAG = 15.0, 20.0  # ship lengths at service speed that are simulated
 
 DATA = Path(__file__).parents[3] / "shared" / "data" / "kvlcc2_marin"
-FILES = {"10-starboard": "zz_-10_m", "10-port": "zz_10_m", SHOWN: "zz_-20_m", "20-port": "zz_20_m"}
+FILES = {
+    "10-starboard": "zz_-10_m",
+    "10-port": "zz_10_m",
+    SHOWN: "zz_-20_m",
+    "20-port": "zz_20_m",
+}
 COLUMNS: Mapping[str, Any] = {
-    "t": "t", "psi": "psi", "u": "dx0", "v": "dy0", "r": "r", "delta": "delta",
+    "t": "t",
+    "psi": "psi",
+    "u": "dx0",
+    "v": "dy0",
+    "r": "r",
+    "delta": "delta",
     "n": {"column": "rpm", "unit": "rpm"},
-}  # fmt: skip
+}
 
-PAPERS_WAY: Mapping[str, Any] = {"objective": "correlation", "free_constant": True, "C": 1.0}
+PAPERS_WAY: Mapping[str, Any] = {
+    "objective": "correlation",
+    "free_constant": True,
+    "C": 1.0,
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,47 +96,77 @@ class Target:
     def fit(self, reference: str, **settings: Any) -> IdentificationResult:
         """RM-SVM with a reference ship and settings of `RMSVM`."""
         return identify(
-            self.trials, structure="grey-box", method="rm-svm", particulars=self.ship.particulars,
-            steering=self.ship.steering, service_shaft_speed=self.shaft, reference_model=reference,
+            self.trials,
+            structure="grey-box",
+            method="rm-svm",
+            particulars=self.ship.particulars,
+            steering=self.ship.steering,
+            service_shaft_speed=self.shaft,
+            reference_model=reference,
             **settings,
-        )  # fmt: skip
+        )
 
     def bare(self, reference: str) -> ShipModel:
         """The reference ship alone, converted."""
-        shaft = float(np.median([t["n"][0] for t in self.trials])) if self.shaft is None else self.shaft
-        return converted_model(reference, self.ship.particulars, self.ship.steering, shaft)
+        shaft = (
+            float(np.median([t["n"][0] for t in self.trials]))
+            if self.shaft is None
+            else self.shaft
+        )
+        return converted_model(
+            reference, self.ship.particulars, self.ship.steering, shaft
+        )
 
     def turn(self, model: ShipModel, rudder_deg: float) -> Trial | None:
         """A turning circle; None where the model runs away."""
         try:
-            return turning_circle(model, rudder_deg, duration=TURN * self.travel, dt=0.01 * self.travel)
+            return turning_circle(
+                model, rudder_deg, duration=TURN * self.travel, dt=0.01 * self.travel
+            )
         except UnstableModelError:
             return None
 
-    def turn_indices(self, model: ShipModel, rudder_deg: float) -> dict[str, float | None]:
+    def turn_indices(
+        self, model: ShipModel, rudder_deg: float
+    ) -> dict[str, float | None]:
         """Advance and tactical diameter, lengths."""
         run = self.turn(model, rudder_deg)
         if run is None:
             return {"advance": None, "tactical": None}
         found = turning_indices(run, self.ship.particulars.length)
-        return {"advance": found.advance_lengths, "tactical": found.tactical_diameter_lengths}
+        return {
+            "advance": found.advance_lengths,
+            "tactical": found.tactical_diameter_lengths,
+        }
 
     def overshoots(self, model: ShipModel) -> dict[str, float | None]:
         """First and second overshoot of a 20/20 zigzag to starboard, degrees."""
-        run = zigzag(model, 20, 20, duration=ZIGZAG * self.travel, dt=0.01 * self.travel)
+        run = zigzag(
+            model, 20, 20, duration=ZIGZAG * self.travel, dt=0.01 * self.travel
+        )
         found = zigzag_indices(run, self.ship.particulars.length)
-        return {"overshoot_1": found.overshoot_1_deg, "overshoot_2": found.overshoot_2_deg}
+        return {
+            "overshoot_1": found.overshoot_1_deg,
+            "overshoot_2": found.overshoot_2_deg,
+        }
 
 
 @cache
 def virtual() -> Target:
     """The MMG model of KVLCC2 at model scale, sampled without noise at what is 1 Hz at full scale."""
     ship = load_model("kvlcc2-l7")
-    second = float(np.sqrt(ship.particulars.length / load_model("kvlcc2").particulars.length))
+    second = float(
+        np.sqrt(ship.particulars.length / load_model("kvlcc2").particulars.length)
+    )
     trials = tuple(
         _recorded(
             zigzag(
-                ship, angle, angle, duration=600.0 * second, dt=second / STEPS_PER_SAMPLE, port_first=port
+                ship,
+                angle,
+                angle,
+                duration=600.0 * second,
+                dt=second / STEPS_PER_SAMPLE,
+                port_first=port,
             ),
             ship,
             f"{angle:g}-{'port' if port else 'starboard'}",
@@ -124,10 +178,16 @@ def virtual() -> Target:
 
 def _recorded(run: Trial, ship: ShipModel, name: str) -> Trial:
     """What the paper's towing tank records: every so many steps, no orders, the shaft speed."""
-    channels = {c: run[c][::STEPS_PER_SAMPLE] for c in ("x", "y", "psi", "u", "v", "r", "delta")}
+    channels = {
+        c: run[c][::STEPS_PER_SAMPLE] for c in ("x", "y", "psi", "u", "v", "r", "delta")
+    }
     channels["n"] = np.full(len(channels["u"]), ship.service_shaft_speed)
     return Trial(
-        run.t[::STEPS_PER_SAMPLE], channels, name=name, kind=run.kind, length=ship.particulars.length
+        run.t[::STEPS_PER_SAMPLE],
+        channels,
+        name=name,
+        kind=run.kind,
+        length=ship.particulars.length,
     )
 
 
@@ -140,19 +200,26 @@ def measured(folder: Path = DATA) -> Target | None:
     trials = tuple(
         _second_by_second(
             Trial.from_csv(
-                folder / f"{file}.csv", COLUMNS, rudder_positive="port", velocity_frame="earth", name=name,
-                kind="zigzag", length=ship.particulars.length,
+                folder / f"{file}.csv",
+                COLUMNS,
+                rudder_positive="port",
+                velocity_frame="earth",
+                name=name,
+                kind="zigzag",
+                length=ship.particulars.length,
             )
         )
         for name, file in FILES.items()
-    )  # fmt: skip
+    )
     return Target(ship, trials, None)
 
 
 def _second_by_second(trial: Trial) -> Trial:
     """Every other sample, 1.08 s apart."""
     channels = {name: values[::2] for name, values in trial.channels.items()}
-    return Trial(trial.t[::2], channels, name=trial.name, kind=trial.kind, length=trial.length)
+    return Trial(
+        trial.t[::2], channels, name=trial.name, kind=trial.kind, length=trial.length
+    )
 
 
 @cache
@@ -176,7 +243,9 @@ def usual_way(target: Target, reference: str) -> IdentificationResult:
 def same_hull() -> str:
     """The reference ship most like the virtual ship, other than herself: her hull at full scale."""
     target = virtual()
-    return select_reference(target.ship.particulars, tuple(target.trials[0].channels), CANDIDATES)[0]
+    return select_reference(
+        target.ship.particulars, tuple(target.trials[0].channels), CANDIDATES
+    )[0]
 
 
 @cache
@@ -186,7 +255,12 @@ def taught_the_turns(rudder_deg: float) -> ShipModel:
     ship, gear = target.ship.particulars, target.ship.steering
     turns = [
         _recorded(
-            turning_circle(target.ship, rudder, duration=TURN * target.travel, dt=0.005 * target.travel),
+            turning_circle(
+                target.ship,
+                rudder,
+                duration=TURN * target.travel,
+                dt=0.005 * target.travel,
+            ),
             target.ship,
             f"turn {rudder:+.0f}",
         )
@@ -194,7 +268,11 @@ def taught_the_turns(rudder_deg: float) -> ShipModel:
     ]
     blank = target.bare(TANKER)
     samples = build_samples(
-        [*target.trials, *turns], blank.table, ship, gear=gear, shaft_speed=blank.service_shaft_speed
+        [*target.trials, *turns],
+        blank.table,
+        ship,
+        gear=gear,
+        shaft_speed=blank.service_shaft_speed,
     )
     return with_coefficients(blank, fit_all(get_method("ls").estimator, samples))
 
@@ -218,15 +296,20 @@ def acceleration_correlations(target: Target, model: ShipModel) -> dict[str, flo
     assert isinstance(box, GreyBox)
     any_table = get_structure("linear")  # the changes are those of the trials
     changes = build_samples(target.trials, any_table, model.particulars, gear=gear)
-    left = build_samples(target.trials, box, model.particulars, gear=gear, shaft_speed=shaft)
+    left = build_samples(
+        target.trials, box, model.particulars, gear=gear, shaft_speed=shaft
+    )
     theta = np.split(
-        box.acceleration_matrix(model.particulars, shaft) @ np.array(list(model.coefficients.values())),
+        box.acceleration_matrix(model.particulars, shaft)
+        @ np.array(list(model.coefficients.values())),
         np.cumsum([len(box.terms(q)) for q in changes.targets])[:-1],
     )
     found = {}
     for (q, change), terms in zip(changes.targets.items(), theta, strict=True):
         modelled = change - left.targets[q] + left.features[q] @ terms
-        found[q] = float(np.corrcoef(modelled / left.duration, change / left.duration)[0, 1])
+        found[q] = float(
+            np.corrcoef(modelled / left.duration, change / left.duration)[0, 1]
+        )
     return found
 
 

@@ -40,7 +40,9 @@ def papers_of(name: str) -> tuple[str, ...]:
     return CASES if check_choice(name, (*CASES, ALL), "paper") == ALL else (name,)
 
 
-def reproduce(names: Iterable[str], tell: Callable[[str], None] | None = None) -> dict[str, list[Row]]:
+def reproduce(
+    names: Iterable[str], tell: Callable[[str], None] | None = None
+) -> dict[str, list[Row]]:
     """Run the cases of papers again.
 
     Parameters
@@ -79,7 +81,10 @@ def terminal_table(name: str, rows: Sequence[Row]) -> Table:
     paper = get_paper(name)
     table = plain_table(paper.citation)
     for heading in HEADINGS:
-        table.add_column(heading.format(ours=paper.ours), justify="right" if heading in NUMBERS else "left")
+        table.add_column(
+            heading.format(ours=paper.ours),
+            justify="right" if heading in NUMBERS else "left",
+        )
     for _, case in groupby(rows, lambda row: row.case):
         for k, row in enumerate(case):
             cells = _cells(row)
@@ -145,7 +150,12 @@ def _table(paper: Paper, rows: Sequence[Row]) -> list[str]:
         "| " + " | ".join((*HEADINGS, "note")).format(ours=paper.ours) + " |",
         "| --- | --- | ---: | ---: | --- | ---: | --- | --- | --- |",
     ]
-    notes = {note: k for k, note in enumerate(dict.fromkeys(row.note for row in rows if row.note), start=1)}
+    notes = {
+        note: k
+        for k, note in enumerate(
+            dict.fromkeys(row.note for row in rows if row.note), start=1
+        )
+    }
     for row in rows:
         number = str(notes[row.note]) if row.note else ""
         lines.append("| " + " | ".join((*map(_escaped, _cells(row)), number)) + " |")
@@ -157,7 +167,10 @@ def _conclusions(conclusions: Sequence[Conclusion], rows: Sequence[Row]) -> list
     if not conclusions:
         return []
     verdicts = [one.verdict(rows) for one in conclusions]
-    counts = ", ".join(f"{verdicts.count(word)} {word}" for word in (CONFIRMED, CONTRADICTED, NOT_TESTABLE))
+    counts = ", ".join(
+        f"{verdicts.count(word)} {word}"
+        for word in (CONFIRMED, CONTRADICTED, NOT_TESTABLE)
+    )
     lines = [
         f"Conclusions: {counts}.",
         "",
@@ -166,7 +179,11 @@ def _conclusions(conclusions: Sequence[Conclusion], rows: Sequence[Row]) -> list
     ]
     for one, verdict in zip(conclusions, verdicts, strict=True):
         shown = [f"{row.name} = {_found(row)}" for row in one.rows(rows)]
-        cells = (one.statement, verdict, "<br>".join([*shown, *([one.remark] if one.remark else [])]))
+        cells = (
+            one.statement,
+            verdict,
+            "<br>".join([*shown, *([one.remark] if one.remark else [])]),
+        )
         lines.append("| " + " | ".join(map(_escaped, cells)) + " |")
     return [*lines, ""]
 
@@ -181,7 +198,10 @@ def _requirements(requirements: Sequence[Requirement]) -> list[str]:
     """What has to be, why it is, and the tests and tables that show it; none for a paper's tables."""
     if not requirements:
         return []
-    lines = ["| | requirement | why it holds | tests | tables |", "| --- | --- | --- | --- | --- |"]
+    lines = [
+        "| | requirement | why it holds | tests | tables |",
+        "| --- | --- | --- | --- | --- |",
+    ]
     for one in requirements:
         tests = "<br>".join(f"`{test}`" for test in one.tests)
         cells = (one.name, one.statement, one.argument, tests, "<br>".join(one.tables))

@@ -31,7 +31,8 @@ class Row:
     met : bool or None
         Whether it is; None where there is nothing to be met.
     note : str
-        Why a row cannot be reproduced, a stand-in for data that are not published, or a slip of the paper.
+        Why a row cannot be reproduced, a stand-in for data that are not published, or a
+        slip of the paper.
     """
 
     case: str
@@ -53,13 +54,19 @@ class Row:
             return None
         mantissa, _, power = f"{self.printed:.4g}".partition("e")
         hidden = 0.5 * 10.0 ** (int(power or 0) - len(mantissa.partition(".")[2]))
-        return abs(self.as_paper - self.printed) <= max(AGREEMENT * abs(self.printed), hidden)
+        return abs(self.as_paper - self.printed) <= max(
+            AGREEMENT * abs(self.printed), hidden
+        )
 
     @property
     def figure(self) -> object:
         """What its aim is about: rows of the same measured number at best share one aim."""
         found = self.as_paper if self.best is None else self.best
-        return (self.quantity, found) if found is None or float(found).is_integer() else found
+        return (
+            (self.quantity, found)
+            if found is None or float(found).is_integer()
+            else found
+        )
 
     @property
     def name(self) -> str:
@@ -91,7 +98,8 @@ class Conclusion:
     shown_by : tuple of str
         Names of rows.
     holds : callable or None
-        Whether the conclusion does, from these rows; None where nothing at hand can test it.
+        Whether the conclusion does, from these rows; None where nothing at hand can
+        test it.
     remark : str
         What was taken for a test of it, or why there is none.
     """
@@ -109,7 +117,9 @@ class Conclusion:
     def verdict(self, rows: Sequence[Row]) -> str:
         """`confirmed`, `contradicted`, or `not testable`, also where the rows' data is not at hand."""
         shown = self.rows(rows)
-        found = [row for row in shown if row.as_paper is not None or row.best is not None]
+        found = [
+            row for row in shown if row.as_paper is not None or row.best is not None
+        ]
         if self.holds is None or len(found) < len(self.shown_by):
             return NOT_TESTABLE
         return CONFIRMED if self.holds(*shown) else CONTRADICTED
@@ -122,7 +132,8 @@ class Requirement:
     Attributes
     ----------
     name : str
-        `R1` to `R8` of Zhu 2018, chapter 2; the rows that measure it have it for their case.
+        `R1` to `R8` of Zhu 2018, chapter 2; the rows that measure it have it for their
+        case.
     statement : str
         The requirement.
     argument : str

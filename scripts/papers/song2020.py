@@ -1,8 +1,9 @@
 """Song 2020: Nomoto's coefficients of Hual Trooper sample by sample, and Yukun's four motions.
 
-Rudder, duration, sampling time, start and omega of the paper's runs are not printed; Yukun's trials,
-propeller and rudder are not published. In their place stand zigzags of the printed Nomoto ships, and the
-container ship, whose thrust and rudder force are known (`song2020_container`).
+Rudder, duration, sampling time, start and omega of the paper's runs are not printed;
+Yukun's trials, propeller and rudder are not published. In their place stand zigzags of
+the printed Nomoto ships, and the container ship, whose thrust and rudder force are
+known (`song2020_container`).
 """
 
 from __future__ import annotations
@@ -28,33 +29,53 @@ from shipgym.trials.trial import Trial
 Floats = NDArray[np.float64]
 
 PARTICULARS = Particulars(
-    name="Hual Trooper", length=190.0, beam=32.26, draught=6.9, block_coefficient=0.535,
-    speed=20.8 * 1852.0 / 3600.0, rudder_area=34.1,
-)  # fmt: skip
+    name="Hual Trooper",
+    length=190.0,
+    beam=32.26,
+    draught=6.9,
+    block_coefficient=0.535,
+    speed=20.8 * 1852.0 / 3600.0,
+    rudder_area=34.1,
+)
 K, T, ALPHA, BETA = 0.15, 47.61, 13.27, 11087.2
 #: rdot = c_r r + c_r3 r^3 + c_d delta, equations 2-16 and 3-1
 TRUTH = {
     "nomoto": {"c_r": -1.0 / T, "c_d": K / T},
     "norrbin": {"c_r": -ALPHA * K / T, "c_r3": -BETA * K / T, "c_d": K / T},
 }
-ANGLE = {"nomoto": 10, "norrbin": 20}  # deg, of the zigzag: the cube of r wants a large one
+ANGLE = {
+    "nomoto": 10,
+    "norrbin": 20,
+}  # deg, of the zigzag: the cube of r wants a large one
 DURATION, INTERVAL = 2000.0, 0.4  # s
 OMEGA = 0.5  # between the printed bounds 0.1 and 1
 WITHIN = 1.0  # aim: error of a coefficient, %
 OF_SPAN = 1.0  # aim: rms error of a predicted channel, % of its span
 SEED = 2020
-INNOVATIONS, REPEATS = (2, 5, 20), 5  # length of the multi-innovation; repetitions of a timing
-#: Standard deviations of white noise: rate gyro, compass, rudder angle, position; rad, m.
+INNOVATIONS, REPEATS = (
+    (2, 5, 20),
+    5,
+)  # length of the multi-innovation; repetitions of a timing
+#: Standard deviations of white noise: rate gyro, compass, rudder angle, position; rad,
+#: m.
 NOISE = {
-    "r": np.radians(0.05), "psi": np.radians(0.1), "delta": np.radians(0.05), "x": 1.0, "y": 1.0,
-}  # fmt: skip
+    "r": np.radians(0.05),
+    "psi": np.radians(0.1),
+    "delta": np.radians(0.05),
+    "x": 1.0,
+    "y": 1.0,
+}
 
-#: Errors of Tables 3-3 and 3-4, %, and estimates, by the stochastic gradient and with nonlinear innovation.
+#: Errors of Tables 3-3 and 3-4, %, and estimates, by the stochastic gradient and with
+#: nonlinear innovation.
 TABLE_3_3 = {"SG": {"K": 52.0, "T": 52.0}, "NISG": {"K": 22.3, "T": 15.3}}
 ESTIMATES = {"SG": (0.072, 22.9088), "NISG": (0.1165, 40.2886)}  # K and T
 TABLE_3_4 = {"SG": {"alpha": 2.6, "beta": 5.5}, "NISG": {"alpha": 0.04, "beta": 2.0}}
 RATIOS = {"c_r": "alpha K/T", "c_r3": "beta K/T", "c_d": "K/T"}
-FAR = "the start is not printed; from 0, with regressors scaled to 1, the gradient has not converged"
+FAR = (
+    "the start is not printed; from 0, with regressors scaled to 1, the gradient has"
+    " not converged"
+)
 
 
 def ship(structure: str, coefficients: Mapping[str, float] | None = None) -> ShipModel:
@@ -69,11 +90,20 @@ def trial(structure: str, noisy: bool = False) -> Trial:
     angle = ANGLE[structure]
     run = zigzag(ship(structure), angle, angle, duration=DURATION, dt=0.1)
     every = round(INTERVAL / 0.1)
-    channels = {name: run[name][::every].copy() for name in ("x", "y", "psi", "u", "v", "r", "delta")}
+    channels = {
+        name: run[name][::every].copy()
+        for name in ("x", "y", "psi", "u", "v", "r", "delta")
+    }
     random = np.random.default_rng(SEED)
     for name, size in NOISE.items() if noisy else ():
         channels[name] += size * random.standard_normal(len(channels[name]))
-    return Trial(run.t[::every], channels, name=f"zigzag {angle}/{angle}", kind="zigzag", length=run.length)
+    return Trial(
+        run.t[::every],
+        channels,
+        name=f"zigzag {angle}/{angle}",
+        kind="zigzag",
+        length=run.length,
+    )
 
 
 def regression(structure: str) -> tuple[Floats, Floats]:
@@ -127,7 +157,10 @@ def gradient_history(
         error = target - float(phi @ theta)
         total += float(phi @ phi)
         if total > 0.0:
-            theta = theta + gain * (np.tanh(omega * error) if omega else error) / total * phi
+            theta = (
+                theta
+                + gain * (np.tanh(omega * error) if omega else error) / total * phi
+            )
             largest = max(largest, abs(omega * error))
         history[k] = theta / size
     return history, largest
@@ -136,7 +169,9 @@ def gradient_history(
 @cache
 def by_gradient(structure: str, method: str) -> dict[str, float]:
     """Coefficients by SG or NISG as printed."""
-    theta, _ = gradient(*regression(structure), omega=OMEGA if method == "NISG" else 0.0)
+    theta, _ = gradient(
+        *regression(structure), omega=OMEGA if method == "NISG" else 0.0
+    )
     return dict(zip(TRUTH[structure], theta.tolist(), strict=True))
 
 
@@ -145,8 +180,14 @@ def at_best(structure: str, noisy: bool = False) -> dict[str, float]:
     """Inverse-free multi-innovation least squares on splines; with noise refined by simulation."""
     run = trial(structure, noisy)
     if noisy:
-        return dict(identify([run], structure, "output-error", particulars=PARTICULARS).coefficients)
-    return coefficient_history(run, structure, PARTICULARS, MultiInnovationLeastSquares(omega=OMEGA)).last
+        return dict(
+            identify(
+                [run], structure, "output-error", particulars=PARTICULARS
+            ).coefficients
+        )
+    return coefficient_history(
+        run, structure, PARTICULARS, MultiInnovationLeastSquares(omega=OMEGA)
+    ).last
 
 
 def indices(coefficients: Mapping[str, float]) -> dict[str, float]:
@@ -159,26 +200,43 @@ def indices(coefficients: Mapping[str, float]) -> dict[str, float]:
 
 def errors(found: Mapping[str, float], truth: Mapping[str, float]) -> dict[str, float]:
     """How far off each number is, %."""
-    return {name: 100.0 * abs(found[name] / value - 1.0) for name, value in truth.items()}
+    return {
+        name: 100.0 * abs(found[name] / value - 1.0) for name, value in truth.items()
+    }
 
 
-def index_rows(structure: str, case: str, printed: Mapping[str, Mapping[str, float]]) -> Iterator[Row]:
+def index_rows(
+    structure: str, case: str, printed: Mapping[str, Mapping[str, float]]
+) -> Iterator[Row]:
     """Tables 3-3 and 3-4: errors of K and T, or of alpha and beta, and their means."""
     truth = indices(TRUTH[structure])
     best = errors(indices(at_best(structure)), truth)
     for method, values in printed.items():
         ours = errors(indices(by_gradient(structure, method)), truth)
         for name, value in values.items():
-            slip = "13.3975 is printed too, which is 0.96 % from 13.27; " * (value == 0.04)
+            slip = "13.3975 is printed too, which is 0.96 % from 13.27; " * (
+                value == 0.04
+            )
             yield Row(
-                case, f"{name} by {method}: error, %", value, ours[name], best[name], f"within {WITHIN:g}",
-                best[name] < WITHIN, slip + FAR,
-            )  # fmt: skip
+                case,
+                f"{name} by {method}: error, %",
+                value,
+                ours[name],
+                best[name],
+                f"within {WITHIN:g}",
+                best[name] < WITHIN,
+                slip + FAR,
+            )
         mean, least = (float(np.mean(list(found.values()))) for found in (ours, best))
         yield Row(
-            case, f"mean by {method}: error, %", float(np.mean(list(values.values()))), mean, least,
-            f"within {WITHIN:g}", least < WITHIN,
-        )  # fmt: skip
+            case,
+            f"mean by {method}: error, %",
+            float(np.mean(list(values.values()))),
+            mean,
+            least,
+            f"within {WITHIN:g}",
+            least < WITHIN,
+        )
 
 
 def effect_rows() -> Iterator[Row]:
@@ -188,10 +246,16 @@ def effect_rows() -> Iterator[Row]:
     for method, (gain, time) in ESTIMATES.items():
         ours = 100.0 * abs(by_gradient("nomoto", method)["c_d"] / truth - 1.0)
         yield Row(
-            "Figures 3.2, 3.3", f"K/T by {method}: error, %", 100.0 * abs(gain / time / truth - 1.0), ours,
-            least, f"within {WITHIN:g}", least < WITHIN,
-            "from the printed K and T: by SG nearly all of their error is in 1/T; by NISG K/T is worse",
-        )  # fmt: skip
+            "Figures 3.2, 3.3",
+            f"K/T by {method}: error, %",
+            100.0 * abs(gain / time / truth - 1.0),
+            ours,
+            least,
+            f"within {WITHIN:g}",
+            least < WITHIN,
+            "from the printed K and T: by SG nearly all of their error is in 1/T; by"
+            " NISG K/T is worse",
+        )
 
 
 def ratio_rows() -> Iterator[Row]:
@@ -202,9 +266,15 @@ def ratio_rows() -> Iterator[Row]:
         ours = errors(by_gradient("norrbin", method), truth)
         for name, ratio in RATIOS.items():
             yield Row(
-                f"Figure {figure}", f"{ratio} by {method}: error, %", None, ours[name], best[name],
-                f"within {WITHIN:g}", best[name] < WITHIN, "the paper shows a picture",
-            )  # fmt: skip
+                f"Figure {figure}",
+                f"{ratio} by {method}: error, %",
+                None,
+                ours[name],
+                best[name],
+                f"within {WITHIN:g}",
+                best[name] < WITHIN,
+                "the paper shows a picture",
+            )
 
 
 def innovation_rows() -> Iterator[Row]:
@@ -220,28 +290,57 @@ def innovation_rows() -> Iterator[Row]:
     plain, half, whole, double = off(), off(omega=OMEGA), off(omega=1.0), off(gain=2.0)
     largest = gradient(X, y, omega=1.0)[1]
     yield Row(
-        "Equation 3-7", "largest omega e of the run, omega 1", None, largest, None, "far below 1",
-        largest < 0.1, "so tanh(omega e) is omega e: the innovation is not changed",
-    )  # fmt: skip
+        "Equation 3-7",
+        "largest omega e of the run, omega 1",
+        None,
+        largest,
+        None,
+        "far below 1",
+        largest < 0.1,
+        "so tanh(omega e) is omega e: the innovation is not changed",
+    )
     yield Row(
-        "Equation 3-7", f"mean error of K and T, %: NISG of omega {OMEGA:g} less SG", -33.2, half - plain,
-        None, "", None, "as printed omega only shortens the steps; that cannot cause the printed gain",
-    )  # fmt: skip
+        "Equation 3-7",
+        f"mean error of K and T, %: NISG of omega {OMEGA:g} less SG",
+        -33.2,
+        half - plain,
+        None,
+        "",
+        None,
+        "as printed omega only shortens the steps; that cannot cause the printed gain",
+    )
     yield Row(
-        "Equation 3-7", "mean error of K and T, %: NISG of omega 1 less SG", -33.2, whole - plain, None,
-        "none", abs(whole - plain) < 1e-3, "the same steps",
-    )  # fmt: skip
+        "Equation 3-7",
+        "mean error of K and T, %: NISG of omega 1 less SG",
+        -33.2,
+        whole - plain,
+        None,
+        "none",
+        abs(whole - plain) < 1e-3,
+        "the same steps",
+    )
     yield Row(
-        "Equation 3-12", "mean error of K and T, %: with 0.5 omega r for r less SG", -33.2, double - plain,
-        None, "below 0", double < plain,
+        "Equation 3-12",
+        "mean error of K and T, %: with 0.5 omega r for r less SG",
+        -33.2,
+        double - plain,
+        None,
+        "below 0",
+        double < plain,
         "the divisor named below equation 3-12 doubles the steps of SG, and that helps",
-    )  # fmt: skip
+    )
     raw = gradient(X, y, scale=False)[0]
     yield Row(
-        "Equation 3-3", "T by SG on columns as they are: error, %", 52.0,
-        100.0 * abs(-1.0 / raw[0] / T - 1.0), None, "", None,
-        "r is a fifteenth of delta, and the gradient depends on delta alone: the paper must have scaled",
-    )  # fmt: skip
+        "Equation 3-3",
+        "T by SG on columns as they are: error, %",
+        52.0,
+        100.0 * abs(-1.0 / raw[0] / T - 1.0),
+        None,
+        "",
+        None,
+        "r is a fifteenth of delta, and the gradient depends on delta alone: the paper"
+        " must have scaled",
+    )
 
 
 def noise_rows() -> Iterator[Row]:
@@ -253,27 +352,46 @@ def noise_rows() -> Iterator[Row]:
         off = errors(indices(found), indices(truth)) if linear else errors(found, truth)
         for name in names:
             yield Row(
-                "Section 3.1", f"{RATIOS.get(name, name)} with noise: error, %", None, None, off[name],
-                f"within {WITHIN:g}", off[name] < WITHIN,
-                f"the paper's disturbance is not printed; {what}; refined by simulation",
-            )  # fmt: skip
+                "Section 3.1",
+                f"{RATIOS.get(name, name)} with noise: error, %",
+                None,
+                None,
+                off[name],
+                f"within {WITHIN:g}",
+                off[name] < WITHIN,
+                f"the paper's disturbance is not printed; {what}; refined by"
+                " simulation",
+            )
 
 
 def prediction_rows() -> Iterator[Row]:
     """Figures 3.6 and 3.7: yaw rate and track of zigzags by the identified models."""
-    models = [ship("norrbin", found) for found in (by_gradient("norrbin", "NISG"), at_best("norrbin"))]
+    models = [
+        ship("norrbin", found)
+        for found in (by_gradient("norrbin", "NISG"), at_best("norrbin"))
+    ]
     for angle in (5, 10, 20):
-        truth, ours, best = (zigzag(s, angle, angle, duration=600.0) for s in (ship("norrbin"), *models))
+        truth, ours, best = (
+            zigzag(s, angle, angle, duration=600.0) for s in (ship("norrbin"), *models)
+        )
         for figure, channel in (("3.6", "r"), ("3.7", "y")):
             span = float(np.ptp(truth[channel]))
             theirs, least = (
-                100.0 * float(np.sqrt(np.mean((run[channel] - truth[channel]) ** 2))) / span
+                100.0
+                * float(np.sqrt(np.mean((run[channel] - truth[channel]) ** 2)))
+                / span
                 for run in (ours, best)
             )
             yield Row(
-                f"Figure {figure}", f"{angle}/{angle} zigzag, {channel}: rms error, % of span", None, theirs,
-                least, f"below {OF_SPAN:g}", least < OF_SPAN, "the paper shows a picture",
-            )  # fmt: skip
+                f"Figure {figure}",
+                f"{angle}/{angle} zigzag, {channel}: rms error, % of span",
+                None,
+                theirs,
+                least,
+                f"below {OF_SPAN:g}",
+                least < OF_SPAN,
+                "the paper shows a picture",
+            )
 
 
 def time_rows() -> Iterator[Row]:
@@ -281,7 +399,10 @@ def time_rows() -> Iterator[Row]:
     X, y = regression("norrbin")
 
     def seconds(length: int, inverse_free: bool) -> tuple[float, Floats]:
-        least, estimator = np.inf, MultiInnovationLeastSquares(innovations=length, inverse_free=inverse_free)
+        least, estimator = (
+            np.inf,
+            MultiInnovationLeastSquares(innovations=length, inverse_free=inverse_free),
+        )
         for _ in range(REPEATS):
             start = process_time()
             estimator.fit(X, y)
@@ -292,10 +413,16 @@ def time_rows() -> Iterator[Row]:
         (scalar, ours), (matrix, theirs) = seconds(length, True), seconds(length, False)
         off = float(np.max(np.abs(ours / theirs - 1.0)))
         yield Row(
-            "Section 4.2", f"time of TMILS by that of MILS, {length} innovations", None, scalar / matrix,
+            "Section 4.2",
+            f"time of TMILS by that of MILS, {length} innovations",
             None,
-            note=f"the same estimate within {off:.0e}; least of {REPEATS} on this machine",
-        )  # fmt: skip
+            scalar / matrix,
+            None,
+            note=(
+                f"the same estimate within {off:.0e}; least of {REPEATS} on this"
+                " machine"
+            ),
+        )
 
 
 def rows() -> Iterator[Row]:
@@ -313,58 +440,80 @@ def rows() -> Iterator[Row]:
 
 CONCLUSIONS = (
     Conclusion(
-        "The nonlinear innovation greatly improves the accuracy over the stochastic gradient",
-        ("Table 3-3: mean by SG: error, %", "Table 3-3: mean by NISG: error, %",
-         "Table 3-4: mean by SG: error, %", "Table 3-4: mean by NISG: error, %"),
-        lambda k_sg, k_nisg, a_sg, a_nisg: k_nisg.as_paper < k_sg.as_paper
-        and a_nisg.as_paper < a_sg.as_paper,
+        "The nonlinear innovation greatly improves the accuracy over the stochastic"
+        " gradient",
+        (
+            "Table 3-3: mean by SG: error, %",
+            "Table 3-3: mean by NISG: error, %",
+            "Table 3-4: mean by SG: error, %",
+            "Table 3-4: mean by NISG: error, %",
+        ),
+        lambda k_sg, k_nisg, a_sg, a_nisg: (
+            k_nisg.as_paper < k_sg.as_paper and a_nisg.as_paper < a_sg.as_paper
+        ),
         "with the printed equations it only shortens the steps",
     ),
     Conclusion(
         "The hyperbolic tangent acts on the innovation",
         ("Equation 3-7: largest omega e of the run, omega 1",),
         lambda largest: largest.as_paper > 0.1,
-        "acts: bends it by more than a third of a per cent; of a yaw acceleration in rad/s2 it does not",
+        "acts: bends it by more than a third of a per cent; of a yaw acceleration in"
+        " rad/s2 it does not",
     ),
     Conclusion(
         "It converges better than the other methods",
-        ("Figures 3.2, 3.3: K/T by SG: error, %", "Figures 3.2, 3.3: K/T by NISG: error, %"),
+        (
+            "Figures 3.2, 3.3: K/T by SG: error, %",
+            "Figures 3.2, 3.3: K/T by NISG: error, %",
+        ),
         lambda sg, nisg: nisg.as_paper < sg.as_paper,
         "after 2000 s neither has converged; least squares (at best) has",
     ),
     Conclusion(
         "Without the matrix inverse the multi-innovation least squares are faster",
-        tuple(f"Section 4.2: time of TMILS by that of MILS, {length} innovations" for length in INNOVATIONS),
+        tuple(
+            f"Section 4.2: time of TMILS by that of MILS, {length} innovations"
+            for length in INNOVATIONS
+        ),
         lambda *found: all(row.as_paper < 1.0 for row in found),
         "with the same estimate",
     ),
     Conclusion(
-        "The identified model predicts a zigzag that it was not fitted to (figures 4.3, 4.4)",
-        ("Figures 4.3, 4.4: zigzag 20/20, psi: rms error, % of span",
-         "Figures 4.3, 4.4: zigzag 20/20, phi: rms error, % of span"),
+        "The identified model predicts a zigzag that it was not fitted to (figures 4.3,"
+        " 4.4)",
+        (
+            "Figures 4.3, 4.4: zigzag 20/20, psi: rms error, % of span",
+            "Figures 4.3, 4.4: zigzag 20/20, phi: rms error, % of span",
+        ),
         lambda *found: all(row.as_paper < 10.0 for row in found),
-        "by the same regressors for the container ship: rms error below 10 % of the span",
+        "by the same regressors for the container ship: rms error below 10 % of the"
+        " span",
     ),
     Conclusion(
         "It is effective with the full-scale trials of Yukun",
-        remark="her trials, propeller and rudder are not published, and two of the printed numbers are not a "
-        "ship's (Table 4-2)",
+        remark=(
+            "her trials, propeller and rudder are not published, and two of the printed"
+            " numbers are not a ship's (Table 4-2)"
+        ),
     ),
-)  # fmt: skip
+)
 PAPER = Paper(
     "song2020",
-    "Song 2020, Nonlinear innovation identification for ship maneuvering modeling via the full-scale trial "
-    "data",
-    f"Hual Trooper's printed Nomoto equations in zigzags of {DURATION:g} s sampled at {INTERVAL:g} s, and "
-    "the container ship in place of Yukun, whose trials are not published.",
+    "Song 2020, Nonlinear innovation identification for ship maneuvering modeling via"
+    " the full-scale trial data",
+    f"Hual Trooper's printed Nomoto equations in zigzags of {DURATION:g} s sampled at"
+    f" {INTERVAL:g} s, and the container ship in place of Yukun, whose trials are not"
+    " published.",
     rows,
     conclusions=CONCLUSIONS,
     figures=(
         (
             "reproduction_song2020.png",
-            "K and T of Hual Trooper sample by sample: the stochastic gradient, the nonlinear innovation, "
-            "inverse-free multi-innovation least squares and, with the noise of instruments, the extended "
-            "Kalman filter",
+            (
+                "K and T of Hual Trooper sample by sample: the stochastic gradient, the"
+                " nonlinear innovation, inverse-free multi-innovation least squares"
+                " and, with the noise of instruments, the extended Kalman filter"
+            ),
         ),
     ),
 )

@@ -1,8 +1,9 @@
 """The regressors of Song 2020, equation 4-2, on the container ship in place of Yukun.
 
-Yukun's trials, propeller and rudder are not published. The container ship sails the same two zigzags; her
-thrust and rudder force are computed as the paper computes Yukun's, her mass and added mass are known, and so
-are the five numbers of propeller and rudder that the regression is to find (Son & Nomoto 1981).
+Yukun's trials, propeller and rudder are not published. The container ship sails the
+same two zigzags; her thrust and rudder force are computed as the paper computes
+Yukun's, her mass and added mass are known, and so are the five numbers of propeller and
+rudder that the regression is to find (Son & Nomoto 1981).
 """
 
 from __future__ import annotations
@@ -36,10 +37,14 @@ EQUATIONS = ("u", "v", "r", "p")
 CHANNELS = ("x", "y", "psi", "u", "v", "r", "p", "phi", "delta", "n")
 STATE = ("x", "y", "psi", "u", "v", "r", "p", "phi")
 
-#: Equation 4-2 without thrust and rudder, as Table 4-2 numbers them (its X_uuu, X_uuuu are u^2, u^3).
+#: Equation 4-2 without thrust and rudder, as Table 4-2 numbers them (its X_uuu, X_uuuu
+#: are u^2, u^3).
 HULL = {
     "u": "u^2, u^3, v^2, r^2, v r, u v^2, u v phi^2",
-    "v": "u v, u p, u^2 v, r^3, v r^2, v^2 r, u v p^2, u r p^2, |v| v, |r| v, |v| r, |r| r",
+    "v": (
+        "u v, u p, u^2 v, r^3, v r^2, v^2 r, u v p^2, u r p^2, |v| v, |r| v, |v| r,"
+        " |r| r"
+    ),
     "r": "u v, u p, u phi, u^2 r, u^2 v, v^3, r^3, v r^2, v^2 r, u r p^2, |r| v, |v| v",
     "p": "p, u v, u r, u^2 v, v^3, v^2 r, v r^2, u v phi^2, u r phi^2, |v| v",
 }
@@ -51,13 +56,23 @@ PROPULSION = {
     "C_P = 1 - t": ("u", 1.3940, 1.0 - own.PUBLISHED.t),
     "C_Ru = 1 - t_R": ("u", 0.5816, own.PUBLISHED.c_RX),
     "C_Rv = 1 + a_H": ("v", 0.9274, 1.0 + own.PUBLISHED.a_H),
-    "C_Rp = -(1 + a_H) z_R": ("p", -0.0882, -(1.0 + own.PUBLISHED.a_H) * own.PUBLISHED.z_R),
-    "C_Rr = x_R + a_H x_H": ("r", -0.5867, own.PUBLISHED.x_R + own.PUBLISHED.a_H * own.PUBLISHED.x_H),
+    "C_Rp = -(1 + a_H) z_R": (
+        "p",
+        -0.0882,
+        -(1.0 + own.PUBLISHED.a_H) * own.PUBLISHED.z_R,
+    ),
+    "C_Rr = x_R + a_H x_H": (
+        "r",
+        -0.5867,
+        own.PUBLISHED.x_R + own.PUBLISHED.a_H * own.PUBLISHED.x_H,
+    ),
 }
 REMARKS = {
     "C_P = 1 - t": "printed: a thrust deduction of -0.39, which no ship has",
-    "C_Rv = 1 + a_H": "printed: a hull that takes force from the rudder; of this ship the list lacks the "
-    "heel in sway",
+    "C_Rv = 1 + a_H": (
+        "printed: a hull that takes force from the rudder; of this ship the list lacks"
+        " the heel in sway"
+    ),
 }
 
 
@@ -75,7 +90,9 @@ def thrust_and_rudder(u: Any, v: Any, r: Any, delta: Any, n: Any) -> tuple[Any, 
     """Thrust and normal force of the rudder, prime system, from velocities in SI units."""
     L, U = own.LENGTH, np.hypot(u, v)
     u_, v_, r_ = u / U, v / U, r * L / U
-    u_P = u_ * (1.0 - own.PUBLISHED.wp + own.PUBLISHED.tau * (v_ + own.PUBLISHED.xp * r_) ** 2)
+    u_P = u_ * (
+        1.0 - own.PUBLISHED.wp + own.PUBLISHED.tau * (v_ + own.PUBLISHED.xp * r_) ** 2
+    )
     J = u_P * U / (n * own.DIAMETER)
     K_T = 0.527 - 0.455 * J
     thrust = 2.0 * own.DIAMETER**4 / (L * L) * K_T * n * np.abs(n) / U**2
@@ -85,25 +102,40 @@ def thrust_and_rudder(u: Any, v: Any, r: Any, delta: Any, n: Any) -> tuple[Any, 
         + own.PUBLISHED.c_Rrrr * r_**3
         + own.PUBLISHED.c_Rrrv * r_**2 * v_
     )
-    u_R = u_P * own.PUBLISHED.epsilon * np.sqrt(1.0 + 8.0 * own.PUBLISHED.kappa / np.pi * K_T / J**2)
-    lift = 6.13 * own.ASPECT_RATIO / (own.ASPECT_RATIO + 2.25) * own.RUDDER_AREA / (L * L)
+    u_R = (
+        u_P
+        * own.PUBLISHED.epsilon
+        * np.sqrt(1.0 + 8.0 * own.PUBLISHED.kappa / np.pi * K_T / J**2)
+    )
+    lift = (
+        6.13 * own.ASPECT_RATIO / (own.ASPECT_RATIO + 2.25) * own.RUDDER_AREA / (L * L)
+    )
     return thrust, -lift * (u_R**2 + v_R**2) * np.sin(delta + np.arctan2(v_R, u_R))
 
 
-def regressors(motion: Mapping[str, Any], hull: Mapping[str, str] = HULL) -> dict[str, list[Any]]:
+def regressors(
+    motion: Mapping[str, Any], hull: Mapping[str, str] = HULL
+) -> dict[str, list[Any]]:
     """Equation 4-2 by equation of motion, prime system; the rudder stands last, before it in surge thrust.
 
-    The paper's F_N is positive for a positive rudder angle, the container ship's is its opposite.
+    The paper's F_N is positive for a positive rudder angle, the container ship's is its
+    opposite.
     """
     U = np.hypot(motion["u"], motion["v"])
     length = {"u": 1.0, "v": 1.0, "r": own.LENGTH, "p": own.LENGTH}
-    prime = {name: motion[name] * unit / U for name, unit in length.items()} | {"phi": motion["phi"]}
+    prime = {name: motion[name] * unit / U for name, unit in length.items()} | {
+        "phi": motion["phi"]
+    }
     prime |= {f"|{name}|": abs(prime[name]) for name in "vr"}
-    thrust, normal = thrust_and_rudder(*(motion[name] for name in ("u", "v", "r", "delta", "n")))
+    thrust, normal = thrust_and_rudder(
+        *(motion[name] for name in ("u", "v", "r", "delta", "n"))
+    )
     along, aside = normal * np.sin(motion["delta"]), normal * np.cos(motion["delta"])
     propulsion = {"u": [thrust, along], "v": [aside], "r": [aside], "p": [aside]}
     return {
-        equation: [_product(prime, powers) for powers in _powers(text)] + propulsion[equation]
+        equation: (
+            [_product(prime, powers) for powers in _powers(text)] + propulsion[equation]
+        )
         for equation, text in hull.items()
     }
 
@@ -143,7 +175,9 @@ def inertia_matrix() -> Floats:
     return matrix
 
 
-def regression(trial: Trial, hull: Mapping[str, str] = HULL) -> dict[str, tuple[Floats, Floats]]:
+def regression(
+    trial: Trial, hull: Mapping[str, str] = HULL
+) -> dict[str, tuple[Floats, Floats]]:
     """Equation 4-8: regressors and what is left of the forces, accelerations by central differences."""
     motion = {name: trial[name] for name in CHANNELS}
     speed = np.hypot(trial["u"], trial["v"])
@@ -151,7 +185,10 @@ def regression(trial: Trial, hull: Mapping[str, str] = HULL) -> dict[str, tuple[
     rates = np.array([np.gradient(trial[name], trial.t) for name in EQUATIONS])
     forces = inertia_matrix() @ (rates * lengths[:, None] * own.LENGTH / speed**2)
     known, columns = known_forces(motion), regressors(motion, hull)
-    return {q: (np.column_stack(columns[q]), forces[EQUATIONS.index(q)] - known[q]) for q in hull}
+    return {
+        q: (np.column_stack(columns[q]), forces[EQUATIONS.index(q)] - known[q])
+        for q in hull
+    }
 
 
 def as_paper(X: Floats, y: Floats) -> Floats:
@@ -181,84 +218,144 @@ def predicted(theta: Mapping[str, Floats], trial: Trial) -> Trial:
 
     def rates(t: float, state: Floats) -> list[float]:
         motion = dict(zip(STATE, state.tolist(), strict=True))
-        motion |= {name: float(np.interp(t, trial.t, trial[name])) for name in ("delta", "n")}
+        motion |= {
+            name: float(np.interp(t, trial.t, trial[name])) for name in ("delta", "n")
+        }
         columns, known = regressors(motion), known_forces(motion)
         forces = [float(theta[q] @ np.array(columns[q])) + known[q] for q in EQUATIONS]
         u, v, psi = motion["u"], motion["v"], motion["psi"]
         accelerations = (matrix @ forces) * (u * u + v * v) / lengths
-        over_ground = (u * np.cos(psi) - v * np.sin(psi), u * np.sin(psi) + v * np.cos(psi))
+        over_ground = (
+            u * np.cos(psi) - v * np.sin(psi),
+            u * np.sin(psi) + v * np.cos(psi),
+        )
         return [*over_ground, motion["r"], *accelerations.tolist(), motion["p"]]
 
     start = [trial[name][0] for name in STATE]
     found = solve_ivp(
-        rates, (trial.t[0], trial.t[-1]), start, t_eval=trial.t, max_step=2.0, rtol=1e-5, atol=1e-8
+        rates,
+        (trial.t[0], trial.t[-1]),
+        start,
+        t_eval=trial.t,
+        max_step=2.0,
+        rtol=1e-5,
+        atol=1e-8,
     )
-    channels = dict(zip(STATE, found.y, strict=True)) | {"delta": trial["delta"], "n": trial["n"]}
+    channels = dict(zip(STATE, found.y, strict=True)) | {
+        "delta": trial["delta"],
+        "n": trial["n"],
+    }
     return Trial(trial.t, channels, name=trial.name, kind="zigzag", length=trial.length)
 
 
 def off(found: Trial, truth: Trial, channel: str) -> float:
     """Root mean square error of a channel, % of its span."""
-    return float(100.0 * np.sqrt(np.mean((found[channel] - truth[channel]) ** 2)) / np.ptp(truth[channel]))
+    return float(
+        100.0
+        * np.sqrt(np.mean((found[channel] - truth[channel]) ** 2))
+        / np.ptp(truth[channel])
+    )
 
 
 def coefficient_rows() -> Iterator[Row]:
     """Table 4-2: the numbers of propeller and rudder, which alone have a counterpart."""
     yield Row(
-        "Table 4-2", "41 hull coefficients of Yukun", None, None, None, "", None,
-        "not to be reproduced: her trials, propeller and rudder are not published. The container ship in her "
-        "place; the regressors are the same",
-    )  # fmt: skip
+        "Table 4-2",
+        "41 hull coefficients of Yukun",
+        None,
+        None,
+        None,
+        "",
+        None,
+        "not to be reproduced: her trials, propeller and rudder are not published. The"
+        " container ship in her place; the regressors are the same",
+    )
     for name, (equation, printed, true) in PROPULSION.items():
         place = -2 if name.startswith("C_P") else -1
         ours, best = (float(fitted(fit)[equation][place]) for fit in (as_paper, tuned))
         yield Row(
-            "Table 4-2", name, printed, ours, best, f"{true:.4g}, the container ship's", None,
+            "Table 4-2",
+            name,
+            printed,
+            ours,
+            best,
+            f"{true:.4g}, the container ship's",
+            None,
             REMARKS.get(name, ""),
-        )  # fmt: skip
+        )
     X, y = regression(recorded(10, 20), {"v": OWN_SWAY})["v"]
     found, true = float(tuned(X, y)[-1]), 1.0 + own.PUBLISHED.a_H
     yield Row(
-        "Table 4-2", "C_Rv = 1 + a_H, sway on the container ship's own terms", None, None, found,
-        f"within 2 % of {true:.4g}", abs(found / true - 1.0) < 0.02,
+        "Table 4-2",
+        "C_Rv = 1 + a_H, sway on the container ship's own terms",
+        None,
+        None,
+        found,
+        f"within 2 % of {true:.4g}",
+        abs(found / true - 1.0) < 0.02,
         "so it is the list of equation 4-2 that is off for this ship, not the method",
-    )  # fmt: skip
+    )
 
 
 def prediction_rows() -> Iterator[Row]:
     """Figures 4.1 to 4.4: the zigzag that was fitted, and the 20/20 predicted."""
-    for figures, truth in (("4.1, 4.2", recorded(10, 20)), ("4.3, 4.4", recorded(20, 20))):
+    for figures, truth in (
+        ("4.1, 4.2", recorded(10, 20)),
+        ("4.3, 4.4", recorded(20, 20)),
+    ):
         ours, best = (predicted(fitted(fit), truth) for fit in (as_paper, tuned))
         for channel in STATE:
             least = off(best, truth, channel)
             yield Row(
-                f"Figures {figures}", f"{truth.name}, {channel}: rms error, % of span", None,
-                off(ours, truth, channel), least, f"below {OF_SPAN:g}", least < OF_SPAN,
-                "fitted" if truth.name == "zigzag 10/20" else "predicted from the 10/20",
-            )  # fmt: skip
+                f"Figures {figures}",
+                f"{truth.name}, {channel}: rms error, % of span",
+                None,
+                off(ours, truth, channel),
+                least,
+                f"below {OF_SPAN:g}",
+                least < OF_SPAN,
+                (
+                    "fitted"
+                    if truth.name == "zigzag 10/20"
+                    else "predicted from the 10/20"
+                ),
+            )
     for number in (1, 2):
         true, theirs, least = (
-            getattr(zigzag_indices(run, 20.0), f"overshoot_{number}_deg") for run in (truth, ours, best)
+            getattr(zigzag_indices(run, 20.0), f"overshoot_{number}_deg")
+            for run in (truth, ours, best)
         )
         yield Row(
-            "Figures 4.3, 4.4", f"zigzag 20/20, overshoot {number}: error, deg", None, abs(theirs - true),
-            abs(least - true), f"below {DEGREES:g}", abs(least - true) < DEGREES,
-        )  # fmt: skip
+            "Figures 4.3, 4.4",
+            f"zigzag 20/20, overshoot {number}: error, deg",
+            None,
+            abs(theirs - true),
+            abs(least - true),
+            f"below {DEGREES:g}",
+            abs(least - true) < DEGREES,
+        )
 
 
 def polynomial_rows() -> Iterator[Row]:
     """The same without data of propeller and rudder, by `identify` with the structure `mmg4dof`."""
     ship, truth = load_model("container"), recorded(20, 20)
     trials = [recorded(10, 20), truth.with_(use="validate")]
-    found = identify(trials, "mmg4dof", particulars=ship.particulars).predictions[truth.name]
+    found = identify(trials, "mmg4dof", particulars=ship.particulars).predictions[
+        truth.name
+    ]
     assert found is not None
     for channel in ("r", "psi", "phi"):
         error = off(found, truth, channel)
         yield Row(
-            "Figures 4.3, 4.4", f"zigzag 20/20, {channel}, thrust and rudder unknown: rms error, % of span",
-            None, None, error, f"below {OF_SPAN:g}", error < OF_SPAN,
+            "Figures 4.3, 4.4",
+            f"zigzag 20/20, {channel}, thrust and rudder unknown: rms error, % of span",
+            None,
+            None,
+            error,
+            f"below {OF_SPAN:g}",
+            error < OF_SPAN,
             "polynomials of n and delta in place of thrust and rudder force",
-        )  # fmt: skip
+        )
 
 
 def container_rows() -> Iterator[Row]:

@@ -1,8 +1,8 @@
 """What truncation does on the 38 collinear terms: errors against rank and noise, in the virtual tank.
 
-Ten of the seventeen tests are fitted, X, Y and N together with the force of each in parts of its root mean
-square; the others are predicted. The columns are scaled to one root mean square, so that a coefficient's
-error is that of what its term contributes.
+Ten of the seventeen tests are fitted, X, Y and N together with the force of each in
+parts of its root mean square; the others are predicted. The columns are scaled to one
+root mean square, so that a coefficient's error is that of what its term contributes.
 """
 
 from __future__ import annotations
@@ -20,8 +20,24 @@ from papers.xu2020_tank import full_regression, truth
 
 Floats = NDArray[np.float64]
 
-FITTED = (0, 1, 3, 4, 7, 8, 11, 12, 13, 14)  # two of surge, two of sway, two of yaw, four of yaw with drift
-NOISES = (0.005, 0.015, 0.05, 0.15)  # standard deviation of each force, in parts of its root mean square
+FITTED = (
+    0,
+    1,
+    3,
+    4,
+    7,
+    8,
+    11,
+    12,
+    13,
+    14,
+)  # two of surge, two of sway, two of yaw, four of yaw with drift
+NOISES = (
+    0.005,
+    0.015,
+    0.05,
+    0.15,
+)  # standard deviation of each force, in parts of its root mean square
 DRAWS = 5
 
 
@@ -40,7 +56,9 @@ class Errors(NamedTuple):
 
     coefficients: Floats  # by rank, shape (38,)
     forces: Floats  # of the tests not fitted, by rank, shape (38,)
-    chosen: tuple[float, float]  # of coefficients and forces at the rank of the L-curve's corner
+    chosen: tuple[
+        float, float
+    ]  # of coefficients and forces at the rank of the L-curve's corner
     ranks: tuple[int, ...]  # that the L-curve chose
 
 
@@ -53,7 +71,11 @@ def problem() -> Problem:
     size = np.sqrt(np.mean(features[seen] ** 2, axis=0))
     features = features / size
     return Problem(
-        features[seen], forces[seen], features[~seen], forces[~seen], truth(tuple(whole.names)) * size
+        features[seen],
+        forces[seen],
+        features[~seen],
+        forces[~seen],
+        truth(tuple(whole.names)) * size,
     )
 
 
@@ -81,15 +103,21 @@ def errors(noise: float) -> Errors:
         estimator = TruncatedLSSVM(fit_intercept=False).fit(case.X, y)
         chosen.append(_off(estimator.coef_[:, None]))
         ranks.append(int(estimator.rank_))
-    mean, corner = (np.sqrt(np.mean(np.square(found), axis=0)) for found in (by_rank, chosen))
-    return Errors(mean[0], mean[1], (float(corner[0, 0]), float(corner[1, 0])), tuple(ranks))
+    mean, corner = (
+        np.sqrt(np.mean(np.square(found), axis=0)) for found in (by_rank, chosen)
+    )
+    return Errors(
+        mean[0], mean[1], (float(corner[0, 0]), float(corner[1, 0])), tuple(ranks)
+    )
 
 
 def _off(coefficients: Floats) -> tuple[Floats, Floats]:
     """Relative errors of coefficients, and of the forces that they predict, for each column."""
     case = problem()
     wrong = np.linalg.norm(coefficients - case.coefficients[:, None], axis=0)
-    missed = np.sqrt(np.mean((case.others @ coefficients - case.unseen[:, None]) ** 2, axis=0))
+    missed = np.sqrt(
+        np.mean((case.others @ coefficients - case.unseen[:, None]) ** 2, axis=0)
+    )
     return wrong / np.linalg.norm(case.coefficients), missed
 
 
@@ -98,11 +126,22 @@ def rows() -> Iterator[Row]:
     condition = decomposition()[1][0] / decomposition()[1][-1]
     for noise in NOISES:
         found = errors(noise)
-        ranks = f"{min(found.ranks)} to {max(found.ranks)}, least error at {found.forces.argmin() + 1}"
-        for k, what in enumerate(("coefficients off by, relative", "forces of other tests off by, relative")):
+        ranks = (
+            f"{min(found.ranks)} to {max(found.ranks)}, least error at"
+            f" {found.forces.argmin() + 1}"
+        )
+        for k, what in enumerate(
+            ("coefficients off by, relative", "forces of other tests off by, relative")
+        ):
             yield Row(
-                "Section 3.2", f"38 terms, noise of {100 * noise:g} %: {what}", None, float(found[k][-1]),
-                found.chosen[k], "below that of all 38 directions", found.chosen[k] < found[k][-1],
-                f"condition number {condition:.2g}; as the paper: all 38 directions, as in LS-SVM; at best "
-                f"truncated at the corner of the L-curve, rank {ranks}; {DRAWS} draws",
-            )  # fmt: skip
+                "Section 3.2",
+                f"38 terms, noise of {100 * noise:g} %: {what}",
+                None,
+                float(found[k][-1]),
+                found.chosen[k],
+                "below that of all 38 directions",
+                found.chosen[k] < found[k][-1],
+                f"condition number {condition:.2g}; as the paper: all 38 directions, as"
+                " in LS-SVM; at best truncated at the corner of the L-curve, rank"
+                f" {ranks}; {DRAWS} draws",
+            )

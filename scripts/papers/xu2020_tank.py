@@ -1,9 +1,10 @@
 """The captive tests of Xu et al. 2020 in a virtual tank, and their reduction of 38 terms step by step.
 
-The ship is Table 11's; her mass, the amplitudes and periods of the tests and the noise are not printed. The
-steps are those of section 5: by type of test the terms to start from, printed with their standard errors.
-A coefficient that an equation shares with another (Y_vdot in X and N, X_udot in Y and N, ...) is known
-from the step before, so sway and yaw alone come before the second step of surge.
+The ship is Table 11's; her mass, the amplitudes and periods of the tests and the noise
+are not printed. The steps are those of section 5: by type of test the terms to start
+from, printed with their standard errors. A coefficient that an equation shares with
+another (Y_vdot in X and N, X_udot in Y and N, ...) is known from the step before, so
+sway and yaw alone come before the second step of surge.
 """
 
 from __future__ import annotations
@@ -18,7 +19,13 @@ from numpy.typing import NDArray
 
 from identification.design.reduction import Reduction, backward_elimination
 from identification.regression.forces import FORCES, ForceRegression, force_regression
-from shipgym.manoeuvres.towing_tank import Tank, pure_surge, pure_sway, pure_yaw, yaw_with_drift
+from shipgym.manoeuvres.towing_tank import (
+    Tank,
+    pure_surge,
+    pure_sway,
+    pure_yaw,
+    yaw_with_drift,
+)
 from shipgym.ships import ShipModel, get_structure
 from shipgym.ships.particulars import Particulars
 from shipgym.ships.steering import SteeringGear
@@ -30,29 +37,61 @@ PMM18: Any = get_structure("pmm18")
 PMM38: Any = get_structure("pmm38")
 #: Table 11: the reduced model of the ship towed at SINTEF Ocean, prime system.
 TABLE_11 = {
-    "X_udot": -1.04e-2, "X_uuu": -2.67e-4, "X_uvv": -9.29e-3, "X_rvu": 5.84e-2, "X_urr": -1.22e-3,
-    "Y_vdot": -3.82e-2, "Y_rdot": -2.66e-4, "Y_uuv": -6.16e-2, "Y_v|v|": -1.22e-1, "Y_uur": 3.13e-2,
+    "X_udot": -1.04e-2,
+    "X_uuu": -2.67e-4,
+    "X_uvv": -9.29e-3,
+    "X_rvu": 5.84e-2,
+    "X_urr": -1.22e-3,
+    "Y_vdot": -3.82e-2,
+    "Y_rdot": -2.66e-4,
+    "Y_uuv": -6.16e-2,
+    "Y_v|v|": -1.22e-1,
+    "Y_uur": 3.13e-2,
     "Y_r|v|": 1.12e-3,
-    "N_rdot": -1.20e-3, "N_vdot": 1.87e-3, "N_uur": -8.41e-3, "N_r|r|": -1.00e-3, "N_uuv": 2.14e-2,
-    "N_v|r|": -1.69e-2, "N_r|v|": 1.11e-2,
-}  # fmt: skip
+    "N_rdot": -1.20e-3,
+    "N_vdot": 1.87e-3,
+    "N_uur": -8.41e-3,
+    "N_r|r|": -1.00e-3,
+    "N_uuv": 2.14e-2,
+    "N_v|r|": -1.69e-2,
+    "N_r|v|": 1.11e-2,
+}
 #: A small research ship; the paper prints no particulars.
 PARTICULARS = Particulars(
-    length=28.9, beam=9.6, draught=2.7, mass=417e3, speed=5.0, xg=-0.5, yaw_gyradius=7.2, water_density=1025.0
+    length=28.9,
+    beam=9.6,
+    draught=2.7,
+    mass=417e3,
+    speed=5.0,
+    xg=-0.5,
+    yaw_gyradius=7.2,
+    water_density=1025.0,
 )
 TANK = Tank(cycles=2, samples=500)
-NOISE = 0.015  # standard deviation of each force, in parts of its root mean square over all tests
+# standard deviation of each force, in parts of its root mean square over all tests
+NOISE = 0.015
 SEED = 2020
 
 # amplitude and period, s: surge in parts of the speed, drift in degrees, yaw rate as r'
 SURGE = ((0.1, 20.0), (0.2, 20.0), (0.2, 40.0))
 SWAY = ((10.0, 15.0), (20.0, 30.0), (30.0, 30.0), (20.0, 15.0))
 YAW = ((0.3, 15.0), (0.6, 30.0), (0.9, 30.0), (0.6, 10.0))
-MIXED = ((0.4, 5.0), (0.6, -10.0), (0.8, 15.0), (0.8, -20.0), (0.8, 25.0), (0.8, -25.0))  # r', drift
+MIXED = (
+    (0.4, 5.0),
+    (0.6, -10.0),
+    (0.8, 15.0),
+    (0.8, -20.0),
+    (0.8, 25.0),
+    (0.8, -25.0),
+)  # r', drift
 MIXED_PERIOD = 20.0
 
-TOLERANCE, THRESHOLD = 1e-5, 0.05  # of an elimination: held-out R2, relative standard error
-#: Of terms that say the same the paper keeps the one that its damping matrix (equation 42) multiplies by u.
+TOLERANCE, THRESHOLD = (
+    1e-5,
+    0.05,
+)  # of an elimination: held-out R2, relative standard error
+#: Of terms that say the same the paper keeps the one that its damping matrix (equation
+#: 42) multiplies by u.
 CUBIC = ("uuu", "uvv", "uuv", "urr", "uur", "rvu")
 
 
@@ -69,7 +108,8 @@ class Step:
     kinds : tuple of str
         Types of test.
     printed : dict of str to tuple of (float, float or None)
-        By coefficient its standard error, %, in the old and in the revised model; None where dropped.
+        By coefficient its standard error, %, in the old and in the revised model; None
+        where dropped.
     """
 
     table: int
@@ -85,7 +125,9 @@ class Step:
     @property
     def kept(self) -> tuple[str, ...]:
         """Of the revised model."""
-        return tuple(name for name, (_, revised) in self.printed.items() if revised is not None)
+        return tuple(
+            name for name, (_, revised) in self.printed.items() if revised is not None
+        )
 
 
 def _step(table: int, force: str, kinds: str, printed: str) -> Step:
@@ -99,29 +141,59 @@ def _step(table: int, force: str, kinds: str, printed: str) -> Step:
 
 
 ALL = "surge sway yaw mixed"
-#: Misprints of the tables: Table 8's r|v| is equation 33's r|r|, Table 9's v|r| is equation 35's v|v|.
+#: Misprints of the tables: Table 8's r|v| is equation 33's r|r|, Table 9's v|r| is
+#: equation 35's v|v|.
 STEPS = (
-    _step(3, "X", "surge sway",
-          "udot .64 .65 uu 14.91 - uuu 14.9 7.23 vv 53.69 - uvv 14.15 1.6 u|v| 31.49 -"),
-    _step(5, "Y", "sway", "vdot .13 .14 uv 11.95 - uuv 10.48 .54 vvv 10.15 - v|v| 5.82 1.65"),
-    _step(6, "Y", "yaw", "rdot 3.41 3.56 ur 57.32 - uur 57.9 .14 rrr 2.64 - r|r| 2.09 2.36"),
-    _step(4, "X", ALL,
-          "udot .6 .61 uuu 1.49 1.29 uvv 1.54 1.76 rvu 4.89 .25 rv 29.68 - rr 3.13 - urr 3.07 2.33"),
-    _step(7, "Y", ALL,
-          "vdot .14 .14 uuv .18 .18 v|v| .28 .28 rdot 3.81 3.85 uur .25 .09 r|r| 10.66 - v|r| 5.95 -"
-          " r|v| .91 .91"),
+    _step(
+        3,
+        "X",
+        "surge sway",
+        "udot .64 .65 uu 14.91 - uuu 14.9 7.23 vv 53.69 - uvv 14.15 1.6 u|v| 31.49 -",
+    ),
+    _step(
+        5,
+        "Y",
+        "sway",
+        "vdot .13 .14 uv 11.95 - uuv 10.48 .54 vvv 10.15 - v|v| 5.82 1.65",
+    ),
+    _step(
+        6,
+        "Y",
+        "yaw",
+        "rdot 3.41 3.56 ur 57.32 - uur 57.9 .14 rrr 2.64 - r|r| 2.09 2.36",
+    ),
+    _step(
+        4,
+        "X",
+        ALL,
+        "udot .6 .61 uuu 1.49 1.29 uvv 1.54 1.76 rvu 4.89 .25 rv 29.68 - rr 3.13 - urr"
+        " 3.07 2.33",
+    ),
+    _step(
+        7,
+        "Y",
+        ALL,
+        "vdot .14 .14 uuv .18 .18 v|v| .28 .28 rdot 3.81 3.85 uur .25 .09 r|r| 10.66 -"
+        " v|r| 5.95 - r|v| .91 .91",
+    ),
     _step(8, "N", "yaw", "rdot .11 .11 ur 17.21 - uur 17.15 .15 r|r| .74 .74"),
     _step(9, "N", "sway", "vdot .55 .56 uv 13.23 - uuv 14.24 .33 v|v| 26.79 -"),
-    _step(10, "N", ALL,
-          "rdot .19 .19 uur .21 .2 r|r| 2.03 2.5 vdot .63 .65 uuv .11 .1 vrr 2.64 - vvr 9.63 - v|r| .79 .4"
-          " r|v| 1.42 .73"),
-)  # fmt: skip
+    _step(
+        10,
+        "N",
+        ALL,
+        "rdot .19 .19 uur .21 .2 r|r| 2.03 2.5 vdot .63 .65 uuv .11 .1 vrr 2.64 - vvr"
+        " 9.63 - v|r| .79 .4 r|v| 1.42 .73",
+    ),
+)
 
 
 def xu_ship(particulars: Particulars) -> ShipModel:
     """The ship of Table 11, which has neither rudder nor propeller; the paper prints no particulars."""
     source = {"source": PMM18.source.replace("equations 39 to 41", "Table 11")}
-    return ShipModel("xu-2020", "pmm18", particulars, SteeringGear(), TABLE_11, provenance=source)
+    return ShipModel(
+        "xu-2020", "pmm18", particulars, SteeringGear(), TABLE_11, provenance=source
+    )
 
 
 @cache
@@ -129,10 +201,21 @@ def captive_tests() -> tuple[tuple[str, Trial], ...]:
     """Type and trial of each test, without noise."""
     ship, speed = xu_ship(PARTICULARS), PARTICULARS.require("speed")
     rate = np.degrees(speed / PARTICULARS.length)
-    runs = [("surge", pure_surge(ship, part * speed, period, TANK)) for part, period in SURGE]
-    runs += [("sway", pure_sway(ship, speed * np.tan(np.radians(a)), period, TANK)) for a, period in SWAY]
-    runs += [("yaw", pure_yaw(ship, prime * rate, period, TANK)) for prime, period in YAW]
-    runs += [("mixed", yaw_with_drift(ship, r * rate, a, MIXED_PERIOD, TANK)) for r, a in MIXED]
+    runs = [
+        ("surge", pure_surge(ship, part * speed, period, TANK))
+        for part, period in SURGE
+    ]
+    runs += [
+        ("sway", pure_sway(ship, speed * np.tan(np.radians(a)), period, TANK))
+        for a, period in SWAY
+    ]
+    runs += [
+        ("yaw", pure_yaw(ship, prime * rate, period, TANK)) for prime, period in YAW
+    ]
+    runs += [
+        ("mixed", yaw_with_drift(ship, r * rate, a, MIXED_PERIOD, TANK))
+        for r, a in MIXED
+    ]
     return tuple(runs)
 
 
@@ -150,7 +233,10 @@ def truth(names: tuple[str, ...]) -> Floats:
 def noise_sizes() -> Floats:
     """Standard deviation of the noise of X, Y and N, prime system, for `NOISE` 1, shape (3,)."""
     regression = full_regression()
-    squares = [np.mean(regression.targets[regression.equation == i] ** 2) for i in range(len(FORCES))]
+    squares = [
+        np.mean(regression.targets[regression.equation == i] ** 2)
+        for i in range(len(FORCES))
+    ]
     sizes: Floats = np.sqrt(np.array(squares))
     return sizes
 
@@ -166,18 +252,25 @@ def measured(sizes: Floats, seed: int = SEED) -> Floats:
 def rows_of(force: str, kinds: tuple[str, ...]) -> NDArray[np.int64]:
     """Rows of one force in tests of the given types, in the order of time within the tests.
 
-    So that each of the stretches that an elimination holds out has its part of every test.
+    So that each of the stretches that an elimination holds out has its part of every
+    test.
     """
     regression = full_regression()
     wanted = np.array([kind in kinds for kind, _ in captive_tests()])
-    rows = np.flatnonzero((regression.equation == FORCES.index(force)) & wanted[regression.trial])
+    rows = np.flatnonzero(
+        (regression.equation == FORCES.index(force)) & wanted[regression.trial]
+    )
     counts = np.bincount(regression.trial[rows])
     clock = np.concatenate([np.arange(n) / n for n in counts if n])
     return rows[np.argsort(clock, kind="stable")]
 
 
 def eliminate(
-    forces: Floats, force: str, kinds: tuple[str, ...], terms: tuple[str, ...], known: Mapping[str, float]
+    forces: Floats,
+    force: str,
+    kinds: tuple[str, ...],
+    terms: tuple[str, ...],
+    known: Mapping[str, float],
 ) -> Reduction:
     """Leave-one-out of one force, the coefficients of others taken as known.
 
@@ -232,5 +325,7 @@ def all_at_once(forces: Floats, known: Mapping[str, float]) -> set[str]:
     return {
         name
         for force in FORCES
-        for name in eliminate(forces, force, kinds, tuple(n for n in names if n[0] == force), known).terms
+        for name in eliminate(
+            forces, force, kinds, tuple(n for n in names if n[0] == force), known
+        ).terms
     }

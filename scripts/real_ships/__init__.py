@@ -1,7 +1,8 @@
 """Measured ships: what identification predicts of runs it has not seen, one file a case.
 
 Each case is a function of a `Data` that gives a `Section` of `docs/real_ships.md`;
-`scripts/predict_real_ships.py` runs them. The measurements lie beside the checkout, not in the project.
+`scripts/predict_real_ships.py` runs them. The measurements lie beside the checkout, not
+in the project.
 """
 
 from __future__ import annotations
@@ -13,7 +14,14 @@ from real_ships.data import Data
 from real_ships.section import Section
 
 #: Module of each case, in the order of the document.
-CASES = {"a": "hsva", "b": "marin", "c": "mei", "d": "esso_osaka", "e": "captive", "f": "mmg"}
+CASES = {
+    "a": "hsva",
+    "b": "marin",
+    "c": "mei",
+    "d": "esso_osaka",
+    "e": "captive",
+    "f": "mmg",
+}
 
 
 def get_case(name: str) -> Callable[[Data], Section]:

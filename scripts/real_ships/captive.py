@@ -1,9 +1,9 @@
 """(e) KVLCC2, static captive tests: truncated LS-SVM with reduction, after Xu et al. 2020.
 
-81 steady conditions of drift, rudder and propeller loading, without yaw or acceleration: what they tell is
-the hull's response to drift and the rudder's force, not inertia or damping of yaw, so the tables of
-`identification.regression.forces`, which begin with inertia, do not apply; the estimator and the
-reduction do.
+81 steady conditions of drift, rudder and propeller loading, without yaw or
+acceleration: what they tell is the hull's response to drift and the rudder's force, not
+inertia or damping of yaw, so the tables of `identification.regression.forces`, which
+begin with inertia, do not apply; the estimator and the reduction do.
 """
 
 from __future__ import annotations
@@ -31,13 +31,37 @@ SERVICE_SPEED = 1.1702  # m/s, of most of the tests; the shaft turns alike in al
 FORCES = ("X'", "Y'", "N'")
 COLUMNS = ("beta(deg)", "delta(deg)", "Speed(m/s)", *FORCES, "test type")
 
-#: Powers of v' = -sin(beta), of the rudder d (rad, positive to starboard) and of the loading n' = U0/U.
+#: Powers of v' = -sin(beta), of the rudder d (rad, positive to starboard) and of the
+#: loading n' = U0/U.
 TERMS: dict[str, tuple[tuple[int, int, int], ...]] = {
-    "X'": ((0, 0, 0), (0, 0, 1), (0, 0, 2), (2, 0, 0), (4, 0, 0), (0, 2, 2), (1, 1, 2), (1, 0, 1), (0, 1, 2),
-           (2, 2, 2), (1, 3, 2)),
-    "Y'": ((0, 0, 1), (0, 0, 2), (1, 0, 0), (1, 0, 1), (3, 0, 0), (5, 0, 0), (0, 1, 1), (0, 1, 2), (0, 3, 2),
-           (2, 1, 2), (1, 2, 2), (2, 0, 0)),
-}  # fmt: skip
+    "X'": (
+        (0, 0, 0),
+        (0, 0, 1),
+        (0, 0, 2),
+        (2, 0, 0),
+        (4, 0, 0),
+        (0, 2, 2),
+        (1, 1, 2),
+        (1, 0, 1),
+        (0, 1, 2),
+        (2, 2, 2),
+        (1, 3, 2),
+    ),
+    "Y'": (
+        (0, 0, 1),
+        (0, 0, 2),
+        (1, 0, 0),
+        (1, 0, 1),
+        (3, 0, 0),
+        (5, 0, 0),
+        (0, 1, 1),
+        (0, 1, 2),
+        (0, 3, 2),
+        (2, 1, 2),
+        (1, 2, 2),
+        (2, 0, 0),
+    ),
+}
 TERMS["N'"] = TERMS["Y'"]
 
 
@@ -53,7 +77,9 @@ class Captive:
 
     def features(self, force: str) -> Floats:
         """Shape (n_conditions, n_terms), by the square of the loading as the targets."""
-        return np.column_stack([self.v**i * self.d**j * self.n ** (k - 2.0) for i, j, k in TERMS[force]])
+        return np.column_stack(
+            [self.v**i * self.d**j * self.n ** (k - 2.0) for i, j, k in TERMS[force]]
+        )
 
     def targets(self, force: str) -> Floats:
         """The force by rho L^2 U0^2/2: as large as the balance felt it, else slow tests outweigh all."""
@@ -68,8 +94,8 @@ def names(force: str) -> list[str]:
 def read(folder: Path) -> Captive:
     """The tests, with the rudder turned to the project's sign (in the file positive steers to port).
 
-    A test that stands there twice counts once. Their order is dealt out so that each of the stretches
-    that the reduction holds out has tests of every kind.
+    A test that stands there twice counts once. Their order is dealt out so that each of
+    the stretches that the reduction holds out has tests of every kind.
 
     Raises
     ------
@@ -81,13 +107,21 @@ def read(folder: Path) -> Captive:
         with path.open(newline="", encoding="utf-8") as file:
             rows = list(csv.DictReader(file))
     except OSError as error:
-        raise InputError(f"{path}: cannot be read ({error.strerror}); give the folder of the data") from error
+        raise InputError(
+            f"{path}: cannot be read ({error.strerror}); give the folder of the data"
+        ) from error
     missing = [name for name in COLUMNS if not rows or name not in rows[0]]
     if missing:
-        raise InputError(f"{path}: column {missing[0]!r} is missing, expected {', '.join(COLUMNS)}")
-    rows = list({tuple(float(row[name]) for name in COLUMNS[:-1]): row for row in rows}.values())
+        raise InputError(
+            f"{path}: column {missing[0]!r} is missing, expected {', '.join(COLUMNS)}"
+        )
+    rows = list(
+        {tuple(float(row[name]) for name in COLUMNS[:-1]): row for row in rows}.values()
+    )
     dealt = [row for fold in range(FOLDS) for row in rows[fold::FOLDS]]
-    column = {name: np.array([float(row[name]) for row in dealt]) for name in COLUMNS[:-1]}
+    column = {
+        name: np.array([float(row[name]) for row in dealt]) for name in COLUMNS[:-1]
+    }
     return Captive(
         v=-np.sin(np.radians(column["beta(deg)"])),
         d=-np.radians(column["delta(deg)"]),
@@ -112,7 +146,10 @@ def r_squared(y: Floats, predicted: Floats) -> float:
 
 
 def held_out(
-    X: Floats, y: Floats, fit: Callable[[Floats, Floats], Floats], folds: Sequence[NDArray[np.int64]]
+    X: Floats,
+    y: Floats,
+    fit: Callable[[Floats, Floats], Floats],
+    folds: Sequence[NDArray[np.int64]],
 ) -> float:
     """R2 of conditions predicted from the others."""
     predicted = np.empty(len(y))
@@ -124,12 +161,16 @@ def held_out(
 
 def least_squares(X: Floats, y: Floats) -> Floats:
     """Coefficients."""
-    return np.asarray(TruncatedLSSVM(selection="full", fit_intercept=False).fit(X, y).coef_)
+    return np.asarray(
+        TruncatedLSSVM(selection="full", fit_intercept=False).fit(X, y).coef_
+    )
 
 
 def truncated(X: Floats, y: Floats) -> Floats:
     """Coefficients; the rank by generalised cross-validation."""
-    return np.asarray(TruncatedLSSVM(selection="gcv", fit_intercept=False).fit(X, y).coef_)
+    return np.asarray(
+        TruncatedLSSVM(selection="gcv", fit_intercept=False).fit(X, y).coef_
+    )
 
 
 def study(tests: Captive, force: str) -> Found:
@@ -165,9 +206,17 @@ def run(data: Data) -> Section:
         steps = of_force.reduction.path
         counts = (len(TERMS[force]), of_force.full.rank_, len(of_force.reduction.terms))
         for (name, score), count in zip(of_force.held_out.items(), counts, strict=True):
-            fitted = steps[-1].r_squared if name.endswith("reduced") else steps[0].r_squared
+            fitted = (
+                steps[-1].r_squared if name.endswith("reduced") else steps[0].r_squared
+            )
             rows.append(
-                [force, name, str(count), number(fitted, 4) if name != "tls-svm" else "-", number(score, 4)]
+                [
+                    force,
+                    name,
+                    str(count),
+                    number(fitted, 4) if name != "tls-svm" else "-",
+                    number(score, 4),
+                ]
             )
     coefficients = [
         [
@@ -182,13 +231,20 @@ def run(data: Data) -> Section:
     text = TEXT.format(
         count=len(tests.d),
         fits=table(["force", "fit", "terms or rank", "R2 of all", "R2 held out"], rows),
-        coefficients=table(["force", "term", "coefficient, 1e-5", "standard error"], coefficients),
+        coefficients=table(
+            ["force", "term", "coefficient, 1e-5", "standard error"], coefficients
+        ),
         combined=table(
             ["force", "R2 of the tests with drift and rudder"],
-            [[force, number(combined(tests, force, of.reduction.terms), 4)] for force, of in found.items()],
+            [
+                [force, number(combined(tests, force, of.reduction.terms), 4)]
+                for force, of in found.items()
+            ],
         ),
     )
-    return Section("KVLCC2, captive tests", text, {"real_ships_e.svg": _painter(tests, found)})
+    return Section(
+        "KVLCC2, captive tests", text, {"real_ships_e.svg": _painter(tests, found)}
+    )
 
 
 def _painter(tests: Captive, found: dict[str, Found]) -> Callable[[Any], None]:
@@ -202,8 +258,12 @@ def _painter(tests: Captive, found: dict[str, Found]) -> Callable[[Any], None]:
             )
             for kind in sorted(set(tests.kind.tolist())):
                 rows = tests.kind == kind
-                axis.plot(1e3 * measured[rows], 1e3 * predicted[rows], ".", ms=4, label=kind)
-            ends = 1e3 * np.array([tests.targets(force).min(), tests.targets(force).max()])
+                axis.plot(
+                    1e3 * measured[rows], 1e3 * predicted[rows], ".", ms=4, label=kind
+                )
+            ends = 1e3 * np.array(
+                [tests.targets(force).min(), tests.targets(force).max()]
+            )
             axis.plot(ends, ends, "k", lw=0.6)
             axis.set(title=f"{force}, 1e-3", xlabel="measured", ylabel="reduced model")
         axis.legend(fontsize=6)

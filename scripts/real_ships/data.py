@@ -43,7 +43,10 @@ class Data:
         return MeasuredShip(
             file.particulars,
             file.steering,
-            {key: thinned(trial, every, key, file.particulars.length) for key, trial in runs.items()},
+            {
+                key: thinned(trial, every, key, file.particulars.length)
+                for key, trial in runs.items()
+            },
         )
 
 
@@ -60,7 +63,9 @@ class MeasuredShip:
         first = next(iter(self.runs.values()))
         shaft = float(first["n"][0]) if "n" in first else 0.0
         gear = self.steering or SteeringGear()
-        return replace(converted_model(reference, self.particulars, gear, shaft), name=reference)
+        return replace(
+            converted_model(reference, self.particulars, gear, shaft), name=reference
+        )
 
 
 def thinned(trial: Trial, every: int, name: str, length: float) -> Trial:

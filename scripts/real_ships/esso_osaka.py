@@ -27,10 +27,13 @@ METHODS: dict[str, dict[str, Any]] = {
     "tls-svm, cubic": TLS,
     "tls-svm, cubic, repaired": {**TLS, "repair": True},
     "tls-svm, grey box of the tanker, repaired": {
-        "structure": "grey-box", "method": "tls-svm", "reference_model": REFERENCE, "repair": True,
+        "structure": "grey-box",
+        "method": "tls-svm",
+        "reference_model": REFERENCE,
+        "repair": True,
     },
     "mmg, prior of formulas, repaired": {"structure": "mmg", "repair": True},
-}  # fmt: skip
+}
 BARE = f"{REFERENCE}, nothing fitted"
 BEST = "tls-svm, cubic, repaired"
 
@@ -39,7 +42,9 @@ def under_way(trial: Trial) -> Trial:
     """The trial from where the ship has way on her."""
     first = int(np.argmax(np.hypot(trial["u"], trial["v"]) > LEAST_SPEED))
     channels = {name: values[first:] for name, values in trial.channels.items()}
-    return Trial(trial.t[first:], channels, name=trial.name, kind=trial.kind, length=trial.length)
+    return Trial(
+        trial.t[first:], channels, name=trial.name, kind=trial.kind, length=trial.length
+    )
 
 
 def errors(model: ShipModel, trial: Trial) -> Floats:
@@ -61,7 +66,9 @@ def study(ship: MeasuredShip, settings: dict[str, Any]) -> dict[str, Any]:
     found: dict[str, Any] = {"rest": [], "way": [], "unstable": 0, "models": {}}
     for held in names:
         runs = [ship.runs[name] for name in names if name != held]
-        result = identify(runs, particulars=ship.particulars, steering=ship.steering, **settings)
+        result = identify(
+            runs, particulars=ship.particulars, steering=ship.steering, **settings
+        )
         _compare(found, result.model, ship.runs[held])
         found["unstable"] += not result.stable
         found["models"][held] = result.model
@@ -73,7 +80,12 @@ def bare_study(ship: MeasuredShip) -> dict[str, Any]:
     names = [name for name in ship.runs if name.startswith("zigzag")]
     shaft = max(float(ship.runs[name]["n"].max()) for name in names)
     model = fastest(ship, shaft)
-    found: dict[str, Any] = {"rest": [], "way": [], "unstable": 0, "models": dict.fromkeys(names, model)}
+    found: dict[str, Any] = {
+        "rest": [],
+        "way": [],
+        "unstable": 0,
+        "models": dict.fromkeys(names, model),
+    }
     for name in names:
         _compare(found, model, ship.runs[name])
     return found
@@ -84,7 +96,9 @@ def fastest(ship: MeasuredShip, shaft: float) -> ShipModel:
     from shipgym.ships import converted_model
     from shipgym.ships.steering import SteeringGear
 
-    return converted_model(REFERENCE, ship.particulars, ship.steering or SteeringGear(), shaft)
+    return converted_model(
+        REFERENCE, ship.particulars, ship.steering or SteeringGear(), shaft
+    )
 
 
 def _compare(found: dict[str, Any], model: ShipModel, trial: Trial) -> None:
@@ -95,38 +109,66 @@ def _compare(found: dict[str, Any], model: ShipModel, trial: Trial) -> None:
 def run(data: Data) -> Section:
     """The case."""
     ship = data.ship(SHIP, EVERY)
-    found = {BARE: bare_study(ship)} | {name: study(ship, settings) for name, settings in METHODS.items()}
+    found = {BARE: bare_study(ship)} | {
+        name: study(ship, settings) for name, settings in METHODS.items()
+    }
     text = TEXT.format(
         way=table(
-            ["fit", *MEASURES, "ran away", "refused by the guard"], [_row(n, f) for n, f in found.items()]
+            ["fit", *MEASURES, "ran away", "refused by the guard"],
+            [_row(n, f) for n, f in found.items()],
         ),
-        rest=table(["fit", *MEASURES], [[n, *_cells(f["rest"])] for n, f in found.items()]),
+        rest=table(
+            ["fit", *MEASURES], [[n, *_cells(f["rest"])] for n, f in found.items()]
+        ),
         size=table(["", *MEASURES], [["root mean square of the runs", *_size(ship)]]),
         repaired=_repaired(ship),
     )
-    return Section("Esso Osaka, zigzags from rest in wind", text, {"real_ships_d.svg": _painter(ship, found)})
+    return Section(
+        "Esso Osaka, zigzags from rest in wind",
+        text,
+        {"real_ships_d.svg": _painter(ship, found)},
+    )
 
 
 def _cells(found: list[Floats]) -> list[str]:
     every = np.array(found)
     if np.isnan(every).all(axis=0).any():
-        means = [np.nan if np.isnan(column).all() else float(np.nanmean(column)) for column in every.T]
+        means = [
+            np.nan if np.isnan(column).all() else float(np.nanmean(column))
+            for column in every.T
+        ]
     else:
         means = np.nanmean(every, axis=0).tolist()
-    return [number(value, digits) for value, digits in zip(means, (3, 3, 2, 1), strict=True)]
+    return [
+        number(value, digits) for value, digits in zip(means, (3, 3, 2, 1), strict=True)
+    ]
 
 
 def _row(name: str, found: dict[str, Any]) -> list[str]:
     away = int(sum(np.isnan(error[2]) for error in found["way"]))
-    return [name, *_cells(found["way"]), f"{away} of {len(found['way'])}", str(found["unstable"])]
+    return [
+        name,
+        *_cells(found["way"]),
+        f"{away} of {len(found['way'])}",
+        str(found["unstable"]),
+    ]
 
 
 def _size(ship: MeasuredShip) -> list[str]:
     """How large the motion is that is predicted."""
-    runs = [under_way(trial) for name, trial in ship.runs.items() if name.startswith("zigzag")]
+    runs = [
+        under_way(trial)
+        for name, trial in ship.runs.items()
+        if name.startswith("zigzag")
+    ]
     scale = {"u": 1.0, "v": 1.0, "r": np.degrees(1.0), "psi": np.degrees(1.0)}
-    means = [float(np.mean([np.sqrt(np.mean(t[c] ** 2)) for t in runs])) * k for c, k in scale.items()]
-    return [number(value, digits) for value, digits in zip(means, (3, 3, 2, 1), strict=True)]
+    means = [
+        float(np.mean([np.sqrt(np.mean(t[c] ** 2)) for t in runs])) * k
+        for c, k in scale.items()
+    ]
+    return [
+        number(value, digits) for value, digits in zip(means, (3, 3, 2, 1), strict=True)
+    ]
 
 
 def _repaired(ship: MeasuredShip) -> str:
@@ -134,7 +176,9 @@ def _repaired(ship: MeasuredShip) -> str:
     from identification.regression.preprocess import repaired
 
     counts = {
-        name: dict(repaired(trial).repaired) for name, trial in ship.runs.items() if name.startswith("zigzag")
+        name: dict(repaired(trial).repaired)
+        for name, trial in ship.runs.items()
+        if name.startswith("zigzag")
     }
     told = [
         f"{name}: {', '.join(f'{c} {n}' for c, n in count.items())}"
@@ -151,15 +195,24 @@ def _painter(ship: MeasuredShip, found: dict[str, Any]) -> Callable[[Any], None]
         axes = figure.subplots(2, len(names), sharex="col")
         for column, name in enumerate(names):
             trial = ship.runs[name]
-            for row, (channel, scale) in enumerate((("u", 1.0), ("psi", np.degrees(1.0)))):
+            for row, (channel, scale) in enumerate(
+                (("u", 1.0), ("psi", np.degrees(1.0)))
+            ):
                 axes[row][column].plot(
-                    trial.t - trial.t[0], scale * trial[channel], "k", lw=1.2, label="measured"
+                    trial.t - trial.t[0],
+                    scale * trial[channel],
+                    "k",
+                    lw=1.2,
+                    label="measured",
                 )
                 for label in (BARE, "least squares, cubic", BEST):
                     prediction = predict(found[label]["models"][name], trial)
                     if prediction is not None:
                         axes[row][column].plot(
-                            prediction.t - trial.t[0], scale * prediction[channel], lw=0.8, label=label
+                            prediction.t - trial.t[0],
+                            scale * prediction[channel],
+                            lw=0.8,
+                            label=label,
                         )
             axes[0][column].set_title(f"{name}, from rest")
             axes[1][column].set_xlabel("t, s")

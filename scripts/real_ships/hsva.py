@@ -13,8 +13,22 @@ from identification.pipeline import identify
 from identification.validation.guard import reasons_unstable
 from identification.validation.prediction import predict
 from real_ships.data import Data, MeasuredShip
-from real_ships.measures import MEASURES, Floats, error_cells, mean_errors, turns, zigzag_errors
-from real_ships.recipe import REFERENCE, STRUCTURE, fitted, fitted_with_table, known, with_fixed_pull
+from real_ships.measures import (
+    MEASURES,
+    Floats,
+    error_cells,
+    mean_errors,
+    turns,
+    zigzag_errors,
+)
+from real_ships.recipe import (
+    REFERENCE,
+    STRUCTURE,
+    fitted,
+    fitted_with_table,
+    known,
+    with_fixed_pull,
+)
 from real_ships.section import Section, table
 from shipgym.manoeuvres import TurningIndices
 from shipgym.ships import ShipModel
@@ -24,17 +38,31 @@ SHIP, EVERY = "kvlcc2_hsva", 4
 RUNS = ("Z_10_05", "Z_10_10_S", "Z_15_05", "Z_20_05", "Z_20_10_S", "Z_30_05")
 SLIGHT = ("Z_05_01", "Z_10_01", "Z_15_01")
 TRIPLES = tuple(combinations(RUNS, 3))
-TURNS = ("advance +35, L", "diameter +35, L", "advance -35, L", "diameter -35, L", "fits that turn")
+TURNS = (
+    "advance +35, L",
+    "diameter +35, L",
+    "advance -35, L",
+    "diameter -35, L",
+    "fits that turn",
+)
 AIMS = ["aim", "0.105", "4.3", "0.4", "1.0", "", ""]
 SHOWN = TRIPLES[0]
 
 Fit = Callable[[MeasuredShip, Sequence[str]], tuple[ShipModel, bool]]
 
 
-def plain(ship: MeasuredShip, names: Sequence[str], structure: str, method: str) -> tuple[ShipModel, bool]:
+def plain(
+    ship: MeasuredShip, names: Sequence[str], structure: str, method: str
+) -> tuple[ShipModel, bool]:
     """A fit with nothing chosen, and whether the guard let it pass."""
     runs = [ship.runs[name] for name in names]
-    result = identify(runs, known(structure), method, particulars=ship.particulars, steering=ship.steering)
+    result = identify(
+        runs,
+        known(structure),
+        method,
+        particulars=ship.particulars,
+        steering=ship.steering,
+    )
     return result.model, result.stable
 
 
@@ -44,7 +72,9 @@ def bare(ship: MeasuredShip, names: Sequence[str]) -> tuple[ShipModel, bool]:
 
 
 def chosen(
-    ship: MeasuredShip, names: Sequence[str], fit: Callable[[MeasuredShip, Sequence[str]], ShipModel]
+    ship: MeasuredShip,
+    names: Sequence[str],
+    fit: Callable[[MeasuredShip, Sequence[str]], ShipModel],
 ) -> tuple[ShipModel, bool]:
     """A recipe, and whether the guard lets its model pass."""
     model = fit(ship, names)
@@ -91,16 +121,25 @@ def run(data: Data) -> Section:
         for name, errors in best["errors"].items()
         if errors
     ]
-    slight = [[name, *error_cells(zigzag_errors(best["model"], ship.runs[name]))] for name in SLIGHT]
+    slight = [
+        [name, *error_cells(zigzag_errors(best["model"], ship.runs[name]))]
+        for name in SLIGHT
+    ]
     text = TEXT.format(
         count=len(TRIPLES),
-        table=table(["fit", *MEASURES, "ran away", "runs away in the guard"], [*rows, AIMS]),
-        turns=table(["fit", *TURNS], [turn_row(name, result) for name, result in found.items()]),
+        table=table(
+            ["fit", *MEASURES, "ran away", "runs away in the guard"], [*rows, AIMS]
+        ),
+        turns=table(
+            ["fit", *TURNS], [turn_row(name, result) for name, result in found.items()]
+        ),
         runs=table(["run", *MEASURES, "times predicted"], per_run),
         slight=table(["run", *MEASURES], slight),
     )
     return Section(
-        "KVLCC2, HSVA zigzags from three others", text, {"real_ships_a.svg": _painter(ship, found)}
+        "KVLCC2, HSVA zigzags from three others",
+        text,
+        {"real_ships_a.svg": _painter(ship, found)},
     )
 
 
@@ -118,18 +157,30 @@ def summary_row(name: str, result: dict[str, Any]) -> list[str]:
 
 def turn_row(name: str, result: dict[str, Any]) -> list[str]:
     """Means and standard deviations over the fits."""
-    sailed = np.array([[np.nan if w is None else w for w in _lengths(pair)] for pair in result["turns"]])
+    sailed = np.array(
+        [
+            [np.nan if w is None else w for w in _lengths(pair)]
+            for pair in result["turns"]
+        ]
+    )
     kept = sailed[~np.isnan(sailed).any(axis=1)]
     if not len(kept):
         return [name, *["-"] * 4, "0"]
-    cells = [f"{m:.2f} +- {s:.2f}" for m, s in zip(kept.mean(axis=0), kept.std(axis=0), strict=True)]
+    cells = [
+        f"{m:.2f} +- {s:.2f}"
+        for m, s in zip(kept.mean(axis=0), kept.std(axis=0), strict=True)
+    ]
     return [name, *cells, str(len(kept))]
 
 
 def _lengths(pair: Sequence[TurningIndices | None]) -> list[float | None]:
     found: list[float | None] = []
     for turn in pair:
-        found += [None, None] if turn is None else [turn.advance_lengths, turn.tactical_diameter_lengths]
+        found += (
+            [None, None]
+            if turn is None
+            else [turn.advance_lengths, turn.tactical_diameter_lengths]
+        )
     return found
 
 
@@ -142,12 +193,17 @@ def _painter(ship: MeasuredShip, found: dict[str, Any]) -> Callable[[Any], None]
         for column, name in enumerate(shown):
             trial = ship.runs[name]
             for row, channel in enumerate(("psi", "r")):
-                axes[row][column].plot(trial.t, np.degrees(trial[channel]), "k", lw=1.2, label="measured")
+                axes[row][column].plot(
+                    trial.t, np.degrees(trial[channel]), "k", lw=1.2, label="measured"
+                )
                 for label in names:
                     prediction = predict(found[label]["model"], trial)
                     if prediction is not None:
                         axes[row][column].plot(
-                            prediction.t, np.degrees(prediction[channel]), lw=0.8, label=label
+                            prediction.t,
+                            np.degrees(prediction[channel]),
+                            lw=0.8,
+                            label=label,
                         )
             axes[0][column].set_title(f"{name}, predicted")
             axes[1][column].set_xlabel("t, s")

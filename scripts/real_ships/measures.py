@@ -25,11 +25,15 @@ def zigzag_errors(model: ShipModel, trial: Trial) -> Floats:
     """RMSE of r and heading and sizes of the errors of two overshoots, NaN where there is none."""
     metrics = trial_metrics(model, trial, predict(model, trial))
     rms = [metrics["rmse"][channel] for channel in ("r", "psi")]
-    found = [float("nan") if value is None else float(np.degrees(value)) for value in rms]
+    found = [
+        float("nan") if value is None else float(np.degrees(value)) for value in rms
+    ]
     for index in ("overshoot_1_deg", "overshoot_2_deg"):
         pair: Mapping[str, Any] = metrics[index] or {}
         ours, measured = pair.get("predicted"), pair.get("measured")
-        found.append(float("nan") if ours is None or measured is None else abs(ours - measured))
+        found.append(
+            float("nan") if ours is None or measured is None else abs(ours - measured)
+        )
     return np.array(found)
 
 
@@ -40,7 +44,10 @@ def mean_errors(errors: Iterable[Floats]) -> Floats:
 
 def error_cells(errors: Floats) -> list[str]:
     """Cells of a table."""
-    return [number(value, digits) for value, digits in zip(errors, (3, 2, 2, 2), strict=True)]
+    return [
+        number(value, digits)
+        for value, digits in zip(errors, (3, 2, 2, 2), strict=True)
+    ]
 
 
 def turns(model: ShipModel, rudder_deg: float = 35.0) -> list[TurningIndices | None]:
@@ -49,7 +56,9 @@ def turns(model: ShipModel, rudder_deg: float = 35.0) -> list[TurningIndices | N
     found: list[TurningIndices | None] = []
     for side in (rudder_deg, -rudder_deg):
         try:
-            circle = turning_circle(model, side, DURATION_LENGTHS * travel, 0.02 * travel)
+            circle = turning_circle(
+                model, side, DURATION_LENGTHS * travel, 0.02 * travel
+            )
         except UnstableModelError:
             found.append(None)
             continue
@@ -63,6 +72,8 @@ def turn_cells(found: Sequence[TurningIndices | None]) -> list[str]:
         number(None if turn is None else value)
         for turn in found
         for value in (
-            (None, None) if turn is None else (turn.advance_lengths, turn.tactical_diameter_lengths)
+            (None, None)
+            if turn is None
+            else (turn.advance_lengths, turn.tactical_diameter_lengths)
         )
     ]

@@ -9,13 +9,22 @@ from identification.pipeline import identify
 from identification.validation.prediction import predict, trial_metrics
 from real_ships.data import Data, MeasuredShip
 from real_ships.marin import MEASURED_ROW, SHIP, TURNS, painter
-from real_ships.measures import MEASURES, Floats, error_cells, mean_errors, turn_cells, turns, zigzag_errors
+from real_ships.measures import (
+    MEASURES,
+    Floats,
+    error_cells,
+    mean_errors,
+    turn_cells,
+    turns,
+    zigzag_errors,
+)
 from real_ships.section import Section, number, table
 from shipgym.ships import ShipModel
 
 EVERY = 2  # about 1 Hz, as in the paper
 RUN = "zz_20_m"
-#: Of the paper: overshoots of the 20/20, degrees; advance and tactical diameter to either side, ship lengths.
+#: Of the paper: overshoots of the 20/20, degrees; advance and tactical diameter to
+#: either side, ship lengths.
 PRINTED_OVERSHOOTS = (11.8, 14.3)
 MEASURED_OVERSHOOTS = (13.8, 14.9)
 PRINTED_TURNS = (3.22, 3.20, 3.26, 3.24)
@@ -29,16 +38,22 @@ METHODS: dict[str, dict[str, Any]] = {
 BARE = {"tanker": "tanker, nothing fitted", "kvlcc2": "kvlcc2, nothing fitted"}
 
 
-def fit(ship: MeasuredShip, names: Sequence[str], settings: dict[str, Any]) -> ShipModel:
+def fit(
+    ship: MeasuredShip, names: Sequence[str], settings: dict[str, Any]
+) -> ShipModel:
     """A model of some of the runs."""
     runs = [ship.runs[name] for name in names]
-    return identify(runs, particulars=ship.particulars, steering=ship.steering, **settings).model
+    return identify(
+        runs, particulars=ship.particulars, steering=ship.steering, **settings
+    ).model
 
 
 def held_out(ship: MeasuredShip, settings: dict[str, Any]) -> Floats:
     """Mean errors on each run, predicted from the three others."""
     return mean_errors(
-        zigzag_errors(fit(ship, [other for other in ship.runs if other != name], settings), trial)
+        zigzag_errors(
+            fit(ship, [other for other in ship.runs if other != name], settings), trial
+        )
         for name, trial in ship.runs.items()
     )
 
@@ -47,27 +62,48 @@ def overshoots(model: ShipModel, ship: MeasuredShip) -> list[str]:
     """First and second overshoot of the 20/20, as measured and as predicted."""
     metrics = trial_metrics(model, ship.runs[RUN], predict(model, ship.runs[RUN]))
     pairs = [metrics[f"overshoot_{i}_deg"] for i in (1, 2)]
-    return [number(pair["predicted"], 1) for pair in pairs] + [number(pair["measured"], 1) for pair in pairs]
+    return [number(pair["predicted"], 1) for pair in pairs] + [
+        number(pair["measured"], 1) for pair in pairs
+    ]
 
 
 def run(data: Data) -> Section:
     """The case."""
     ship = data.ship(SHIP, EVERY)
     bare = {label: ship.bare_reference(name) for name, label in BARE.items()}
-    fitted = bare | {name: fit(ship, list(ship.runs), settings) for name, settings in METHODS.items()}
+    fitted = bare | {
+        name: fit(ship, list(ship.runs), settings) for name, settings in METHODS.items()
+    }
     zigzags = [
-        [name, *error_cells(mean_errors(zigzag_errors(model, t) for t in ship.runs.values()))]
+        [
+            name,
+            *error_cells(
+                mean_errors(zigzag_errors(model, t) for t in ship.runs.values())
+            ),
+        ]
         for name, model in bare.items()
-    ] + [[name, *error_cells(held_out(ship, settings))] for name, settings in METHODS.items()]
+    ] + [
+        [name, *error_cells(held_out(ship, settings))]
+        for name, settings in METHODS.items()
+    ]
     measured = overshoots(fitted[BARE["tanker"]], ship)[2:]
     text = TEXT.format(
         zigzags=table(["fit", *MEASURES], zigzags),
         overshoots=table(
             ["fit of all four", "1st overshoot, deg", "2nd overshoot, deg"],
             [
-                *([name, *overshoots(model, ship)[:2]] for name, model in fitted.items()),
-                ["printed, rm-svm", *(number(value, 1) for value in PRINTED_OVERSHOOTS)],
-                ["measured, as printed", *(number(value, 1) for value in MEASURED_OVERSHOOTS)],
+                *(
+                    [name, *overshoots(model, ship)[:2]]
+                    for name, model in fitted.items()
+                ),
+                [
+                    "printed, rm-svm",
+                    *(number(value, 1) for value in PRINTED_OVERSHOOTS),
+                ],
+                [
+                    "measured, as printed",
+                    *(number(value, 1) for value in MEASURED_OVERSHOOTS),
+                ],
                 ["measured, this record", *measured],
             ],
         ),
@@ -81,7 +117,11 @@ def run(data: Data) -> Section:
         ),
         differences=differences(ship),
     )
-    return Section("KVLCC2, RM-SVM on MARIN's four zigzags", text, {"real_ships_c.svg": shown(ship, fitted)})
+    return Section(
+        "KVLCC2, RM-SVM on MARIN's four zigzags",
+        text,
+        {"real_ships_c.svg": shown(ship, fitted)},
+    )
 
 
 def differences(ship: MeasuredShip) -> str:
@@ -89,7 +129,9 @@ def differences(ship: MeasuredShip) -> str:
     sides = []
     for angle in (10, 20):
         starboard, port = (
-            trial_metrics(ship.bare_reference("tanker"), trial, None)["overshoot_1_deg"]["measured"]
+            trial_metrics(ship.bare_reference("tanker"), trial, None)[
+                "overshoot_1_deg"
+            ]["measured"]
             for trial in (ship.runs[f"zz_{angle}_m"], ship.runs[f"zz_-{angle}_m"])
         )
         sides.append(f"{angle}/{angle}: {starboard:.1f} and {port:.1f}")
@@ -99,7 +141,11 @@ def differences(ship: MeasuredShip) -> str:
 def shown(ship: MeasuredShip, fitted: dict[str, ShipModel]) -> Callable[[Any], None]:
     """What the figure shows."""
     return painter(
-        {name: fitted[name] for name in (BARE["tanker"], "rm-svm, tanker", "rm-svm, kvlcc2")}, ship.runs
+        {
+            name: fitted[name]
+            for name in (BARE["tanker"], "rm-svm, tanker", "rm-svm, kvlcc2")
+        },
+        ship.runs,
     )
 
 

@@ -15,19 +15,34 @@ from real_ships.data import Data, MeasuredShip
 from real_ships.hsva import SHIP as HSVA
 from real_ships.marin import SHIP as MARIN
 from real_ships.marin import full_scale
-from real_ships.measures import DURATION_LENGTHS, MEASURES, Floats, mean_errors, zigzag_errors
+from real_ships.measures import (
+    DURATION_LENGTHS,
+    MEASURES,
+    Floats,
+    mean_errors,
+    zigzag_errors,
+)
 from real_ships.section import Section, headings, number, table
 from shipgym.errors import UnstableModelError
-from shipgym.manoeuvres import switch_heading_deg, turning_circle, turning_indices, zigzag_indices
+from shipgym.manoeuvres import (
+    switch_heading_deg,
+    turning_circle,
+    turning_indices,
+    zigzag_indices,
+)
 from shipgym.ships import ShipModel
 from shipgym.trials.trial import Trial
 
 EVERY = 4
-FITTED, OTHERS = ("Z_10_05", "Z_20_05", "Z_30_05"), ("Z_10_10_S", "Z_15_05", "Z_20_10_S")
+FITTED, OTHERS = (
+    ("Z_10_05", "Z_20_05", "Z_30_05"),
+    ("Z_10_10_S", "Z_15_05", "Z_20_10_S"),
+)
 CLOSED = ("1st, reversed as measured", "2nd, reversed as measured")
 AIMS = (0.095, 4.3, np.nan, np.nan, 0.30, 0.45)
-#: Measured at MARIN, 35 deg to starboard and to port, from the execute of the rudder: advance and tactical
-#: diameter, ship lengths, steady drift, deg, and steady speed over that of approach.
+#: Measured at MARIN, 35 deg to starboard and to port, from the execute of the rudder:
+#: advance and tactical diameter, ship lengths, steady drift, deg, and steady speed over
+#: that of approach.
 CIRCLES = ((3.095, 3.332, 18.4, 0.367), (3.003, 3.066, 19.8, 0.361))
 TURN = ("advance", "tactical diameter", "drift, deg", "U/U0")
 REFERENCE = "kvlcc2-l7"
@@ -49,7 +64,9 @@ def overshoot_errors(model: ShipModel, trial: Trial) -> Floats:
     found = zigzag_indices(sailed, length, heading)
     names = ("overshoot_1_deg", "overshoot_2_deg")
     pairs = [(getattr(measured, name), getattr(found, name)) for name in names]
-    return np.array([np.nan if None in pair else abs(pair[0] - pair[1]) for pair in pairs])
+    return np.array(
+        [np.nan if None in pair else abs(pair[0] - pair[1]) for pair in pairs]
+    )
 
 
 def all_errors(model: ShipModel, trial: Trial) -> Floats:
@@ -62,7 +79,9 @@ def circle(model: ShipModel, side: float) -> tuple[float | None, ...]:
     ship = model.particulars
     travel = ship["length"] / ship["speed"]
     try:
-        run = turning_circle(model, 35.0 * side, DURATION_LENGTHS * travel, 0.02 * travel)
+        run = turning_circle(
+            model, 35.0 * side, DURATION_LENGTHS * travel, 0.02 * travel
+        )
     except UnstableModelError:
         return (None,) * len(TURN)
     found = turning_indices(run, ship.length)
@@ -87,13 +106,21 @@ def circle_cells(model: ShipModel) -> list[str]:
             elif k < 2:
                 found.append(f"{value:.3f} ({100.0 * (value / true - 1.0):+.1f} %)")
             else:
-                found.append(f"{value:.1f} ({value - true:+.1f})" if k == 2 else f"{value:.3f}")
+                found.append(
+                    f"{value:.1f} ({value - true:+.1f})" if k == 2 else f"{value:.3f}"
+                )
     return found
 
 
-def fitted(ship: MeasuredShip, names: Sequence[str] = FITTED, **settings: Any) -> ShipModel:
+def fitted(
+    ship: MeasuredShip, names: Sequence[str] = FITTED, **settings: Any
+) -> ShipModel:
     """A fit of some zigzags, of the MMG form if nothing else is asked for."""
-    known = {"particulars": ship.particulars, "steering": ship.steering, "structure": "mmg"}
+    known = {
+        "particulars": ship.particulars,
+        "steering": ship.steering,
+        "structure": "mmg",
+    }
     return identify([ship.runs[name] for name in names], **(known | settings)).model
 
 
@@ -132,7 +159,10 @@ def run(data: Data) -> Section:
                 label = f"{name}, strength {strength:g}"
                 models[label] = fitted(hsva, **settings, prior_strength=strength)
     large = {name: full_scale(model, marin) for name, model in models.items()}
-    zigzags = {name: [all_errors(model, hsva.runs[r]) for r in OTHERS] for name, model in models.items()}
+    zigzags = {
+        name: [all_errors(model, hsva.runs[r]) for r in OTHERS]
+        for name, model in models.items()
+    }
     first, second, _ = PRIORS
     began = time.process_time()
     fitted(hsva, **PRIORS[first])
@@ -141,15 +171,24 @@ def run(data: Data) -> Section:
         fitted=", ".join(FITTED),
         chosen=table(
             ["prior", *(f"strength {s:g}" for s in STRENGTHS), "chosen"],
-            [[n, *(number(e, 2) for e in scores[n].values()), f"{strengths[n]:g}"] for n in PRIORS],
+            [
+                [n, *(number(e, 2) for e in scores[n].values()), f"{strengths[n]:g}"]
+                for n in PRIORS
+            ],
         ),
         zigzags=table(
             ["fit", *MEASURES, *CLOSED],
-            [*([n, *cells(mean_errors(e))] for n, e in zigzags.items()), ["aim", *cells(np.array(AIMS))]],
+            [
+                *([n, *cells(mean_errors(e))] for n, e in zigzags.items()),
+                ["aim", *cells(np.array(AIMS))],
+            ],
         ),
         runs=table(
             ["run", *MEASURES, *CLOSED],
-            [[run, *cells(errors)] for run, errors in zip(OTHERS, zigzags[first], strict=True)],
+            [
+                [run, *cells(errors)]
+                for run, errors in zip(OTHERS, zigzags[first], strict=True)
+            ],
         ),
         circles=table(
             ["fit", *(f"{name} {side}" for side in ("+35", "-35") for name in TURN)],
@@ -161,22 +200,33 @@ def run(data: Data) -> Section:
     )
     shown = [f"{REFERENCE}, nothing fitted", first, second]
     return Section(
-        "KVLCC2 by the MMG form, HSVA's zigzags and MARIN's circles", text,
-        {"real_ships_f.svg": painter({n: models[n] for n in shown}, {n: large[n] for n in shown}, hsva)},
-    )  # fmt: skip
+        "KVLCC2 by the MMG form, HSVA's zigzags and MARIN's circles",
+        text,
+        {
+            "real_ships_f.svg": painter(
+                {n: models[n] for n in shown}, {n: large[n] for n in shown}, hsva
+            )
+        },
+    )
 
 
 def measured_row() -> list[str]:
     """The measured circles."""
     digits = (3, 3, 1, 3)
-    return ["measured", *(number(v, d) for side in CIRCLES for v, d in zip(side, digits, strict=True))]
+    return [
+        "measured",
+        *(number(v, d) for side in CIRCLES for v, d in zip(side, digits, strict=True)),
+    ]
 
 
 def found_text(model: ShipModel) -> str:
     """What the trials changed most, in standard deviations of the prior."""
     moved: Mapping[str, float] = (model.provenance or {})["deviations_from_prior"]
     largest = sorted(moved, key=lambda name: -abs(moved[name]))[:4]
-    return ", ".join(f"`{name}` {model.coefficients[name]:.3g} ({moved[name]:+.1f})" for name in largest)
+    return ", ".join(
+        f"`{name}` {model.coefficients[name]:.3g} ({moved[name]:+.1f})"
+        for name in largest
+    )
 
 
 def painter(
@@ -187,16 +237,30 @@ def painter(
     def paint(figure: Any) -> None:
         axes: Sequence[Any] = figure.subplots(1, 3, width_ratios=(1.2, 1.2, 1.0))
         for axis, name in zip(axes, OTHERS[1:], strict=False):
-            runs = {label: closed_loop(model, hsva.runs[name]) for label, model in models.items()}
+            runs = {
+                label: closed_loop(model, hsva.runs[name])
+                for label, model in models.items()
+            }
             headings(axis, hsva.runs[name], runs, f"{name}, reversed as measured")
-        figure.legend(*axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=4, fontsize=6.0)
+        figure.legend(
+            *axes[0].get_legend_handles_labels(),
+            loc="outside lower center",
+            ncols=4,
+            fontsize=6.0,
+        )
         for k, model in enumerate(large.values()):
             ship = replace(model, covariance=None).particulars
             travel = ship["length"] / ship["speed"]
             for side in (35.0, -35.0):
-                turn = turning_circle(model, side, DURATION_LENGTHS * travel, 0.02 * travel)
-                axes[2].plot(turn["y"] / ship.length, turn["x"] / ship.length, f"C{k}", lw=0.8)
-        axes[2].set(title="rudder 35 deg", xlabel="y / L", ylabel="x / L", aspect="equal")
+                turn = turning_circle(
+                    model, side, DURATION_LENGTHS * travel, 0.02 * travel
+                )
+                axes[2].plot(
+                    turn["y"] / ship.length, turn["x"] / ship.length, f"C{k}", lw=0.8
+                )
+        axes[2].set(
+            title="rudder 35 deg", xlabel="y / L", ylabel="x / L", aspect="equal"
+        )
 
     return paint
 

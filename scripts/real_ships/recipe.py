@@ -1,7 +1,8 @@
 """What is fitted to the KVLCC2: a reduced Abkowitz table pulled toward a reference ship's zigzags and turns.
 
-The table was found on the HSVA zigzags: without the cubes of the rudder, it predicts larger rudders than it
-has seen. How strong the pull is, each fit finds among its own runs.
+The table was found on the HSVA zigzags: without the cubes of the rudder, it predicts
+larger rudders than it has seen. How strong the pull is, each fit finds among its own
+runs.
 """
 
 from __future__ import annotations
@@ -29,10 +30,14 @@ REFERENCE = "kvlcc2-l7"
 STRENGTHS = (0.0, 0.01, 0.03, 0.1, 0.2)
 #: What the six HSVA zigzags choose.
 PULL = 0.1
-#: Share by which the error held out may exceed the least: the pull is for turns, which are in no zigzag.
+#: Share by which the error held out may exceed the least: the pull is for turns, which
+#: are in no zigzag.
 TOLERANCE = 0.25
 
-ROOT = "Abkowitz, Mariner form, without products of rudder and drift and with less of surge"
+ROOT = (
+    "Abkowitz, Mariner form, without products of rudder and drift and with less of"
+    " surge"
+)
 SURGE, SWAY_AND_YAW = "u uu vv rr dd vr vd", "0 0u 0uu v r d vvv vvr ud uv ur uud"
 
 
@@ -52,15 +57,21 @@ def known(structure: str) -> str:
         sway_and_yaw, source = OWN[structure]
         terms = short_terms(sway_and_yaw)
         table = {"u": short_terms(SURGE), "v": terms, "r": terms}
-        register_structure(structure, table, source, normalisation="prime", quantity="force")
+        register_structure(
+            structure, table, source, normalisation="prime", quantity="force"
+        )
     return structure
 
 
 #: Refinement from there, the reference ship's turns inside its cost.
 REFINEMENT: dict[str, Any] = {
-    "segment_lengths": 8.0, "segment_start": "measured", "rudder_offsets": True, "pull": 1e-2,
-    "anchor": REFERENCE, "anchor_weight": 1e-2,
-}  # fmt: skip
+    "segment_lengths": 8.0,
+    "segment_start": "measured",
+    "rudder_offsets": True,
+    "pull": 1e-2,
+    "anchor": REFERENCE,
+    "anchor_weight": 1e-2,
+}
 
 
 @cache
@@ -69,14 +80,21 @@ def _blank(ship: MeasuredShip, structure: str) -> tuple[ShipModel, Prior]:
     names = get_structure(known(structure)).coefficient_names
     particulars = ship.particulars.completed()
     blank = ShipModel(
-        particulars.name, structure, particulars, ship.steering or SteeringGear(), dict.fromkeys(names, 0.0)
+        particulars.name,
+        structure,
+        particulars,
+        ship.steering or SteeringGear(),
+        dict.fromkeys(names, 0.0),
     )
     return blank, reference_prior(REFERENCE, blank)
 
 
 @cache
 def pulled(
-    ship: MeasuredShip, names: tuple[str, ...], strength: float, structure: str = STRUCTURE
+    ship: MeasuredShip,
+    names: tuple[str, ...],
+    strength: float,
+    structure: str = STRUCTURE,
 ) -> ShipModel:
     """Least squares on some runs, pulled toward the reference ship."""
     blank, prior = _blank(ship, structure)
@@ -88,7 +106,10 @@ def pulled(
 
 
 def held_out_error(
-    ship: MeasuredShip, names: Sequence[str], strength: float, structure: str = STRUCTURE
+    ship: MeasuredShip,
+    names: Sequence[str],
+    strength: float,
+    structure: str = STRUCTURE,
 ) -> float:
     """Root mean square error of r, deg/s, over runs predicted one by one from the others.
 
@@ -96,13 +117,17 @@ def held_out_error(
     """
     squares = []
     for held in names:
-        model = pulled(ship, tuple(name for name in names if name != held), strength, structure)
+        model = pulled(
+            ship, tuple(name for name in names if name != held), strength, structure
+        )
         error = float(zigzag_errors(model, ship.runs[held])[0])
         squares.append(error**2 if np.isfinite(error) else np.inf)
     return float(np.sqrt(np.mean(squares)))
 
 
-def chosen_strength(ship: MeasuredShip, names: Sequence[str]) -> tuple[float, dict[float, float]]:
+def chosen_strength(
+    ship: MeasuredShip, names: Sequence[str]
+) -> tuple[float, dict[float, float]]:
     """The strongest pull whose error held out is within a quarter of the least.
 
     Returns
@@ -129,12 +154,18 @@ def with_fixed_pull(ship: MeasuredShip, names: Sequence[str]) -> ShipModel:
 
 def fitted_with_table(ship: MeasuredShip, names: Sequence[str]) -> ShipModel:
     """The fit whose table and pull predict each of the runs best from the others."""
-    options = [(held_out_error(ship, names, s, table), s, table) for table in TABLES for s in STRENGTHS]
+    options = [
+        (held_out_error(ship, names, s, table), s, table)
+        for table in TABLES
+        for s in STRENGTHS
+    ]
     _, strength, table = min(options)
     return steady(ship, names, strength, table)
 
 
-def steady(ship: MeasuredShip, names: Sequence[str], least: float, structure: str) -> ShipModel:
+def steady(
+    ship: MeasuredShip, names: Sequence[str], least: float, structure: str
+) -> ShipModel:
     """The least pull, from a given one on, with which the model does not run away; that one if none."""
     runs = [ship.runs[name] for name in names]
     for strength in STRENGTHS[STRENGTHS.index(least) :]:

@@ -44,7 +44,9 @@ def number(value: float | None, digits: int = 3) -> str:
     return "-" if value is None or value != value else f"{value:.{digits}f}"
 
 
-def headings(axis: Any, trial: Trial, predictions: Mapping[str, Trial | None], title: str) -> None:
+def headings(
+    axis: Any, trial: Trial, predictions: Mapping[str, Trial | None], title: str
+) -> None:
     """A trial's heading and what models predict of it, by label, on an axis of matplotlib."""
     axis.plot(trial.t, np.degrees(trial["psi"]), "k", lw=1.2, label="measured")
     for label, predicted in predictions.items():
@@ -57,9 +59,16 @@ def wrapped(text: str) -> str:
     """Markdown whose paragraphs, unlike its tables and images, have lines of one width."""
     blocks = text.strip().split("\n\n")
     prose = [
-        block
-        if block.lstrip().startswith(("|", "!", "#"))
-        else fill(" ".join(block.split()), WIDTH, break_long_words=False, break_on_hyphens=False)
+        (
+            block
+            if block.lstrip().startswith(("|", "!", "#"))
+            else fill(
+                " ".join(block.split()),
+                WIDTH,
+                break_long_words=False,
+                break_on_hyphens=False,
+            )
+        )
         for block in blocks
     ]
     return "\n\n".join(prose)
@@ -82,7 +91,10 @@ def put(document: str, case: str, section: Section) -> str:
     before, rest = document.split(first)
     _, after = rest.split(last)
     command = f"`python scripts/predict_real_ships.py {case}`"
-    body = f"{first}\n## ({case}) {section.title}\n\nCommand: {command}\n\n{wrapped(section.text)}\n{last}"
+    body = (
+        f"{first}\n## ({case}) {section.title}\n\nCommand:"
+        f" {command}\n\n{wrapped(section.text)}\n{last}"
+    )
     return before + body + after
 
 

@@ -74,10 +74,15 @@ def single_environment(n_steps: int = 1000) -> Row:
 
 
 def native_speed(
-    env_id: str, n_envs: int, clock: Callable[[], float] = time.process_time, **options: Any
+    env_id: str,
+    n_envs: int,
+    clock: Callable[[], float] = time.process_time,
+    **options: Any,
 ) -> float:
     """Steps per second of a native vector environment of Gymnasium, by all that its `step` returns."""
-    env = gymnasium.make_vec(env_id, num_envs=n_envs, vectorization_mode="vector_entry_point", **options)
+    env = gymnasium.make_vec(
+        env_id, num_envs=n_envs, vectorization_mode="vector_entry_point", **options
+    )
     env.reset(seed=0)
     env.action_space.seed(0)
     actions = env.action_space.sample()
@@ -85,7 +90,9 @@ def native_speed(
 
     def sail() -> None:
         for _ in range(steps):
-            env.step(actions)  # and let go of what it returns, as a learner does that has copied it
+            env.step(
+                actions
+            )  # and let go of what it returns, as a learner does that has copied it
 
     return steps * n_envs / best_time(sail, SHORT_REPEATS, clock)
 
@@ -93,7 +100,9 @@ def native_speed(
 def native_against_python(task: str, n_envs: int = 64) -> Row:
     """The native vector environment against SyncVectorEnv of the same files run as plain Python."""
     native = native_speed(env_id(task), n_envs, model=MODEL)
-    (plain,) = run_python(SYNC_STEPS_IN_PYTHON, env_id(task), MODEL, str(n_envs), NUMBA_DISABLE_JIT="1")
+    (plain,) = run_python(
+        SYNC_STEPS_IN_PYTHON, env_id(task), MODEL, str(n_envs), NUMBA_DISABLE_JIT="1"
+    )
     return Row(
         f"{n_envs} {task}, gymnasium.make_vec",
         f"{native / 1e6:.1f} M steps/s",
@@ -135,7 +144,10 @@ def vector_environment(task: str, n_envs: int, aim: str) -> Row:
 
 def two_threads(n_envs: int = 16384) -> Row:
     """Two threads against one, by the clock on the wall: needs two idle cores."""
-    one, two = (vector_speed(n_envs, clock=time.perf_counter, threads=threads) for threads in (1, 2))
+    one, two = (
+        vector_speed(n_envs, clock=time.perf_counter, threads=threads)
+        for threads in (1, 2)
+    )
     return Row(
         f"CourseKeeping, {n_envs} at once, two threads",
         f"{two / 1e6:.1f} M steps/s",
@@ -147,7 +159,9 @@ def two_threads(n_envs: int = 16384) -> Row:
 
 def weather(n_envs: int) -> Row:
     """A native vector environment with current, wind and waves, against calm water."""
-    sea = Weather(current=Current(1.0, variation=0.2), wind=Wind(12.0), waves=Waves(3.25, 9.7))
+    sea = Weather(
+        current=Current(1.0, variation=0.2), wind=Wind(12.0), waves=Waves(3.25, 9.7)
+    )
     rough, calm = vector_speed(n_envs, sea=sea), vector_speed(n_envs)
     return Row(
         f"CourseKeeping, {n_envs} at once, in current, wind and waves",
@@ -162,22 +176,33 @@ def kernel_ship(n_envs: int = 1024, centres: int = 64) -> Row:
     """A black-box model with radial basis functions, against their sums alone on NumPy arrays."""
     ship = shipgym.load_model("kvlcc2-l7")
     trials = [
-        zigzag(ship, angle, angle, duration=100.0, dt=0.2, port_first=port).with_(name=f"{angle} {port}")
+        zigzag(ship, angle, angle, duration=100.0, dt=0.2, port_first=port).with_(
+            name=f"{angle} {port}"
+        )
         for angle in (10, 20)
         for port in (False, True)
     ]
     model = identify(
-        trials, kernel="rbf", centres=centres, kernel_length=1.4, C=100.0, particulars=ship.particulars,
+        trials,
+        kernel="rbf",
+        centres=centres,
+        kernel_length=1.4,
+        C=100.0,
+        particulars=ship.particulars,
         steering=ship.steering,
-    ).model  # fmt: skip
+    ).model
     native = native_speed("shipgym/CourseKeeping-v0", n_envs, model=model)
-    states = {name: np.full(n_envs, value) for name, value in zip("uvr", (1.0, 0.1, 0.01), strict=True)}
+    states = {
+        name: np.full(n_envs, value)
+        for name, value in zip("uvr", (1.0, 0.1, 0.01), strict=True)
+    }
     states["delta"] = np.linspace(-0.5, 0.5, n_envs)
     stage = best_time(lambda: model.table.features("r", states, model.particulars), 50)
     return Row(
         f"CourseKeeping, {n_envs} kernel models of {centres} centres",
         f"{native / 1e6:.1f} M steps/s",
-        f"the sums over their centres alone in NumPy {n_envs / (4.0 * stage) / 1e6:.2f} M steps/s",
+        f"the sums over their centres alone in NumPy {n_envs / (4.0 * stage) / 1e6:.2f}"
+        " M steps/s",
         native * 4.0 * stage / n_envs,
         "3 M steps/s",
     )

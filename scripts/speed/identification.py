@@ -7,7 +7,13 @@ from numpy.typing import NDArray
 from papers.dense_dual import dense_dual_solution
 
 import shipgym
-from identification import ArtificialBeeColony, RecursiveLeastSquares, TruncatedLSSVM, TunedLSSVM, identify
+from identification import (
+    ArtificialBeeColony,
+    RecursiveLeastSquares,
+    TruncatedLSSVM,
+    TunedLSSVM,
+    identify,
+)
 from shipgym.manoeuvres import zigzag
 from shipgym.trials.sensors import Sensors
 from speed.measure import Row, best_time
@@ -18,15 +24,21 @@ Floats = NDArray[np.float64]
 def made_up_regression(n_samples: int, n_terms: int) -> tuple[Floats, Floats]:
     """Correlated features and noisy targets."""
     random = np.random.default_rng(0)
-    X = random.standard_normal((n_samples, n_terms)) @ random.standard_normal((n_terms, n_terms))
-    return X, X @ random.standard_normal(n_terms) + 0.1 * random.standard_normal(n_samples)
+    X = random.standard_normal((n_samples, n_terms)) @ random.standard_normal(
+        (n_terms, n_terms)
+    )
+    return X, X @ random.standard_normal(n_terms) + 0.1 * random.standard_normal(
+        n_samples
+    )
 
 
 def truncated_fit(n_samples: int, aim: str, n_terms: int = 15) -> Row:
     """TLS-SVM in primal form, its L-curve included, against the dense dual system of LS-SVM."""
     X, y = made_up_regression(n_samples, n_terms)
     primal = best_time(lambda: TruncatedLSSVM(C=1e6).fit(X, y), 200)
-    dense = best_time(lambda: dense_dual_solution(X, y, C=1e6), 3 if n_samples < 3000 else 1)
+    dense = best_time(
+        lambda: dense_dual_solution(X, y, C=1e6), 3 if n_samples < 3000 else 1
+    )
     return Row(
         f"TLS-SVM fit, {n_samples} samples, {n_terms} terms",
         f"{primal * 1e3:.2f} ms",
@@ -41,7 +53,9 @@ def bee_colony_search(objective: str, n_samples: int = 1800, n_terms: int = 7) -
 
     def least(n: int) -> float:
         X, y = made_up_regression(n, n_terms)
-        machine = TunedLSSVM(optimiser=ArtificialBeeColony(20, 30, 20), objective=objective)
+        machine = TunedLSSVM(
+            optimiser=ArtificialBeeColony(20, 30, 20), objective=objective
+        )
         return best_time(lambda: machine.fit(X, y), 50)
 
     once, tenfold = least(n_samples), least(10 * n_samples)
@@ -93,7 +107,13 @@ def refinement() -> Row:
 
     def fit(method: str) -> float:
         return best_time(
-            lambda: identify(trials, method=method, particulars=ship.particulars, steering=ship.steering), 2
+            lambda: identify(
+                trials,
+                method=method,
+                particulars=ship.particulars,
+                steering=ship.steering,
+            ),
+            2,
         )
 
     refined, start = fit("output-error"), fit("tls-svm")

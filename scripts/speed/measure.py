@@ -28,12 +28,15 @@ class Row:
 
 
 def best_time(
-    work: Callable[[], object], repeats: int = 5, clock: Callable[[], float] = time.process_time
+    work: Callable[[], object],
+    repeats: int = 5,
+    clock: Callable[[], float] = time.process_time,
 ) -> float:
     """Least processor time of some repeats, s.
 
-    Not the clock on the wall, which counts what else the machine does. The caches are shared all the same, so
-    that many short repeats are needed to find a moment without other work.
+    Not the clock on the wall, which counts what else the machine does. The caches are
+    shared all the same, so that many short repeats are needed to find a moment without
+    other work.
     """
     times = []
     for _ in range(repeats):

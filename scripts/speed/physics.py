@@ -12,9 +12,12 @@ from speed.measure import MODEL, SHORT_REPEATS, SHORT_STEPS, Row, best_time
 
 #: Ships whose bare physics is timed, and the aim for them.
 FLEET = {
-    "mariner": "40 M steps/s, ", MODEL: "40 M steps/s, ", "container": "15 M steps/s, ", "tanker": "",
+    "mariner": "40 M steps/s, ",
+    MODEL: "40 M steps/s, ",
+    "container": "15 M steps/s, ",
+    "tanker": "",
     "kvlcc2": "",
-}  # fmt: skip
+}
 
 
 def batched_physics(name: str, n_ships: int, aim: str) -> Row:
@@ -26,14 +29,28 @@ def batched_physics(name: str, n_ships: int, aim: str) -> Row:
     commands = np.column_stack([rudders, np.full(n_ships, model.service_shaft_speed)])
     tiles, ships = n_ships // LANES, model.ship_numbers()[None]
     tiled, orders = (
-        np.ascontiguousarray(a.reshape(tiles, LANES, -1).transpose(0, 2, 1)).reshape(tiles, -1)
+        np.ascontiguousarray(a.reshape(tiles, LANES, -1).transpose(0, 2, 1)).reshape(
+            tiles, -1
+        )
         for a in (states, commands)
     )
-    h, steps = 0.01 * model.particulars["length"] / model.particulars["speed"], SHORT_STEPS // n_ships
+    h, steps = (
+        0.01 * model.particulars["length"] / model.particulars["speed"],
+        SHORT_STEPS // n_ships,
+    )
     advance, on_arrays = ship_loop(model.vessel, "alike"), numpy_step(model)
-    columns, shafts = tuple(np.ascontiguousarray(states.T)), np.ascontiguousarray(commands[:, 1])
-    compiled = steps * n_ships / best_time(lambda: advance(tiled, orders, h, steps, ships), SHORT_REPEATS)
-    plain = n_ships / best_time(lambda: on_arrays(columns, rudders, shafts, h), SHORT_REPEATS)
+    columns, shafts = (
+        tuple(np.ascontiguousarray(states.T)),
+        np.ascontiguousarray(commands[:, 1]),
+    )
+    compiled = (
+        steps
+        * n_ships
+        / best_time(lambda: advance(tiled, orders, h, steps, ships), SHORT_REPEATS)
+    )
+    plain = n_ships / best_time(
+        lambda: on_arrays(columns, rudders, shafts, h), SHORT_REPEATS
+    )
     return Row(
         f"physics of {n_ships} ships, {name}",
         f"{compiled / 1e6:.1f} M steps/s",
@@ -48,4 +65,6 @@ def zigzag_run() -> Row:
     ship = shipgym.load_model(MODEL)
     shipgym.manoeuvres.zigzag(ship, 20.0, 20.0)
     seconds = best_time(lambda: shipgym.manoeuvres.zigzag(ship, 20.0, 20.0), 20)
-    return Row("zigzag 20/20, 600 s at 0.1 s", f"{1e3 * seconds:.1f} ms", "", None, "5 ms")
+    return Row(
+        "zigzag 20/20, 600 s at 0.1 s", f"{1e3 * seconds:.1f} ms", "", None, "5 ms"
+    )

@@ -51,22 +51,37 @@ def start_up() -> list[Row]:
     runs = np.array([run_python(code) for _ in range(5)])
     imported, first_step = runs.min(axis=0)
     (bare,) = run_python(
-        "import time; s = time.perf_counter(); import gymnasium; print(time.perf_counter() - s)"
+        "import time; s = time.perf_counter(); import gymnasium;"
+        " print(time.perf_counter() - s)"
     )
     return [
         Row(
-            "import shipgym", f"{imported:.2f} s", f"import gymnasium {bare:.2f} s", imported / bare, "0.3 s"
+            "import shipgym",
+            f"{imported:.2f} s",
+            f"import gymnasium {bare:.2f} s",
+            imported / bare,
+            "0.3 s",
         ),
-        Row("import to first step, warm cache", f"{first_step:.2f} s", "", None, "0.6 s"),
+        Row(
+            "import to first step, warm cache", f"{first_step:.2f} s", "", None, "0.6 s"
+        ),
     ]
 
 
 def cold_start(sea: str, aim: str) -> Row:
     """Processor time to the first step of a fresh process, on an empty cache and on a filled one."""
     with tempfile.TemporaryDirectory() as cache:
-        (cold,), (warm,) = (run_python(COLD_START, MODEL, sea, SHIPGYM_CACHE=cache) for _ in range(2))
+        (cold,), (warm,) = (
+            run_python(COLD_START, MODEL, sea, SHIPGYM_CACHE=cache) for _ in range(2)
+        )
     what = f"first environment, {sea} sea, empty cache"
-    return Row(what, f"{cold:.1f} s of processor", f"filled cache {warm:.1f} s", cold / warm, aim)
+    return Row(
+        what,
+        f"{cold:.1f} s of processor",
+        f"filled cache {warm:.1f} s",
+        cold / warm,
+        aim,
+    )
 
 
 def cold_workers() -> list[Row]:
@@ -78,9 +93,17 @@ def cold_workers() -> list[Row]:
         return wall, processor
 
     rows = []
-    for env, aim in (("shipgym:shipgym/CourseKeeping-v0", "1.3 times"), ("CartPole-v1", "")):
+    for env, aim in (
+        ("shipgym:shipgym/CourseKeeping-v0", "1.3 times"),
+        ("CartPole-v1", ""),
+    ):
         one, four = taken(env, 1), taken(env, 4)
-        ours, single = (f"{wall:.1f} s, {processor:.1f} s of processor" for wall, processor in (four, one))
-        what = f"SubprocVecEnv of {env.rpartition('/')[2]}, 4 spawned workers, empty cache"
+        ours, single = (
+            f"{wall:.1f} s, {processor:.1f} s of processor"
+            for wall, processor in (four, one)
+        )
+        what = (
+            f"SubprocVecEnv of {env.rpartition('/')[2]}, 4 spawned workers, empty cache"
+        )
         rows.append(Row(what, ours, f"one worker {single}", four[0] / one[0], aim))
     return rows

@@ -37,7 +37,9 @@ def array_at(dtype: Any, dimensions: int) -> Part:
         size = int(np.prod(shape)) * np.dtype(dtype).itemsize
         if size == 0:
             return np.zeros(shape, dtype)
-        return np.frombuffer((ctypes.c_char * size).from_address(int(world[k])), dtype).reshape(shape)
+        return np.frombuffer(
+            (ctypes.c_char * size).from_address(int(world[k])), dtype
+        ).reshape(shape)
 
     kind = partial(_kind, dtype, dimensions, "C")
 
@@ -45,18 +47,26 @@ def array_at(dtype: Any, dimensions: int) -> Part:
         word = context.get_value_type(kinds[1])
         data = context.make_array(kinds[0])(context, builder, values[0]).data
         words = [
-            builder.load(builder.gep(data, [builder.add(values[1], word(i))])) for i in range(dimensions + 1)
+            builder.load(builder.gep(data, [builder.add(values[1], word(i))]))
+            for i in range(dimensions + 1)
         ]
         strides = [word(np.dtype(dtype).itemsize)]
         for length in reversed(words[2:]):
             strides.insert(0, builder.mul(strides[0], length))
-        pointer = builder.inttoptr(words[0], context.get_data_type(kind().dtype).as_pointer())
+        pointer = builder.inttoptr(
+            words[0], context.get_data_type(kind().dtype).as_pointer()
+        )
         return new_array(context, builder, kind(), pointer, words[1:], strides)
 
-    return Part(at, code=partial(intrinsic, generate, 2, kind), key=("at", np.dtype(dtype).str, dimensions))
+    return Part(
+        at,
+        code=partial(intrinsic, generate, 2, kind),
+        key=("at", np.dtype(dtype).str, dimensions),
+    )
 
 
-#: Arrays of a loop's world by kind and dimensions; parts, which a loop calls as functions.
+#: Arrays of a loop's world by kind and dimensions; parts, which a loop calls as
+#: functions.
 words_at: Any = array_at(np.uint64, 3)
 numbers_at: Any = array_at(np.float64, 1)
 table_at: Any = array_at(np.float64, 2)
@@ -81,4 +91,6 @@ def plan_at(first: int) -> Part:
         length = builder.sub(builder.sdiv(tile.nitems, word(LANES)), word(first))
         return new_array(context, builder, kind(), pointer, [length], [word(8 * LANES)])
 
-    return Part(plan_of, code=partial(intrinsic, generate, 2, kind), key=("plan", first))
+    return Part(
+        plan_of, code=partial(intrinsic, generate, 2, kind), key=("plan", first)
+    )

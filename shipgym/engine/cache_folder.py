@@ -1,8 +1,9 @@
 """The folder in which compiled loops are kept, and whether what lies there may be run.
 
-A loop's file is code. It is run only if nobody but root and this user could have written it: files, the
-folder and all above it are theirs, and others may not write them. A folder above may be sticky, as ``/tmp``
-is, where others cannot rename what is not theirs.
+A loop's file is code. It is run only if nobody but root and this user could have
+written it: files, the folder and all above it are theirs, and others may not write
+them. A folder above may be sticky, as ``/tmp`` is, where others cannot rename what is
+not theirs.
 """
 
 import os
@@ -27,8 +28,12 @@ DIGEST = 32  # bytes of a SHA-256, at the beginning of a file
 def cache_folder() -> Path:
     """Where compiled loops are kept; below ``~`` if nobody knows where the user's home is."""
     try:
-        return Path(os.environ.get(CACHE_VARIABLE) or user_cache_path("shipgym")).expanduser()
-    except RuntimeError:  # of a user without an entry in the list of users, in a container
+        return Path(
+            os.environ.get(CACHE_VARIABLE) or user_cache_path("shipgym")
+        ).expanduser()
+    except (
+        RuntimeError
+    ):  # of a user without an entry in the list of users, in a container
         return Path("~", ".cache", "shipgym")
 
 
@@ -47,8 +52,8 @@ def usable_folder() -> Path | None:
 def open_folder() -> Path:
     """The folder of the cache, without links in its path; it is made where there is none.
 
-    Raises OSError if it cannot be made or read, ValueError if code in it might be another user's, with what
-    to do.
+    Raises OSError if it cannot be made or read, ValueError if code in it might be
+    another user's, with what to do.
     """
     home = cache_folder()
     if home.parts[:1] == ("~",):
@@ -71,7 +76,9 @@ def _others_of(found: os.stat_result, above: bool = False) -> str:
         return ""
     if found.st_uid not in (0, os.geteuid()):
         return f"belongs to another user ({found.st_uid})"
-    if found.st_mode & (stat.S_IWGRP | stat.S_IWOTH) and not (above and found.st_mode & stat.S_ISVTX):
+    if found.st_mode & (stat.S_IWGRP | stat.S_IWOTH) and not (
+        above and found.st_mode & stat.S_ISVTX
+    ):
         return "may be written by other users"
     return ""
 
@@ -79,10 +86,12 @@ def _others_of(found: os.stat_result, above: bool = False) -> str:
 def read_loop(path: Path) -> bytes:
     """What a loop's file holds behind its hash.
 
-    Raises OSError if it cannot be read, ValueError, with what is wrong, if it is damaged or might be
-    another user's.
+    Raises OSError if it cannot be read, ValueError, with what is wrong, if it is
+    damaged or might be another user's.
     """
-    number = os.open(path, os.O_RDONLY | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_BINARY", 0))
+    number = os.open(
+        path, os.O_RDONLY | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_BINARY", 0)
+    )
     with os.fdopen(number, "rb") as file:
         if why := _others_of(os.fstat(number)):
             raise ValueError(why)
@@ -116,12 +125,14 @@ def write_loop(content: bytes, path: Path) -> None:
 def locked(path: Path, waiting: Callable[[], None]) -> Iterator[None]:
     """One process compiles a loop's file, the others wait; the lock of a process that was killed is free.
 
-    `waiting` is called where another process holds the lock. Where no lock can be had, in a folder that may
-    only be read or on a disk without locks, each compiles.
+    `waiting` is called where another process holds the lock. Where no lock can be had,
+    in a folder that may only be read or on a disk without locks, each compiles.
     """
     from filelock import FileLock, Timeout
 
-    lock = FileLock(path.with_name(path.name.partition("-")[0] + ".lock"))  # the name begins with a hash
+    lock = FileLock(
+        path.with_name(path.name.partition("-")[0] + ".lock")
+    )  # the name begins with a hash
     with suppress(OSError, NotImplementedError):
         try:
             lock.acquire(blocking=False)
@@ -138,8 +149,8 @@ def warn_of(folder: Path, error: BaseException) -> None:
     """Say that nothing can be kept, because of an OSError, and what to do."""
     reason = getattr(error, "strerror", error)
     tell(
-        f"{folder}: cannot be written ({reason}), so ships are compiled again in each process. "
-        f"Set {CACHE_VARIABLE} to a folder that can."
+        f"{folder}: cannot be written ({reason}), so ships are compiled again in each"
+        f" process. Set {CACHE_VARIABLE} to a folder that can."
     )
 
 

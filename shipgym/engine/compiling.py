@@ -1,9 +1,10 @@
 """How loops are compiled for a ship, a sea and a task, and kept on disk, never stale.
 
-The machine code of a loop lies in the cache under a name that hashes all that it depends on: the bytecode of
-the loop and of every function put into it, the fields of their records, the code generators of this folder,
-the versions of Python and Numba, and the processor. A file that is there is right, whoever made it and when;
-so a cache that was filled beforehand and may only be read is used as it is.
+The machine code of a loop lies in the cache under a name that hashes all that it
+depends on: the bytecode of the loop and of every function put into it, the fields of
+their records, the code generators of this folder, the versions of Python and Numba, and
+the processor. A file that is there is right, whoever made it and when; so a cache that
+was filled beforehand and may only be read is used as it is.
 """
 
 import gc
@@ -18,7 +19,13 @@ import numpy as np
 
 from shipgym.engine.cache_folder import locked, usable_folder
 from shipgym.engine.numba_errors import explanation
-from shipgym.engine.specialise import SEMANTICS, Parts, Specialisation, fingerprint, is_shipped
+from shipgym.engine.specialise import (
+    SEMANTICS,
+    Parts,
+    Specialisation,
+    fingerprint,
+    is_shipped,
+)
 from shipgym.errors import InputError
 
 SECONDS = 4  # about what a loop takes to compile on a laptop; what is told to who waits
@@ -27,14 +34,17 @@ SECONDS = 4  # about what a loop takes to compile on a laptop; what is told to w
 def compiled(loop: Any, signature: str, parts: Parts, what: str) -> Any:
     """A loop compiled with parts in the places that it names, or read from the cache.
 
-    The loop is a plain Python function on arrays, the signature that of its arguments as Numba writes it;
-    `parts` (Parts, numbers or other globals) take the place of the globals that loop and parts name; `what`
-    says in messages what is compiled for whom. With `NUMBA_DISABLE_JIT=1` it is plain Python. Raises
-    InputError if a part does not compile, naming its function, the line and Numba's reason.
+    The loop is a plain Python function on arrays, the signature that of its arguments
+    as Numba writes it; `parts` (Parts, numbers or other globals) take the place of the
+    globals that loop and parts name; `what` says in messages what is compiled for whom.
+    With `NUMBA_DISABLE_JIT=1` it is plain Python. Raises InputError if a part does not
+    compile, naming its function, the line and Numba's reason.
     """
     tag = fingerprint(loop, parts)
     if plain_python():
-        wraps = np.errstate(over="ignore")  # words of random numbers overflow, as they do when compiled
+        wraps = np.errstate(
+            over="ignore"
+        )  # words of random numbers overflow, as they do when compiled
         return wraps(Specialisation(parts, tag, None).copy(loop))
     from shipgym.engine.disk_cache import DiskCache
 
@@ -92,11 +102,19 @@ def _compile(dispatcher: Any, signature: str, what: str) -> None:
     try:
         with global_compiler_lock, _uncollected(), lean(name):
             dispatcher.compile(signature)
-            for code in dispatcher.overloads.values():  # what loops call has an environment, too, for `print`
+            for code in (
+                dispatcher.overloads.values()
+            ):  # what loops call has an environment, too, for `print`
                 for one in code._find_referenced_environments():
                     code.library.codegen.set_env(one.env_name, one)
     # the latter three: another record than is due, none at all, one whose field is set
-    except (NumbaError, UnsupportedBytecodeError, TypeError, AttributeError, NotImplementedError) as error:
+    except (
+        NumbaError,
+        UnsupportedBytecodeError,
+        TypeError,
+        AttributeError,
+        NotImplementedError,
+    ) as error:
         raise InputError(explanation(error, what)) from None
 
 
@@ -113,7 +131,11 @@ def _uncollected() -> Iterator[None]:
 
 
 def _announce(what: str, folder: Path | None) -> None:
-    kept = f"kept in {folder} (beforehand: shipgym warm)" if folder else "kept in memory only"
+    kept = (
+        f"kept in {folder} (beforehand: shipgym warm)"
+        if folder
+        else "kept in memory only"
+    )
     _say(f"shipgym: compiling {what}, once, about {SECONDS} s; {kept}")
 
 

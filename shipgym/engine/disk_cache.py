@@ -16,7 +16,8 @@ from shipgym.errors import InputError
 class DiskCache(NullCache):  # type: ignore[misc]
     """What Numba asks of a cache, for one loop, in a folder that need not be writable.
 
-    `tag` is the hash of everything that the loop depends on, `signature` that of its arguments.
+    `tag` is the hash of everything that the loop depends on, `signature` that of its
+    arguments.
     """
 
     def __init__(self, folder: Path, tag: str, signature: str) -> None:
@@ -32,7 +33,10 @@ class DiskCache(NullCache):  # type: ignore[misc]
         except OSError:
             pass
         except ValueError as error:
-            tell(f"{self.path.parent}: a compiled loop {error}; it is compiled again (see shipgym doctor)")
+            tell(
+                f"{self.path.parent}: a compiled loop {error}; it is compiled again"
+                " (see shipgym doctor)"
+            )
         return self._content is not None
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
@@ -44,7 +48,10 @@ class DiskCache(NullCache):  # type: ignore[misc]
         try:
             return CompileResult._rebuild(target_context, *pickle.loads(content))
         except Exception as error:  # whatever the inside of another Numba may raise
-            tell(f"{self.path}: cannot be loaded ({type(error).__name__}: {error}); it is compiled again")
+            tell(
+                f"{self.path}: cannot be loaded ({type(error).__name__}: {error}); it"
+                " is compiled again"
+            )
             return None
 
     def save_overload(self, sig: Any, data: Any) -> None:

@@ -54,6 +54,16 @@ def envelope_distance(motion: Motion, data: Envelope) -> float:
 def outside_range(motion: Motion, data: Envelope) -> bool:
     """Whether one of u, v, r, delta is outside its range in the data."""
     low, high = data.low, data.high
-    below = (motion.u < low.u) | (motion.v < low.v) | (motion.r < low.r) | (motion.delta < low.delta)
-    above = (motion.u > high.u) | (motion.v > high.v) | (motion.r > high.r) | (motion.delta > high.delta)
+    below = (
+        (motion.u < low.u)
+        | (motion.v < low.v)
+        | (motion.r < low.r)
+        | (motion.delta < low.delta)
+    )
+    above = (
+        (motion.u > high.u)
+        | (motion.v > high.v)
+        | (motion.r > high.r)
+        | (motion.delta > high.delta)
+    )
     return below | above

@@ -1,11 +1,12 @@
 """Episodes of many ships at once: begin them, take a control interval.
 
-Ships lie in tiles of 64 lanes. What every step needs is one loop over lanes, which is vectorised; what comes
-seldom (a new set-point, the next leg, the end of an episode) is done lane by lane afterwards. The task, the
-sensor set, the sea and the ship are parts (`shipgym.engine.voyages`): this file knows none of them.
+Ships lie in tiles of 64 lanes. What every step needs is one loop over lanes, which is
+vectorised; what comes seldom (a new set-point, the next leg, the end of an episode) is
+done lane by lane afterwards. The task, the sensor set, the sea and the ship are parts
+(`shipgym.engine.voyages`): this file knows none of them.
 
-Arrays that are not tiles are indexed by unsigned numbers: an index that could be negative, and would count
-from the end, keeps a loop from being vectorised.
+Arrays that are not tiles are indexed by unsigned numbers: an index that could be
+negative, and would count from the end, keeps a loop from being vectorised.
 """
 
 from typing import Any, NamedTuple
@@ -13,33 +14,86 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from shipgym.engine.addresses import (
-    flag_table_at, flags_at, numbers_at, rows_at, single_table_at, table_at, words_at,
-)  # fmt: skip
+    flag_table_at,
+    flags_at,
+    numbers_at,
+    rows_at,
+    single_table_at,
+    table_at,
+    words_at,
+)
 from shipgym.engine.envelope import envelope_distance, outside_range
 from shipgym.engine.mathematics import clip, pick
 from shipgym.engine.motion import HAS_SEA, lost, sail
 from shipgym.engine.places import (
-    begin_sea, choose_memory, choose_motion, choose_reward, choose_sea, choose_state, common_sea,
-    common_ship, common_view, due, encounter_frequency, evolve, load_course, load_memory, load_motion,
-    load_outcome, load_sea, load_state, measure, no_reward, observe, on_event, plan_of, push, read_rules,
-    read_sensor, read_settings, readings, sea_at, ship_at, store_course, store_ended, store_memory,
-    store_motion, store_observation, store_outcome, store_ran_away, store_reward, store_sea, store_state,
-    task_begin, task_step, total_reward, view_at, worst_cost,
-)  # fmt: skip
+    begin_sea,
+    choose_memory,
+    choose_motion,
+    choose_reward,
+    choose_sea,
+    choose_state,
+    common_sea,
+    common_ship,
+    common_view,
+    due,
+    encounter_frequency,
+    evolve,
+    load_course,
+    load_memory,
+    load_motion,
+    load_outcome,
+    load_sea,
+    load_state,
+    measure,
+    no_reward,
+    observe,
+    on_event,
+    plan_of,
+    push,
+    read_rules,
+    read_sensor,
+    read_settings,
+    readings,
+    sea_at,
+    ship_at,
+    store_course,
+    store_ended,
+    store_memory,
+    store_motion,
+    store_observation,
+    store_outcome,
+    store_ran_away,
+    store_reward,
+    store_sea,
+    store_state,
+    task_begin,
+    task_step,
+    total_reward,
+    view_at,
+    worst_cost,
+)
 from shipgym.engine.random import BEGIN_WORDS, EVOLVE_WORDS, stream, uniform
 from shipgym.engine.records import LANES
 from shipgym.tasks.contract import Interval, Random
 
 REFUSED = -1  # what `step` answers to commands that are not finite
-OF_STATE = 1 << 40  # added to the offset of a row that stands in the state, not in the result
-N_STEP, N_STEP_FLAGS = 3, 2  # of outcomes and flags, what `step` answers: reward, terminated, truncated
-SHIP_DRAW = np.uint64(1 << 40)  # number of the draw of an episode's ship, apart from those of its task
-# NumPy's numbers, since a function is compiled anew for each literal that it is called with
+OF_STATE = (
+    1 << 40
+)  # added to the offset of a row that stands in the state, not in the result
+N_STEP, N_STEP_FLAGS = (
+    3,
+    2,
+)  # of outcomes and flags, what `step` answers: reward, terminated, truncated
+SHIP_DRAW = np.uint64(
+    1 << 40
+)  # number of the draw of an episode's ship, apart from those of its task
+# NumPy's numbers, since a function is compiled anew for each literal that it is called
+# with
 FIRST_LANE: Any = np.int64(0)
 WHOLE: Any = np.bool_(True)
 ANSWERED: Any = np.bool_(False)  # all rows but what `step` answers
-# Lanes are sailed in whole vectors, whose arithmetic may be contracted otherwise than that of a single lane,
-# so that results do not depend on the number of ships.
+# Lanes are sailed in whole vectors, whose arithmetic may be contracted otherwise than
+# that of a single lane, so that results do not depend on the number of ships.
 GROUP = 16
 
 
@@ -69,10 +123,18 @@ class Tile(NamedTuple):
     """64 ships and what they need, as arrays."""
 
     state: Any  # float64 (n_rows * 64,)
-    result: Any  # float64 (n_result_rows * 64,), what comes of the interval; room that all tiles share
-    keys: Any  # uint64 (3, 64): seed and number of each episode, and the state of its sea's random numbers
-    ships: Any  # float64 (n_ship_rows * 64,), or (n_ship_rows,) where all lanes share one
-    pool: Any  # float64 (n_pool, n_ship_rows): of which each episode draws one, or none for those of `ships`
+    # float64 (n_result_rows * 64,), what comes of the interval; room that all tiles
+    # share
+    result: Any
+    # uint64 (3, 64): seed and number of each episode, and the state of its sea's random
+    # numbers
+    keys: Any
+    ships: (
+        Any  # float64 (n_ship_rows * 64,), or (n_ship_rows,) where all lanes share one
+    )
+    # float64 (n_pool, n_ship_rows): of which each episode draws one, or none for those
+    # of `ships`
+    pool: Any
     settings: Any  # float64: `Rules`, settings of the sensor set, settings of the task
     first: int  # number of its first lane
     lanes: int  # how many there are
@@ -81,7 +143,9 @@ class Tile(NamedTuple):
 class Shown(NamedTuple):
     """What users are given of all ships."""
 
-    rows: Any  # int64: how many observations, outcomes and flags there are, then the offsets of their rows
+    # int64: how many observations, outcomes and flags there are, then the offsets of
+    # their rows
+    rows: Any
     observations: Any  # float32 (n, n_observations)
     outcomes: Any  # float64 (n_outcomes, n): reward, terminated, truncated, then info
     flags: Any  # bool (n_flags, n): terminated, truncated, then those of info
@@ -113,9 +177,15 @@ def tile_of(fleet: Fleet, number: int) -> Tile:
     """One tile of a fleet."""
     first = number * LANES
     return Tile(
-        fleet.states[number], fleet.result, fleet.keys[number], fleet.ships[number % fleet.ships.shape[0]],
-        fleet.pool, fleet.settings, first, min(fleet.n_ships - first, LANES),
-    )  # fmt: skip
+        fleet.states[number],
+        fleet.result,
+        fleet.keys[number],
+        fleet.ships[number % fleet.ships.shape[0]],
+        fleet.pool,
+        fleet.settings,
+        first,
+        min(fleet.n_ships - first, LANES),
+    )
 
 
 def take_commands(tile: Tile, actions: Any) -> None:
@@ -126,18 +196,28 @@ def take_commands(tile: Tile, actions: Any) -> None:
         over = course.ended != 0.0
         rudder = clip(float(actions[0, np.uintp(first + lane)]), -1.0, 1.0)
         course = Course(
-            pick(over, course.rudder_command, rudder), course.shaft_command, motion.delta,
-            course.steps + (1.0 - course.ended), course.ended, 0.0,
-        )  # fmt: skip
+            pick(over, course.rudder_command, rudder),
+            course.shaft_command,
+            motion.delta,
+            course.steps + (1.0 - course.ended),
+            course.ended,
+            0.0,
+        )
         store_course(state, lane, course)
     if actions.shape[0] > 1:
         for lane in range(tile.lanes):
             course = load_course(state, lane)
-            shaft = clip(float(actions[1, np.uintp(first + lane)]), rules.least_shaft, 1.0)
+            shaft = clip(
+                float(actions[1, np.uintp(first + lane)]), rules.least_shaft, 1.0
+            )
             course = Course(
-                course.rudder_command, pick(course.ended != 0.0, course.shaft_command, shaft),
-                course.rudder_before, course.steps, course.ended, course.ran_away,
-            )  # fmt: skip
+                course.rudder_command,
+                pick(course.ended != 0.0, course.shaft_command, shaft),
+                course.rudder_before,
+                course.steps,
+                course.ended,
+                course.ran_away,
+            )
             store_course(state, lane, course)
 
 
@@ -148,8 +228,15 @@ def sail_lanes(tile: Tile, h: float, groups: int) -> None:
     for lane in range(groups * GROUP):
         ship, coefficients = ship_at(common, tile.ships, lane)
         p = sea_at(sea_common, tile.ships, lane)
-        before, course, sea = load_motion(state, lane), load_course(state, lane), load_sea(state, lane)
-        rudder, shaft = course.rudder_command * ship.rudder_limit, course.shaft_command * ship.shaft
+        before, course, sea = (
+            load_motion(state, lane),
+            load_course(state, lane),
+            load_sea(state, lane),
+        )
+        rudder, shaft = (
+            course.rudder_command * ship.rudder_limit,
+            course.shaft_command * ship.shaft,
+        )
         after = sail(before, rudder, shaft, h, push(before, sea, p), coefficients, ship)
         store_motion(state, lane, end_of_step(tile, lane, after, h, ship, p))
 
@@ -157,7 +244,11 @@ def sail_lanes(tile: Tile, h: float, groups: int) -> None:
 def end_of_step(tile: Tile, lane: int, after: Any, h: float, ship: Any, p: Any) -> Any:
     """Where a ship is after her step of h seconds; the sea of parameters p goes on."""
     state, words = tile.state, tile.keys[2]
-    before, course, sea = load_motion(state, lane), load_course(state, lane), load_sea(state, lane)
+    before, course, sea = (
+        load_motion(state, lane),
+        load_course(state, lane),
+        load_sea(state, lane),
+    )
     away = lost(after, ship)
     over = course.ended != 0.0
     motion = choose_motion(away | over, before, after)
@@ -172,29 +263,48 @@ def end_of_step(tile: Tile, lane: int, after: Any, h: float, ship: Any, p: Any) 
 def conclude_lanes(tile: Tile, groups: int) -> tuple[int, int]:
     """Reward, readings and observations of an interval that is over.
 
-    Returns in how many lanes of the tile something is due, and how many episodes have just ended; lanes
-    beyond them, up to so many groups, fill vectors.
+    Returns in how many lanes of the tile something is due, and how many episodes have
+    just ended; lanes beyond them, up to so many groups, fill vectors.
     """
     state, result, keys, settings = tile.state, tile.result, tile.keys, tile.settings
-    rules, sensor, asked = read_rules(settings, 0), read_sensor(settings, 0), read_settings(settings, 0)
-    common, view, sea_common = common_ship(tile.ships), common_view(tile.ships), common_sea(tile.ships)
+    rules, sensor, asked = (
+        read_rules(settings, 0),
+        read_sensor(settings, 0),
+        read_settings(settings, 0),
+    )
+    common, view, sea_common = (
+        common_ship(tile.ships),
+        common_view(tile.ships),
+        common_sea(tile.ships),
+    )
     worst = worst_cost(asked)
     n_due, n_ended = 0, 0
     for lane in range(groups * GROUP):
         ship, _ = ship_at(common, tile.ships, lane)
         data, scale = view_at(view, tile.ships, lane)
-        motion, course, sea = load_motion(state, lane), load_course(state, lane), load_sea(state, lane)
+        motion, course, sea = (
+            load_motion(state, lane),
+            load_course(state, lane),
+            load_sea(state, lane),
+        )
         before, memory = load_state(state, lane), load_memory(state, lane)
         distance = envelope_distance(motion, data)
         beyond = pick(outside_range(motion, data) | (distance > 1.0), 1.0, 0.0)
         interval = Interval(
-            rules.dt, course.steps, course.rudder_before, course.rudder_command, course.shaft_command,
-            distance, beyond,
-        )  # fmt: skip
+            rules.dt,
+            course.steps,
+            course.rudder_before,
+            course.rudder_command,
+            course.shaft_command,
+            distance,
+            beyond,
+        )
         after, parts, failed, arrived = task_step(motion, before, interval, ship, asked)
 
         going, over = 1.0 - course.ended, course.ended != 0.0
-        wrecked = going * pick(failed | (distance > rules.largest_distance), 1.0, course.ran_away)
+        wrecked = going * pick(
+            failed | (distance > rules.largest_distance), 1.0, course.ran_away
+        )
         terminated = max(wrecked, going * pick(arrived, 1.0, 0.0))
         late = pick(course.steps >= rules.time_limit, going, 0.0)
         end = -(wrecked * worst * (rules.time_limit - course.steps))
@@ -203,20 +313,30 @@ def conclude_lanes(tile: Tile, groups: int) -> tuple[int, int]:
         reward = total_reward(earned) + end
         after = choose_state(over, before, after)
         random = Random(keys[0, lane], keys[1, lane])
-        frequency = encounter_frequency(motion, sea, sea_at(sea_common, tile.ships, lane))
+        frequency = encounter_frequency(
+            motion, sea, sea_at(sea_common, tile.ships, lane)
+        )
         measured = measure(motion, sea, memory, frequency, interval, sensor, random)
         memory = choose_memory(over, memory, measured)
 
         store_ended(state, lane, ended)
         truncated = late * (1.0 - terminated)
-        store_outcome(result, lane, Outcome(reward, terminated, truncated, distance, beyond, end))
+        store_outcome(
+            result, lane, Outcome(reward, terminated, truncated, distance, beyond, end)
+        )
         store_reward(result, lane, earned)
         store_state(state, lane, after)
         store_memory(state, lane, memory)
         seen = readings(motion, sea, memory)
-        store_observation(result, lane, observe(seen, after, interval, ship, asked), scale)
+        store_observation(
+            result, lane, observe(seen, after, interval, ship, asked), scale
+        )
         real = lane < tile.lanes
-        n_due += 1 if due(motion, after, interval, ship, asked) & (ended == 0.0) & real else 0
+        n_due += (
+            1
+            if due(motion, after, interval, ship, asked) & (ended == 0.0) & real
+            else 0
+        )
         n_ended += 1 if (max(terminated, late) > 0.0) & real else 0
     return n_due, n_ended
 
@@ -225,9 +345,14 @@ def interval_of(tile: Tile, lane: int) -> Interval:
     """The interval of a lane, as it was concluded."""
     course, outcome = load_course(tile.state, lane), load_outcome(tile.result, lane)
     return Interval(
-        read_rules(tile.settings, 0).dt, course.steps, course.rudder_before, course.rudder_command,
-        course.shaft_command, outcome.envelope_distance, outcome.extrapolating,
-    )  # fmt: skip
+        read_rules(tile.settings, 0).dt,
+        course.steps,
+        course.rudder_before,
+        course.rudder_command,
+        course.shaft_command,
+        outcome.envelope_distance,
+        outcome.extrapolating,
+    )
 
 
 def observe_lane(tile: Tile, lane: int) -> None:
@@ -235,8 +360,12 @@ def observe_lane(tile: Tile, lane: int) -> None:
     state, asked = tile.state, read_settings(tile.settings, 0)
     ship, _ = ship_at(common_ship(tile.ships), tile.ships, lane)
     _, scale = view_at(common_view(tile.ships), tile.ships, lane)
-    seen = readings(load_motion(state, lane), load_sea(state, lane), load_memory(state, lane))
-    observation = observe(seen, load_state(state, lane), interval_of(tile, lane), ship, asked)
+    seen = readings(
+        load_motion(state, lane), load_sea(state, lane), load_memory(state, lane)
+    )
+    observation = observe(
+        seen, load_state(state, lane), interval_of(tile, lane), ship, asked
+    )
     store_observation(tile.result, lane, observation, scale)
 
 
@@ -244,12 +373,23 @@ def let_events_come(tile: Tile) -> None:
     """Rare events, such as a new set-point, in the lanes in which one is due."""
     state, asked = tile.state, read_settings(tile.settings, 0)
     for lane in range(tile.lanes):
-        course, motion, before = load_course(state, lane), load_motion(state, lane), load_state(state, lane)
+        course, motion, before = (
+            load_course(state, lane),
+            load_motion(state, lane),
+            load_state(state, lane),
+        )
         ship, _ = ship_at(common_ship(tile.ships), tile.ships, lane)
         interval = interval_of(tile, lane)
         if course.ended == 0.0 and due(motion, before, interval, ship, asked):
-            random, plan = Random(tile.keys[0, lane], tile.keys[1, lane]), plan_of(state, lane)
-            store_state(state, lane, on_event(motion, before, interval, ship, asked, random, plan))
+            random, plan = (
+                Random(tile.keys[0, lane], tile.keys[1, lane]),
+                plan_of(state, lane),
+            )
+            store_state(
+                state,
+                lane,
+                on_event(motion, before, interval, ship, asked, random, plan),
+            )
             observe_lane(tile, lane)
 
 
@@ -263,12 +403,20 @@ def show(tile: Tile, shown: Shown, whole: bool, begin: int, end: int) -> None:
             shown.observations[np.uintp(first + lane), k] = result[np.uintp(row + lane)]
     at += rows[0]
     for k in range(0 if whole else N_STEP, rows[1]):
-        source, row = (state, rows[at + k] - OF_STATE) if rows[at + k] >= OF_STATE else (result, rows[at + k])
+        source, row = (
+            (state, rows[at + k] - OF_STATE)
+            if rows[at + k] >= OF_STATE
+            else (result, rows[at + k])
+        )
         for lane in range(begin, end):
             shown.outcomes[k, np.uintp(first + lane)] = source[np.uintp(row + lane)]
     at += rows[1]
     for k in range(0 if whole else N_STEP_FLAGS, rows[2]):
-        source, row = (state, rows[at + k] - OF_STATE) if rows[at + k] >= OF_STATE else (result, rows[at + k])
+        source, row = (
+            (state, rows[at + k] - OF_STATE)
+            if rows[at + k] >= OF_STATE
+            else (result, rows[at + k])
+        )
         for lane in range(begin, end):
             shown.flags[k, np.uintp(first + lane)] = source[np.uintp(row + lane)] > 0.0
 
@@ -278,7 +426,9 @@ def begin_lane(tile: Tile, lane: int) -> None:
     state, result, keys, pool = tile.state, tile.result, tile.keys, tile.pool
     random = Random(keys[0, lane], keys[1, lane])
     if pool.shape[0] > 0:
-        number = int(uniform(random.key, random.episode, SHIP_DRAW, 0.0, float(pool.shape[0])))
+        number = int(
+            uniform(random.key, random.episode, SHIP_DRAW, 0.0, float(pool.shape[0]))
+        )
         for row in range(pool.shape[1]):
             tile.ships[row * LANES + lane] = pool[number, row]
     for row in range(0, len(state) // LANES):
@@ -299,7 +449,9 @@ def begin_lane(tile: Tile, lane: int) -> None:
     sea, sensor = load_sea(state, lane), read_sensor(tile.settings, 0)
     frequency = encounter_frequency(motion, sea, p)
     memory = load_memory(state, lane)
-    memory = measure(motion, sea, memory, frequency, interval_of(tile, lane), sensor, random)
+    memory = measure(
+        motion, sea, memory, frequency, interval_of(tile, lane), sensor, random
+    )
     store_memory(state, lane, memory)
     observe_lane(tile, lane)
 
@@ -323,8 +475,8 @@ def are_finite(actions: Any) -> bool:
 def reset(fleet: Fleet, shown: Shown, which: Any, next_one: bool) -> None:
     """Begin an episode in the lanes of `which`, bool of shape (n,), and show it.
 
-    It is the one of the keys, or, with `next_one`, the next one under the key, whose lane keeps reward and
-    flags of the last step.
+    It is the one of the keys, or, with `next_one`, the next one under the key, whose
+    lane keeps reward and flags of the last step.
     """
     for number in range(fleet.states.shape[0]):
         tile = tile_of(fleet, number)
@@ -337,13 +489,21 @@ def reset(fleet: Fleet, shown: Shown, which: Any, next_one: bool) -> None:
                     show(tile, shown, WHOLE, lane, lane + 1)
 
 
-def step(fleet: Fleet, shown: Shown, actions: Any, first_tile: int, end_tile: int, next_ones: bool) -> int:
+def step(
+    fleet: Fleet,
+    shown: Shown,
+    actions: Any,
+    first_tile: int,
+    end_tile: int,
+    next_ones: bool,
+) -> int:
     """One control interval of the tiles from `first_tile` up to `end_tile`.
 
-    `actions` holds rows of commands, float32 of shape (n_commands, n): of the rudder and, if there is a
-    second, of the shaft. A lane whose episode was over stays as it is and earns nothing, or, with
-    `next_ones`, begins its next episode. Returns the number of episodes that ended, or `REFUSED`, nothing
-    changed, if a command is not finite.
+    `actions` holds rows of commands, float32 of shape (n_commands, n): of the rudder
+    and, if there is a second, of the shaft. A lane whose episode was over stays as it
+    is and earns nothing, or, with `next_ones`, begins its next episode. Returns the
+    number of episodes that ended, or `REFUSED`, nothing changed, if a command is not
+    finite.
     """
     if not are_finite(actions):
         return REFUSED
@@ -376,17 +536,26 @@ STEP, STEP_AND_BEGIN, BEGIN, BEGIN_NEXT = range(4)  # what `run` may be asked fo
 def run(world: Any, asked: int) -> int:
     """`step` or `reset` of arrays that are given by their addresses and shapes, by turns.
 
-    To look at a dozen arrays takes the interpreter longer than to sail a ship. In `world`, int64, stand
-    states, keys, settings, pool, ships, rows, lanes to begin, actions, observations, outcomes and flags, then
-    the first tile of a step, the one behind its last, and room for the result of a tile. Asked is `STEP`,
-    `STEP_AND_BEGIN` (episodes that were over begin anew), or `BEGIN` or `BEGIN_NEXT` in some lanes.
+    To look at a dozen arrays takes the interpreter longer than to sail a ship. In
+    `world`, int64, stand states, keys, settings, pool, ships, rows, lanes to begin,
+    actions, observations, outcomes and flags, then the first tile of a step, the one
+    behind its last, and room for the result of a tile. Asked is `STEP`,
+    `STEP_AND_BEGIN` (episodes that were over begin anew), or `BEGIN` or `BEGIN_NEXT` in
+    some lanes.
     """
     actions, observations = single_table_at(world, 19), single_table_at(world, 22)
-    shown = Shown(rows_at(world, 15), observations, table_at(world, 25), flag_table_at(world, 28))
+    shown = Shown(
+        rows_at(world, 15), observations, table_at(world, 25), flag_table_at(world, 28)
+    )
     fleet = Fleet(
-        table_at(world, 0), numbers_at(world, 33), words_at(world, 3), table_at(world, 12),
-        table_at(world, 9), numbers_at(world, 7), observations.shape[0],
-    )  # fmt: skip
+        table_at(world, 0),
+        numbers_at(world, 33),
+        words_at(world, 3),
+        table_at(world, 12),
+        table_at(world, 9),
+        numbers_at(world, 7),
+        observations.shape[0],
+    )
     if asked >= BEGIN:
         reset(fleet, shown, flags_at(world, 17), asked == BEGIN_NEXT)
         return 0

@@ -1,10 +1,11 @@
 """Sine, cosine, exponential, arc tangent and the like, in forms that are vectorised in loops.
 
-Calls into the C library would stop the loop over lanes from being vectorised. Sine and cosine:
-Cody-Waite reduction to [-pi/4, pi/4] and the minimax polynomials of fdlibm (`k_sin.c`, `k_cos.c`,
-Sun Microsystems 1993); error below 2e-16 for |x| < 1e5. Exponential: the same reduction to
-[-ln 2 / 2, ln 2 / 2] and the polynomial of `e_exp.c`. Arc tangent: reduction to |x| < 0.66 and the rational
-function of the Cephes library (`atan.c`, Moshier 1995).
+Calls into the C library would stop the loop over lanes from being vectorised. Sine and
+cosine: Cody-Waite reduction to [-pi/4, pi/4] and the minimax polynomials of fdlibm
+(`k_sin.c`, `k_cos.c`, Sun Microsystems 1993); error below 2e-16 for |x| < 1e5.
+Exponential: the same reduction to [-ln 2 / 2, ln 2 / 2] and the polynomial of
+`e_exp.c`. Arc tangent: reduction to |x| < 0.66 and the rational function of the Cephes
+library (`atan.c`, Moshier 1995).
 """
 
 from math import copysign, fabs, pi
@@ -17,9 +18,15 @@ HALF_PI_LOW = 6.07710050650619224932e-11
 PER_LN_2 = 1.44269504088896338700e00
 LN_2_HIGH = 6.93147180369123816490e-01
 LN_2_LOW = 1.90821492927058770002e-10
-LOWEST, HIGHEST = -746.0, 710.0  # exponents beyond which the exponential is 0 or infinite
-SHIFT = 6755399441055744.0  # 1.5 * 2^52: a number added to it loses what is behind the point
-EXPONENT = 4503599627370496.0 + 1023.0  # added to a whole number: its biased exponent in the lowest bits
+LOWEST, HIGHEST = (
+    -746.0,
+    710.0,
+)  # exponents beyond which the exponential is 0 or infinite
+# 1.5 * 2^52: a number added to it loses what is behind the point
+SHIFT = 6755399441055744.0
+EXPONENT = (
+    4503599627370496.0 + 1023.0
+)  # added to a whole number: its biased exponent in the lowest bits
 TAN_3_PI_OVER_8 = 2.41421356237309504880
 HALF_PI_REST = 6.12323399573676588613e-17  # pi / 2 less its double
 
@@ -43,14 +50,22 @@ def sine_polynomial(y: float, z: float) -> float:
     """Sine of y within [-pi/4, pi/4]; z is its square."""
     rest = -2.50507602534068634195e-08 + z * 1.58969099521155010221e-10
     rest = -1.98412698298579493134e-04 + z * (2.75573137070700676789e-06 + z * rest)
-    return y + y * z * (-1.66666666666666324348e-01 + z * (8.33333333332248946124e-03 + z * rest))
+    return y + y * z * (
+        -1.66666666666666324348e-01 + z * (8.33333333332248946124e-03 + z * rest)
+    )
 
 
 def cosine_polynomial(z: float) -> float:
     """Cosine of an angle within [-pi/4, pi/4]; z is its square."""
     rest = 2.08757232129817482790e-09 - z * 1.13596475577881948265e-11
     rest = 2.48015872894767294178e-05 + z * (-2.75573143513906633035e-07 + z * rest)
-    return 1.0 - 0.5 * z + z * z * (4.16666666666666019037e-02 + z * (-1.38888888888741095749e-03 + z * rest))
+    return (
+        1.0
+        - 0.5 * z
+        + z
+        * z
+        * (4.16666666666666019037e-02 + z * (-1.38888888888741095749e-03 + z * rest))
+    )
 
 
 def sin_cos(x: float) -> tuple[float, float]:
@@ -119,8 +134,12 @@ def exponential(x: float) -> float:
     low = k * LN_2_LOW
     y = high - low
     z = y * y
-    rest = 6.61375632143793436117e-05 + z * (-1.65339022054652515390e-06 + z * 4.13813679705723846039e-08)
-    c = y - z * (1.66666666666666019037e-01 + z * (-2.77777777770155933842e-03 + z * rest))
+    rest = 6.61375632143793436117e-05 + z * (
+        -1.65339022054652515390e-06 + z * 4.13813679705723846039e-08
+    )
+    c = y - z * (
+        1.66666666666666019037e-01 + z * (-2.77777777770155933842e-03 + z * rest)
+    )
     mantissa = 1.0 - ((low - y * c / (2.0 - c)) - high)
     half = nearest(0.5 * k - 0.25)  # in two steps, for the subnormal numbers
     value = mantissa * power_of_two(half) * power_of_two(k - half)
@@ -133,10 +152,15 @@ def two_to(x: float) -> float:
     shifted = within + (SHIFT + 1023.0)  # in its lowest bits the biased exponent
     f = within - (shifted - (SHIFT + 1023.0))
     mantissa = 0.00015403433646322688 + f * (
-        1.5252654813770773e-05 + f * (1.3259667128066899e-06 + f * 1.0209003757888788e-07)
+        1.5252654813770773e-05
+        + f * (1.3259667128066899e-06 + f * 1.0209003757888788e-07)
     )
-    mantissa = 0.05550410866438316 + f * (0.009618129194101738 + f * (0.001333355823666942 + f * mantissa))
-    mantissa = 1.0000000000000144 + f * (0.6931471805599516 + f * (0.24022650695639336 + f * mantissa))
+    mantissa = 0.05550410866438316 + f * (
+        0.009618129194101738 + f * (0.001333355823666942 + f * mantissa)
+    )
+    mantissa = 1.0000000000000144 + f * (
+        0.6931471805599516 + f * (0.24022650695639336 + f * mantissa)
+    )
     return mantissa * power_of_bits(shifted)
 
 
@@ -149,7 +173,9 @@ def arctan2(y: float, x: float) -> float:
     below = a if steep else (a + b if middling else b)
     q = above / (below if below > 0.0 else 1.0)
     z = q * q
-    p = -7.500855792314704667340e01 + z * (-1.615753718733365076637e01 + z * -8.750608600031904122785e-01)
+    p = -7.500855792314704667340e01 + z * (
+        -1.615753718733365076637e01 + z * -8.750608600031904122785e-01
+    )
     p = -6.485021904942025371773e01 + z * (-1.228866684490136173410e02 + z * p)
     d = 1.650270098316988542046e02 + z * (2.485846490142306297962e01 + z)
     d = 4.853903996359136964868e02 + z * (4.328810604912902668951e02 + z * d)

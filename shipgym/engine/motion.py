@@ -1,6 +1,7 @@
 """One ship through one time step: kinematics, steering gear and classical Runge-Kutta.
 
-Equations: Fossen 2011, Handbook of Marine Craft Hydrodynamics and Motion Control, 2.2 (kinematics).
+Equations: Fossen 2011, Handbook of Marine Craft Hydrodynamics and Motion Control, 2.2
+(kinematics).
 """
 
 from math import fabs
@@ -8,7 +9,8 @@ from typing import Any, NamedTuple
 
 from shipgym.engine.mathematics import clip, sin_cos, small_cosine, turn_sin_cos
 
-# a state beyond these multiples of service speed and of yaw rate U0 / L belongs to no ship
+# a state beyond these multiples of service speed and of yaw rate U0 / L belongs to no
+# ship
 RUNAWAY_SPEED = 3.0
 RUNAWAY_YAW_RATE = 6.0
 CAPSIZED = 1.5707963267948966  # rad; nor does it heel beyond a right angle
@@ -37,10 +39,12 @@ class Ship(NamedTuple):
     speed: float  # m/s, service speed
     rudder_limit: float  # rad
     rudder_rate: float  # rad/s
-    gear_frequency: float  # 1/s, inverse of the steering gear's time constant; 0: ramp at constant rate
+    # 1/s, inverse of the steering gear's time constant; 0: ramp at constant rate
+    gear_frequency: float
     shaft: float  # 1/s, shaft speed at service speed
     water_depth: float  # m
-    scale_speed: float  # m/s, by which observations and costs are scaled: as a rule the service speed
+    # m/s, by which observations and costs are scaled: as a rule the service speed
+    scale_speed: float
 
 
 class Push(NamedTuple):
@@ -68,16 +72,21 @@ class Rates(NamedTuple):
     n: float
 
 
-# What ship, gear and sea have is known when they are compiled, so that what they lack costs nothing.
+# What ship, gear and sea have is known when they are compiled, so that what they lack
+# costs nothing.
 HAS_ROLL, HAS_SHAFT, HAS_MEMORY, HAS_LAG, HAS_SEA = True, True, True, True, True
 
 
-def accelerations(motion: Motion, coefficients: Any, ship: Ship) -> tuple[float, float, float, float, float]:
+def accelerations(
+    motion: Motion, coefficients: Any, ship: Ship
+) -> tuple[float, float, float, float, float]:
     """Accelerations in surge, sway, yaw, roll and of the memory of yaw; the ship's own take its place."""
     return 0.0, 0.0, 0.0, 0.0, 0.0
 
 
-def shaft_acceleration(n: float, command: float, coefficients: Any, ship: Ship) -> float:
+def shaft_acceleration(
+    n: float, command: float, coefficients: Any, ship: Ship
+) -> float:
     """Acceleration of a shaft whose speed is a state, 1/s^2; the ship's own takes its place."""
     return 0.0
 
@@ -85,11 +94,15 @@ def shaft_acceleration(n: float, command: float, coefficients: Any, ship: Ship) 
 def gear_rate(delta: float, order: float, ship: Ship) -> float:
     """Rate of a steering gear with a lag, limited in rate, rad/s; 0 for a gear without lag."""
     if HAS_LAG:
-        return clip((order - delta) * ship.gear_frequency, -ship.rudder_rate, ship.rudder_rate)
+        return clip(
+            (order - delta) * ship.gear_frequency, -ship.rudder_rate, ship.rudder_rate
+        )
     return 0.0
 
 
-def rudder_after(delta: float, rate: float, order: float, h: float, ship: Ship) -> float:
+def rudder_after(
+    delta: float, rate: float, order: float, h: float, ship: Ship
+) -> float:
     """Rudder angle a time h later: along the slope `rate`, or, without lag, up a ramp to the order."""
     if HAS_LAG:
         return delta + h * rate
@@ -101,7 +114,11 @@ def rudder_velocity(delta: float, order: float, ship: Ship) -> float:
     """Rate at which the rudder moves now, rad/s, with or without lag."""
     if HAS_LAG:
         return gear_rate(delta, order, ship)
-    return 0.0 if order == delta else (ship.rudder_rate if order > delta else -ship.rudder_rate)
+    return (
+        0.0
+        if order == delta
+        else (ship.rudder_rate if order > delta else -ship.rudder_rate)
+    )
 
 
 def upright(motion: Motion) -> float:
@@ -114,30 +131,58 @@ def ground_velocity(motion: Motion, north: float, east: float) -> tuple[float, f
     ahead, aside = motion.u, motion.v * upright(motion)
     if HAS_SEA:
         sine, cosine = sin_cos(motion.psi)
-        return ahead + north * cosine + east * sine, aside + east * cosine - north * sine
+        return (
+            ahead + north * cosine + east * sine,
+            aside + east * cosine - north * sine,
+        )
     return ahead, aside
 
 
-def rates(motion: Motion, order: float, shaft: float, push: Push, coefficients: Any, ship: Ship) -> Rates:
+def rates(
+    motion: Motion,
+    order: float,
+    shaft: float,
+    push: Push,
+    coefficients: Any,
+    ship: Ship,
+) -> Rates:
     """Time derivative of a state."""
     udot, vdot, rdot, pdot, qdot = accelerations(motion, coefficients, ship)
     if HAS_SEA:
-        udot, vdot, rdot, pdot = udot + push.u, vdot + push.v, rdot + push.r, pdot + push.p
+        udot, vdot, rdot, pdot = (
+            udot + push.u,
+            vdot + push.v,
+            rdot + push.r,
+            pdot + push.p,
+        )
     return Rates(
-        psi=motion.r * upright(motion), u=udot, v=vdot, r=rdot, p=pdot, phi=motion.p, q=qdot,
-        delta=gear_rate(motion.delta, order, ship), n=shaft_acceleration(motion.n, shaft, coefficients, ship),
-    )  # fmt: skip
+        psi=motion.r * upright(motion),
+        u=udot,
+        v=vdot,
+        r=rdot,
+        p=pdot,
+        phi=motion.p,
+        q=qdot,
+        delta=gear_rate(motion.delta, order, ship),
+        n=shaft_acceleration(motion.n, shaft, coefficients, ship),
+    )
 
 
 def along(start: Motion, k: Rates, h: float, delta: float) -> Motion:
     """The state h seconds along the rates k, with the rudder at delta; what the ship lacks stays."""
     return Motion(
-        x=start.x, y=start.y, psi=start.psi + h * k.psi,
-        u=start.u + h * k.u, v=start.v + h * k.v, r=start.r + h * k.r,
-        p=start.p + h * k.p if HAS_ROLL else 0.0, phi=start.phi + h * k.phi if HAS_ROLL else 0.0,
+        x=start.x,
+        y=start.y,
+        psi=start.psi + h * k.psi,
+        u=start.u + h * k.u,
+        v=start.v + h * k.v,
+        r=start.r + h * k.r,
+        p=start.p + h * k.p if HAS_ROLL else 0.0,
+        phi=start.phi + h * k.phi if HAS_ROLL else 0.0,
         q=start.q + h * k.q if HAS_MEMORY else 0.0,
-        delta=delta, n=start.n + h * k.n if HAS_SHAFT else start.n,
-    )  # fmt: skip
+        delta=delta,
+        n=start.n + h * k.n if HAS_SHAFT else start.n,
+    )
 
 
 def stage(start: Motion, k: Rates, h: float, order: float, ship: Ship) -> Motion:
@@ -149,11 +194,15 @@ def weighted(a: Rates, b: Rates, c: Rates, d: Rates) -> Rates:
     """Runge and Kutta's sum of four slopes, six times their mean."""
     return Rates(
         psi=a.psi + 2.0 * (b.psi + c.psi) + d.psi,
-        u=a.u + 2.0 * (b.u + c.u) + d.u, v=a.v + 2.0 * (b.v + c.v) + d.v, r=a.r + 2.0 * (b.r + c.r) + d.r,
-        p=a.p + 2.0 * (b.p + c.p) + d.p, phi=a.phi + 2.0 * (b.phi + c.phi) + d.phi,
+        u=a.u + 2.0 * (b.u + c.u) + d.u,
+        v=a.v + 2.0 * (b.v + c.v) + d.v,
+        r=a.r + 2.0 * (b.r + c.r) + d.r,
+        p=a.p + 2.0 * (b.p + c.p) + d.p,
+        phi=a.phi + 2.0 * (b.phi + c.phi) + d.phi,
         q=a.q + 2.0 * (b.q + c.q) + d.q,
-        delta=a.delta + 2.0 * (b.delta + c.delta) + d.delta, n=a.n + 2.0 * (b.n + c.n) + d.n,
-    )  # fmt: skip
+        delta=a.delta + 2.0 * (b.delta + c.delta) + d.delta,
+        n=a.n + 2.0 * (b.n + c.n) + d.n,
+    )
 
 
 def way(motion: Motion) -> tuple[float, float]:
@@ -164,16 +213,34 @@ def way(motion: Motion) -> tuple[float, float]:
 
 
 def sail(
-    motion: Motion, rudder: float, shaft: float, h: float, push: Push, coefficients: Any, ship: Ship
+    motion: Motion,
+    rudder: float,
+    shaft: float,
+    h: float,
+    push: Push,
+    coefficients: Any,
+    ship: Ship,
 ) -> Motion:
     """State after one classical Runge-Kutta step of h seconds with the commands held, rad and 1/s.
 
-    The way made is summed in the frame of the heading at the start and turned once: the stages are but a
-    small angle away from it, whose sine and cosine cost little.
+    The way made is summed in the frame of the heading at the start and turned once: the
+    stages are but a small angle away from it, whose sine and cosine cost little.
     """
     order = clip(rudder, -ship.rudder_limit, ship.rudder_limit)
     n = motion.n if HAS_SHAFT else shaft
-    one = Motion(0.0, 0.0, 0.0, motion.u, motion.v, motion.r, motion.p, motion.phi, motion.q, motion.delta, n)
+    one = Motion(
+        0.0,
+        0.0,
+        0.0,
+        motion.u,
+        motion.v,
+        motion.r,
+        motion.p,
+        motion.phi,
+        motion.q,
+        motion.delta,
+        n,
+    )
     a = rates(one, order, shaft, push, coefficients, ship)
     two = stage(one, a, 0.5 * h, order, ship)
     b = rates(two, order, shaft, push, coefficients, ship)
@@ -186,22 +253,48 @@ def sail(
     ahead_4, aside_4 = way(four)
     ahead = one.u + 2.0 * (ahead_2 + ahead_3) + ahead_4
     aside = one.v * upright(one) + 2.0 * (aside_2 + aside_3) + aside_4
-    return arrival(motion, one, weighted(a, b, c, d), ahead, aside, order, h, push, ship)
+    return arrival(
+        motion, one, weighted(a, b, c, d), ahead, aside, order, h, push, ship
+    )
 
 
 def arrival(
-    motion: Motion, one: Motion, k: Rates, ahead: float, aside: float, order: float, h: float, push: Push,
+    motion: Motion,
+    one: Motion,
+    k: Rates,
+    ahead: float,
+    aside: float,
+    order: float,
+    h: float,
+    push: Push,
     ship: Ship,
-) -> Motion:  # fmt: skip
+) -> Motion:
     """State after a step from what its stages sum up to: rates, and the way made from the state `one`."""
     sixth = h / 6.0
-    end = along(one, k, sixth, rudder_after(one.delta, k.delta * (1.0 / 6.0), order, h, ship))
+    end = along(
+        one, k, sixth, rudder_after(one.delta, k.delta * (1.0 / 6.0), order, h, ship)
+    )
     ahead, aside = sixth * ahead, sixth * aside
     sine, cosine = sin_cos(motion.psi)
-    x, y = motion.x + (ahead * cosine - aside * sine), motion.y + (ahead * sine + aside * cosine)
+    x, y = (
+        motion.x + (ahead * cosine - aside * sine),
+        motion.y + (ahead * sine + aside * cosine),
+    )
     if HAS_SEA:
         x, y = x + h * push.north, y + h * push.east
-    return Motion(x, y, motion.psi + end.psi, end.u, end.v, end.r, end.p, end.phi, end.q, end.delta, end.n)
+    return Motion(
+        x,
+        y,
+        motion.psi + end.psi,
+        end.u,
+        end.v,
+        end.r,
+        end.p,
+        end.phi,
+        end.q,
+        end.delta,
+        end.n,
+    )
 
 
 def lost(motion: Motion, ship: Ship) -> bool:

@@ -12,19 +12,28 @@ from shipgym.python_files import LIBRARIES
 
 #: What Numba's reasons mean that do not say it.
 PLAINLY = {
-    r"Unsupported constraint encountered: raise .*": "the text of an error is put together, expected a "
-    "constant one",
-    r"Unknown attribute '(\w+)' of type Module\(<module '((?!numpy|math)[\w.]+)'.*": r"\2.\1 is looked up in "
-    r"its module, expected it to be imported by name: from \2 import \1",
-    r".*: setitem\(readonly array.*": "a global array is written, expected one that is only read",
+    r"Unsupported constraint encountered: raise .*": (
+        "the text of an error is put together, expected a constant one"
+    ),
+    r"Unknown attribute '(\w+)' of type Module\(<module '((?!numpy|math)[\w.]+)'.*": (
+        r"\2.\1 is looked up in "
+        r"its module, expected it to be imported by name: from \2 import \1"
+    ),
+    r".*: setitem\(readonly array.*": (
+        "a global array is written, expected one that is only read"
+    ),
 }
 
 
 def explanation(error: Exception, what: str) -> str:
     """Numba's reason in one sentence, with the function and the line of the innermost call."""
-    text = re.sub(r"\x1b\[[\d;]*m", "", str(error))  # in colour where colorama is installed
+    text = re.sub(
+        r"\x1b\[[\d;]*m", "", str(error)
+    )  # in colour where colorama is installed
     lines = [line.strip() for line in text.splitlines() if line.strip()]
-    reason = next((line for line in lines if not line.startswith("Failed in")), "no reason given")
+    reason = next(
+        (line for line in lines if not line.startswith("Failed in")), "no reason given"
+    )
     if reason.endswith("signature:"):
         reason = reason[: -len(" found for signature:")] + next(
             (f": {line[4:]}" for line in lines if line.startswith(">>> ")), ""
@@ -33,11 +42,19 @@ def explanation(error: Exception, what: str) -> str:
     own = text[: callee.start()] if callee else text  # behind it stands who calls it
     written = re.search(r"^def (\w+)\(", own, re.MULTILINE)
     function = written[1] if written else callee[2] if callee else ""
-    places = re.findall(r"(?:at|from) (\S+) \((\d+)\)", own) + re.findall(r'File "([^"]+)", line (\d+)', own)
-    users = (one for one in places if not str(Path(one[0]).resolve()).startswith(LIBRARIES))
+    places = re.findall(r"(?:at|from) (\S+) \((\d+)\)", own) + re.findall(
+        r'File "([^"]+)", line (\d+)', own
+    )
+    users = (
+        one for one in places if not str(Path(one[0]).resolve()).startswith(LIBRARIES)
+    )
     place = next(users, places[0] if places else None)
-    functions = (one.py_func for one in SHARED.values() if callee and hasattr(one, "py_func"))
-    code = next((one.__code__ for one in functions if one.__qualname__ == callee[1]), None)  # type: ignore[index]
+    functions = (
+        one.py_func for one in SHARED.values() if callee and hasattr(one, "py_func")
+    )
+    code = next(
+        (one.__code__ for one in functions if one.__qualname__ == callee[1]), None
+    )  # type: ignore[index]
     if code is not None:
         file, line = code.co_filename, place[1] if place else _line_of(code, reason)
     elif place:
@@ -53,7 +70,9 @@ def explanation(error: Exception, what: str) -> str:
 def _line_of(code: CodeType, reason: str) -> int:
     """The line in which a function names what a reason quotes, or its first."""
     lines = (
-        (i.positions and i.positions.lineno) for i in dis.get_instructions(code) if f"'{i.argval}'" in reason
+        (i.positions and i.positions.lineno)
+        for i in dis.get_instructions(code)
+        if f"'{i.argval}'" in reason
     )
     return next(filter(None, lines), code.co_firstlineno)
 

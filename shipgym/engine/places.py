@@ -1,7 +1,7 @@
 """Places that loops name and parts take: what a ship, a sea, a sensor set and a task put there.
 
-Each function stands for one that is given when a loop is compiled (`shipgym.engine.specialise`); the one here
-raises an error that names who gives it.
+Each function stands for one that is given when a loop is compiled
+(`shipgym.engine.specialise`); the one here raises an error that names who gives it.
 """
 
 from typing import Any
@@ -19,7 +19,9 @@ def __getattr__(name: str) -> Any:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 
     def place(*arguments: Any) -> Any:
-        raise RuntimeError(f"{name} is a place that {giver} fill when a loop is compiled")
+        raise RuntimeError(
+            f"{name} is a place that {giver} fill when a loop is compiled"
+        )
 
     place.__name__ = name
     return place

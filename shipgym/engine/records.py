@@ -1,8 +1,9 @@
 """Records and where their numbers stand.
 
-Numbers of many ships lie in tiles of 64 lanes, one lane a ship, row after row: a tile is a contiguous
-one-dimensional array, and lane `i` of row `k` is entry `64 k + i`. A single ship is a vector with one entry a
-row. Field order is row order, so no row number is written by hand.
+Numbers of many ships lie in tiles of 64 lanes, one lane a ship, row after row: a tile
+is a contiguous one-dimensional array, and lane `i` of row `k` is entry `64 k + i`. A
+single ship is a vector with one entry a row. Field order is row order, so no row number
+is written by hand.
 """
 
 import sys
@@ -18,7 +19,9 @@ Record = type[tuple[Any, ...]]
 
 def is_record(kind: Any) -> bool:
     """Whether a type is a `NamedTuple`."""
-    return isinstance(kind, type) and issubclass(kind, tuple) and hasattr(kind, "_fields")
+    return (
+        isinstance(kind, type) and issubclass(kind, tuple) and hasattr(kind, "_fields")
+    )
 
 
 class Table:
@@ -41,7 +44,9 @@ def is_table(kind: Any) -> bool:
 @cache
 def field_types(record: Record, notes: bool = False) -> dict[str, Any]:
     """Types of a record's fields, with or without what they are annotated with."""
-    return get_type_hints(record, globalns=vars(sys.modules[record.__module__]), include_extras=notes)
+    return get_type_hints(
+        record, globalns=vars(sys.modules[record.__module__]), include_extras=notes
+    )
 
 
 @cache
@@ -52,7 +57,9 @@ def leaves(record: Record, prefix: str = "") -> tuple[str, ...]:
         if is_table(kind):
             paths += [f"{prefix}{name}.{row}" for row in range(kind.rows)]
         else:
-            paths += leaves(kind, f"{prefix}{name}.") if is_record(kind) else [prefix + name]
+            paths += (
+                leaves(kind, f"{prefix}{name}.") if is_record(kind) else [prefix + name]
+            )
     return tuple(paths)
 
 
@@ -62,7 +69,9 @@ class Rows:
 
     record: Record  # a `NamedTuple` of floats, or of such records
     first: int  # row of its first number
-    present: tuple[str, ...]  # paths of the numbers that have a row; the others are 0 and not stored
+    present: tuple[
+        str, ...
+    ]  # paths of the numbers that have a row; the others are 0 and not stored
 
     def row(self, path: str) -> int:
         """Row of one number."""
@@ -81,7 +90,11 @@ class Layout:
         self.rows: dict[str, Rows] = {}
         end = 0
         for name, given in records.items():
-            record, present = given if isinstance(given, tuple) and not is_record(given) else (given, None)
+            record, present = (
+                given
+                if isinstance(given, tuple) and not is_record(given)
+                else (given, None)
+            )
             kept = tuple(n for n in leaves(record) if present is None or n in present)
             self.rows[name] = Rows(record, end, kept)
             end += len(kept)
@@ -93,7 +106,11 @@ class Layout:
 
 def is_list(kind: Any) -> bool:
     """Whether a field is a list of numbers; only the last one of settings may be."""
-    return kind not in (float, int, bool, Any) and not is_record(kind) and not is_table(kind)
+    return (
+        kind not in (float, int, bool, Any)
+        and not is_record(kind)
+        and not is_table(kind)
+    )
 
 
 def flat(record: Any) -> list[float]:

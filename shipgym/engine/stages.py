@@ -1,8 +1,9 @@
 """Many ships through a step stage by stage, for ships part of whose accelerations is a sum over a table.
 
-A loop over the rows of a table inside the loop over lanes would keep that one from being vectorised. So each
-stage of the Runge-Kutta step is finished in all lanes of a tile before the next one, and the loop over rows
-has that over lanes inside. What stands between the loops lies in the room for results.
+A loop over the rows of a table inside the loop over lanes would keep that one from
+being vectorised. So each stage of the Runge-Kutta step is finished in all lanes of a
+tile before the next one, and the loop over rows has that over lanes inside. What stands
+between the loops lies in the room for results.
 """
 
 from typing import Any, NamedTuple
@@ -11,10 +12,27 @@ from shipgym.engine.episodes import GROUP, Tile, end_of_step
 from shipgym.engine.mathematics import clip
 from shipgym.engine.motion import HAS_SHAFT, Motion, Rates, arrival, rates, stage, way
 from shipgym.engine.places import (
-    common_sea, common_ship, load_course, load_motion, load_passed, load_point, load_sea, load_slope,
-    load_sums, point_of, push, row_sums, sea_at, ship_at, store_motion, store_passed, store_point,
-    store_slope, store_sums, sum_accelerations,
-)  # fmt: skip
+    common_sea,
+    common_ship,
+    load_course,
+    load_motion,
+    load_passed,
+    load_point,
+    load_sea,
+    load_slope,
+    load_sums,
+    point_of,
+    push,
+    row_sums,
+    sea_at,
+    ship_at,
+    store_motion,
+    store_passed,
+    store_point,
+    store_slope,
+    store_sums,
+    sum_accelerations,
+)
 
 N_ROWS = 0  # part: of the table that is summed over, a multiple of
 ROWS_AT_ONCE = 4  # written out, so that sums are loaded and stored less often
@@ -59,7 +77,11 @@ def sail_lanes(tile: Tile, h: float, groups: int) -> None:
         for row in range(0, N_ROWS, ROWS_AT_ONCE):
             for lane in range(groups * GROUP):
                 _, coefficients = ship_at(common, tile.ships, lane)
-                at, sums, terms = load_point(result, lane), load_sums(result, lane), coefficients.terms
+                at, sums, terms = (
+                    load_point(result, lane),
+                    load_sums(result, lane),
+                    coefficients.terms,
+                )
                 sums = row_sums(at, row_sums(at, sums, terms, row), terms, row + 1)
                 sums = row_sums(at, row_sums(at, sums, terms, row + 2), terms, row + 3)
                 store_sums(result, lane, sums)
@@ -67,14 +89,24 @@ def sail_lanes(tile: Tile, h: float, groups: int) -> None:
     arrive(tile, h, groups)
 
 
-def start_of(tile: Tile, common: Any, lane: int) -> tuple[Motion, float, float, Any, Any]:
+def start_of(
+    tile: Tile, common: Any, lane: int
+) -> tuple[Motion, float, float, Any, Any]:
     """State at the beginning of the step, heading as zero; orders to rudder and shaft; the ship."""
     ship, coefficients = ship_at(common, tile.ships, lane)
     m, course = load_motion(tile.state, lane), load_course(tile.state, lane)
-    order = clip(course.rudder_command * ship.rudder_limit, -ship.rudder_limit, ship.rudder_limit)
+    order = clip(
+        course.rudder_command * ship.rudder_limit, -ship.rudder_limit, ship.rudder_limit
+    )
     shaft = course.shaft_command * ship.shaft
     n = m.n if HAS_SHAFT else shaft
-    return Motion(0.0, 0.0, 0.0, m.u, m.v, m.r, m.p, m.phi, m.q, m.delta, n), order, shaft, ship, coefficients
+    return (
+        Motion(0.0, 0.0, 0.0, m.u, m.v, m.r, m.p, m.phi, m.q, m.delta, n),
+        order,
+        shaft,
+        ship,
+        coefficients,
+    )
 
 
 def prepare(tile: Tile, h: float, groups: int) -> None:
@@ -89,30 +121,47 @@ def prepare(tile: Tile, h: float, groups: int) -> None:
 
 def conclude(tile: Tile, h: float, weight: float, groups: int) -> None:
     """The slope at a stage, and what it adds to the step."""
-    result, common, sea_common = tile.result, common_ship(tile.ships), common_sea(tile.ships)
+    result, common, sea_common = (
+        tile.result,
+        common_ship(tile.ships),
+        common_sea(tile.ships),
+    )
     for lane in range(groups * GROUP):
         start, order, shaft, ship, coefficients = start_of(tile, common, lane)
         at = stage(start, load_slope(result, lane), h, order, ship)
         pushed = push(
-            load_motion(tile.state, lane), load_sea(tile.state, lane), sea_at(sea_common, tile.ships, lane)
+            load_motion(tile.state, lane),
+            load_sea(tile.state, lane),
+            sea_at(sea_common, tile.ships, lane),
         )
         k = rates(at, order, shaft, pushed, coefficients, ship)
         udot, vdot, rdot = sum_accelerations(at, load_sums(result, lane), ship)
-        k = Rates(k.psi, k.u + udot, k.v + vdot, k.r + rdot, k.p, k.phi, k.q, k.delta, k.n)
+        k = Rates(
+            k.psi, k.u + udot, k.v + vdot, k.r + rdot, k.p, k.phi, k.q, k.delta, k.n
+        )
         passed, (ahead, aside) = load_passed(result, lane), way(at)
         store_slope(result, lane, k)
         total = added(passed.total, weight, k)
         store_passed(
-            result, lane, Passed(total, passed.ahead + weight * ahead, passed.aside + weight * aside)
+            result,
+            lane,
+            Passed(total, passed.ahead + weight * ahead, passed.aside + weight * aside),
         )
 
 
 def added(total: Rates, w: float, k: Rates) -> Rates:
     """Rates and others times a weight."""
     return Rates(
-        total.psi + w * k.psi, total.u + w * k.u, total.v + w * k.v, total.r + w * k.r, total.p + w * k.p,
-        total.phi + w * k.phi, total.q + w * k.q, total.delta + w * k.delta, total.n + w * k.n,
-    )  # fmt: skip
+        total.psi + w * k.psi,
+        total.u + w * k.u,
+        total.v + w * k.v,
+        total.r + w * k.r,
+        total.p + w * k.p,
+        total.phi + w * k.phi,
+        total.q + w * k.q,
+        total.delta + w * k.delta,
+        total.n + w * k.n,
+    )
 
 
 def arrive(tile: Tile, h: float, groups: int) -> None:
@@ -123,7 +172,17 @@ def arrive(tile: Tile, h: float, groups: int) -> None:
         passed, before = load_passed(tile.result, lane), load_motion(tile.state, lane)
         p = sea_at(sea_common, tile.ships, lane)
         pushed = push(before, load_sea(tile.state, lane), p)
-        after = arrival(before, start, passed.total, passed.ahead, passed.aside, order, h, pushed, ship)
+        after = arrival(
+            before,
+            start,
+            passed.total,
+            passed.ahead,
+            passed.aside,
+            order,
+            h,
+            pushed,
+            ship,
+        )
         store_motion(tile.state, lane, end_of_step(tile, lane, after, h, ship, p))
 
 

@@ -1,9 +1,10 @@
 """One ship through time: with given commands, with a measured rudder, through a zigzag, held to a yaw rate.
 
-Each loop but `derivatives` begins with the state in row 0 of `out` and writes one a sample into the others;
-it returns the last row at which the ship had not yet run away. States are vectors in the order of the ship's
-`state_names`; behind them, in the open sea, stands what is recorded of it (`SEA_CHANNELS`). `sea` is the
-vector of the sea's state and `words` that of its random numbers, one word long; both are changed.
+Each loop but `derivatives` begins with the state in row 0 of `out` and writes one a
+sample into the others; it returns the last row at which the ship had not yet run away.
+States are vectors in the order of the ship's `state_names`; behind them, in the open
+sea, stands what is recorded of it (`SEA_CHANNELS`). `sea` is the vector of the sea's
+state and `words` that of its random numbers, one word long; both are changed.
 `parameters` tell of the sea, `numbers` of the ship.
 """
 
@@ -12,31 +13,72 @@ from typing import Any
 
 from shipgym.engine.mathematics import clip, sin_cos
 from shipgym.engine.motion import (
-    HAS_SEA, HAS_SHAFT, Motion, Push, Ship, ground_velocity, lost, rates, rudder_velocity, sail,
-)  # fmt: skip
+    HAS_SEA,
+    HAS_SHAFT,
+    Motion,
+    Push,
+    Ship,
+    ground_velocity,
+    lost,
+    rates,
+    rudder_velocity,
+    sail,
+)
 from shipgym.engine.places import (
-    begin_sea, evolve, load_motion, load_sea, load_sea_parameters, push, store_motion, store_sea,
-)  # fmt: skip
+    begin_sea,
+    evolve,
+    load_motion,
+    load_sea,
+    load_sea_parameters,
+    push,
+    store_motion,
+    store_sea,
+)
 from shipgym.engine.random import BEGIN_WORDS, EVOLVE_WORDS
 from shipgym.engine.vessel import read_ship
 
 SWITCH_ITERATIONS = 12
 #: What is recorded of the sea beside the state: first-order motion, current, wind.
 SEA_CHANNELS = (
-    "psi_wave", "r_wave", "phi_wave", "p_wave", "current_north", "current_east", "wind_speed", "wind_from",
-)  # fmt: skip
+    "psi_wave",
+    "r_wave",
+    "phi_wave",
+    "p_wave",
+    "current_north",
+    "current_east",
+    "wind_speed",
+    "wind_from",
+)
 NO_LIMIT = 1e300
 
 
 def with_gear(ship: Ship, limit: float, rate: float) -> Ship:
     """The ship with another steering gear, without lag."""
-    return Ship(ship.length, ship.speed, limit, rate, 0.0, ship.shaft, ship.water_depth, ship.scale_speed)
+    return Ship(
+        ship.length,
+        ship.speed,
+        limit,
+        rate,
+        0.0,
+        ship.shaft,
+        ship.water_depth,
+        ship.scale_speed,
+    )
 
 
 def in_depth(ship: Ship, water_depth: float) -> Ship:
     """The ship in water of another depth."""
     limit, rate, frequency = ship.rudder_limit, ship.rudder_rate, ship.gear_frequency
-    return Ship(ship.length, ship.speed, limit, rate, frequency, ship.shaft, water_depth, ship.scale_speed)
+    return Ship(
+        ship.length,
+        ship.speed,
+        limit,
+        rate,
+        frequency,
+        ship.shaft,
+        water_depth,
+        ship.scale_speed,
+    )
 
 
 def replaced(m: Motion, psi: float, delta: float, n: float) -> Motion:
@@ -45,7 +87,13 @@ def replaced(m: Motion, psi: float, delta: float, n: float) -> Motion:
 
 
 def advanced(
-    motion: Motion, command: float, n: float, h: float, pushed: Push, coefficients: Any, ship: Ship
+    motion: Motion,
+    command: float,
+    n: float,
+    h: float,
+    pushed: Push,
+    coefficients: Any,
+    ship: Ship,
 ) -> Motion:
     """State h seconds later, the command held; called, not inlined, where it stands several times."""
     return sail(motion, command, n, h, pushed, coefficients, ship)
@@ -70,7 +118,9 @@ def record(out: Any, row: int, columns: int, sea: Any, parameters: Any) -> None:
     out[row, columns - 1] = atan2(now.wind_east, now.wind_north)
 
 
-def follow(out: Any, row: int, motion: Motion, h: float, sea: Any, words: Any, parameters: Any) -> None:
+def follow(
+    out: Any, row: int, motion: Motion, h: float, sea: Any, words: Any, parameters: Any
+) -> None:
     """Write down where a step led, and let the sea go on meanwhile."""
     store_motion(out[row], 0, motion)
     if HAS_SEA:
@@ -83,12 +133,20 @@ def follow(out: Any, row: int, motion: Motion, h: float, sea: Any, words: Any, p
 def meet(out: Any, sea: Any, words: Any, parameters: Any) -> None:
     """Begin the sea for the ship in row 0, with `words[0]` as the seed of its random numbers."""
     if HAS_SEA:
-        store_sea(sea, 0, begin_sea(load_motion(out[0], 0), words[0], load_sea_parameters(parameters, 0)))
+        store_sea(
+            sea,
+            0,
+            begin_sea(
+                load_motion(out[0], 0), words[0], load_sea_parameters(parameters, 0)
+            ),
+        )
         words[0] += BEGIN_WORDS
         record(out, 0, out.shape[1], sea, parameters)
 
 
-def derivatives(states: Any, commands: Any, depths: Any, numbers: Any, out: Any) -> None:
+def derivatives(
+    states: Any, commands: Any, depths: Any, numbers: Any, out: Any
+) -> None:
     """Time derivative of each state; `commands` holds rudder angle and shaft speed."""
     ship, coefficients = read_ship(numbers)
     for i in range(states.shape[0]):
@@ -96,33 +154,56 @@ def derivatives(states: Any, commands: Any, depths: Any, numbers: Any, out: Any)
         n = stored.n if HAS_SHAFT else commands[i, 1]
         motion = replaced(stored, stored.psi, stored.delta, n)
         order = clip(commands[i, 0], -ship.rudder_limit, ship.rudder_limit)
-        k = rates(motion, order, commands[i, 1], Push(0.0, 0.0, 0.0, 0.0, 0.0, 0.0), coefficients, at)
+        k = rates(
+            motion,
+            order,
+            commands[i, 1],
+            Push(0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
+            coefficients,
+            at,
+        )
         ahead, aside = ground_velocity(motion, 0.0, 0.0)
         sine, cosine = sin_cos(motion.psi)
         north, east = ahead * cosine - aside * sine, ahead * sine + aside * cosine
         gear = rudder_velocity(motion.delta, order, ship)
-        store_motion(out[i], 0, Motion(north, east, k.psi, k.u, k.v, k.r, k.p, k.phi, k.q, gear, k.n))
+        store_motion(
+            out[i],
+            0,
+            Motion(north, east, k.psi, k.u, k.v, k.r, k.p, k.phi, k.q, gear, k.n),
+        )
 
 
-def simulate(out: Any, commands: Any, h: float, sea: Any, words: Any, parameters: Any, numbers: Any) -> int:
+def simulate(
+    out: Any,
+    commands: Any,
+    h: float,
+    sea: Any,
+    words: Any,
+    parameters: Any,
+    numbers: Any,
+) -> int:
     """One row of commands (rudder, shaft speed) a step of h seconds."""
     ship, coefficients = read_ship(numbers)
     motion = load_motion(out[0], 0)
     for i in range(commands.shape[0]):
         pushed = felt(motion, sea, parameters)
-        motion = sail(motion, commands[i, 0], commands[i, 1], h, pushed, coefficients, ship)
+        motion = sail(
+            motion, commands[i, 0], commands[i, 1], h, pushed, coefficients, ship
+        )
         if lost(motion, ship):
             return i
         follow(out, i + 1, motion, h, sea, words, parameters)
     return len(commands)
 
 
-def open_loop(out: Any, t: Any, delta: Any, n: Any, wind: Any, longest_step: float, numbers: Any) -> int:
+def open_loop(
+    out: Any, t: Any, delta: Any, n: Any, wind: Any, longest_step: float, numbers: Any
+) -> int:
     """The rudder is measured at times t, and moves straight between the samples.
 
-    A measured rudder is a steering gear without limit or lag that moves at the measured rate. The water is
-    calm; `wind` holds the accelerations by measured wind in surge, sway and yaw, one row a step, of which a
-    loop for calm water knows nothing.
+    A measured rudder is a steering gear without limit or lag that moves at the measured
+    rate. The water is calm; `wind` holds the accelerations by measured wind in surge,
+    sway and yaw, one row a step, of which a loop for calm water knows nothing.
     """
     own, coefficients = read_ship(numbers)
     motion = load_motion(out[0], 0)
@@ -133,7 +214,15 @@ def open_loop(out: Any, t: Any, delta: Any, n: Any, wind: Any, longest_step: flo
         for k in range(steps):
             shaft = n[i] + (n[i + 1] - n[i]) * (k + 0.5) / steps
             pushed = Push(wind[i, 0], wind[i, 1], wind[i, 2], 0.0, 0.0, 0.0)
-            motion = sail(motion, delta[i + 1], shaft, interval / steps, pushed, coefficients, ship)
+            motion = sail(
+                motion,
+                delta[i + 1],
+                shaft,
+                interval / steps,
+                pushed,
+                coefficients,
+                ship,
+            )
         if lost(motion, ship):
             return i
         motion = replaced(motion, motion.psi, delta[i + 1], motion.n)
@@ -142,18 +231,28 @@ def open_loop(out: Any, t: Any, delta: Any, n: Any, wind: Any, longest_step: flo
 
 
 def switched(
-    motion: Motion, command: float, threshold: float, n: float, h: float, pushed: Push, coefficients: Any,
+    motion: Motion,
+    command: float,
+    threshold: float,
+    n: float,
+    h: float,
+    pushed: Push,
+    coefficients: Any,
     ship: Ship,
-) -> Motion:  # fmt: skip
+) -> Motion:
     """State after a step within which the heading crosses the threshold and the rudder reverses.
 
-    The instant is found by regula falsi on the heading after part of the step; the miss of the end that stays
-    is halved each time, as the Illinois variant does where an end stays twice.
+    The instant is found by regula falsi on the heading after part of the step; the miss
+    of the end that stays is halved each time, as the Illinois variant does where an end
+    stays twice.
     """
     side = 1.0 if command > 0.0 else -1.0
     low, high = 0.0, 1.0
     miss_low = side * motion.psi - threshold
-    miss_high = side * advanced(motion, command, n, h, pushed, coefficients, ship).psi - threshold
+    miss_high = (
+        side * advanced(motion, command, n, h, pushed, coefficients, ship).psi
+        - threshold
+    )
     part = 1.0
     for _ in range(SWITCH_ITERATIONS):
         part = low - miss_low * (high - low) / (miss_high - miss_low)
@@ -166,18 +265,29 @@ def switched(
         else:
             break
     at_switch = advanced(motion, command, n, part * h, pushed, coefficients, ship)
-    return advanced(at_switch, -command, n, (1.0 - part) * h, pushed, coefficients, ship)
+    return advanced(
+        at_switch, -command, n, (1.0 - part) * h, pushed, coefficients, ship
+    )
 
 
 def zigzag(
-    out: Any, commands: Any, angle: float, threshold: float, n: float, h: float, inside_step: bool,
-    sea: Any, words: Any, parameters: Any, numbers: Any,
-) -> tuple[int, int]:  # fmt: skip
+    out: Any,
+    commands: Any,
+    angle: float,
+    threshold: float,
+    n: float,
+    h: float,
+    inside_step: bool,
+    sea: Any,
+    words: Any,
+    parameters: Any,
+    numbers: Any,
+) -> tuple[int, int]:
     """A zigzag; `commands` receives the rudder angle held from each sample on.
 
-    The first order is `angle`; the rudder reverses when the heading has moved by `threshold` to the
-    side of the order, at that instant (`inside_step`) or at the next sample. The second number
-    returned counts the reversals.
+    The first order is `angle`; the rudder reverses when the heading has moved by
+    `threshold` to the side of the order, at that instant (`inside_step`) or at the next
+    sample. The second number returned counts the reversals.
     """
     ship, coefficients = read_ship(numbers)
     first = load_motion(out[0], 0)
@@ -194,7 +304,9 @@ def zigzag(
         side = 1.0 if command > 0.0 else -1.0
         if side * following.psi >= threshold:
             if inside_step:
-                following = switched(motion, command, threshold, n, h, pushed, coefficients, ship)
+                following = switched(
+                    motion, command, threshold, n, h, pushed, coefficients, ship
+                )
             command = -command
             reversals += 1
         if lost(following, ship):
@@ -210,13 +322,23 @@ def zigzag(
 
 
 def steer_rate(
-    out: Any, commands: Any, memory: Any, rate: float, n: float, h: float, gain: float, reset_time: float,
-    sea: Any, words: Any, parameters: Any, numbers: Any,
-) -> int:  # fmt: skip
+    out: Any,
+    commands: Any,
+    memory: Any,
+    rate: float,
+    n: float,
+    h: float,
+    gain: float,
+    reset_time: float,
+    sea: Any,
+    words: Any,
+    parameters: Any,
+    numbers: Any,
+) -> int:
     """A proportional-integral helmsman holds the yaw rate at `rate`, as in the reverse spiral of Bech.
 
-    `commands` receives the rudder angle held from each sample on; `memory` holds the integral part of the
-    helmsman's rudder and is changed.
+    `commands` receives the rudder angle held from each sample on; `memory` holds the
+    integral part of the helmsman's rudder and is changed.
     """
     ship, coefficients = read_ship(numbers)
     motion = load_motion(out[0], 0)
@@ -227,7 +349,9 @@ def steer_rate(
         error = rate - motion.r
         kept = clip(kept + gain * error * h / reset_time, -limit, limit)
         commands[i] = clip(gain * error + kept, -limit, limit)
-        motion = sail(motion, commands[i], n, h, felt(motion, sea, parameters), coefficients, ship)
+        motion = sail(
+            motion, commands[i], n, h, felt(motion, sea, parameters), coefficients, ship
+        )
         if lost(motion, ship):
             last = i
             break

@@ -19,11 +19,12 @@ class Vessel:
     name: str  # for messages
     state_names: tuple[str, ...]  # numbers of `Motion` that she has, in its order
     coefficients: Record  # `NamedTuple` of the numbers that her functions read
-    # Parts or other globals: `accelerations`, `shaft_acceleration`, and what these name in turn
+    # Parts or other globals: `accelerations`, `shaft_acceleration`, and what these name
+    # in turn
     functions: Mapping[str, Any]
     lag: bool  # whether her steering gear has a time constant
-    # of a ship part of whose accelerations is a sum over a table: Parts that take the place of her functions
-    # where many ships are sailed (`shipgym.engine.stages`)
+    # of a ship part of whose accelerations is a sum over a table: Parts that take the
+    # place of her functions where many ships are sailed (`shipgym.engine.stages`)
     summed: Mapping[str, Any] = field(default_factory=dict)
 
     @cached_property
@@ -39,28 +40,38 @@ class Vessel:
     def parts(self, lanes: int = LANES, shared: bool = True) -> dict[str, Any]:
         """What takes the place of the globals of `shipgym.engine.motion` and of the loops.
 
-        `lanes` are those of a tile of states, 64, or 1 where states are vectors. With `shared` all lanes have
-        the same ship: her numbers are a vector and not a tile.
+        `lanes` are those of a tile of states, 64, or 1 where states are vectors. With
+        `shared` all lanes have the same ship: her numbers are a vector and not a tile.
         """
         of_ships = 1 if shared else LANES
         return {
             **self.functions,
-            "HAS_ROLL": "phi" in self.state_names, "HAS_SHAFT": "n" in self.state_names,
-            "HAS_MEMORY": "q" in self.state_names, "HAS_LAG": self.lag, "HAS_SEA": False,
+            "HAS_ROLL": "phi" in self.state_names,
+            "HAS_SHAFT": "n" in self.state_names,
+            "HAS_MEMORY": "q" in self.state_names,
+            "HAS_LAG": self.lag,
+            "HAS_SEA": False,
             "load_motion": loader(self.motion, lanes),
             "store_motion": storer(self.motion, lanes),
-            **{f"load_{name}": loader(rows, of_ships) for name, rows in self.layout.rows.items()},
+            **{
+                f"load_{name}": loader(rows, of_ships)
+                for name, rows in self.layout.rows.items()
+            },
             "row_of": row_reader(of_ships),
             "common_ship": Part(read_ship if shared else nothing),
             "ship_at": Part(the_common if shared else ship_of_lane),
-        }  # fmt: skip
+        }
 
 
 @cache
 def vessel_of(
-    name: str, state_names: tuple[str, ...], coefficients: Record, functions: tuple[tuple[str, Any], ...],
-    lag: bool, summed: tuple[tuple[str, Any], ...] = (),
-) -> Vessel:  # fmt: skip
+    name: str,
+    state_names: tuple[str, ...],
+    coefficients: Record,
+    functions: tuple[tuple[str, Any], ...],
+    lag: bool,
+    summed: tuple[tuple[str, Any], ...] = (),
+) -> Vessel:
     """The one vessel of these fields, so that what is compiled for one ship serves all that are like her."""
     return Vessel(name, state_names, coefficients, dict(functions), lag, dict(summed))
 

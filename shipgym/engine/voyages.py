@@ -10,7 +10,15 @@ from shipgym.engine.compiling import compiled, plain_python
 from shipgym.engine.envelope import Envelope
 from shipgym.engine.motion import Motion, Ship
 from shipgym.engine.places import load_envelope, load_scale, load_sea_parameters
-from shipgym.engine.record_code import bounded_storer, chooser, loader, number_storer, storer, summer, zero
+from shipgym.engine.record_code import (
+    bounded_storer,
+    chooser,
+    loader,
+    number_storer,
+    storer,
+    summer,
+    zero,
+)
 from shipgym.engine.records import LANES, Layout, leaves
 from shipgym.engine.specialise import Part
 from shipgym.engine.vessel import Vessel, nothing, the_common
@@ -20,9 +28,15 @@ from shipgym.tasks.definition import TaskDefinition
 
 #: Functions of `episodes` that loops call; others become part of them.
 CALLED = (
-    "begin_lane", "begin_next", "let_events_come", "observe_lane", "show", "take_commands", "sail_lanes",
+    "begin_lane",
+    "begin_next",
+    "let_events_come",
+    "observe_lane",
+    "show",
+    "take_commands",
+    "sail_lanes",
     "conclude_lanes",
-)  # fmt: skip
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,28 +53,40 @@ class Voyages:
     def state(self) -> Layout:
         """Rows of a tile of states; behind them the plan of an episode."""
         return Layout(
-            motion=(Motion, self.vessel.state_names), sea=open_sea.sea_records(self.windy)[0],
-            course=episodes.Course, memory=self.sensors.Memory, state=self.task.State,
-        )  # fmt: skip
+            motion=(Motion, self.vessel.state_names),
+            sea=open_sea.sea_records(self.windy)[0],
+            course=episodes.Course,
+            memory=self.sensors.Memory,
+            state=self.task.State,
+        )
 
     @cached_property
     def result(self) -> Layout:
         """Rows of what comes of an interval in one tile."""
-        seen = {"outcome": episodes.Outcome, "reward": self.task.Reward, "observation": self.task.Observation}
+        seen = {
+            "outcome": episodes.Outcome,
+            "reward": self.task.Reward,
+            "observation": self.task.Observation,
+        }
         return Layout(**seen, **(stages.ROOM if self.vessel.summed else {}))
 
     @cached_property
     def ship(self) -> Layout:
         """Rows of the numbers of a ship."""
         return Layout(
-            ship=Ship, coefficients=self.vessel.coefficients, envelope=Envelope,
-            sea=open_sea.sea_records(self.windy)[1], scale=self.task.Observation,
-        )  # fmt: skip
+            ship=Ship,
+            coefficients=self.vessel.coefficients,
+            envelope=Envelope,
+            sea=open_sea.sea_records(self.windy)[1],
+            scale=self.task.Observation,
+        )
 
     @cached_property
     def settings(self) -> Layout:
         """Places of the settings of engine, sensor set and task."""
-        return Layout(rules=episodes.Rules, sensor=self.sensors.Settings, task=self.task.Settings)
+        return Layout(
+            rules=episodes.Rules, sensor=self.sensors.Settings, task=self.task.Settings
+        )
 
     def row(self, name: str) -> int:
         """Row of a number of the state by its name: `u`, `course`, `steps`."""
@@ -82,7 +108,12 @@ class Voyages:
     @cached_property
     def parts(self) -> dict[str, Any]:
         """What takes the place of the globals of `shipgym.engine.episodes`."""
-        return {**self._records(), **self._ships(), **self._functions(), **self.vessel.summed}
+        return {
+            **self._records(),
+            **self._ships(),
+            **self._functions(),
+            **self.vessel.summed,
+        }
 
     def _records(self) -> dict[str, Any]:
         rows, result = self.state, self.result
@@ -99,36 +130,46 @@ class Voyages:
             "store_ended": number_storer(rows["course"].row("ended")),
             "store_ran_away": number_storer(rows["course"].row("ran_away")),
             "store_observation": bounded_storer(result["observation"], bounds),
-            "no_reward": zero(self.task.Reward), "total_reward": summer(self.task.Reward),
-            "read_rules": loader(settings["rules"], 1), "read_sensor": loader(settings["sensor"], 1),
-            "read_settings": loader(settings["task"], 1), "plan_of": plan_at(rows.n_rows),
-        }  # fmt: skip
+            "no_reward": zero(self.task.Reward),
+            "total_reward": summer(self.task.Reward),
+            "read_rules": loader(settings["rules"], 1),
+            "read_sensor": loader(settings["sensor"], 1),
+            "read_settings": loader(settings["task"], 1),
+            "plan_of": plan_at(rows.n_rows),
+        }
 
     def _ships(self) -> dict[str, Any]:
         lanes = 1 if self.shared else LANES
         load = {name: loader(place, lanes) for name, place in self.ship.rows.items()}
         return {
             **self.vessel.parts(shared=self.shared),
-            "load_envelope": load["envelope"], "load_scale": load["scale"],
+            "load_envelope": load["envelope"],
+            "load_scale": load["scale"],
             "load_sea_parameters": load["sea"],
             "common_sea": Part(read_sea if self.shared else nothing),
             "sea_at": Part(the_common if self.shared else sea_of_lane),
             "common_view": Part(read_view if self.shared else nothing),
             "view_at": Part(the_common if self.shared else view_of_lane),
-        }  # fmt: skip
+        }
 
     def _functions(self) -> dict[str, Any]:
         task, sensors = self.task, self.sensors
-        return {name: Part(getattr(episodes, name), inline=False) for name in CALLED} | {
+        return {
+            name: Part(getattr(episodes, name), inline=False) for name in CALLED
+        } | {
             **open_sea.sea_functions(self.windy),
             "GROUP": 1 if plain_python() else episodes.GROUP,
             "HAS_NOISE": self.sensors.noise,
             "HAS_FILTER": self.sensors.filter,
-            "measure": Part(sensors.measure), "readings": Part(sensors.readings),
-            "task_begin": Part(task.begin, inline=False), "on_event": Part(task.on_event, inline=False),
-            "task_step": Part(task.step), "observe": Part(task.observe), "due": Part(task.due),
+            "measure": Part(sensors.measure),
+            "readings": Part(sensors.readings),
+            "task_begin": Part(task.begin, inline=False),
+            "on_event": Part(task.on_event, inline=False),
+            "task_step": Part(task.step),
+            "observe": Part(task.observe),
+            "due": Part(task.due),
             "worst_cost": Part(task.worst_cost),
-        }  # fmt: skip
+        }
 
     @cached_property
     def run(self) -> Any:

@@ -30,12 +30,16 @@ class Artist:
     def note(self, engine: Engine) -> None:
         """Note where the ship is."""
         state = engine.physical_state()
-        self._wake.append((float(state["x"][self._lane]), float(state["y"][self._lane])))
+        self._wake.append(
+            (float(state["x"][self._lane]), float(state["y"][self._lane]))
+        )
         del self._wake[:-WAKE_POINTS]
 
     def picture(self, engine: Engine) -> NDArray[np.uint8]:
         """The picture, uint8 array of shape (600, 600, 3)."""
-        return self._renderer.draw(scene(engine, self._lane, np.array(self._wake).reshape(-1, 2)))
+        return self._renderer.draw(
+            scene(engine, self._lane, np.array(self._wake).reshape(-1, 2))
+        )
 
     def close(self) -> None:
         """Close the window, if there is one."""
@@ -44,28 +48,44 @@ class Artist:
 
 def scene(engine: Engine, lane: int, wake: Floats) -> Scene:
     """What a picture of one lane shows."""
-    state = {name: float(values[lane]) for name, values in engine.physical_state().items()}
+    state = {
+        name: float(values[lane]) for name, values in engine.physical_state().items()
+    }
     particulars = engine.model.particulars
     length, wind = particulars["length"], state.get("wind_speed", 0.0)
     north, east = state.get("current_north", 0.0), state.get("current_east", 0.0)
     return Scene(
-        x=state["x"], y=state["y"], heading=state["psi"], rudder=state["delta"], length=length,
-        beam=particulars.get("beam") or USUAL_BEAM * length, rudder_limit=engine.model.steering.limit,
-        wake=wake, course_order=state.get("set_point", state["psi"]), waypoints=engine.waypoints(lane),
-        turn_radius=engine.path_metres("turn_radius"), corridor=engine.path_metres("corridor"),
+        x=state["x"],
+        y=state["y"],
+        heading=state["psi"],
+        rudder=state["delta"],
+        length=length,
+        beam=particulars.get("beam") or USUAL_BEAM * length,
+        rudder_limit=engine.model.steering.limit,
+        wake=wake,
+        course_order=state.get("set_point", state["psi"]),
+        waypoints=engine.waypoints(lane),
+        turn_radius=engine.path_metres("turn_radius"),
+        corridor=engine.path_metres("corridor"),
         wind=(wind, state["wind_from"]) if wind else None,
         current=(hypot(north, east), atan2(east, north)) if north or east else None,
         readouts=_readouts(engine, lane, state),
-    )  # fmt: skip
+    )
 
 
 def _readouts(engine: Engine, lane: int, state: dict[str, float]) -> dict[str, str]:
     """Speed, errors and the last reward."""
     speed = hypot(state["u"], state["v"])
-    lines = {"speed": f"{speed:.1f} m/s, {speed / KNOT:.1f} kn", "heading": _bearing(state["psi"])}
+    lines = {
+        "speed": f"{speed:.1f} m/s, {speed / KNOT:.1f} kn",
+        "heading": _bearing(state["psi"]),
+    }
     if "set_point" in state:
         error = (state["set_point"] - state["psi"] + pi) % (2.0 * pi) - pi
-        lines |= {"to steer": _bearing(state["set_point"]), "heading error": f"{degrees(error):+.1f} deg"}
+        lines |= {
+            "to steer": _bearing(state["set_point"]),
+            "heading error": f"{degrees(error):+.1f} deg",
+        }
     lines["rudder"] = f"{degrees(state['delta']):+.1f} deg"
     if "cross_track" in engine.task.info_names:
         lines["cross-track"] = f"{engine.info('cross_track')[lane]:+.0f} m"

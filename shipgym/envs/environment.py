@@ -11,7 +11,14 @@ import numpy as np
 from gymnasium.envs.registration import EnvSpec
 from numpy.typing import NDArray
 
-from shipgym.checks import check_choice, check_keys, check_table, did_you_mean, quoted, shown
+from shipgym.checks import (
+    check_choice,
+    check_keys,
+    check_table,
+    did_you_mean,
+    quoted,
+    shown,
+)
 from shipgym.envs.artist import Artist
 from shipgym.envs.engine import Engine, as_array, episode_key
 from shipgym.envs.randomisation import Randomisation
@@ -39,16 +46,21 @@ class UnknownKeywordError(InputError, TypeError):
 
 
 def read_options(
-    task: Any, model: str | Path | ShipModel, options: Mapping[str, Any], taken: Sequence[str] = ()
+    task: Any,
+    model: str | Path | ShipModel,
+    options: Mapping[str, Any],
+    taken: Sequence[str] = (),
 ) -> tuple[ShipModel, Task, Randomisation]:
     """The ship, the task and what is randomised, by an environment's keywords.
 
-    `taken`: keywords that its caller takes beside them, for messages. Raises InputError for an unknown model
-    or keyword, or a value out of its range.
+    `taken`: keywords that its caller takes beside them, for messages. Raises InputError
+    for an unknown model or keyword, or a value out of its range.
     """
     definition = read_definition(task, options.get("reward"))
     sensors = options.get("sensors")
-    own = Task.option_names(definition, None if sensors is None else read_sensors(sensors))
+    own = Task.option_names(
+        definition, None if sensors is None else read_sensors(sensors)
+    )
     known = list(dict.fromkeys([*taken, "reward", *own, *Randomisation.names()]))
     for name in options:
         if name not in known:
@@ -56,7 +68,10 @@ def read_options(
     randomisation, rest = Randomisation.take_from(options)
     rest.pop("reward", None)
     if not isinstance(model, str | Path | ShipModel):
-        raise InputError(f"model: {model!r} found, expected a name, the path of a model file, or a ShipModel")
+        raise InputError(
+            f"model: {model!r} found, expected a name, the path of a model file, or a"
+            " ShipModel"
+        )
     ship = model if isinstance(model, ShipModel) else load_model(model)
     return ship, Task.of(definition, **rest), randomisation
 
@@ -64,21 +79,36 @@ def read_options(
 def spaces(task: Task, model: ShipModel) -> tuple[gymnasium.spaces.Box, Space]:
     """Observation and action space of a task for a ship."""
     observed = task.observed(model)
-    low, high = np.array([(quantity.low, quantity.high) for quantity in observed], dtype=np.float32).T
-    actions: Space = gymnasium.spaces.Box(-1.0, 1.0, (task.n_commands,), dtype=np.float32)
+    low, high = np.array(
+        [(quantity.low, quantity.high) for quantity in observed], dtype=np.float32
+    ).T
+    actions: Space = gymnasium.spaces.Box(
+        -1.0, 1.0, (task.n_commands,), dtype=np.float32
+    )
     if task.action == "rudder-discrete":
         actions = gymnasium.spaces.Discrete(len(RUDDER_ORDERS))
     return gymnasium.spaces.Box(low, high, dtype=np.float32), actions
 
 
-def rudder_orders(numbers: Any, shape: tuple[int, ...], where: str) -> NDArray[np.float32]:
+def rudder_orders(
+    numbers: Any, shape: tuple[int, ...], where: str
+) -> NDArray[np.float32]:
     """Discrete rudder orders by their numbers, as a column for each row; InputError for others."""
     array, last = as_array(numbers), len(ORDERS) - 1
-    if array.shape != shape or array.dtype.kind not in "iu" or array.min() < 0 or array.max() > last:
+    if (
+        array.shape != shape
+        or array.dtype.kind not in "iu"
+        or array.min() < 0
+        or array.max() > last
+    ):
         what, each = (
-            (f"int of shape {shape}", "rudder orders") if shape else ("a whole number", "a rudder order")
+            (f"int of shape {shape}", "rudder orders")
+            if shape
+            else ("a whole number", "a rudder order")
         )
-        raise InputError(f"{where}: {numbers!r} found, expected {what} from 0 to {last}: {each}")
+        raise InputError(
+            f"{where}: {numbers!r} found, expected {what} from 0 to {last}: {each}"
+        )
     ordered: NDArray[np.float32] = ORDERS[array.reshape(-1, 1)]
     return ordered
 
@@ -86,8 +116,8 @@ def rudder_orders(numbers: Any, shape: tuple[int, ...], where: str) -> NDArray[n
 class ShipsEnv:
     """An environment on an engine.
 
-    `copy.deepcopy` and `pickle` make an environment again by its arguments, and give it state and attributes:
-    what is compiled stays where it is.
+    `copy.deepcopy` and `pickle` make an environment again by its arguments, and give it
+    state and attributes: what is compiled stays where it is.
 
     Attributes
     ----------
@@ -104,18 +134,36 @@ class ShipsEnv:
     _spec: EnvSpec | None = None
 
     def _make(
-        self, arguments: dict[str, Any], taken: Sequence[str], render_modes: Sequence[str]
+        self,
+        arguments: dict[str, Any],
+        taken: Sequence[str],
+        render_modes: Sequence[str],
     ) -> tuple[gymnasium.spaces.Box, Space]:
         """Take the arguments of its making; returns the spaces of one ship."""
         options = arguments.pop("options")
-        given = {name: arguments[name] for name in arguments if name not in ("self", "__class__")}
+        given = {
+            name: arguments[name]
+            for name in arguments
+            if name not in ("self", "__class__")
+        }
         self._arguments = given | options
         num_envs, threads = given.get("num_envs", 1), given.get("threads", 1)
         self.render_mode = given["render_mode"]
         if self.render_mode is not None:
-            check_choice(self.render_mode, render_modes, "render_mode", also=", or None")
-        self.model, self.task, randomisation = read_options(given["task"], given["model"], options, taken)
-        engine = Engine(self.model, num_envs, self.task, randomisation, given["allow_unstable"], threads)
+            check_choice(
+                self.render_mode, render_modes, "render_mode", also=", or None"
+            )
+        self.model, self.task, randomisation = read_options(
+            given["task"], given["model"], options, taken
+        )
+        engine = Engine(
+            self.model,
+            num_envs,
+            self.task,
+            randomisation,
+            given["allow_unstable"],
+            threads,
+        )
         self._own_engine, self._asked = engine, dict[str, Any]()
         drawn = range(num_envs) if self.render_mode else ()
         self._artists = [Artist(self.render_mode, row) for row in drawn]
@@ -150,7 +198,11 @@ class ShipsEnv:
         return self._engine.dt
 
     def __reduce__(self) -> Any:
-        attributes = {name: value for name, value in vars(self).items() if name not in self._by_arguments}
+        attributes = {
+            name: value
+            for name, value in vars(self).items()
+            if name not in self._by_arguments
+        }
         state = self.get_state() if self._begun else None
         return remade, (type(self), self._arguments, state, attributes)
 
@@ -169,19 +221,26 @@ class ShipsEnv:
         """
         if not self._begun:
             self._refuse_step()
-        return {"asked": self._asked, "engine": self._engine.get_state(), **self._counters()}
+        return {
+            "asked": self._asked,
+            "engine": self._engine.get_state(),
+            **self._counters(),
+        }
 
     def set_state(self, state: Mapping[str, Any]) -> None:
         """Go on from what `get_state` of an environment made by the same arguments gave.
 
-        Raises InputError for a state of another task, version, ship or number of ships, or one with a number
-        that is not finite; nothing is changed then.
+        Raises InputError for a state of another task, version, ship or number of ships,
+        or one with a number that is not finite; nothing is changed then.
         """
         names = ("asked", "engine", *self._counters())
         check_table(state, "state", names, names)
         for name in self._counters():
             if np.asarray(state[name]).dtype.kind not in "biu":  # whole numbers
-                raise InputError(f"state: {name} {shown(state[name])} found, expected what `get_state` gave")
+                raise InputError(
+                    f"state: {name} {shown(state[name])} found, expected what"
+                    " `get_state` gave"
+                )
         engine = self._engine_for(check_table(state["asked"], "state: asked"))
         engine.set_state(state["engine"])
         self._asked, self._begun = state["asked"], True
@@ -198,7 +257,11 @@ class ShipsEnv:
         """The environment's own engine, or one with other waypoints or a certain ship."""
         if not asked:
             return self._own_engine
-        task = self.task.changed(waypoints=asked["waypoints"]) if "waypoints" in asked else self.task
+        task = (
+            self.task.changed(waypoints=asked["waypoints"])
+            if "waypoints" in asked
+            else self.task
+        )
         return self._own_engine.remade(task=task, model_index=asked.get("model_index"))
 
     def _take(self, options: Mapping[str, Any] | None, *more: str) -> Any:
@@ -206,13 +269,24 @@ class ShipsEnv:
 
         Raises InputError for other options, or a value that does not fit.
         """
-        given = {name: value for name, value in (options or {}).items() if value is not None}
-        check_keys(given, (*["waypoints"] * self.task.follows_path, "model_index", "state", *more), "options")
+        given = {
+            name: value for name, value in (options or {}).items() if value is not None
+        }
+        check_keys(
+            given,
+            (*["waypoints"] * self.task.follows_path, "model_index", "state", *more),
+            "options",
+        )
         if "state" in given and len(given) > 1:
             raise InputError(
-                f"options: 'state' found together with {sorted({*given} - {'state'})}, expected it alone"
+                f"options: 'state' found together with {sorted({*given} - {'state'})},"
+                " expected it alone"
             )
-        asked = {name: value for name, value in given.items() if name in ("waypoints", "model_index")}
+        asked = {
+            name: value
+            for name, value in given.items()
+            if name in ("waypoints", "model_index")
+        }
         if (asked or self._asked) and "state" not in given:
             self._use(self._engine_for(asked))
             self._asked = asked
@@ -220,11 +294,17 @@ class ShipsEnv:
 
     def _refuse_step(self) -> NoReturn:
         """Raise the InputError of an environment that was not reset yet, or is closed."""
-        raise InputError("step: no episode has begun, or the environment was closed; call reset first")
+        raise InputError(
+            "step: no episode has begun, or the environment was closed; call reset"
+            " first"
+        )
 
     def _drawn_keys(self) -> NDArray[np.uint64]:
         """Keys of episodes from the environment's own random numbers."""
-        return np.array([episode_key(self.np_random) for _ in range(self._engine.num_envs)], dtype=np.uint64)
+        return np.array(
+            [episode_key(self.np_random) for _ in range(self._engine.num_envs)],
+            dtype=np.uint64,
+        )
 
     def _draw(self, mask: NDArray[np.bool_] | None = None) -> None:
         """Let the wakes grow, or begin where an episode did; only in the rows of a mask, if there is one."""
@@ -234,7 +314,9 @@ class ShipsEnv:
                 artist.begin(self._engine) if begun else artist.note(self._engine)
 
 
-def remade(kind: Any, arguments: dict[str, Any], state: Any, attributes: dict[str, Any]) -> Any:
+def remade(
+    kind: Any, arguments: dict[str, Any], state: Any, attributes: dict[str, Any]
+) -> Any:
     """An environment made again."""
     env = kind(**arguments)
     vars(env).update(attributes)

@@ -10,8 +10,15 @@ from numpy.typing import ArrayLike
 
 from shipgym.arrays import Floats
 from shipgym.checks import (
-    check_finite, check_flag, check_number, check_table, check_text, check_whole, placed, quoted,
-)  # fmt: skip
+    check_finite,
+    check_flag,
+    check_number,
+    check_table,
+    check_text,
+    check_whole,
+    placed,
+    quoted,
+)
 from shipgym.envs.episode_file import from_file, to_file
 from shipgym.errors import InputError
 from shipgym.files import read_json, write_json
@@ -28,8 +35,8 @@ REQUIRED_STATES = ("x", "y", "psi", "delta")
 class Episode:
     """What happened in one episode, immutable, SI units and the project's signs.
 
-    States and info are those at the beginning and after each of the n steps; commands, actions and rewards
-    belong to the steps.
+    States and info are those at the beginning and after each of the n steps; commands,
+    actions and rewards belong to the steps.
 
     Raises InputError naming the field, what was found and what is expected.
 
@@ -48,21 +55,25 @@ class Episode:
     rewards : array-like of shape (n_steps,)
         Sum of the parts.
     commands : mapping of str to array-like of shape (n_steps,), optional
-        What was ordered in each step, ``delta`` in rad and ``n`` in 1/s, where that is known.
+        What was ordered in each step, ``delta`` in rad and ``n`` in 1/s, where that is
+        known.
     reward_parts : mapping of str to array-like of shape (n_steps,), optional
         Parts of the rewards, as `info` names them.
     info : mapping of str to array-like of shape (n_steps + 1,), optional
-        What else `info` reported in numbers, at the beginning and after each step; true is 1.
+        What else `info` reported in numbers, at the beginning and after each step; true
+        is 1.
     waypoints : array-like of shape (n_waypoints, 2), optional
         Of the path to follow, north and east, m.
     corridor, turn_radius, beam : float, optional
-        Half the width of the corridor along the path, radius of its turns, and the ship's beam, m.
+        Half the width of the corridor along the path, radius of its turns, and the
+        ship's beam, m.
     arguments : mapping of str to Any, optional
         Of the environment, ready for JSON.
     seed : int, optional
         With which the environment was last reset.
     number : int
-        Of the episode since then, from 0: `reset(seed=seed)` and that many times `reset()` begin it again.
+        Of the episode since then, from 0: `reset(seed=seed)` and that many times
+        `reset()` begin it again.
     terminated, truncated : bool
         How it ended; neither where it was cut off.
     success : bool, optional
@@ -98,7 +109,9 @@ class Episode:
         for name in ("dt", "length", "rudder_limit", "beam", "corridor", "turn_radius"):
             value = getattr(self, name)
             if value is not None or name not in ("beam", "corridor", "turn_radius"):
-                self._set(name, check_number(value, name, above=0.0, at_most=most.get(name)))
+                self._set(
+                    name, check_number(value, name, above=0.0, at_most=most.get(name))
+                )
         check_table(self.arguments, "arguments")
         if self.seed is not None:
             check_whole(self.seed, "seed", at_least=0)
@@ -120,20 +133,28 @@ class Episode:
         actions = check_finite(self.actions, "actions")
         if actions.ndim != 2 or len(actions) != len(rewards):
             raise InputError(
-                f"actions: shape {actions.shape} found, expected ({len(rewards)}, n_actions), a row for "
-                "each reward"
+                f"actions: shape {actions.shape} found, expected ({len(rewards)},"
+                " n_actions), a row for each reward"
             )
         self._set("rewards", rewards)
         self._set("actions", actions)
-        for group, more in {"states": 1, "info": 1, "commands": 0, "reward_parts": 0}.items():
+        for group, more in {
+            "states": 1,
+            "info": 1,
+            "commands": 0,
+            "reward_parts": 0,
+        }.items():
             table = check_table(getattr(self, group), group)
             arrays = {
-                name: series(values, f"{group}.{name}", len(rewards) + more) for name, values in table.items()
+                name: series(values, f"{group}.{name}", len(rewards) + more)
+                for name, values in table.items()
             }
             self._set(group, arrays)
         missing = [name for name in REQUIRED_STATES if name not in self.states]
         if missing:
-            raise InputError(f"states: {quoted(missing)} missing, found {quoted(self.states)}")
+            raise InputError(
+                f"states: {quoted(missing)} missing, found {quoted(self.states)}"
+            )
 
     def _set(self, name: str, value: Any) -> None:
         object.__setattr__(self, name, value)
@@ -156,12 +177,15 @@ class Episode:
     def to_trial(self, name: str | None = None, use: str = "fit") -> Trial:
         """What the ship did, as a trial to identify from; by default named by environment, seed and number.
 
-        It has the states that are channels of trials, the orders `delta_command` and `n_command` constant
-        from each sample on (the last one to the last sample too), and `n` of a shaft that turns as ordered.
-        `use` is "fit", "validate" or "skip". Raises InputError for an episode of a single step, which is too
-        short for a trial.
+        It has the states that are channels of trials, the orders `delta_command` and
+        `n_command` constant from each sample on (the last one to the last sample too),
+        and `n` of a shaft that turns as ordered. `use` is "fit", "validate" or "skip".
+        Raises InputError for an episode of a single step, which is too short for a
+        trial.
         """
-        channels = {key: values for key, values in self.states.items() if key in CHANNELS}
+        channels = {
+            key: values for key, values in self.states.items() if key in CHANNELS
+        }
         channels["psi"] = np.unwrap(channels["psi"])
         for key, values in self.commands.items():
             orders = np.append(values, values[-1])
@@ -169,7 +193,13 @@ class Episode:
             if key == "n":
                 channels.setdefault("n", orders)
         own = f"{self.environment} seed {self.seed} episode {self.number}"
-        return Trial(self.t, channels, name=own if name is None else name, use=use, length=self.length)
+        return Trial(
+            self.t,
+            channels,
+            name=own if name is None else name,
+            use=use,
+            length=self.length,
+        )
 
     def save(self, path: str | Path) -> None:
         """Write the episode as JSON, atomically; InputError where that fails."""
@@ -181,7 +211,11 @@ class Episode:
 
         Raises InputError, naming the file and the field at fault.
         """
-        content = read_json(Path(path), "recorded episode", "record the episode again or take another copy")
+        content = read_json(
+            Path(path),
+            "recorded episode",
+            "record the episode again or take another copy",
+        )
         with placed(str(path)):
             return cls(**from_file(content))
 
@@ -191,6 +225,7 @@ def series(values: ArrayLike, where: str, count: int | None) -> Floats:
     array = check_finite(values, where)
     if array.ndim != 1 or (count is not None and len(array) != count):
         raise InputError(
-            f"{where}: shape {array.shape} found, expected ({'n_steps' if count is None else count},)"
+            f"{where}: shape {array.shape} found, expected"
+            f" ({'n_steps' if count is None else count},)"
         )
     return array

@@ -2,23 +2,19 @@
 
 Format 1:
 
-    format       1
-    kind         "episode"
-    environment  {"id": text, "arguments": {name: value}}
-    model        name of the ship model
-    seed         whole number or null: the last reset with a seed; "number" counts the episodes since then
-    number       whole number
-    dt           control interval, s
-    ship         {"length": m, "beam": m or null, "rudder_limit": rad}
-    path         null or {"waypoints": [[north, east], ...] in m, "corridor": half its width in m or null},
+    format       1 kind         "episode" environment  {"id": text, "arguments": {name:
+    value}} model        name of the ship model seed         whole number or null: the
+    last reset with a seed; "number" counts the episodes since then number       whole
+    number dt           control interval, s ship         {"length": m, "beam": m or
+    null, "rudder_limit": rad} path         null or {"waypoints": [[north, east], ...]
+    in m, "corridor": half its width in m or null},
                  and "turn_radius" in m where its turns are arcs
-    states       {name: n + 1 values}, SI units: at the beginning and after each of the n steps
-    commands     {"delta": n values in rad, "n": n values in 1/s}, of each step; what is not known is absent
-    actions      n rows, as the agent gave them
-    rewards      n values
-    reward_parts {name: n values}
-    info         {name: n + 1 values}: what else it reported, at the beginning and after each step
-    outcome      {"terminated": bool, "truncated": bool, "success": bool or null}
+    states       {name: n + 1 values}, SI units: at the beginning and after each of the
+    n steps commands     {"delta": n values in rad, "n": n values in 1/s}, of each step;
+    what is not known is absent actions      n rows, as the agent gave them rewards
+    n values reward_parts {name: n values} info         {name: n + 1 values}: what else
+    it reported, at the beginning and after each step outcome      {"terminated": bool,
+    "truncated": bool, "success": bool or null}
 """
 
 from collections.abc import Mapping
@@ -48,23 +44,31 @@ def to_file(episode: Mapping[str, Any]) -> dict[str, Any]:
     """The content of an episode file, ready for JSON, from an episode's fields by name."""
     values = {name: _listed(value) for name, value in episode.items()}
     tables: dict[str, Any] = {
-        table: {key: values[name] for key, name in names.items()} for table, names in TABLES.items()
+        table: {key: values[name] for key, name in names.items()}
+        for table, names in TABLES.items()
     }
     if values["waypoints"] is None:
         tables["path"] = None
     elif values["turn_radius"] is None:
         del tables["path"]["turn_radius"]
-    return {"format": FORMAT, "kind": KIND, **tables, **{name: values[name] for name in PLAIN}}
+    return {
+        "format": FORMAT,
+        "kind": KIND,
+        **tables,
+        **{name: values[name] for name in PLAIN},
+    }
 
 
 def from_file(content: Mapping[str, Any]) -> dict[str, Any]:
     """An episode's fields by name, from the content of an episode file.
 
-    Raises InputError for another kind of file or format, a field that is missing, unknown or not of numbers.
+    Raises InputError for another kind of file or format, a field that is missing,
+    unknown or not of numbers.
     """
     if content.get("kind") != KIND:
         raise InputError(
-            f"kind: {content.get('kind')!r} found, expected {KIND!r}: a file that RecordEpisode wrote"
+            f"kind: {content.get('kind')!r} found, expected {KIND!r}: a file that"
+            " RecordEpisode wrote"
         )
     check_format(content, FORMAT, KIND)
     known = ("format", "kind", *TABLES, *PLAIN)
@@ -73,12 +77,16 @@ def from_file(content: Mapping[str, Any]) -> dict[str, Any]:
     for table, names in TABLES.items():
         if table == "path" and content[table] is None:
             continue
-        found = check_table(content[table], table, names, [key for key in names if key != "turn_radius"])
+        found = check_table(
+            content[table], table, names, [key for key in names if key != "turn_radius"]
+        )
         values |= {name: found[key] for key, name in names.items() if key in found}
     values["rewards"] = check_array(content["rewards"], (None,), "rewards")
     values["actions"] = check_array(content["actions"], (None, None), "actions")
     if "waypoints" in values:
-        values["waypoints"] = check_array(values["waypoints"], (None, 2), "path.waypoints")
+        values["waypoints"] = check_array(
+            values["waypoints"], (None, 2), "path.waypoints"
+        )
     for group in SERIES:
         values[group] = {
             name: check_array(numbers, (None,), f"{group}.{name}")

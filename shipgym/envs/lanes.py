@@ -21,21 +21,28 @@ from shipgym.ships import ShipModel
 from shipgym.tasks.task import Task
 from shipgym.trials.sensors import SEA_TRIAL
 
-#: Settings of a bridge's instruments, and the channel of a sea trial whose noise they take.
+#: Settings of a bridge's instruments, and the channel of a sea trial whose noise they
+#: take.
 SENSOR_NOISE = {"heading": "psi", "yaw_rate": "r", "speed": "u", "position": "x"}
 
 
 class Lanes:
     """The arrays that loops work on; `Engine` steps them.
 
-    `own` are the lanes' ships and seas, one for all or one each; or, if `drawn`, the pool of which each
-    episode draws one.
+    `own` are the lanes' ships and seas, one for all or one each; or, if `drawn`, the
+    pool of which each episode draws one.
     """
 
     shown: Outputs  # what the last step answered
 
     def __init__(
-        self, made: Voyages, model: ShipModel, task: Task, num_envs: int, own: Pool, drawn: bool
+        self,
+        made: Voyages,
+        model: ShipModel,
+        task: Task,
+        num_envs: int,
+        own: Pool,
+        drawn: bool,
     ) -> None:
         self.model, self.task, self.num_envs = model, task, num_envs
         self.windy, self.dt = made.windy, task.interval(model)
@@ -46,33 +53,51 @@ class Lanes:
         self._ships = ship_tiles(columns, tiles, len(own) > 1)
         plan = int(task.definition.plan_length(task.settings))
         self._states = np.zeros((tiles, (made.state.n_rows + plan) * LANES))
-        self._keys = np.zeros((tiles, 3, LANES), dtype=np.uint64)  # words of the random numbers
+        self._keys = np.zeros(
+            (tiles, 3, LANES), dtype=np.uint64
+        )  # words of the random numbers
         rules = Rules(
-            self.dt, task.substeps(model), task.episode_steps, task.max_envelope_distance,
+            self.dt,
+            task.substeps(model),
+            task.episode_steps,
+            task.max_envelope_distance,
             task.least_shaft(model),
-        )  # fmt: skip
-        noise = {field: SEA_TRIAL[channel].noise * task.noise for field, channel in SENSOR_NOISE.items()}
-        sensor = task.sensor_settings or made.sensors.make_settings(noise if made.sensors.noise else {})
-        self._settings = np.array([*rules, *flat(sensor), *flat(task.settings)], dtype=float)
+        )
+        noise = {
+            field: SEA_TRIAL[channel].noise * task.noise
+            for field, channel in SENSOR_NOISE.items()
+        }
+        sensor = task.sensor_settings or made.sensors.make_settings(
+            noise if made.sensors.noise else {}
+        )
+        self._settings = np.array(
+            [*rules, *flat(sensor), *flat(task.settings)], dtype=float
+        )
         self.flag_names = [name for name in task.info_names if name in task.flags]
         observed = [quantity.path for quantity in task.observed(model)]
         self._rows = self._shown_rows(observed)
         self._outputs = OutputPool(
-            num_envs, len(observed), STEP_OUTCOME + len(task.info_names), STEP_FLAGS + len(self.flag_names)
+            num_envs,
+            len(observed),
+            STEP_OUTCOME + len(task.info_names),
+            STEP_FLAGS + len(self.flag_names),
         )
 
     def _shown_rows(self, observed: Sequence[str]) -> NDArray[np.int64]:
         """How many observations, outcomes and flags there are, and the offsets of their rows."""
         made = self._voyages
         outcomes = [
-            LANES * made.result["outcome"].row(name) for name in ("reward", "terminated", "truncated")
+            LANES * made.result["outcome"].row(name)
+            for name in ("reward", "terminated", "truncated")
         ]
         rows = [
             [LANES * made.result["observation"].row(path) for path in observed],
             [*outcomes, *(made.info_offset(name) for name in self.task.info_names)],
             [*outcomes[1:], *(made.info_offset(name) for name in self.flag_names)],
         ]
-        return np.array([*map(len, rows), *(row for kind in rows for row in kind)], dtype=np.int64)
+        return np.array(
+            [*map(len, rows), *(row for kind in rows for row in kind)], dtype=np.int64
+        )
 
     @property
     def episodes(self) -> NDArray[np.uint64]:
@@ -99,13 +124,16 @@ class Lanes:
     def physical_state(self) -> dict[str, Floats]:
         """State, course, commands and, unless it is calm, the weather, SI units, each of shape (num_envs,).
 
-        Heading and yaw rate are without the first-order motion in waves, which has names of its own, as has
-        the weather (`weather_rows.CHANNEL_NAMES`). `set_point` is the heading to steer, rad.
+        Heading and yaw rate are without the first-order motion in waves, which has
+        names of its own, as has the weather (`weather_rows.CHANNEL_NAMES`). `set_point`
+        is the heading to steer, rad.
         """
         state = {name: self.read(name) for name in self.model.state_names}
         if "course" in self._voyages.state["state"].present:
             state["set_point"] = self.read("course")
-        state["delta_command"] = self.read("rudder_command") * self._ship_row("rudder_limit")
+        state["delta_command"] = self.read("rudder_command") * self._ship_row(
+            "rudder_limit"
+        )
         if "n" in self.model.command_names:
             state["n_command"] = self.read("shaft_command") * self._ship_row("shaft")
         return {**state, **self._weather_now()} if self.windy else state
@@ -116,7 +144,10 @@ class Lanes:
         names = ["psi_wave", "r_wave", *roll, "current_north", "current_east"]
         now = {name: self.read(name) for name in names}
         now["wind_speed"] = self._ship_row("wind_speed") + self.read("gust")
-        return {**now, "wind_from": np.arctan2(self.read("wind_east"), self.read("wind_north"))}
+        return {
+            **now,
+            "wind_from": np.arctan2(self.read("wind_east"), self.read("wind_north")),
+        }
 
     def _ship_row(self, name: str) -> Floats:
         """One number of the ships, or of their sea, for each lane, shape (num_envs,)."""
@@ -138,14 +169,30 @@ class Lanes:
     def path_metres(self, name: str) -> float | None:
         """A setting of the path that is in ship lengths, `corridor` or `turn_radius`, m; None without one."""
         lengths = getattr(self.task, name, None)
-        return None if lengths is None else float(lengths * self.model.particulars["length"])
+        return (
+            None
+            if lengths is None
+            else float(lengths * self.model.particulars["length"])
+        )
 
     def get_state(self) -> dict[str, Any]:
         """All that `set_state` needs to go on from here, copies by name."""
         shown, gear = self.shown, self._voyages.state
-        rows = [f"{name}.{path}" for name, place in gear.rows.items() for path in place.present]
-        made_for = {"task": self.task.name, "model": self.model.name, "num_envs": self.num_envs, "rows": rows}
-        outputs = {name: getattr(shown, name).copy() for name in ("observations", "outcomes", "flags")}
+        rows = [
+            f"{name}.{path}"
+            for name, place in gear.rows.items()
+            for path in place.present
+        ]
+        made_for = {
+            "task": self.task.name,
+            "model": self.model.name,
+            "num_envs": self.num_envs,
+            "rows": rows,
+        }
+        outputs = {
+            name: getattr(shown, name).copy()
+            for name in ("observations", "outcomes", "flags")
+        }
         return {"made_for": made_for, **self.memory(), **outputs}
 
     def check_state(self, state: Mapping[str, Any]) -> None:
@@ -156,25 +203,41 @@ class Lanes:
         for name, expected in own["made_for"].items():
             if (found := made_for.get(name)) != expected:
                 raise InputError(
-                    f"state: {name} {shown(found)} found, expected {shown(expected)}: a state fits an "
-                    "environment made by the same arguments in the same version"
+                    f"state: {name} {shown(found)} found, expected {shown(expected)}: a"
+                    " state fits an environment made by the same arguments in the same"
+                    " version"
                 )
         for name, expected in own.items():
             if name != "made_for" and np.shape(state[name]) != np.shape(expected):
                 found = f"of shape {np.shape(state[name])}"
-                raise InputError(f"state: {name} {found} found, expected {np.shape(expected)}")
-        if self._voyages.shared and not np.array_equal(state["ships"], self._ships, equal_nan=True):
-            raise InputError(f"state: of another ship than this {self.model.name!r}, expected the same")
-        lanes = np.moveaxis(lanes_of(state["states"]), 1, 2).reshape(-1, len(self._states[0]) // LANES)
+                raise InputError(
+                    f"state: {name} {found} found, expected {np.shape(expected)}"
+                )
+        if self._voyages.shared and not np.array_equal(
+            state["ships"], self._ships, equal_nan=True
+        ):
+            raise InputError(
+                f"state: of another ship than this {self.model.name!r}, expected the"
+                " same"
+            )
+        lanes = np.moveaxis(lanes_of(state["states"]), 1, 2).reshape(
+            -1, len(self._states[0]) // LANES
+        )
         for lane, row in np.argwhere(~np.isfinite(lanes[: self.num_envs]))[:1]:
             name = (*own["made_for"]["rows"], *["plan"] * row)[row]
-            raise InputError(f"state: {name} in row {lane} is not finite, expected a number")
+            raise InputError(
+                f"state: {name} in row {lane} is not finite, expected a number"
+            )
         if not np.isfinite(state["observations"]).all():
             raise InputError("state: observations are not finite, expected numbers")
 
     def memory(self) -> dict[str, NDArray[Any]]:
         """All that the steps to come depend on beside their commands, copies by name."""
-        return {"states": self._states.copy(), "keys": self._keys.copy(), "ships": self._ships.copy()}
+        return {
+            "states": self._states.copy(),
+            "keys": self._keys.copy(),
+            "ships": self._ships.copy(),
+        }
 
     def remember(self, memory: Mapping[str, NDArray[Any]]) -> None:
         """Go on from what `memory` of the same engine, or of one made alike, gave."""
@@ -187,24 +250,31 @@ def lanes_of(tiles: NDArray[Any]) -> NDArray[Any]:
     return tiles.reshape(len(tiles), -1, LANES)
 
 
-def ship_columns(pool: Pool, windy: bool, task: Task, base: ShipModel, drawn: bool) -> Floats:
+def ship_columns(
+    pool: Pool, windy: bool, task: Task, base: ShipModel, drawn: bool
+) -> Floats:
     """Numbers of ships and of the seas they meet, a row each; the sea worked out once for each kind of ship.
 
-    Ships that are drawn for an episode are seen in the scales of the environment's model.
+    Ships that are drawn for an episode are seen in the scales of the environment's
+    model.
     """
     known: dict[tuple[int, int], Floats] = {}
     columns = []
     for model, sea in pool:
         kind = (id(model.particulars), id(sea))
         if windy and kind not in known:
-            known[kind] = weather_column(model, sea, task.substep(base), task.water_depth)
+            known[kind] = weather_column(
+                model, sea, task.substep(base), task.water_depth
+            )
         numbers = model.ship_numbers(task.water_depth, task.substep(base))
         if drawn and model.particulars["length"] == base.particulars["length"]:
             numbers[Ship._fields.index("scale_speed")] = base.particulars["speed"]
         ship = Ship(*numbers[: len(Ship._fields)].tolist())
         scales = [task.scale(path, ship) for path in task.definition.seen]
         per_scale = [1.0 / scale if scale else 0.0 for scale in scales]
-        columns.append([*numbers, *envelope_numbers(model), *known.get(kind, ()), *per_scale])
+        columns.append(
+            [*numbers, *envelope_numbers(model), *known.get(kind, ()), *per_scale]
+        )
     return np.stack(columns)
 
 
@@ -215,7 +285,9 @@ def envelope_numbers(model: ShipModel) -> Floats:
         numbers[:4], numbers[4:8] = -np.inf, np.inf
         return numbers
     data = model.envelope
-    return np.concatenate([data.low, data.high, data.centre, data.shape[np.triu_indices(4)]])
+    return np.concatenate(
+        [data.low, data.high, data.centre, data.shape[np.triu_indices(4)]]
+    )
 
 
 def ship_tiles(columns: Floats, tiles: int, own: bool) -> Floats:
@@ -224,4 +296,6 @@ def ship_tiles(columns: Floats, tiles: int, own: bool) -> Floats:
         return columns.copy()
     rest = np.tile(columns[:1], (max(tiles * LANES - len(columns), 0), 1))
     lanes = np.concatenate([columns[: tiles * LANES], rest])
-    return np.ascontiguousarray(lanes.reshape(tiles, LANES, -1).transpose(0, 2, 1)).reshape(tiles, -1)
+    return np.ascontiguousarray(
+        lanes.reshape(tiles, LANES, -1).transpose(0, 2, 1)
+    ).reshape(tiles, -1)

@@ -26,21 +26,27 @@ Pool = list[tuple[ShipModel, Weather]]
 class Randomisation:
     """What differs from episode to episode beside task and sea."""
 
-    # {None, "covariance"}; whether each episode's ship is drawn from the identified covariance ("posterior"
-    # is taken too)
+    # {None, "covariance"}; whether each episode's ship is drawn from the identified
+    # covariance ("posterior" is taken too)
     model_uncertainty: str | None = None
     # further models of the same structure, of which each episode has one
     ensemble: Sequence[str | Path | ShipModel] = ()
-    # least and largest approach speed, parts of the service speed; the shaft turns in proportion
+    # least and largest approach speed, parts of the service speed; the shaft turns in
+    # proportion
     speed_range: Range | None = None
-    # least and largest displacement, parts of that of the model: accelerations are divided by it
+    # least and largest displacement, parts of that of the model: accelerations are
+    # divided by it
     loading_range: Range | None = None
 
     def __post_init__(self) -> None:
         if self.model_uncertainty is not None:
-            check_choice(self.model_uncertainty, ("covariance", "posterior"), "model_uncertainty")
+            check_choice(
+                self.model_uncertainty, ("covariance", "posterior"), "model_uncertainty"
+            )
         if isinstance(self.ensemble, str | Path | ShipModel):
-            raise InputError(f"ensemble: {self.ensemble!r} found, expected a list of models")
+            raise InputError(
+                f"ensemble: {self.ensemble!r} found, expected a list of models"
+            )
         for name in ("speed_range", "loading_range"):
             if (given := getattr(self, name)) is not None:
                 _check_range(given, name)
@@ -54,28 +60,42 @@ class Randomisation:
     def take_from(cls, options: Mapping[str, Any]) -> tuple[Self, dict[str, Any]]:
         """What is randomised among an environment's options, and the others."""
         own = {key: value for key, value in options.items() if key in cls.names()}
-        return cls(**own), {key: value for key, value in options.items() if key not in own}
+        return cls(**own), {
+            key: value for key, value in options.items() if key not in own
+        }
 
     def ships(self, model: ShipModel, seas: Sequence[Weather]) -> Pool:
         """The pool of ships and seas that episodes are drawn from; a single one where nothing differs.
 
-        The same for the same arguments. Raises InputError if a model cannot be drawn from, has another
-        structure, or is not loaded by its coefficients.
+        The same for the same arguments. Raises InputError if a model cannot be drawn
+        from, has another structure, or is not loaded by its coefficients.
         """
-        models = [model, *(one if isinstance(one, ShipModel) else load_model(one) for one in self.ensemble)]
+        models = [
+            model,
+            *(
+                one if isinstance(one, ShipModel) else load_model(one)
+                for one in self.ensemble
+            ),
+        ]
         for other in models[1:]:
             if other.vessel is not model.vessel:
                 raise InputError(
-                    f"ensemble: {other.name!r} has other equations than {model.name!r}, expected models of "
-                    "one structure; make an environment for each"
+                    f"ensemble: {other.name!r} has other equations than {model.name!r},"
+                    " expected models of one structure; make an environment for each"
                 )
         if not (self.model_uncertainty or self.speed_range or self.loading_range):
             return list(product(models, seas))
         random = np.random.default_rng(POOL_SEED)
         turns = -(-POOL_SIZE // len(models))
-        drawn = [one.sample(turns, random) if self.model_uncertainty else [one] * turns for one in models]
+        drawn = [
+            one.sample(turns, random) if self.model_uncertainty else [one] * turns
+            for one in models
+        ]
         ships = [ship for turn in zip(*drawn, strict=True) for ship in turn]
-        in_turn = [(ship, seas[i // len(models) % len(seas)]) for i, ship in enumerate(ships[:POOL_SIZE])]
+        in_turn = [
+            (ship, seas[i // len(models) % len(seas)])
+            for i, ship in enumerate(ships[:POOL_SIZE])
+        ]
         paces = self._paces(models)
         return [(self._varied(ship, paces, random), sea) for ship, sea in in_turn]
 
@@ -89,21 +109,31 @@ class Randomisation:
         }
 
     def _varied(
-        self, ship: ShipModel, paces: dict[int, list[Particulars]], random: np.random.Generator
+        self,
+        ship: ShipModel,
+        paces: dict[int, list[Particulars]],
+        random: np.random.Generator,
     ) -> ShipModel:
         """A ship at a speed and of a loading within the ranges."""
         if self.loading_range:
             ship = _loaded(ship, random.uniform(*self.loading_range))
         if self.speed_range:
-            own, pace = ship.particulars, paces[id(ship.particulars)][random.integers(N_SPEEDS)]
-            shaft = pace["speed"] / own["speed"] * ship.service_shaft_speed  # in proportion
+            own, pace = (
+                ship.particulars,
+                paces[id(ship.particulars)][random.integers(N_SPEEDS)],
+            )
+            shaft = (
+                pace["speed"] / own["speed"] * ship.service_shaft_speed
+            )  # in proportion
             ship = replace(ship, particulars=pace, service_shaft_speed=shaft)
         return ship
 
 
 def _check_range(given: Any, name: str) -> None:
     if not isinstance(given, Sequence) or len(given) != 2:
-        raise InputError(f"{name}: {given!r} found, expected the least and the largest, two numbers")
+        raise InputError(
+            f"{name}: {given!r} found, expected the least and the largest, two numbers"
+        )
     check_number(given[0], f"{name}: the least", above=0.0)
     check_number(given[1], f"{name}: the largest", at_least=given[0])
 
@@ -112,8 +142,9 @@ def _loaded(ship: ShipModel, displacement: float) -> ShipModel:
     """A ship that forces accelerate less, the heavier it is."""
     if not isinstance(ship.dynamics, Structure):
         raise InputError(
-            f"loading_range: the equations of {ship.name!r} are not a table of coefficients; name its "
-            "loading conditions as models of their own in `ensemble`"
+            f"loading_range: the equations of {ship.name!r} are not a table of"
+            " coefficients; name its loading conditions as models of their own in"
+            " `ensemble`"
         )
     lighter = {name: value / displacement for name, value in ship.coefficients.items()}
     return replace(ship, coefficients=lighter, covariance=None)

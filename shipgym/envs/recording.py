@@ -24,15 +24,16 @@ SUCCESS = ("success", "is_success")
 
 
 class RecordEpisode(
-    gymnasium.Wrapper[Observation, Action, Observation, Action], gymnasium.utils.RecordConstructorArgs
+    gymnasium.Wrapper[Observation, Action, Observation, Action],
+    gymnasium.utils.RecordConstructorArgs,
 ):
     """Writes each episode to a file of its own, `episode-00000.json` and so on.
 
-    A file is written, complete, when its episode ends. One cut off by `reset` or `close` is written as
-    well, neither terminated nor truncated, if it has a step.
+    A file is written, complete, when its episode ends. One cut off by `reset` or
+    `close` is written as well, neither terminated nor truncated, if it has a step.
 
-    Raises InputError if the environment is not one of shipgym's, the folder cannot be made, or it holds
-    recordings already.
+    Raises InputError if the environment is not one of shipgym's, the folder cannot be
+    made, or it holds recordings already.
 
     Parameters
     ----------
@@ -41,9 +42,11 @@ class RecordEpisode(
     folder : str or Path
         Where the files go; made if it does not exist.
     episode_trigger : callable of int, optional
-        Given the number of an episode, counted from 0, whether to record it. All by default.
+        Given the number of an episode, counted from 0, whether to record it. All by
+        default.
     trials : bool
-        Whether each episode is written as a trial too, `episode-00000.csv`, if it has two steps.
+        Whether each episode is written as a trial too, `episode-00000.csv`, if it has
+        two steps.
     name_prefix : str
         How the names of the files begin.
     overwrite : bool
@@ -51,14 +54,23 @@ class RecordEpisode(
     """
 
     def __init__(
-        self, env: gymnasium.Env[Observation, Action], folder: str | Path,
-        episode_trigger: Callable[[int], bool] | None = None, *, trials: bool = False,
-        name_prefix: str = "episode", overwrite: bool = False,
-    ) -> None:  # fmt: skip
+        self,
+        env: gymnasium.Env[Observation, Action],
+        folder: str | Path,
+        episode_trigger: Callable[[int], bool] | None = None,
+        *,
+        trials: bool = False,
+        name_prefix: str = "episode",
+        overwrite: bool = False,
+    ) -> None:
         gymnasium.utils.RecordConstructorArgs.__init__(
-            self, folder=str(folder), episode_trigger=episode_trigger, trials=trials, name_prefix=name_prefix,
+            self,
+            folder=str(folder),
+            episode_trigger=episode_trigger,
+            trials=trials,
+            name_prefix=name_prefix,
             overwrite=overwrite,
-        )  # fmt: skip
+        )
         _check_environment(env)
         super().__init__(env)
         self.episode_number = -1
@@ -81,7 +93,9 @@ class RecordEpisode(
             self._recorded = _Recorded(self.env, self._since_seed, info)
         return observation, info
 
-    def step(self, action: Action) -> tuple[Observation, SupportsFloat, bool, bool, dict[str, Any]]:
+    def step(
+        self, action: Action
+    ) -> tuple[Observation, SupportsFloat, bool, bool, dict[str, Any]]:
         """One step; the one that ends an episode writes its files."""
         observation, reward, terminated, truncated, info = super().step(action)
         if self._recorded is not None:
@@ -112,7 +126,9 @@ class _Recorded:
     Path and ship are taken at its beginning, because the next reset may change them.
     """
 
-    def __init__(self, env: gymnasium.Env[Any, Any], since_seed: int, info: Mapping[str, Any]) -> None:
+    def __init__(
+        self, env: gymnasium.Env[Any, Any], since_seed: int, info: Mapping[str, Any]
+    ) -> None:
         ship: Any = env.unwrapped
         self._ship, self._model = ship, ship.model
         self._actions: list[Floats] = []
@@ -121,39 +137,71 @@ class _Recorded:
         self._parts: list[dict[str, float]] = []
         self._numbers = [_numbers(info)]
         self._outcome: dict[str, Any] = {}
-        waypoints, spec, seed = getattr(ship, "waypoints", None), env.spec, ship.np_random_seed
+        waypoints, spec, seed = (
+            getattr(ship, "waypoints", None),
+            env.spec,
+            ship.np_random_seed,
+        )
         self._facts: dict[str, Any] = {
             "environment": type(ship).__name__ if spec is None else spec.id,
             "arguments": {} if spec is None else plain(spec.kwargs),
-            "model": self._model.name, "number": since_seed, "dt": float(ship.dt),
-            "seed": None if seed is None or seed < 0 else int(seed),  # no seed of a generator put in by hand
-            "length": self._model.particulars["length"], "beam": self._model.particulars["beam"],
+            "model": self._model.name,
+            "number": since_seed,
+            "dt": float(ship.dt),
+            "seed": (
+                None if seed is None or seed < 0 else int(seed)
+            ),  # no seed of a generator put in by hand
+            "length": self._model.particulars["length"],
+            "beam": self._model.particulars["beam"],
             "rudder_limit": math.radians(self._model.steering.rudder_limit_deg),
-            "waypoints": None if waypoints is None else np.array(waypoints, dtype=float),
+            "waypoints": (
+                None if waypoints is None else np.array(waypoints, dtype=float)
+            ),
             "turn_radius": getattr(ship, "turn_radius", None),
             "corridor": getattr(ship, "corridor", None),
-        }  # fmt: skip
+        }
 
     def add(
-        self, action: Any, reward: float, terminated: bool, truncated: bool, info: Mapping[str, Any]
+        self,
+        action: Any,
+        reward: float,
+        terminated: bool,
+        truncated: bool,
+        info: Mapping[str, Any],
     ) -> None:
         """One more step and what came of it."""
         self._actions.append(np.array(action, dtype=float).reshape(-1))
         self.rewards.append(reward)
         self._states.append(self._ship.physical_state())
-        self._parts.append({key: float(info[key]) for key in info if key.startswith(REWARD)})
+        self._parts.append(
+            {key: float(info[key]) for key in info if key.startswith(REWARD)}
+        )
         self._numbers.append(_numbers(info))
-        success = next((bool(info[key]) for key in SUCCESS if info.get(key) is not None), None)
-        self._outcome = {"terminated": bool(terminated), "truncated": bool(truncated), "success": success}
+        success = next(
+            (bool(info[key]) for key in SUCCESS if info.get(key) is not None), None
+        )
+        self._outcome = {
+            "terminated": bool(terminated),
+            "truncated": bool(truncated),
+            "success": success,
+        }
 
     def episode(self) -> Episode:
         """All of it."""
         orders = self._model.command_names
         return Episode(
-            states=_columns(self._states), actions=np.array(self._actions), rewards=np.array(self.rewards),
-            commands={name: np.array([s[f"{name}_command"] for s in self._states[1:]]) for name in orders},
-            reward_parts=_columns(self._parts), info=_columns(self._numbers), **self._facts, **self._outcome,
-        )  # fmt: skip
+            states=_columns(self._states),
+            actions=np.array(self._actions),
+            rewards=np.array(self.rewards),
+            commands={
+                name: np.array([s[f"{name}_command"] for s in self._states[1:]])
+                for name in orders
+            },
+            reward_parts=_columns(self._parts),
+            info=_columns(self._numbers),
+            **self._facts,
+            **self._outcome,
+        )
 
 
 def _numbers(info: Mapping[str, Any]) -> dict[str, float]:
@@ -176,21 +224,29 @@ def _columns(rows: list[dict[str, float]]) -> dict[str, Floats]:
 
 def _check_environment(env: Any) -> None:
     if not isinstance(env, gymnasium.Env):
-        raise InputError(f"env: {env!r} found, expected a single environment; give each its own recorder")
+        raise InputError(
+            f"env: {env!r} found, expected a single environment; give each its own"
+            " recorder"
+        )
     for name in ("physical_state", "model", "dt"):
         if not hasattr(env.unwrapped, name):
-            raise InputError(f"env: {env.unwrapped} has no '{name}', expected an environment of shipgym")
+            raise InputError(
+                f"env: {env.unwrapped} has no '{name}', expected an environment of"
+                " shipgym"
+            )
 
 
 def _folder(folder: Path, prefix: str, overwrite: bool) -> Path:
     if Path(check_text(prefix, "name_prefix")).name != prefix:
-        raise InputError(f"name_prefix: {prefix!r} found, expected the beginning of a file's name")
+        raise InputError(
+            f"name_prefix: {prefix!r} found, expected the beginning of a file's name"
+        )
     make_folder(folder)
     there = next(iter(sorted(folder.glob(f"{escape(prefix)}-[0-9]*.json"))), None)
     if there is not None and not overwrite:
         raise InputError(
-            f"folder: {folder} holds '{there.name}' of an earlier recording; choose another folder or "
-            "overwrite=True"
+            f"folder: {folder} holds '{there.name}' of an earlier recording; choose"
+            " another folder or overwrite=True"
         )
     return folder
 

@@ -10,7 +10,8 @@ from shipgym.errors import InputError
 from shipgym.files import shipped_toml
 from shipgym.tasks.source import kept_source
 
-#: Keywords of the variants by id, without the version, and models that are the defaults of ids of version 1.
+#: Keywords of the variants by id, without the version, and models that are the defaults
+#: of ids of version 1.
 VARIANTS, IDENTIFIED = shipped_toml("shipgym.envs", "variants.toml").values()
 #: Tasks by their names, a version in them where it is not the first.
 TASKS = ("CourseKeeping", "PathFollowing", "PathFollowing-v1")
@@ -31,7 +32,11 @@ def environments() -> dict[str, dict[str, Any]]:
     }
     for name, model in IDENTIFIED.items():
         # course keeping has no version 1 of its own: the same task, on another model
-        same = name.replace("-v1", "-v0") if name.startswith("shipgym/CourseKeeping") else name
+        same = (
+            name.replace("-v1", "-v0")
+            if name.startswith("shipgym/CourseKeeping")
+            else name
+        )
         found[name] = {**found[same], "model": model}
     return found
 
@@ -45,16 +50,17 @@ def register_environments() -> None:
 def register_task(env_id: str, task: str | Path | Any, **options: Any) -> None:
     """Register a task of your own, so that `gym.make` and `gym.make_vec` know it.
 
-    It is tried in plain Python and compiled, which takes some seconds, once. Raises InputError if the task is
-    not what the contract asks, cannot be compiled or does not fit the ship, or the id belongs to another;
-    nothing is registered then.
+    It is tried in plain Python and compiled, which takes some seconds, once. Raises
+    InputError if the task is not what the contract asks, cannot be compiled or does not
+    fit the ship, or the id belongs to another; nothing is registered then.
 
     Parameters
     ----------
     env_id : str
         Such as "harbour/TurningBasin-v0".
     task : str, Path or module
-        The file of the task (`shipgym.tasks.contract`). Give its path, and worker processes find it too.
+        The file of the task (`shipgym.tasks.contract`). Give its path, and worker
+        processes find it too.
     **options
         Keywords of the environment that differ from their defaults.
     """
@@ -64,14 +70,22 @@ def register_task(env_id: str, task: str | Path | Any, **options: Any) -> None:
     from shipgym.tasks.task import ENV_OPTIONS
 
     given = {"task": kept_source(task), **options}
-    given |= {name: kept_source(options[name]) for name in ("reward", "sensors") if name in options}
-    own = {name: value for name, value in options.items() if name == "reward" or name not in ENV_OPTIONS}
+    given |= {
+        name: kept_source(options[name])
+        for name in ("reward", "sensors")
+        if name in options
+    }
+    own = {
+        name: value
+        for name, value in options.items()
+        if name == "reward" or name not in ENV_OPTIONS
+    }
     ship, asked, _ = read_options(task, options.get("model", DEFAULT_MODEL), own)
     known = gymnasium.registry.get(check_text(env_id, "env_id"))
     if known is not None and known.kwargs != given:
         raise InputError(
-            f"{env_id}: registered already, for {known.kwargs.get('task')!r}, expected an id of its own; "
-            "give another name or version"
+            f"{env_id}: registered already, for {known.kwargs.get('task')!r}, expected"
+            " an id of its own; give another name or version"
         )
     if fault := fault_in_python(ship, asked):
         raise InputError(fault)
@@ -80,7 +94,8 @@ def register_task(env_id: str, task: str | Path | Any, **options: Any) -> None:
         _register(env_id, given)
     except gymnasium.error.Error as error:
         raise InputError(
-            f"{env_id!r} found, expected an id such as 'harbour/{asked.name}-v0': {error}"
+            f"{env_id!r} found, expected an id such as 'harbour/{asked.name}-v0':"
+            f" {error}"
         ) from None
 
 
@@ -91,6 +106,7 @@ def _register(env_id: str, options: dict[str, Any]) -> None:
         id=env_id,
         entry_point="shipgym.envs.ship_env:ShipEnv",
         vector_entry_point="shipgym.envs.ship_vector_env:ShipVectorEnv",
-        disable_env_checker=True,  # it checks its actions itself; the tests run check_env
+        # it checks its actions itself; the tests run check_env
+        disable_env_checker=True,
         kwargs=options,
     )

@@ -14,14 +14,27 @@ from shipgym.envs.ship_vector_env import Infos, ShipVectorEnv
 from shipgym.errors import InputError
 from shipgym.extras import library
 
-Monitor = library("stable_baselines3.common.monitor", "rl", "ShipVecEnv needs it").Monitor
-VecEnv: Any = library("stable_baselines3.common.vec_env", "rl", "ShipVecEnv needs it").VecEnv
+Monitor = library(
+    "stable_baselines3.common.monitor", "rl", "ShipVecEnv needs it"
+).Monitor
+VecEnv: Any = library(
+    "stable_baselines3.common.vec_env", "rl", "ShipVecEnv needs it"
+).VecEnv
 
 Indices = None | int | Sequence[int]
 Vectors = VectorEnv[Any, Any, Any]
 
 #: What all rows have in common, by the names of the single environment.
-SHARED = ("dt", "metadata", "model", "observation_names", "observation_scales", "render_mode", "spec", "task")
+SHARED = (
+    "dt",
+    "metadata",
+    "model",
+    "observation_names",
+    "observation_scales",
+    "render_mode",
+    "spec",
+    "task",
+)
 SPACES = ("observation_space", "action_space")  # of one ship
 
 
@@ -49,7 +62,10 @@ class Row:
 
     def physical_state(self) -> dict[str, float]:
         """State, course to steer and weather by name, SI units (see `Engine.physical_state`)."""
-        return {name: float(values[self._number]) for name, values in self._env.physical_state().items()}
+        return {
+            name: float(values[self._number])
+            for name, values in self._env.physical_state().items()
+        }
 
     def render(self) -> Any:
         """A picture, uint8 array of shape (600, 600, 3); None without a render mode."""
@@ -63,19 +79,20 @@ FIXED = {*SHARED, *SPACES, *(name for name in vars(Row) if not name.startswith("
 class ShipVecEnv(VecEnv):  # type: ignore[misc]  # stable-baselines3 is not type-checked here
     """Ships under a task as a vector environment of stable-baselines3, equal to its DummyVecEnv of them.
 
-    The list of infos is the same in every step, and its dictionaries are empty but for episodes that ended:
-    those hold what the single environment's `info` does, `terminal_observation`, `TimeLimit.truncated`,
-    `episode` as stable-baselines3's Monitor writes it (return `r`, length `l`, time `t`) and, where paths
-    are followed, `is_success`. Copy the list to keep infos beyond the next step.
+    The list of infos is the same in every step, and its dictionaries are empty but for
+    episodes that ended: those hold what the single environment's `info` does,
+    `terminal_observation`, `TimeLimit.truncated`, `episode` as stable-baselines3's
+    Monitor writes it (return `r`, length `l`, time `t`) and, where paths are followed,
+    `is_success`. Copy the list to keep infos beyond the next step.
 
-    Raises InputError for an environment that is not native, an unknown keyword or a value out of its range,
-    or options beside an environment that is made already.
+    Raises InputError for an environment that is not native, an unknown keyword or a
+    value out of its range, or options beside an environment that is made already.
 
     Parameters
     ----------
     env : str or VectorEnv
-        An environment's id, or a native vector environment with the autoreset mode SAME_STEP, also within
-        Gymnasium's wrappers of vector environments.
+        An environment's id, or a native vector environment with the autoreset mode
+        SAME_STEP, also within Gymnasium's wrappers of vector environments.
     num_envs : int, optional
         Number of ships; by default 1, or that of the given environment.
     seed : int, optional
@@ -87,14 +104,23 @@ class ShipVecEnv(VecEnv):  # type: ignore[misc]  # stable-baselines3 is not type
     """
 
     def __init__(
-        self, env: str | Vectors, num_envs: int | None = None, *, seed: int | None = None,
-        info_names: Sequence[str] = (), **options: Any,
-    ) -> None:  # fmt: skip
+        self,
+        env: str | Vectors,
+        num_envs: int | None = None,
+        *,
+        seed: int | None = None,
+        info_names: Sequence[str] = (),
+        **options: Any,
+    ) -> None:
         self.vector_env: Any = _native(env, num_envs, options)
         self._ships: ShipVectorEnv = self.vector_env.unwrapped
         n = self.vector_env.num_envs
         self._rows = [Row(self._ships, number) for number in range(n)]
-        super().__init__(n, self.vector_env.single_observation_space, self.vector_env.single_action_space)
+        super().__init__(
+            n,
+            self.vector_env.single_observation_space,
+            self.vector_env.single_action_space,
+        )
         self.metadata: dict[str, Any] = dict(self.vector_env.metadata)
         self.spec = self.vector_env.spec
         self.info_names = tuple(info_names)
@@ -111,14 +137,20 @@ class ShipVecEnv(VecEnv):  # type: ignore[misc]  # stable-baselines3 is not type
     def reset(self) -> NDArray[np.float32]:
         """Begin an episode in each row: with the seeds of `seed`, once, or else the next.
 
-        Raises InputError if there are options: as the single environments, these know none.
+        Raises InputError if there are options: as the single environments, these know
+        none.
         """
         options = [given for given in self._options if given]
         self._reset_options()
         if options:
-            raise InputError(f"options: {options[0]!r} found, expected none; name them when it is made")
+            raise InputError(
+                f"options: {options[0]!r} found, expected none; name them when it is"
+                " made"
+            )
         observations: NDArray[np.float32]
-        observations, infos = self.vector_env.reset(seed=None if None in self._seeds else self._seeds)
+        observations, infos = self.vector_env.reset(
+            seed=None if None in self._seeds else self._seeds
+        )
         self._reset_seeds()
         self.reset_infos = [_info_of(infos, row) for row in range(self.num_envs)]
         self._infos = [{} for _ in range(self.num_envs)]
@@ -131,13 +163,20 @@ class ShipVecEnv(VecEnv):  # type: ignore[misc]  # stable-baselines3 is not type
 
     def step_wait(
         self,
-    ) -> tuple[NDArray[np.float32], NDArray[np.float32], NDArray[np.bool_], list[dict[str, Any]]]:
+    ) -> tuple[
+        NDArray[np.float32],
+        NDArray[np.float32],
+        NDArray[np.bool_],
+        list[dict[str, Any]],
+    ]:
         """One control interval; where an episode ends the next begins and the observation is its first.
 
-        Observations and rewards are float32, infos the same list in each step. Raises InputError if an action
-        is not a number or their shape is another.
+        Observations and rewards are float32, infos the same list in each step. Raises
+        InputError if an action is not a number or their shape is another.
         """
-        observations, rewards, terminated, truncated, infos = self.vector_env.step(self._actions)
+        observations, rewards, terminated, truncated, infos = self.vector_env.step(
+            self._actions
+        )
         self._returns += rewards
         self._lengths += 1
         for row in self._touched:
@@ -168,7 +207,10 @@ class ShipVecEnv(VecEnv):  # type: ignore[misc]  # stable-baselines3 is not type
 
     def memory(self) -> dict[str, NDArray[Any]]:
         """All that the steps to come depend on beside their actions, copies by name; after a `reset`."""
-        return {"returns": self._returns.copy(), "lengths": self._lengths.copy()} | self._ships.memory()
+        return {
+            "returns": self._returns.copy(),
+            "lengths": self._lengths.copy(),
+        } | self._ships.memory()
 
     def remember(self, memory: Mapping[str, NDArray[Any]]) -> None:
         """Go on from the `memory` of an environment made with the same arguments, in place of a `reset`."""
@@ -196,19 +238,28 @@ class ShipVecEnv(VecEnv):  # type: ignore[misc]  # stable-baselines3 is not type
         """
         if attr_name in FIXED:
             raise InputError(
-                f"set_attr: {attr_name!r} is fixed when the ships are made, expected a name of your own; "
-                "make a new ShipVecEnv with another argument"
+                f"set_attr: {attr_name!r} is fixed when the ships are made, expected a"
+                " name of your own; make a new ShipVecEnv with another argument"
             )
         for row in self._chosen(indices):
             setattr(row, attr_name, value)
 
     def env_method(
-        self, method_name: str, *method_args: Any, indices: Indices = None, **method_kwargs: Any
+        self,
+        method_name: str,
+        *method_args: Any,
+        indices: Indices = None,
+        **method_kwargs: Any,
     ) -> list[Any]:
         """What a method of the single environments of some rows returns (see `Row`)."""
-        return [getattr(row, method_name)(*method_args, **method_kwargs) for row in self._chosen(indices)]
+        return [
+            getattr(row, method_name)(*method_args, **method_kwargs)
+            for row in self._chosen(indices)
+        ]
 
-    def env_is_wrapped(self, wrapper_class: type[gymnasium.Wrapper], indices: Indices = None) -> list[bool]:
+    def env_is_wrapped(
+        self, wrapper_class: type[gymnasium.Wrapper], indices: Indices = None
+    ) -> list[bool]:
         """Whether the rows do what a wrapper does: Monitor's episode statistics, yes; nothing else."""
         return [wrapper_class is Monitor for _ in self._chosen(indices)]
 
@@ -222,7 +273,7 @@ def _info_of(infos: Infos, row: int) -> dict[str, Any]:
         name: values[row].item()
         for name, values in infos.items()
         if not name.startswith(("_", "final_")) and not isinstance(values, dict)
-    }  # fmt: skip
+    }
 
 
 def _native(env: str | Vectors, num_envs: int | None, options: dict[str, Any]) -> Any:
@@ -230,25 +281,29 @@ def _native(env: str | Vectors, num_envs: int | None, options: dict[str, Any]) -
     if isinstance(env, str):
         if "autoreset_mode" in options:
             raise InputError(
-                "autoreset_mode: found, expected none; stable-baselines3 begins episodes in the same step"
+                "autoreset_mode: found, expected none; stable-baselines3 begins"
+                " episodes in the same step"
             )
         n = 1 if num_envs is None else num_envs
-        made: Any = gymnasium.make_vec(env, num_envs=n, autoreset_mode=AutoresetMode.SAME_STEP, **options)
+        made: Any = gymnasium.make_vec(
+            env, num_envs=n, autoreset_mode=AutoresetMode.SAME_STEP, **options
+        )
     else:
         made = env
         if num_envs is not None or options:
             raise InputError(
-                f"num_envs, options: {sorted(options) or num_envs} found with an environment that is made "
-                "already; give them where it is made, or give its id"
+                f"num_envs, options: {sorted(options) or num_envs} found with an"
+                " environment that is made already; give them where it is made, or"
+                " give its id"
             )
     if not isinstance(getattr(made, "unwrapped", None), ShipVectorEnv):
         raise InputError(
-            f"env: {made!r} found, expected the id of an environment of shipgym or what gymnasium.make_vec "
-            "makes of it, also wrapped"
+            f"env: {made!r} found, expected the id of an environment of shipgym or what"
+            " gymnasium.make_vec makes of it, also wrapped"
         )
     if made.metadata["autoreset_mode"] is not AutoresetMode.SAME_STEP:
         raise InputError(
-            f"env: autoreset_mode {made.metadata['autoreset_mode'].name} found, expected SAME_STEP: "
-            "gymnasium.make_vec(..., autoreset_mode='SameStep')"
+            f"env: autoreset_mode {made.metadata['autoreset_mode'].name} found,"
+            " expected SAME_STEP: gymnasium.make_vec(..., autoreset_mode='SameStep')"
         )
     return made

@@ -11,7 +11,12 @@ from numpy.typing import NDArray
 from shipgym.arrays import Floats
 from shipgym.engine.episodes import REFUSED
 from shipgym.envs.engine import Engine, as_numbers
-from shipgym.envs.environment import DEFAULT_MODEL, DEFAULT_TASK, ShipsEnv, rudder_orders
+from shipgym.envs.environment import (
+    DEFAULT_MODEL,
+    DEFAULT_TASK,
+    ShipsEnv,
+    rudder_orders,
+)
 from shipgym.envs.outputs import STEP_OUTCOME
 from shipgym.errors import InputError
 from shipgym.ships import ShipModel
@@ -24,10 +29,12 @@ FLOAT32 = np.dtype(np.float32)
 class ShipEnv(ShipsEnv, gymnasium.Env[Observation, Any]):
     """One ship under a task; the environments differ by their task alone.
 
-    The action is the commanded rudder, -1 to 1 of its limit, positive to starboard. The observation holds the
-    quantities of `observation_names`, each divided by its entry of `observation_scales`. The reward is the
-    sum of its parts, which `info` has by name. What is asked, observed and paid is told by the task's file
-    (`shipgym/tasks/course_keeping.py`, `shipgym/tasks/path_following.py`, or one of your own).
+    The action is the commanded rudder, -1 to 1 of its limit, positive to starboard. The
+    observation holds the quantities of `observation_names`, each divided by its entry
+    of `observation_scales`. The reward is the sum of its parts, which `info` has by
+    name. What is asked, observed and paid is told by the task's file
+    (`shipgym/tasks/course_keeping.py`, `shipgym/tasks/path_following.py`, or one of
+    your own).
 
     Raises InputError for an unknown model or keyword, or an argument out of its range.
 
@@ -42,25 +49,40 @@ class ShipEnv(ShipsEnv, gymnasium.Env[Observation, Any]):
     allow_unstable : bool
         Whether a model that was found unstable when it was identified may be used.
     **options
-        Settings of the task, fields of `Task` and of `Randomisation`; `reward` and `sensors`, files with a
-        reward and a sensor set of your own (`shipgym.tasks.contract`).
+        Settings of the task, fields of `Task` and of `Randomisation`; `reward` and
+        `sensors`, files with a reward and a sensor set of your own
+        (`shipgym.tasks.contract`).
     """
 
-    metadata: dict[str, Any] = {"render_modes": ["human", "rgb_array"], "render_fps": 30}  # noqa: RUF012 - Gymnasium declares it so
+    metadata: dict[str, Any] = {  # noqa: RUF012
+        "render_modes": ["human", "rgb_array"],
+        "render_fps": 30,
+    }
 
     def __init__(
-        self, model: str | Path | ShipModel = DEFAULT_MODEL, task: Any = DEFAULT_TASK,
-        render_mode: str | None = None, allow_unstable: bool = False, **options: Any,
-    ) -> None:  # fmt: skip
-        seen, commands = self._make(locals(), ENV_OPTIONS, self.metadata["render_modes"])
+        self,
+        model: str | Path | ShipModel = DEFAULT_MODEL,
+        task: Any = DEFAULT_TASK,
+        render_mode: str | None = None,
+        allow_unstable: bool = False,
+        **options: Any,
+    ) -> None:
+        seen, commands = self._make(
+            locals(), ENV_OPTIONS, self.metadata["render_modes"]
+        )
         self.observation_space, self.action_space = seen, commands  # type: ignore[assignment]
         self._names = self.task.info_names
-        self._flags = [(name, k) for k, name in enumerate(self._names) if name in self.task.flags]
+        self._flags = [
+            (name, k) for k, name in enumerate(self._names) if name in self.task.flags
+        ]
         self._made()
 
     def _use(self, engine: Engine) -> None:
         super()._use(engine)
-        self._seen, self._outcomes = engine.shown.observations[0], engine.shown.outcomes[:, 0]
+        self._seen, self._outcomes = (
+            engine.shown.observations[0],
+            engine.shown.outcomes[:, 0],
+        )
         self._advance, self._command = engine.step_of_one(), engine.command[:, 0]
 
     @property
@@ -90,8 +112,9 @@ class ShipEnv(ShipsEnv, gymnasium.Env[Observation, Any]):
         seed : int, optional
             Fixes this episode and all that follow it.
         options : dict, optional
-            Until the next reset: `waypoints` of the path, or of several; `model_index`, the one of the ships
-            that episodes are drawn from. Or, alone, `state`: go on from what `get_state` gave.
+            Until the next reset: `waypoints` of the path, or of several; `model_index`,
+            the one of the ships that episodes are drawn from. Or, alone, `state`: go on
+            from what `get_state` gave.
 
         Returns
         -------
@@ -113,16 +136,19 @@ class ShipEnv(ShipsEnv, gymnasium.Env[Observation, Any]):
                 self.render()
         return self._seen.copy(), self._info(self._outcomes[STEP_OUTCOME:].tolist())
 
-    def step(self, action: Any) -> tuple[Observation, SupportsFloat, bool, bool, dict[str, Any]]:
+    def step(
+        self, action: Any
+    ) -> tuple[Observation, SupportsFloat, bool, bool, dict[str, Any]]:
         """Hold a command over one control interval.
 
-        Raises InputError if the action is not a finite number for each command, or no episode has begun.
+        Raises InputError if the action is not a finite number for each command, or no
+        episode has begun.
 
         Parameters
         ----------
         action : array of shape (n_commands,), or int
-            Commanded rudder, and shaft speed, parts of their limits, clipped to [-1, 1]; or the number of a
-            rudder order.
+            Commanded rudder, and shaft speed, parts of their limits, clipped to [-1,
+            1]; or the number of a rudder order.
 
         Returns
         -------
@@ -130,15 +156,20 @@ class ShipEnv(ShipsEnv, gymnasium.Env[Observation, Any]):
         reward : float
         terminated, truncated : bool
         info : dict
-            The parts of the reward, `heading_error` in rad, `envelope_distance`, `extrapolating`, and what
-            the environment's page names.
+            The parts of the reward, `heading_error` in rad, `envelope_distance`,
+            `extrapolating`, and what the environment's page names.
         """
         if not self._begun:
             self._refuse_step()
         self._order(action)
         if self._advance() == REFUSED:
-            wrong = next(number for number in self._command.tolist() if not isfinite(number))
-            raise InputError(f"action: {wrong} found, expected numbers in [-1, 1]: parts of the limit")
+            wrong = next(
+                number for number in self._command.tolist() if not isfinite(number)
+            )
+            raise InputError(
+                f"action: {wrong} found, expected numbers in [-1, 1]: parts of the"
+                " limit"
+            )
         values = self._outcomes.tolist()
         if not isfinite(values[0]):
             self._engine.refuse_rewards()
@@ -162,13 +193,21 @@ class ShipEnv(ShipsEnv, gymnasium.Env[Observation, Any]):
         elif not isinstance(action, np.ndarray) or action.dtype is not FLOAT32:
             action = as_numbers(action, "action")
         if action.shape != self._command.shape:
-            what = "the commanded rudder" + (" and shaft speed" if len(self._command) > 1 else "")
-            raise InputError(f"action: shape {action.shape} found, expected {self._command.shape}: {what}")
+            what = "the commanded rudder" + (
+                " and shaft speed" if len(self._command) > 1 else ""
+            )
+            raise InputError(
+                f"action: shape {action.shape} found, expected {self._command.shape}:"
+                f" {what}"
+            )
         self._command[...] = action
 
     def physical_state(self) -> dict[str, float]:
         """State, course to steer and weather by name, SI units (see `Engine.physical_state`)."""
-        return {name: float(value[0]) for name, value in self._engine.physical_state().items()}
+        return {
+            name: float(value[0])
+            for name, value in self._engine.physical_state().items()
+        }
 
     def render(self) -> Any:
         """The ship on her chart, uint8 array of shape (600, 600, 3); None without a render mode."""

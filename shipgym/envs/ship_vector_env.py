@@ -13,7 +13,12 @@ from numpy.typing import NDArray
 from shipgym.arrays import Floats
 from shipgym.checks import check_keys, quoted
 from shipgym.envs.engine import episode_keys
-from shipgym.envs.environment import DEFAULT_MODEL, DEFAULT_TASK, ShipsEnv, rudder_orders
+from shipgym.envs.environment import (
+    DEFAULT_MODEL,
+    DEFAULT_TASK,
+    ShipsEnv,
+    rudder_orders,
+)
 from shipgym.envs.outputs import named_rows
 from shipgym.errors import InputError
 from shipgym.ships import ShipModel
@@ -50,22 +55,33 @@ class ShipVectorEnv(ShipsEnv, VectorEnv[Observation, Any, Floats]):
     """
 
     def __init__(
-        self, num_envs: int = 1, model: str | Path | ShipModel = DEFAULT_MODEL, task: Any = DEFAULT_TASK,
-        render_mode: str | None = None, allow_unstable: bool = False,
-        autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP, threads: int = 1,
-        max_episode_steps: int | None = None, **options: Any,
-    ) -> None:  # fmt: skip
+        self,
+        num_envs: int = 1,
+        model: str | Path | ShipModel = DEFAULT_MODEL,
+        task: Any = DEFAULT_TASK,
+        render_mode: str | None = None,
+        allow_unstable: bool = False,
+        autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
+        threads: int = 1,
+        max_episode_steps: int | None = None,
+        **options: Any,
+    ) -> None:
         arguments = locals()
         mode = _mode(autoreset_mode)
         if max_episode_steps is not None:
             steps = options.setdefault("episode_steps", max_episode_steps)
             if steps != max_episode_steps:
                 raise InputError(
-                    f"max_episode_steps: {max_episode_steps!r} found together with episode_steps {steps!r}"
+                    f"max_episode_steps: {max_episode_steps!r} found together with"
+                    f" episode_steps {steps!r}"
                 )
         seen, commands = self._make(arguments, VECTOR_OPTIONS, ["rgb_array"])
         self.num_envs = int(num_envs)
-        self.metadata = {"render_modes": ["rgb_array"], "render_fps": 30, "autoreset_mode": mode}
+        self.metadata = {
+            "render_modes": ["rgb_array"],
+            "render_fps": 30,
+            "autoreset_mode": mode,
+        }
         self.single_observation_space, self.single_action_space = seen, commands
         self.observation_space = batch_space(seen, self.num_envs)
         self.action_space = batch_space(commands, self.num_envs)
@@ -84,7 +100,10 @@ class ShipVectorEnv(ShipsEnv, VectorEnv[Observation, Any, Floats]):
         self._some_over = bool(counters["some_over"])
 
     def reset(
-        self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
+        self,
+        *,
+        seed: int | Sequence[int | None] | None = None,
+        options: dict[str, Any] | None = None,
     ) -> tuple[Observation, Infos]:
         """Begin an episode in each row.
 
@@ -93,10 +112,11 @@ class ShipVectorEnv(ShipsEnv, VectorEnv[Observation, Any, Floats]):
         Parameters
         ----------
         seed : int or sequence of int or None, optional
-            Row i has the seed `seed + i`, or number i of the sequence. Without one the next episodes begin.
+            Row i has the seed `seed + i`, or number i of the sequence. Without one the
+            next episodes begin.
         options : dict, optional
-            `reset_mask`, bool array of shape (num_envs,): rows to begin anew, the others go on. Or, for all
-            rows, those of the single environment.
+            `reset_mask`, bool array of shape (num_envs,): rows to begin anew, the
+            others go on. Or, for all rows, those of the single environment.
 
         Returns
         -------
@@ -119,7 +139,9 @@ class ShipVectorEnv(ShipsEnv, VectorEnv[Observation, Any, Floats]):
                 self._keys[row], episodes[row] = episode_keys(number), 0
         before = self._engine.shown
         self._engine.show_anew()
-        self._engine.shown.take(before)  # rows that are not begun anew keep what they show
+        self._engine.shown.take(
+            before
+        )  # rows that are not begun anew keep what they show
         self._begun = True
         self._engine.begin(self._keys, episodes, mask)
         self._draw(mask)
@@ -130,16 +152,31 @@ class ShipVectorEnv(ShipsEnv, VectorEnv[Observation, Any, Floats]):
     def _infos(self) -> Infos:
         """Rows of the last step's arrays by name, with their masks."""
         shown = self._engine.shown
-        return named_rows(shown.outcomes, shown.flags, self._names, self._flags) | self._masks
+        return (
+            named_rows(shown.outcomes, shown.flags, self._names, self._flags)
+            | self._masks
+        )
 
     def _mask(self, options: dict[str, Any] | None) -> Flags:
         mask = (options or {}).get("reset_mask", self._engine.all_lanes)
-        if not isinstance(mask, np.ndarray) or mask.shape != (self.num_envs,) or mask.dtype != np.bool_:
-            raise InputError(f"options: reset_mask {mask!r} found, expected a bool array of {self.num_envs}")
+        if (
+            not isinstance(mask, np.ndarray)
+            or mask.shape != (self.num_envs,)
+            or mask.dtype != np.bool_
+        ):
+            raise InputError(
+                f"options: reset_mask {mask!r} found, expected a bool array of"
+                f" {self.num_envs}"
+            )
         if not mask.any():
-            raise InputError("options: reset_mask is False in all rows, expected one at least to begin anew")
+            raise InputError(
+                "options: reset_mask is False in all rows, expected one at least to"
+                " begin anew"
+            )
         if not mask.all():
-            check_keys(options or {}, ["reset_mask"], "options with a reset_mask of some rows")
+            check_keys(
+                options or {}, ["reset_mask"], "options with a reset_mask of some rows"
+            )
         return mask
 
     def _seeds(self, seed: int | Sequence[int | None] | None) -> Sequence[int | None]:
@@ -148,14 +185,17 @@ class ShipVectorEnv(ShipsEnv, VectorEnv[Observation, Any, Floats]):
         if isinstance(seed, int | np.integer):
             return [int(seed) + row for row in range(self.num_envs)]
         if len(seed) != self.num_envs:
-            raise InputError(f"seed: {len(seed)} found, expected one for each of {self.num_envs} rows")
+            raise InputError(
+                f"seed: {len(seed)} found, expected one for each of {self.num_envs}"
+                " rows"
+            )
         return seed
 
     def step(self, actions: Any) -> tuple[Observation, Floats, Flags, Flags, Infos]:  # type: ignore[override]
         """One control interval of all rows.
 
-        Raises InputError if an action is not a number or their shape is another, a reward of your own is not
-        finite, or no episode has begun.
+        Raises InputError if an action is not a number or their shape is another, a
+        reward of your own is not finite, or no episode has begun.
 
         Parameters
         ----------
@@ -168,13 +208,17 @@ class ShipVectorEnv(ShipsEnv, VectorEnv[Observation, Any, Floats]):
         rewards : array of shape (num_envs,)
         terminated, truncated : bool arrays of shape (num_envs,)
         infos : dict
-            Arrays of shape (num_envs,) with their masks; `final_obs` and `final_info` of episodes that ended
-            where the next one begins in the same step.
+            Arrays of shape (num_envs,) with their masks; `final_obs` and `final_info`
+            of episodes that ended where the next one begins in the same step.
         """
         if not self._begun:
             self._refuse_step()
         engine = self._engine
-        engine.order(rudder_orders(actions, (self.num_envs,), "actions") if self._discrete else actions)
+        engine.order(
+            rudder_orders(actions, (self.num_envs,), "actions")
+            if self._discrete
+            else actions
+        )
         ended = engine.advance(self._some_over, anew=True)
         shown = engine.shown
         if self._own_reward and not isfinite(shown.outcomes[0].sum()):
@@ -186,7 +230,13 @@ class ShipVectorEnv(ShipsEnv, VectorEnv[Observation, Any, Floats]):
             infos |= self._final()
             engine.begin_next(shown.terminated | shown.truncated)
         self._draw()
-        return shown.observations, shown.outcomes[0], shown.terminated, shown.truncated, infos
+        return (
+            shown.observations,
+            shown.outcomes[0],
+            shown.terminated,
+            shown.truncated,
+            infos,
+        )
 
     def _final(self) -> Infos:
         """What episodes that ended showed last."""
@@ -198,9 +248,11 @@ class ShipVectorEnv(ShipsEnv, VectorEnv[Observation, Any, Floats]):
         kept = np.where(ended, shown.outcomes, 0.0), shown.flags & ended
         final_info = named_rows(*kept, self._names, self._flags)
         return {
-            "final_obs": final_obs, "_final_obs": ended,
-            "final_info": final_info | {f"_{name}": ended for name in final_info}, "_final_info": ended,
-        }  # fmt: skip
+            "final_obs": final_obs,
+            "_final_obs": ended,
+            "final_info": final_info | {f"_{name}": ended for name in final_info},
+            "_final_info": ended,
+        }
 
     def write(self, name: str, values: Any) -> None:
         """Write one number of the state in all rows (see `Engine.write`)."""
@@ -236,9 +288,12 @@ class ShipVectorEnv(ShipsEnv, VectorEnv[Observation, Any, Floats]):
 
 
 def _mode(given: AutoresetMode | str) -> AutoresetMode:
-    by_name = {name: mode for mode in AutoresetMode for name in (mode, mode.value, mode.name)}
+    by_name = {
+        name: mode for mode in AutoresetMode for name in (mode, mode.value, mode.name)
+    }
     if given not in by_name:
         raise InputError(
-            f"autoreset_mode: {given!r} found, expected one of {quoted(m.value for m in AutoresetMode)}"
+            f"autoreset_mode: {given!r} found, expected one of"
+            f" {quoted(m.value for m in AutoresetMode)}"
         )
     return by_name[given]

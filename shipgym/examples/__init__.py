@@ -10,14 +10,14 @@ FOLDER = Path(__file__).parent
 def example_ship(name: str = "mariner") -> Path:
     """Path of a ship file with trials that comes with the package.
 
-    Returns its path, for `shipgym.ShipFile.load` and the commands that take a ship file. Raises InputError
-    for another name.
+    Returns its path, for `shipgym.ShipFile.load` and the commands that take a ship
+    file. Raises InputError for another name.
 
     Parameters
     ----------
     name : {"mariner"}
-        The ship: "mariner" is a cargo ship of the Mariner class with three simulated zigzags as a sea trial
-        would log them, two to fit and one to validate.
+        The ship: "mariner" is a cargo ship of the Mariner class with three simulated
+        zigzags as a sea trial would log them, two to fit and one to validate.
     """
     known = sorted(path.parent.name for path in FOLDER.glob("*/ship.toml"))
     return FOLDER / check_choice(name, known, "example ship") / "ship.toml"

@@ -1,7 +1,8 @@
 """A bridge's instruments: first-order motion in waves, noise, and a filter against the waves.
 
-The notch filter (s^2 + 2 a w s + w^2) / (s^2 + 2 b w s + w^2) around the frequency of encounter: Fossen 2011,
-Handbook of Marine Craft Hydrodynamics and Motion Control, 11.1.2.
+The notch filter (s^2 + 2 a w s + w^2) / (s^2 + 2 b w s + w^2) around the frequency of
+encounter: Fossen 2011, Handbook of Marine Craft Hydrodynamics and Motion Control,
+11.1.2.
 """
 
 from typing import NamedTuple
@@ -14,7 +15,9 @@ from shipgym.engine.random import DRAW, mix, normal, stream
 from shipgym.sea.open_sea import Sea
 from shipgym.tasks.contract import Interval, Random, Readings
 
-INSTRUMENTS_STREAM = np.uint64(0xE7037ED1A0B428DB)  # apart from the draws of task and weather
+INSTRUMENTS_STREAM = np.uint64(
+    0xE7037ED1A0B428DB
+)  # apart from the draws of task and weather
 DEEP, WIDE = 0.1, 0.7  # damping ratios of the notch's numerator and denominator
 STEEPEST = 2.8  # largest angle between samples that the filter is tuned to, rad
 
@@ -53,9 +56,14 @@ class Memory(NamedTuple):
 
 
 def measure(
-    motion: Motion, sea: Sea, memory: Memory, frequency: float, interval: Interval, settings: Settings,
+    motion: Motion,
+    sea: Sea,
+    memory: Memory,
+    frequency: float,
+    interval: Interval,
+    settings: Settings,
     random: Random,
-) -> Memory:  # fmt: skip
+) -> Memory:
     """First-order motion, noise, and what the filter takes away (see `shipgym.instruments.perfect`)."""
     psi, r, x, y, u, v = sea.psi_wave, sea.r_wave, 0.0, 0.0, 0.0, 0.0
     if HAS_NOISE:
@@ -63,8 +71,14 @@ def measure(
         word = mix(word + np.uint64(interval.steps) * DRAW[1])
         psi += settings.heading * normal(word, DRAW[0])
         r += settings.yaw_rate * normal(word, DRAW[1])
-        u, v = settings.speed * normal(word, DRAW[2]), settings.speed * normal(word, DRAW[3])
-        x, y = settings.position * normal(word, DRAW[4]), settings.position * normal(word, DRAW[5])
+        u, v = (
+            settings.speed * normal(word, DRAW[2]),
+            settings.speed * normal(word, DRAW[3]),
+        )
+        x, y = (
+            settings.position * normal(word, DRAW[4]),
+            settings.position * normal(word, DRAW[5]),
+        )
     if not HAS_FILTER:
         return Memory(x, y, psi, u, v, r, memory.heading, memory.rate)
     turn = clip(frequency * interval.dt, 0.0, STEEPEST)
@@ -77,8 +91,8 @@ def measure(
 def notched(signal: float, turn: float, first: bool, memory: Notch) -> Notch:
     """A notch filter after a sample, around `turn` rad a sample; `taken_1` is what it takes away.
 
-    The notch is 1 less a band-pass, discretised bilinearly with its frequency kept. In the episode's first
-    sample nothing is taken away.
+    The notch is 1 less a band-pass, discretised bilinearly with its frequency kept. In
+    the episode's first sample nothing is taken away.
     """
     sine, cosine = sin_cos(0.5 * turn)
     k = sine / cosine
@@ -90,16 +104,28 @@ def notched(signal: float, turn: float, first: bool, memory: Notch) -> Notch:
         - (1.0 - 2.0 * WIDE * k + k * k) * per * memory.taken_2
     )
     return Notch(
-        signal, pick(first, signal, memory.signal_1), pick(first, 0.0, taken),
+        signal,
+        pick(first, signal, memory.signal_1),
+        pick(first, 0.0, taken),
         pick(first, 0.0, memory.taken_1),
-    )  # fmt: skip
+    )
 
 
 def readings(motion: Motion, sea: Sea, memory: Memory) -> Readings:
     """The ship's motion, and what the instruments add."""
     ahead, aside = ground_velocity(motion, sea.current_north, sea.current_east)
     return Readings(
-        motion.x + memory.x, motion.y + memory.y, motion.psi + memory.psi, motion.u + memory.u,
-        motion.v + memory.v, motion.r + memory.r, motion.p + sea.p_wave, motion.phi + sea.phi_wave,
-        motion.delta, motion.n, motion.psi, ahead, aside,
-    )  # fmt: skip
+        motion.x + memory.x,
+        motion.y + memory.y,
+        motion.psi + memory.psi,
+        motion.u + memory.u,
+        motion.v + memory.v,
+        motion.r + memory.r,
+        motion.p + sea.p_wave,
+        motion.phi + sea.phi_wave,
+        motion.delta,
+        motion.n,
+        motion.psi,
+        ahead,
+        aside,
+    )

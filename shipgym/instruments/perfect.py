@@ -20,9 +20,14 @@ class Memory(NamedTuple):
 
 
 def measure(
-    motion: Motion, sea: Sea, memory: Memory, frequency: float, interval: Interval, settings: Settings,
+    motion: Motion,
+    sea: Sea,
+    memory: Memory,
+    frequency: float,
+    interval: Interval,
+    settings: Settings,
     random: Random,
-) -> Memory:  # fmt: skip
+) -> Memory:
     """What is remembered from sample to sample.
 
     Parameters
@@ -49,6 +54,17 @@ def readings(motion: Motion, sea: Sea, memory: Memory) -> Readings:
     """What is shown."""
     ahead, aside = ground_velocity(motion, sea.current_north, sea.current_east)
     return Readings(
-        motion.x, motion.y, motion.psi, motion.u, motion.v, motion.r, motion.p, motion.phi, motion.delta,
-        motion.n, motion.psi, ahead, aside,
-    )  # fmt: skip
+        motion.x,
+        motion.y,
+        motion.psi,
+        motion.u,
+        motion.v,
+        motion.r,
+        motion.p,
+        motion.phi,
+        motion.delta,
+        motion.n,
+        motion.psi,
+        ahead,
+        aside,
+    )

@@ -10,7 +10,15 @@ from shipgym.instruments import bridge, perfect
 from shipgym.tasks.source import Configurable, check_namespace, read_source
 
 FUNCTIONS = {
-    "measure": ("motion", "sea", "memory", "frequency", "interval", "settings", "random"),
+    "measure": (
+        "motion",
+        "sea",
+        "memory",
+        "frequency",
+        "interval",
+        "settings",
+        "random",
+    ),
     "readings": ("motion", "sea", "memory"),
 }
 
@@ -32,7 +40,11 @@ def read_sensors(source: Any) -> SensorSet:
     if isinstance(source, SensorSet):
         return source
     namespace, where = read_source(source)
-    return SensorSet(where, where, **check_namespace(namespace, where, ("Settings", "Memory"), FUNCTIONS))
+    return SensorSet(
+        where,
+        where,
+        **check_namespace(namespace, where, ("Settings", "Memory"), FUNCTIONS),
+    )
 
 
 @cache

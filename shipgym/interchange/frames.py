@@ -1,8 +1,9 @@
 """Trials and episodes as pandas frames and xarray datasets, and back to the very same numbers.
 
-Series are columns: channels by their names, those of an episode by group and name, such as `states.x`,
-`commands.delta`, `reward_parts.reward_heading`, `info.cross_track_error`, `rewards` and `actions.0`. All else
-is in one attribute, as JSON, which Parquet and netCDF files keep too.
+Series are columns: channels by their names, those of an episode by group and name, such
+as `states.x`, `commands.delta`, `reward_parts.reward_heading`,
+`info.cross_track_error`, `rewards` and `actions.0`. All else is in one attribute, as
+JSON, which Parquet and netCDF files keep too.
 """
 
 from __future__ import annotations
@@ -27,14 +28,20 @@ if TYPE_CHECKING:
     from xarray import Dataset
 
 KEY = "shipgym"  # the attribute of what is no series
-OF_STEPS = ("commands", "reward_parts", "rewards", "actions")  # a value less than there are states
+OF_STEPS = (
+    "commands",
+    "reward_parts",
+    "rewards",
+    "actions",
+)  # a value less than there are states
 SETTINGS = ("name", "kind", "use", "length", "over_ground", "notes")
 
 
 def to_frame(recorded: Trial | Episode) -> DataFrame:
     """A trial or an episode as a pandas frame over time, s.
 
-    In the last row of an episode commands, actions and rewards are nan: there is no step after its end.
+    In the last row of an episode commands, actions and rewards are nan: there is no
+    step after its end.
     """
     import pandas as pd
 
@@ -50,7 +57,12 @@ def from_frame(frame: DataFrame) -> Trial | Episode:
     Raises InputError for another frame: one of a log is read by `Trial.from_frame`.
     """
     series = {str(name): column.to_numpy() for name, column in frame.items()}
-    return put_together(frame.index.to_numpy(), series, frame.attrs, "Trial.from_frame reads that of a log")
+    return put_together(
+        frame.index.to_numpy(),
+        series,
+        frame.attrs,
+        "Trial.from_frame reads that of a log",
+    )
 
 
 def to_xarray(recorded: Trial | Episode) -> Dataset:
@@ -61,36 +73,58 @@ def to_xarray(recorded: Trial | Episode) -> Dataset:
     t, series, facts = taken_apart(recorded)
     variables = {}
     for name, values in series.items():
-        units = {"units": next(iter(UNITS[QUANTITIES[name]]))} if name in QUANTITIES else {}
+        units = (
+            {"units": next(iter(UNITS[QUANTITIES[name]]))} if name in QUANTITIES else {}
+        )
         variables[name] = ("t" if len(values) == len(t) else "step", values, units)
-    return library("xarray", "xarray").Dataset(variables, {"t": ("t", t, {"units": "s"})}, {KEY: facts})
+    return library("xarray", "xarray").Dataset(
+        variables, {"t": ("t", t, {"units": "s"})}, {KEY: facts}
+    )
 
 
 def from_xarray(dataset: Dataset) -> Trial | Episode:
     """The trial or episode of `to_xarray`; a trial's `raw` is lost. Raises InputError for another dataset."""
-    series = {str(name): values.to_numpy() for name, values in dataset.data_vars.items()}
-    return put_together(dataset["t"].to_numpy(), series, dataset.attrs, "expected one of to_xarray")
+    series = {
+        str(name): values.to_numpy() for name, values in dataset.data_vars.items()
+    }
+    return put_together(
+        dataset["t"].to_numpy(), series, dataset.attrs, "expected one of to_xarray"
+    )
 
 
 def taken_apart(recorded: Trial | Episode) -> tuple[Floats, dict[str, Floats], str]:
     """Times, s, series by their names, and all else as JSON."""
     if isinstance(recorded, Trial):
         settings = {name: getattr(recorded, name) for name in SETTINGS}
-        settings |= {"derived": sorted(recorded.derived), "repaired": dict(recorded.repaired)}
+        settings |= {
+            "derived": sorted(recorded.derived),
+            "repaired": dict(recorded.repaired),
+        }
         return recorded.t, dict(recorded.channels), json.dumps({"trial": settings})
     series = {
-        f"{group}.{name}": values for group in SERIES for name, values in getattr(recorded, group).items()
+        f"{group}.{name}": values
+        for group in SERIES
+        for name, values in getattr(recorded, group).items()
     }
     series["rewards"] = recorded.rewards
-    series |= {f"actions.{k}": recorded.actions[:, k] for k in range(recorded.actions.shape[1])}
+    series |= {
+        f"actions.{k}": recorded.actions[:, k] for k in range(recorded.actions.shape[1])
+    }
     content = to_file(vars(recorded))
-    facts = {name: value for name, value in content.items() if name not in (*SERIES, *OF_STEPS)}
+    facts = {
+        name: value
+        for name, value in content.items()
+        if name not in (*SERIES, *OF_STEPS)
+    }
     return recorded.t, series, json.dumps({"episode": facts})
 
 
 def padded(series: Mapping[str, Floats], length: int) -> dict[str, Floats]:
     """The series in one length, nan where one has ended."""
-    return {name: np.append(values, np.full(length - len(values), np.nan)) for name, values in series.items()}
+    return {
+        name: np.append(values, np.full(length - len(values), np.nan))
+        for name, values in series.items()
+    }
 
 
 def put_together(
@@ -100,7 +134,9 @@ def put_together(
     try:
         facts = check_table(json.loads(attributes[KEY]), KEY)
     except (KeyError, TypeError, ValueError):
-        raise InputError(f"attribute '{KEY}': none of shipgym's found; {remedy}") from None
+        raise InputError(
+            f"attribute '{KEY}': none of shipgym's found; {remedy}"
+        ) from None
     if "trial" in facts:
         return Trial(t, series, **check_table(facts["trial"], "trial"))
     content = dict(check_table(facts.get("episode"), "episode"))

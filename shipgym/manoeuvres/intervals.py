@@ -14,7 +14,8 @@ from shipgym.ships.ship_model import ShipModel
 
 LEVELS = (0.025, 0.975)  # of the 95 % interval
 
-#: From a ship to the indices of one of her manoeuvres, a dataclass such as `ZigzagIndices`.
+#: From a ship to the indices of one of her manoeuvres, a dataclass such as
+#: `ZigzagIndices`.
 Evaluation = Callable[[ShipModel], Any]
 
 
@@ -22,15 +23,20 @@ Evaluation = Callable[[ShipModel], Any]
 class IndexInterval:
     """One index of a model and of models drawn from its covariance."""
 
-    value: float | None  # of the model itself; None where its manoeuvre never got so far
-    values: Floats  # shape (n_draws,); of the draws; NaN where one ran away or its manoeuvre never got so far
+    value: (
+        float | None
+    )  # of the model itself; None where its manoeuvre never got so far
+    # shape (n_draws,); of the draws; NaN where one ran away or its manoeuvre never got
+    # so far
+    values: Floats
     ran_away: Flags  # shape (n_draws,); draws that ran away in the manoeuvre
 
     @property
     def interval(self) -> tuple[float, float] | None:
         """The 95 % interval: quantiles of 2.5 and 97.5 per cent of the draws that have a value.
 
-        It says nothing of those that ran away or never got so far: see their counts. None without any.
+        It says nothing of those that ran away or never got so far: see their counts.
+        None without any.
         """
         low, high = self.quantiles(*LEVELS)
         return None if low is None or high is None else (low, high)
@@ -55,9 +61,12 @@ class IndexInterval:
     def to_dict(self) -> dict[str, Any]:
         """Value, interval and counts, as JSON knows them."""
         return {
-            "value": self.value, "interval_95": self.interval, "draws": len(self.values),
-            "ran_away": self.n_ran_away, "never_reached": self.n_never_reached,
-        }  # fmt: skip
+            "value": self.value,
+            "interval_95": self.interval,
+            "draws": len(self.values),
+            "ran_away": self.n_ran_away,
+            "never_reached": self.n_never_reached,
+        }
 
     def __str__(self) -> str:
         text = "-" if self.value is None else f"{self.value:.4g}"
@@ -68,28 +77,38 @@ class IndexInterval:
     @property
     def lost_in_words(self) -> str:
         """How many draws have no value, which are not in the interval; empty where all have one."""
-        lost = ((self.n_ran_away, "ran away"), (self.n_never_reached, "never got so far"))
-        return ", ".join(f"{count} of {len(self.values)} draws {what}" for count, what in lost if count)
+        lost = (
+            (self.n_ran_away, "ran away"),
+            (self.n_never_reached, "never got so far"),
+        )
+        return ", ".join(
+            f"{count} of {len(self.values)} draws {what}"
+            for count, what in lost
+            if count
+        )
 
 
 def index_intervals(
-    model: ShipModel, manoeuvre: str | Evaluation = "zigzag 20/20, starboard first",
-    n_draws: int = 200, seed: int | np.random.Generator = 0,
-) -> dict[str, IndexInterval]:  # fmt: skip
+    model: ShipModel,
+    manoeuvre: str | Evaluation = "zigzag 20/20, starboard first",
+    n_draws: int = 200,
+    seed: int | np.random.Generator = 0,
+) -> dict[str, IndexInterval]:
     """Indices of a manoeuvre with their 95 % intervals over the estimated covariance of a model.
 
-    Returns an IndexInterval by the name of each index, with its unit in the name. Draws that run away or
-    never get so far are counted. Raises InputError for a model without covariance, or a manoeuvre that is not
-    known or that the ship cannot sail. Raises UnstableModelError if the model itself runs away. Raises
-    ManoeuvreError if the model itself never reaches its switch heading or its speed.
+    Returns an IndexInterval by the name of each index, with its unit in the name. Draws
+    that run away or never get so far are counted. Raises InputError for a model without
+    covariance, or a manoeuvre that is not known or that the ship cannot sail. Raises
+    UnstableModelError if the model itself runs away. Raises ManoeuvreError if the model
+    itself never reaches its switch heading or its speed.
 
     Parameters
     ----------
     model : ShipModel
         With a covariance.
     manoeuvre : str or callable
-        A name of `standard_manoeuvres`, or a function from a ship to the indices of a manoeuvre, such as
-        ``lambda ship: zigzag_indices(zigzag(ship, 15, 10))``.
+        A name of `standard_manoeuvres`, or a function from a ship to the indices of a
+        manoeuvre, such as ``lambda ship: zigzag_indices(zigzag(ship, 15, 10))``.
     n_draws : int
         Models drawn (`ShipModel.sample`).
     seed : int or Generator
@@ -105,24 +124,34 @@ def index_intervals(
     """
     if isinstance(manoeuvre, str):
         known = standard_manoeuvres(model)
-        evaluate: Evaluation = known[check_choice(manoeuvre, tuple(known), "manoeuvre")].evaluate
+        evaluate: Evaluation = known[
+            check_choice(manoeuvre, tuple(known), "manoeuvre")
+        ].evaluate
     else:
         evaluate = manoeuvre
     check_number(n_draws, "n_draws", at_least=2)
-    return intervals_of({"": asdict(evaluate(model))}, model.sample(int(n_draws), seed), {"": evaluate})[""]
+    return intervals_of(
+        {"": asdict(evaluate(model))}, model.sample(int(n_draws), seed), {"": evaluate}
+    )[""]
 
 
 def intervals_of(
-    own: Mapping[str, Mapping[str, float | None]], draws: Sequence[ShipModel],
-    evaluations: Mapping[str, Evaluation], progress: Callable[[int], None] | None = None,
-) -> dict[str, dict[str, IndexInterval]]:  # fmt: skip
+    own: Mapping[str, Mapping[str, float | None]],
+    draws: Sequence[ShipModel],
+    evaluations: Mapping[str, Evaluation],
+    progress: Callable[[int], None] | None = None,
+) -> dict[str, dict[str, IndexInterval]]:
     """Indices of several manoeuvres over the same draws, by manoeuvre and index.
 
-    `own` are those of the model itself, `evaluations` give them from a ship; both by manoeuvre. Without draws
-    the values stand alone. `progress` is called with the number of draws done.
+    `own` are those of the model itself, `evaluations` give them from a ship; both by
+    manoeuvre. Without draws the values stand alone. `progress` is called with the
+    number of draws done.
     """
     ran_away = {name: np.zeros(len(draws), dtype=np.bool_) for name in own}
-    values = {name: {index: np.full(len(draws), np.nan) for index in own[name]} for name in own}
+    values = {
+        name: {index: np.full(len(draws), np.nan) for index in own[name]}
+        for name in own
+    }
     for k, draw in enumerate(draws):
         for name in own:
             indices, ran_away[name][k] = attempt(evaluations[name], draw)
@@ -140,11 +169,14 @@ def intervals_of(
     }
 
 
-def attempt(evaluate: Evaluation, model: ShipModel) -> tuple[dict[str, float | None], bool]:
+def attempt(
+    evaluate: Evaluation, model: ShipModel
+) -> tuple[dict[str, float | None], bool]:
     """Indices of a manoeuvre, none where it never got so far, and whether the ship ran away.
 
-    A spiral of a draw that turns to one side only, or whose rudder has the wrong sign, has no indices either:
-    there the error lies in the draw and not in what the user gave.
+    A spiral of a draw that turns to one side only, or whose rudder has the wrong sign,
+    has no indices either: there the error lies in the draw and not in what the user
+    gave.
     """
     try:
         return asdict(evaluate(model)), False

@@ -16,7 +16,8 @@ from shipgym.trials.trial import KINDS, Trial
 if TYPE_CHECKING:
     from plotly.graph_objects import Figure
 
-LENGTHS = 40.0  # duration of a standard zigzag or turning circle, in times to travel one ship length
+# duration of a standard zigzag or turning circle, in times to travel one ship length
+LENGTHS = 40.0
 STEPS_PER_LENGTH = 50  # of their simulation
 FASTEST = 1.5  # speed by that of service that no manoeuvre at service power exceeds
 QUICKEST_TURN = 3.0  # likewise the yaw rate by U / L
@@ -27,11 +28,14 @@ SIDES = (("starboard", 1.0), ("port", -1.0))
 class Manoeuvre:
     """One manoeuvre with all its settings, and the indices that are read from it."""
 
-    sail: Callable[[ShipModel], Any]  # from a ship to the trial (to the spiral, for spirals)
+    sail: Callable[
+        [ShipModel], Any
+    ]  # from a ship to the trial (to the spiral, for spirals)
     indices: Callable[[Any], Any]  # from what was sailed to its indices
     outcome: type  # the dataclass of its indices, units in the names of its fields
     caption: str = ""  # what its figure shows
-    # from what was sailed to its figure; by default what suits its kind (`shipgym.plots.manoeuvre_figure`)
+    # from what was sailed to its figure; by default what suits its kind
+    # (`shipgym.plots.manoeuvre_figure`)
     figure: Callable[[Any], Figure] | None = None
 
     @property
@@ -50,17 +54,26 @@ class Manoeuvre:
 def _check_physical(model: ShipModel, trial: Trial) -> None:
     """Refuse a run beyond every speed and yaw rate of a ship at service power, short of overflow."""
     speed, length = model.particulars["speed"], model.particulars["length"]
-    for name, most in (("u", FASTEST * speed), ("v", speed), ("r", QUICKEST_TURN * speed / length)):
+    for name, most in (
+        ("u", FASTEST * speed),
+        ("v", speed),
+        ("r", QUICKEST_TURN * speed / length),
+    ):
         if name in trial and np.abs(trial[name]).max() > most:
             k = int(np.argmax(np.abs(trial[name]) > most))
             raise UnstableModelError(
-                f"model {model.name!r} runs away after {trial.t[k]:.1f} s ({name} = {trial[name][k]:.3g})",
+                f"model {model.name!r} runs away after {trial.t[k]:.1f} s ({name} ="
+                f" {trial[name][k]:.3g})",
                 float(trial.t[k]),
-                {channel: float(values[k]) for channel, values in trial.channels.items()},
+                {
+                    channel: float(values[k])
+                    for channel, values in trial.channels.items()
+                },
             )
 
 
-#: From a ship and the depth of the water in m to the manoeuvres of a family that suit her, by name.
+#: From a ship and the depth of the water in m to the manoeuvres of a family that suit
+#: her, by name.
 Variants = Callable[[ShipModel, float], Mapping[str, Manoeuvre]]
 
 
@@ -76,7 +89,9 @@ class Family:
 FAMILIES: dict[str, Family] = {}
 
 
-def register_manoeuvre(name: str, variants: Variants, title: str = "", kind: str | None = None) -> None:
+def register_manoeuvre(
+    name: str, variants: Variants, title: str = "", kind: str | None = None
+) -> None:
     """Make a family of manoeuvres known to `standard_manoeuvres`, `index_intervals` and `shipgym trials`.
 
     Raises InputError if a family of that name is registered already.
@@ -86,8 +101,9 @@ def register_manoeuvre(name: str, variants: Variants, title: str = "", kind: str
     name : str
         Of the family, such as ``"zigzags"``.
     variants : callable
-        From a ship and the depth of the water, m, to a dict of `Manoeuvre` by name; empty for a ship that
-        the manoeuvre does not suit. Angles and durations are chosen for the ship there.
+        From a ship and the depth of the water, m, to a dict of `Manoeuvre` by name;
+        empty for a ship that the manoeuvre does not suit. Angles and durations are
+        chosen for the ship there.
     title : str
         Heading on pages; by default the name.
     kind : str, optional
@@ -95,22 +111,32 @@ def register_manoeuvre(name: str, variants: Variants, title: str = "", kind: str
     """
     check_text(name, "manoeuvre: name")
     if name in FAMILIES:
-        raise InputError(f"manoeuvre: '{name}' is registered already; choose another name")
+        raise InputError(
+            f"manoeuvre: '{name}' is registered already; choose another name"
+        )
     FAMILIES[name] = Family(title or name.capitalize(), variants)
     if kind is not None and kind not in KINDS:
         KINDS.append(check_text(kind, "manoeuvre: kind"))
 
 
-def families_of(model: ShipModel, water_depth: float = np.inf) -> dict[str, dict[str, Manoeuvre]]:
+def families_of(
+    model: ShipModel, water_depth: float = np.inf
+) -> dict[str, dict[str, Manoeuvre]]:
     """The manoeuvres that suit a ship, by family and name; arguments and errors of `standard_manoeuvres`."""
     model.check_depth(water_depth)
-    return {name: dict(family.variants(model, water_depth)) for name, family in FAMILIES.items()}
+    return {
+        name: dict(family.variants(model, water_depth))
+        for name, family in FAMILIES.items()
+    }
 
 
-def standard_manoeuvres(model: ShipModel, water_depth: float = np.inf) -> dict[str, Manoeuvre]:
+def standard_manoeuvres(
+    model: ShipModel, water_depth: float = np.inf
+) -> dict[str, Manoeuvre]:
     """The registered manoeuvres that suit a ship, from service speed, in deep water by default.
 
-    Raises InputError for water that is too shallow, or for shallow water with a deep-water model.
+    Raises InputError for water that is too shallow, or for shallow water with a
+    deep-water model.
 
     Parameters
     ----------
@@ -122,13 +148,16 @@ def standard_manoeuvres(model: ShipModel, water_depth: float = np.inf) -> dict[s
     Returns
     -------
     dict of str to Manoeuvre
-        Zigzags 10/10 and 20/20, turning circles with full rudder and pull-outs, each to both sides; a direct
-        spiral, and a reverse spiral where the ship is unstable on a straight course; with a shaft an inertia
-        stop and an acceleration, and a crash stop where her equations hold for a shaft astern; and what was
-        registered besides (`register_manoeuvre`).
+        Zigzags 10/10 and 20/20, turning circles with full rudder and pull-outs, each to
+        both sides; a direct spiral, and a reverse spiral where the ship is unstable on
+        a straight course; with a shaft an inertia stop and an acceleration, and a crash
+        stop where her equations hold for a shaft astern; and what was registered
+        besides (`register_manoeuvre`).
     """
     families = families_of(model, water_depth).values()
-    return {name: manoeuvre for family in families for name, manoeuvre in family.items()}
+    return {
+        name: manoeuvre for family in families for name, manoeuvre in family.items()
+    }
 
 
 def standard_time(model: ShipModel) -> tuple[float, float]:

@@ -17,26 +17,38 @@ STRETCH = 5.0  # ship lengths at service speed over which the motion is averaged
 MOST_STRETCHES = 60  # after which a leg ends, steady or not
 HELMSMAN_BANDWIDTH = 2.0  # of the helmsman who holds a yaw rate, U0 / L
 HELMSMAN_RESET = 4.0  # time constant of his integral part, L / U0
-STEADY = 2e-5  # largest change of (u, v, r L) / U0 and rudder from one stretch to the next
+STEADY = (
+    2e-5  # largest change of (u, v, r L) / U0 and rudder from one stretch to the next
+)
 
-#: Fills states of shape (n_steps + 1, n_columns), which begin with the start, and commands (n_steps, 2).
+#: Fills states of shape (n_steps + 1, n_columns), which begin with the start, and
+#: commands (n_steps, 2).
 Sail = Callable[[Floats, Floats], None]
 
 
 class Voyage:
     """A manoeuvre in the making: one leg after the other, from service speed or a given state.
 
-    Samples are dt apart, s; by default a fortieth of the time to travel one ship length. In weather the
-    motion is never steady: legs that wait for it last their longest.
+    Samples are dt apart, s; by default a fortieth of the time to travel one ship
+    length. In weather the motion is never steady: legs that wait for it last their
+    longest.
     """
 
     def __init__(
-        self, model: ShipModel, dt: float | None, conditions: Conditions, state: Floats | None = None
+        self,
+        model: ShipModel,
+        dt: float | None,
+        conditions: Conditions,
+        state: Floats | None = None,
     ) -> None:
         self.model, self.water_depth = model, conditions.water_depth
         self.length_time = model.travel_time
         default = self.length_time / STEPS_PER_LENGTH
-        self.dt = default if dt is None else check_number(dt, "dt", above=0.0, at_most=self.length_time)
+        self.dt = (
+            default
+            if dt is None
+            else check_number(dt, "dt", above=0.0, at_most=self.length_time)
+        )
         self.passage = Passage(model, conditions, self.dt)
         start = model.service_state if state is None else state
         self._states = [self.passage.states(start, 0)]
@@ -49,14 +61,19 @@ class Voyage:
 
     def go(self, sail: Sail, n_steps: int) -> tuple[Floats, Floats]:
         """Sail some steps; states of shape (n_steps, n_columns) and commands of shape (n_steps, 2)."""
-        states, commands = self.passage.states(self.state, n_steps), np.empty((n_steps, 2))
+        states, commands = (
+            self.passage.states(self.state, n_steps),
+            np.empty((n_steps, 2)),
+        )
         sail(states, commands)
         self._states.append(states[1:])
         self._commands.append(commands)
         return states[1:], commands
 
     def _run(self, loop: str, states: Floats, *arguments: Any) -> None:
-        self.passage.run(loop, states, *arguments, since=self.dt * sum(map(len, self._commands)))
+        self.passage.run(
+            loop, states, *arguments, since=self.dt * sum(map(len, self._commands))
+        )
 
     def hold(self, rudder: float, shaft: float) -> Sail:
         """Leg with constant orders: rudder in rad, shaft speed in 1/s."""
@@ -70,17 +87,31 @@ class Voyage:
     def rate_helmsman(self) -> Callable[[float], Sail]:
         """From a yaw rate, rad/s, to the leg in which a proportional-integral helmsman holds it.
 
-        The helmsman is designed from the rudder's effect at service speed; the integral part
-        carries over from leg to leg.
+        The helmsman is designed from the rudder's effect at service speed; the integral
+        part carries over from leg to leg.
         """
         memory, shaft = np.zeros(1), self.model.service_shaft_speed
-        gain = HELMSMAN_BANDWIDTH / self.length_time / _rudder_effect(self.model, self.water_depth)
+        gain = (
+            HELMSMAN_BANDWIDTH
+            / self.length_time
+            / _rudder_effect(self.model, self.water_depth)
+        )
         reset_time = HELMSMAN_RESET * self.length_time
 
         def at_rate(rate: float) -> Sail:
             def sail(states: Floats, commands: Floats) -> None:
                 orders = np.empty(len(commands))
-                self._run("steer_rate", states, orders, memory, rate, shaft, self.dt, gain, reset_time)
+                self._run(
+                    "steer_rate",
+                    states,
+                    orders,
+                    memory,
+                    rate,
+                    shaft,
+                    self.dt,
+                    gain,
+                    reset_time,
+                )
                 commands[:, 0], commands[:, 1] = orders, shaft
 
             return sail
@@ -90,10 +121,14 @@ class Voyage:
     def settle(self, sail: Sail) -> tuple[float, float]:
         """Sail until the motion no longer changes, 300 ship lengths at most.
 
-        Returns the means over the last stretch of the rudder ordered, rad, and the yaw rate, rad/s.
+        Returns the means over the last stretch of the rudder ordered, rad, and the yaw
+        rate, rad/s.
         """
         n_steps = round(STRETCH * self.length_time / self.dt)
-        speed, length = self.model.particulars["speed"], self.model.particulars["length"]
+        speed, length = (
+            self.model.particulars["speed"],
+            self.model.particulars["length"],
+        )
         columns = [self.model.state_names.index(name) for name in "uvr"]
         before: Floats | None = None
         for _ in range(MOST_STRETCHES):
@@ -119,11 +154,14 @@ def _rudder_effect(model: ShipModel, water_depth: float) -> float:
     """Yaw acceleration per rudder angle at service speed, 1/s^2."""
     angle = float(np.radians(5.0))
     u, n = np.full(2, model.particulars["speed"]), np.full(2, model.service_shaft_speed)
-    rates = model.rates({"u": u, "delta": np.array([angle, -angle]), "n": n}, water_depth)["r"]
+    rates = model.rates(
+        {"u": u, "delta": np.array([angle, -angle]), "n": n}, water_depth
+    )["r"]
     effect = float(rates[0] - rates[1]) / (2.0 * angle)
     if not effect > 0.0:
         raise InputError(
-            f"model {model.name!r}: rdot by delta is {effect:g} 1/s^2 at service speed, expected a "
-            "rudder that turns the ship to its side; check the signs of its coefficients"
+            f"model {model.name!r}: rdot by delta is {effect:g} 1/s^2 at service speed,"
+            " expected a rudder that turns the ship to its side; check the signs of"
+            " its coefficients"
         )
     return effect

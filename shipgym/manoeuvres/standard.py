@@ -1,6 +1,7 @@
 """The registry with the manoeuvres of this package in it, in the order in which they are reported.
 
-A new manoeuvre is a file and a call of `register_manoeuvre`: here, or in the file itself for one of a user.
+A new manoeuvre is a file and a call of `register_manoeuvre`: here, or in the file
+itself for one of a user.
 """
 
 from shipgym.manoeuvres.pull_outs import standard_pull_outs
@@ -10,13 +11,19 @@ from shipgym.manoeuvres.registry import (
     families_of,
     register_manoeuvre,
     standard_manoeuvres,
-)  # fmt: skip
+)
 from shipgym.manoeuvres.spirals import standard_spirals
 from shipgym.manoeuvres.stopping import standard_stops
 from shipgym.manoeuvres.turning import standard_circles
 from shipgym.manoeuvres.zigzags import standard_zigzags
 
-__all__ = ["FAMILIES", "Manoeuvre", "families_of", "register_manoeuvre", "standard_manoeuvres"]
+__all__ = [
+    "FAMILIES",
+    "Manoeuvre",
+    "families_of",
+    "register_manoeuvre",
+    "standard_manoeuvres",
+]
 
 register_manoeuvre("zigzags", standard_zigzags)
 register_manoeuvre("circles", standard_circles, "Turning circles")

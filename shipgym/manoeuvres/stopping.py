@@ -20,20 +20,28 @@ from shipgym.trials.trial import Trial
 LONGEST = 300.0  # of a stopping trial, L / U0
 ACCELERATION = 40.0  # duration of an acceleration, L / U0
 
-STOP_CAPTION = "The shaft stopped at service speed, the rudder amidships, until a tenth of it is left."
-CRASH_CAPTION = (
-    "The shaft ordered full astern at service speed, the rudder amidships, until dead in the water."
+STOP_CAPTION = (
+    "The shaft stopped at service speed, the rudder amidships, until a tenth of it is"
+    " left."
 )
-ACCELERATION_CAPTION = "From a quarter of service speed, the shaft ordered to service speed."
+CRASH_CAPTION = (
+    "The shaft ordered full astern at service speed, the rudder amidships, until dead"
+    " in the water."
+)
+ACCELERATION_CAPTION = (
+    "From a quarter of service speed, the shaft ordered to service speed."
+)
 
 
 @dataclass(frozen=True)
 class StoppingIndices:
     """Indices of a stopping trial."""
 
-    # distance sailed along the track until the speed is reached, ship lengths: the stopping distance
+    # distance sailed along the track until the speed is reached, ship lengths: the
+    # stopping distance
     track_reach_lengths: float
-    # the same along and across the heading at the order, ship lengths; to starboard positive
+    # the same along and across the heading at the order, ship lengths; to starboard
+    # positive
     head_reach_lengths: float
     side_reach_lengths: float
     heading_change_deg: float  # degrees, positive to starboard
@@ -50,38 +58,51 @@ class AccelerationIndices:
 
 
 def stopping(
-    model: ShipModel, shaft_speed: float = 0.0, speed_ratio: float = 0.1, dt: float | None = None,
-    water_depth: float = np.inf, weather: Weather | str | None = None, seed: Seed = 0,
-) -> Trial:  # fmt: skip
+    model: ShipModel,
+    shaft_speed: float = 0.0,
+    speed_ratio: float = 0.1,
+    dt: float | None = None,
+    water_depth: float = np.inf,
+    weather: Weather | str | None = None,
+    seed: Seed = 0,
+) -> Trial:
     """Simulate a stop from service speed, the rudder amidships, until the ship is slow enough.
 
-    A shaft ordered astern needs equations that hold there: of the reference ships only those of `tanker`
-    do. The propellers of `container` and `kvlcc2` are open-water curves of a shaft turning ahead; with the
-    shaft stopped they are used beyond the advance ratios they were measured at, where the container
-    ship's has no drag and KVLCC2's that of a propeller dragged along.
+    A shaft ordered astern needs equations that hold there: of the reference ships only
+    those of `tanker` do. The propellers of `container` and `kvlcc2` are open-water
+    curves of a shaft turning ahead; with the shaft stopped they are used beyond the
+    advance ratios they were measured at, where the container ship's has no drag and
+    KVLCC2's that of a propeller dragged along.
 
-    The shaft is ordered to `shaft_speed`, 1/s, 0 for stopped, negative for astern. The trial ends at
-    `speed_ratio` of the surge speed at service, 0 for dead in the water, which only a shaft astern brings
-    about; other arguments are as in `pull_out`.
+    The shaft is ordered to `shaft_speed`, 1/s, 0 for stopped, negative for astern. The
+    trial ends at `speed_ratio` of the surge speed at service, 0 for dead in the water,
+    which only a shaft astern brings about; other arguments are as in `pull_out`.
 
-    Raises InputError for a ship whose propeller is not in its equations, an order astern where they do not
-    hold, an order that does not slow the ship down, or dead in the water without an order astern;
-    ManoeuvreError, with the trial so far, if the ship is still faster after 300 times the time to travel one
-    ship length; UnstableModelError if the ship runs away.
+    Raises InputError for a ship whose propeller is not in its equations, an order
+    astern where they do not hold, an order that does not slow the ship down, or dead in
+    the water without an order astern; ManoeuvreError, with the trial so far, if the
+    ship is still faster after 300 times the time to travel one ship length;
+    UnstableModelError if the ship runs away.
     """
     order = _stopping_order(model, shaft_speed, speed_ratio)
     voyage = Voyage(model, dt, Conditions(water_depth, weather, seed))
-    sail, n_steps = voyage.hold(0.0, order), max(round(voyage.length_time / voyage.dt), 2)
+    sail, n_steps = (
+        voyage.hold(0.0, order),
+        max(round(voyage.length_time / voyage.dt), 2),
+    )
     target = speed_ratio * model.particulars["speed"]
     for stretch in range(round(LONGEST)):
         states, _ = voyage.go(sail, n_steps)
         slow = np.flatnonzero(states[:, 3] <= target)
         if len(slow):
-            return voyage.trial("straight", max(stretch * n_steps + int(slow[0]) + 1, 2))
+            return voyage.trial(
+                "straight", max(stretch * n_steps + int(slow[0]) + 1, 2)
+            )
     trial = voyage.trial("straight")
     raise ManoeuvreError(
-        f"stopping of {model.name!r}: surge speed {trial['u'][-1]:.3g} m/s after {trial.duration:.0f} s, "
-        f"expected {target:.3g} m/s; order the shaft to less, or stop at a larger speed_ratio",
+        f"stopping of {model.name!r}: surge speed {trial['u'][-1]:.3g} m/s after"
+        f" {trial.duration:.0f} s, expected {target:.3g} m/s; order the shaft to less,"
+        " or stop at a larger speed_ratio",
         trial,
     )
 
@@ -90,18 +111,29 @@ def _stopping_order(model: ShipModel, shaft_speed: float, speed_ratio: float) ->
     """The order for the shaft, 1/s, after checking it and the ratio of speeds."""
     service = shaft_of(model)
     order = check_number(
-        shaft_speed, "shaft_speed", at_least=-1.5 * service, below=service, hint="less than at service speed"
+        shaft_speed,
+        "shaft_speed",
+        at_least=-1.5 * service,
+        below=service,
+        hint="less than at service speed",
     )
     if order < 0.0 and not goes_astern(model):
         raise InputError(
-            f"shaft_speed: {order:g} 1/s found, but the propeller of {model.name!r} holds for a "
-            "shaft turning ahead only; expected a number >= 0, or a ship like 'tanker'"
+            f"shaft_speed: {order:g} 1/s found, but the propeller of {model.name!r}"
+            " holds for a shaft turning ahead only; expected a number >= 0, or a ship"
+            " like 'tanker'"
         )
-    check_number(speed_ratio, "speed_ratio", at_least=0.0, below=1.0, hint="part of the service speed")
+    check_number(
+        speed_ratio,
+        "speed_ratio",
+        at_least=0.0,
+        below=1.0,
+        hint="part of the service speed",
+    )
     if speed_ratio == 0.0 and order >= 0.0:
         raise InputError(
-            "speed_ratio: 0 found, but a ship without an order astern is never dead in the water; expected "
-            "a number > 0, such as 0.1"
+            "speed_ratio: 0 found, but a ship without an order astern is never dead in"
+            " the water; expected a number > 0, such as 0.1"
         )
     return order
 
@@ -114,7 +146,8 @@ def goes_astern(model: ShipModel) -> bool:
 def crash_stop(model: ShipModel, water_depth: float = np.inf) -> Trial:
     """The full astern stopping test: the shaft ordered astern as fast as ahead, until dead in the water.
 
-    InputError for a ship whose equations do not hold astern; `water_depth` as in `zigzag`.
+    InputError for a ship whose equations do not hold astern; `water_depth` as in
+    `zigzag`.
     """
     return stopping(model, -shaft_of(model), speed_ratio=0.0, water_depth=water_depth)
 
@@ -124,9 +157,10 @@ def stopping_indices(
 ) -> StoppingIndices:
     """Stopping distance of a measured or simulated stop, from the first sample, that of the order, on.
 
-    The trial has u, v, x, y and psi. She counts as stopped at `speed_ratio` of the surge speed at the start,
-    by default at the end of the trial; `length`, between perpendiculars, m, is by default the trial's own.
-    Raises InputError if a channel or the length is missing, ManoeuvreError if the speed is never reached.
+    The trial has u, v, x, y and psi. She counts as stopped at `speed_ratio` of the
+    surge speed at the start, by default at the end of the trial; `length`, between
+    perpendiculars, m, is by default the trial's own. Raises InputError if a channel or
+    the length is missing, ManoeuvreError if the speed is never reached.
     """
     require(trial, ("u", "v", "x", "y", "psi"), "a stopping trial")
     lpp, u = ship_length(trial, length), trial["u"]
@@ -139,23 +173,37 @@ def stopping_indices(
         for values in (trial["x"], trial["y"], trial["psi"], distance_sailed(trial))
     )
     ahead, aside = (float(way) / lpp for way in rotate_to_body(x, y, trial["psi"][0]))
-    return StoppingIndices(sailed / lpp, ahead, aside, float(np.degrees(psi)), end - float(trial.t[0]))
+    return StoppingIndices(
+        sailed / lpp, ahead, aside, float(np.degrees(psi)), end - float(trial.t[0])
+    )
 
 
 def acceleration(
-    model: ShipModel, start_ratio: float = 0.25, duration: float | None = None, dt: float | None = None,
-    water_depth: float = np.inf, weather: Weather | str | None = None, seed: Seed = 0,
-) -> Trial:  # fmt: skip
+    model: ShipModel,
+    start_ratio: float = 0.25,
+    duration: float | None = None,
+    dt: float | None = None,
+    water_depth: float = np.inf,
+    weather: Weather | str | None = None,
+    seed: Seed = 0,
+) -> Trial:
     """Simulate a straight-line acceleration: from a slow speed with the shaft ordered to service speed.
 
     A helmsman keeps the yaw rate at zero, so that an unstable ship stays straight.
 
-    `start_ratio` is speed and shaft speed at the start by those at service; the duration, s, is by default 40
-    times the time to travel one ship length; the rest as in `pull_out`. Raises InputError for a ship whose
-    propeller is not in its equations or a number out of range, UnstableModelError if the ship runs away.
+    `start_ratio` is speed and shaft speed at the start by those at service; the
+    duration, s, is by default 40 times the time to travel one ship length; the rest as
+    in `pull_out`. Raises InputError for a ship whose propeller is not in its equations
+    or a number out of range, UnstableModelError if the ship runs away.
     """
     shaft_of(model)
-    check_number(start_ratio, "start_ratio", above=0.0, below=1.0, hint="part of the service speed")
+    check_number(
+        start_ratio,
+        "start_ratio",
+        above=0.0,
+        below=1.0,
+        hint="part of the service speed",
+    )
     start = model.service_state.copy()
     for name in ("u", "n"):
         if name in model.state_names:
@@ -167,23 +215,29 @@ def acceleration(
     return voyage.trial("straight")
 
 
-def acceleration_indices(trial: Trial, part: float = 0.9, length: float | None = None) -> AccelerationIndices:
+def acceleration_indices(
+    trial: Trial, part: float = 0.9, length: float | None = None
+) -> AccelerationIndices:
     """Time and distance that a ship needs for a part of a change of speed.
 
-    The trial has u and v, beginning with the order and ending at steady speed; `part` is that of the change
-    of surge speed from the first sample to the last, `length` as in `stopping_indices`. Raises InputError if
-    a channel or the length is missing, or the ship does not become faster.
+    The trial has u and v, beginning with the order and ending at steady speed; `part`
+    is that of the change of surge speed from the first sample to the last, `length` as
+    in `stopping_indices`. Raises InputError if a channel or the length is missing, or
+    the ship does not become faster.
     """
     require(trial, ("u", "v"), "an acceleration")
     check_number(part, "part", above=0.0, below=1.0)
     u = trial["u"]
     if not u[-1] > u[0]:
         raise InputError(
-            f"trial {trial.name!r}: u goes from {u[0]:.3g} to {u[-1]:.3g} m/s, expected an acceleration"
+            f"trial {trial.name!r}: u goes from {u[0]:.3g} to {u[-1]:.3g} m/s, expected"
+            " an acceleration"
         )
     end = _when(trial, u, u[0] + part * (u[-1] - u[0]))
     sailed = float(np.interp(end, trial.t, distance_sailed(trial)))
-    return AccelerationIndices(end - float(trial.t[0]), sailed / ship_length(trial, length), float(u[-1]))
+    return AccelerationIndices(
+        end - float(trial.t[0]), sailed / ship_length(trial, length), float(u[-1])
+    )
 
 
 def _when(trial: Trial, values: np.ndarray, threshold: float) -> float:
@@ -191,21 +245,30 @@ def _when(trial: Trial, values: np.ndarray, threshold: float) -> float:
     time = reached(values, threshold, trial.t)
     if time is None:
         raise ManoeuvreError(
-            f"trial {trial.name!r}: surge speed {trial['u'][-1]:.3g} m/s at its end, expected it to reach "
-            f"{abs(threshold):.3g} m/s; give a larger speed_ratio",
+            f"trial {trial.name!r}: surge speed {trial['u'][-1]:.3g} m/s at its end,"
+            f" expected it to reach {abs(threshold):.3g} m/s; give a larger"
+            " speed_ratio",
             trial,
         )
     return time
 
 
-def standard_stops(model: ShipModel, water_depth: float = np.inf) -> dict[str, Manoeuvre]:
+def standard_stops(
+    model: ShipModel, water_depth: float = np.inf
+) -> dict[str, Manoeuvre]:
     """Inertia stop and acceleration of a ship with a shaft; a crash stop where she can go astern."""
     if "n" not in model.command_names:
         return {}
     sails = (stopping, crash_stop, acceleration)
     stop, crash, faster = (partial(sail, water_depth=water_depth) for sail in sails)
-    found = {"inertia stop": Manoeuvre(stop, stopping_indices, StoppingIndices, STOP_CAPTION)}
+    found = {
+        "inertia stop": Manoeuvre(stop, stopping_indices, StoppingIndices, STOP_CAPTION)
+    }
     if goes_astern(model):
-        found["crash stop"] = Manoeuvre(crash, stopping_indices, StoppingIndices, CRASH_CAPTION)
-    found["acceleration"] = Manoeuvre(faster, acceleration_indices, AccelerationIndices, ACCELERATION_CAPTION)
+        found["crash stop"] = Manoeuvre(
+            crash, stopping_indices, StoppingIndices, CRASH_CAPTION
+        )
+    found["acceleration"] = Manoeuvre(
+        faster, acceleration_indices, AccelerationIndices, ACCELERATION_CAPTION
+    )
     return found

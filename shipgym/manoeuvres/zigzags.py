@@ -11,7 +11,13 @@ import numpy as np
 from shipgym.arrays import Floats
 from shipgym.checks import check_choice, check_number
 from shipgym.errors import ManoeuvreError
-from shipgym.manoeuvres.execution import distance_sailed, number_of_steps, reached, reversals, ship_length
+from shipgym.manoeuvres.execution import (
+    distance_sailed,
+    number_of_steps,
+    reached,
+    reversals,
+    ship_length,
+)
 from shipgym.manoeuvres.registry import SIDES, Manoeuvre, standard_time
 from shipgym.sea.conditions import Weather
 from shipgym.ships.ship_model import ShipModel
@@ -19,14 +25,18 @@ from shipgym.ships.simulate import Conditions, Passage, Seed, as_trial, orders
 from shipgym.trials.trial import Trial
 
 STANDARD_DEG = (10.0, 20.0)
-CAPTION = "Heading change and rudder in degrees; dotted: the heading at which the rudder is reversed."
+CAPTION = (
+    "Heading change and rudder in degrees; dotted: the heading at which the rudder is"
+    " reversed."
+)
 
 
 @dataclass(frozen=True)
 class ZigzagIndices:
     """Indices of a zigzag; None if the manoeuvre ended earlier."""
 
-    # heading beyond that at which the rudder was reversed for the first and the second time, degrees
+    # heading beyond that at which the rudder was reversed for the first and the second
+    # time, degrees
     overshoot_1_deg: float | None
     overshoot_2_deg: float | None
     # distance sailed from the first order to the first reversal, ship lengths
@@ -35,18 +45,25 @@ class ZigzagIndices:
 
 
 def zigzag(
-    model: ShipModel, rudder_deg: float = 20.0, heading_deg: float = 20.0, port_first: bool = False,
-    duration: float = 600.0, dt: float = 0.1, switch: Literal["inside", "step"] = "inside",
-    water_depth: float = np.inf, must_reverse: bool = True, weather: Weather | str | None = None,
+    model: ShipModel,
+    rudder_deg: float = 20.0,
+    heading_deg: float = 20.0,
+    port_first: bool = False,
+    duration: float = 600.0,
+    dt: float = 0.1,
+    switch: Literal["inside", "step"] = "inside",
+    water_depth: float = np.inf,
+    must_reverse: bool = True,
+    weather: Weather | str | None = None,
     seed: Seed = 0,
-) -> Trial:  # fmt: skip
+) -> Trial:
     """Simulate a zigzag from straight ahead at service speed, without an approach run.
 
     The trial has the rudder ordered from each sample on in `delta_command`.
 
-    Raises InputError for an angle, a duration or a step that is not above 0. Raises ManoeuvreError if the
-    heading of the first reversal is never reached; with the trial so far. Raises UnstableModelError if the
-    ship runs away.
+    Raises InputError for an angle, a duration or a step that is not above 0. Raises
+    ManoeuvreError if the heading of the first reversal is never reached; with the trial
+    so far. Raises UnstableModelError if the ship runs away.
 
     Parameters
     ----------
@@ -58,20 +75,22 @@ def zigzag(
     duration, dt : float
         s. The samples are dt apart.
     switch : {"inside", "step"}
-        Reverse the rudder at the instant at which the heading is reached, inside a step, or at the
-        first sample at which it has been reached.
+        Reverse the rudder at the instant at which the heading is reached, inside a
+        step, or at the first sample at which it has been reached.
     water_depth : float
         m, for ships whose equations cover shallow water.
     must_reverse : bool
         Whether a ship that never reaches the heading of the first reversal is an error.
     weather : Weather or str, optional
-        A weather or the name of a sea state. The rudder is reversed by the heading without first-order
-        motion in waves, as a helmsman does who sees through it.
+        A weather or the name of a sea state. The rudder is reversed by the heading
+        without first-order motion in waves, as a helmsman does who sees through it.
     seed : int or Generator
         Of the weather.
     """
     angle = np.radians(check_number(rudder_deg, "rudder_deg", above=0.0, at_most=90.0))
-    threshold = np.radians(check_number(heading_deg, "heading_deg", above=0.0, at_most=180.0))
+    threshold = np.radians(
+        check_number(heading_deg, "heading_deg", above=0.0, at_most=180.0)
+    )
     n_steps = number_of_steps(duration, dt)
     check_choice(switch, ("inside", "step"), "switch")
     passage = Passage(model, Conditions(water_depth, weather, seed), dt)
@@ -82,10 +101,10 @@ def zigzag(
     if must_reverse and turns == 0:
         gained = np.degrees(np.sign(rudder[0]) * (trial["psi"] - trial["psi"][0])).max()
         raise ManoeuvreError(
-            f"zigzag {rudder_deg:g}/{heading_deg:g} of {model.name!r}: the heading changed by at most "
-            f"{gained:.3g} deg to the side of the rudder in {trial.duration:g} s, expected "
-            f"{heading_deg:g} deg, where the rudder is reversed; sail longer, or order more rudder or less "
-            "heading",
+            f"zigzag {rudder_deg:g}/{heading_deg:g} of {model.name!r}: the heading"
+            f" changed by at most {gained:.3g} deg to the side of the rudder in"
+            f" {trial.duration:g} s, expected {heading_deg:g} deg, where the rudder is"
+            " reversed; sail longer, or order more rudder or less heading",
             trial,
         )
     return trial
@@ -96,24 +115,35 @@ def zigzag_indices(
 ) -> ZigzagIndices:
     """Overshoots, initial turning and period of a measured or simulated zigzag.
 
-    The trial has psi and delta (or delta_command), and u and v for the distance; `length`, between
-    perpendiculars, m, is by default the trial's own; `heading_deg` is the heading change at which the rudder
-    had to be reversed, degrees, by default `switch_heading_deg`. InputError for a missing channel or length.
+    The trial has psi and delta (or delta_command), and u and v for the distance;
+    `length`, between perpendiculars, m, is by default the trial's own; `heading_deg` is
+    the heading change at which the rudder had to be reversed, degrees, by default
+    `switch_heading_deg`. InputError for a missing channel or length.
     """
     start, turns = reversals(trial)
     if not turns:
         return ZigzagIndices(None, None, None, None)
     threshold = switch_heading_deg(trial) if heading_deg is None else heading_deg
     spans = pairwise([*turns, trial.t[-1]][:3])
-    first, second, *_ = [*(_overshoot_deg(trial, start, *span, threshold) for span in spans), None]
+    first, second, *_ = [
+        *(_overshoot_deg(trial, start, *span, threshold) for span in spans),
+        None,
+    ]
     lengths = _initial_turning(trial, start, threshold, ship_length(trial, length))
-    return ZigzagIndices(first, second, lengths, turns[2] - turns[0] if len(turns) > 2 else None)
+    return ZigzagIndices(
+        first, second, lengths, turns[2] - turns[0] if len(turns) > 2 else None
+    )
 
 
-def _initial_turning(trial: Trial, start: float, threshold_deg: float | None, length: float) -> float | None:
+def _initial_turning(
+    trial: Trial, start: float, threshold_deg: float | None, length: float
+) -> float | None:
     """Lengths sailed from the first order until the heading has changed by the threshold, if it has."""
     after = trial.t >= start
-    times, change = trial.t[after], np.abs(_heading_change(trial, start, trial.t[after]))
+    times, change = (
+        trial.t[after],
+        np.abs(_heading_change(trial, start, trial.t[after])),
+    )
     when = reached(change, float(np.radians(threshold_deg or np.inf)), times)
     if when is None:
         return None
@@ -124,18 +154,22 @@ def _initial_turning(trial: Trial, start: float, threshold_deg: float | None, le
 def switch_heading_deg(trial: Trial) -> float | None:
     """Heading change at which the rudder of a zigzag was to be reversed, degrees; None without reversal.
 
-    Orders are given in whole degrees, in trials nearly always 1 or a multiple of 5, and carried out
-    after a delay in which the heading moves on. So it is the largest such angle that had been reached,
-    to 5 per cent, at the first reversal; where that lies more than 3 degrees back, the heading of the
-    reversal itself.
+    Orders are given in whole degrees, in trials nearly always 1 or a multiple of 5, and
+    carried out after a delay in which the heading moves on. So it is the largest such
+    angle that had been reached, to 5 per cent, at the first reversal; where that lies
+    more than 3 degrees back, the heading of the reversal itself.
     """
     start, turns = reversals(trial)
     if not turns:
         return None
     row = int(np.clip(np.searchsorted(trial.t, turns[0]), 1, len(trial) - 1))
-    step = float(trial.t[row] - trial.t[row - 1])  # the sampling step that ends at or spans the reversal
+    step = float(
+        trial.t[row] - trial.t[row - 1]
+    )  # the sampling step that ends at or spans the reversal
     around = [turns[0] - step, turns[0]]
-    before, at = sorted(np.abs(np.degrees(_heading_change(trial, start, around))).tolist())
+    before, at = sorted(
+        np.abs(np.degrees(_heading_change(trial, start, around))).tolist()
+    )
     if "delta_command" in trial.channels:
         whole = np.floor(at + 1e-6)
         return float(whole) if whole >= before - 1e-6 else float(0.5 * (before + at))
@@ -144,13 +178,17 @@ def switch_heading_deg(trial: Trial) -> float | None:
     return float(reached[-1]) if len(reached) and at - reached[-1] < 3.0 else float(at)
 
 
-def _heading_change(trial: Trial, start: float, times: Sequence[float] | Floats) -> Floats:
+def _heading_change(
+    trial: Trial, start: float, times: Sequence[float] | Floats
+) -> Floats:
     """Heading at some times less the mean heading up to the start, rad."""
     approach = trial["psi"][trial.t <= start].mean()
     return np.asarray(np.interp(times, trial.t, trial["psi"]) - approach)
 
 
-def _overshoot_deg(trial: Trial, start: float, turn: float, end: float, switch: float | None) -> float | None:
+def _overshoot_deg(
+    trial: Trial, start: float, turn: float, end: float, switch: float | None
+) -> float | None:
     """Heading beyond that of the switch after the reversal at time `turn`; None if still growing at `end`."""
     window = (trial.t >= turn) & (trial.t <= end)
     if switch is None or window.sum() < 3:
@@ -162,15 +200,21 @@ def _overshoot_deg(trial: Trial, start: float, turn: float, end: float, switch: 
     return float(beyond.max())
 
 
-def standard_zigzags(model: ShipModel, water_depth: float = np.inf) -> dict[str, Manoeuvre]:
+def standard_zigzags(
+    model: ShipModel, water_depth: float = np.inf
+) -> dict[str, Manoeuvre]:
     """Zigzags 10/10 and 20/20 to both sides; one that never reverses has no indices."""
     duration, dt = standard_time(model)
-    sail = partial(zigzag, duration=duration, dt=dt, water_depth=water_depth, must_reverse=False)
+    sail = partial(
+        zigzag, duration=duration, dt=dt, water_depth=water_depth, must_reverse=False
+    )
     return {
         f"zigzag {angle:.0f}/{angle:.0f}, {side} first": Manoeuvre(
             partial(sail, rudder_deg=angle, heading_deg=angle, port_first=sign < 0.0),
-            zigzag_indices, ZigzagIndices, CAPTION,
+            zigzag_indices,
+            ZigzagIndices,
+            CAPTION,
         )
         for angle in STANDARD_DEG
         for side, sign in SIDES
-    }  # fmt: skip
+    }

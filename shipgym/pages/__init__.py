@@ -1,9 +1,19 @@
 """Pages of results: one HTML file each, made from a template, which loads nothing from anywhere.
 
-A page extends `shipgym.pages/page.html` and is made of the macros in `shipgym.pages/parts.html`.
+A page extends `shipgym.pages/page.html` and is made of the macros in
+`shipgym.pages/parts.html`.
 """
 
 from shipgym.pages.numbers import MINUS, NONE, fixed, number, percent
 from shipgym.pages.templates import environment, plotly_script, render
 
-__all__ = ["MINUS", "NONE", "environment", "fixed", "number", "percent", "plotly_script", "render"]
+__all__ = [
+    "MINUS",
+    "NONE",
+    "environment",
+    "fixed",
+    "number",
+    "percent",
+    "plotly_script",
+    "render",
+]

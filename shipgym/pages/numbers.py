@@ -15,7 +15,10 @@ def number(value: float | None, digits: int = 3) -> str:
         return "0"
     if not 1e-4 <= abs(value) < 1e7:
         mantissa, exponent = f"{value:.{digits - 1}e}".split("e")
-        return f"{mantissa.replace('-', MINUS)} · 10{str(int(exponent)).translate(SUPERSCRIPTS)}"
+        return (
+            f"{mantissa.replace('-', MINUS)} ·"
+            f" 10{str(int(exponent)).translate(SUPERSCRIPTS)}"
+        )
     return fixed(value, max(digits - 1 - int(np.floor(np.log10(abs(value)))), 0))
 
 

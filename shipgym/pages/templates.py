@@ -16,8 +16,8 @@ from shipgym.plots.style import Figure
 def render(template: str, **data: Any) -> str:
     """A page, as text; the same data gives the same text.
 
-    The template is the package it lies in and its file, such as "identification.report/report.html". A
-    variable of it that `data` lacks is an error.
+    The template is the package it lies in and its file, such as
+    "identification.report/report.html". A variable of it that `data` lacks is an error.
     """
     return environment().get_template(template).render(contents=[], **data)
 
@@ -26,15 +26,28 @@ def render(template: str, **data: Any) -> str:
 def environment() -> Environment:
     """What all templates share: escaping, the ways to write a number, and plotly.js."""
     made = Environment(
-        autoescape=True, undefined=StrictUndefined, loader=FunctionLoader(_source),
-        finalize=lambda value: NONE if value is None else value, extensions=["jinja2.ext.do"],
-        trim_blocks=True, lstrip_blocks=True,
-    )  # fmt: skip
+        autoescape=True,
+        undefined=StrictUndefined,
+        loader=FunctionLoader(_source),
+        finalize=lambda value: NONE if value is None else value,
+        extensions=["jinja2.ext.do"],
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
     made.filters |= {
-        "counted": counted, "degrees": degrees, "fixed": fixed, "number": number, "percent": percent,
-        "plotted": plotted, "sentence": sentence,
-    }  # fmt: skip
-    made.globals |= {"plotly_script": plotly_script, "dash": NONE, "version": shipgym.__version__}
+        "counted": counted,
+        "degrees": degrees,
+        "fixed": fixed,
+        "number": number,
+        "percent": percent,
+        "plotted": plotted,
+        "sentence": sentence,
+    }
+    made.globals |= {
+        "plotly_script": plotly_script,
+        "dash": NONE,
+        "version": shipgym.__version__,
+    }
     made.policies["json.dumps_kwargs"] = {"allow_nan": False, "separators": (",", ":")}
     return made
 
@@ -48,9 +61,10 @@ def _source(name: str) -> tuple[str, str, None]:
 def plotly_script() -> Markup:
     """The source of plotly.js, to stand once in a page.
 
-    Its bundle `cartesian`, a third of the whole: lines, bars, boxes, histograms, heat maps, contours. The
-    file is that of the npm package plotly.js-cartesian-dist-min 4.1.1: plotly's Python package has the whole
-    only, with which a page that works offline would be 5.5 MB.
+    Its bundle `cartesian`, a third of the whole: lines, bars, boxes, histograms, heat
+    maps, contours. The file is that of the npm package plotly.js-cartesian-dist-min
+    4.1.1: plotly's Python package has the whole only, with which a page that works
+    offline would be 5.5 MB.
     """
     source, *_ = _source("shipgym.pages/plotly/plotly-cartesian.min.js")
     return Markup(source.replace("</script", "<\\/script"))

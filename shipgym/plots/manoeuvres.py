@@ -11,7 +11,18 @@ from shipgym.manoeuvres.pull_outs import pull_out_indices
 from shipgym.manoeuvres.spirals import Spiral, spiral_indices, turning_point
 from shipgym.manoeuvres.turning import track_from_order, turning_indices
 from shipgym.manoeuvres.zigzags import switch_heading_deg
-from shipgym.plots.style import LIMIT, MEASURED, MODEL, MUTED, PALETTE, Figure, Panel, axis, line, panels
+from shipgym.plots.style import (
+    LIMIT,
+    MEASURED,
+    MODEL,
+    MUTED,
+    PALETTE,
+    Figure,
+    Panel,
+    axis,
+    line,
+    panels,
+)
 from shipgym.plots.trials import AXES, history_figure, quantity, thinned
 from shipgym.trials.trial import Trial
 
@@ -24,23 +35,35 @@ def zigzag_figure(trial: Trial, height: int = 320) -> Figure:
     Of a trial with psi and delta; height in pixels.
     """
     heading = np.degrees(trial["psi"] - trial["psi"][0])
-    hover, dotted = {"hovertemplate": "%{y:.2f} deg"}, {"line_dash": "dot", "hoverinfo": "skip"}
+    hover, dotted = (
+        {"hovertemplate": "%{y:.2f} deg"},
+        {"line_dash": "dot", "hoverinfo": "skip"},
+    )
     lines = [
         line(trial.t, heading, "heading change", MODEL, 2.0, **hover),
         line(trial.t, np.degrees(trial["delta"]), "rudder", MUTED, 1.4, **hover),
     ]
     if (switch := switch_heading_deg(trial)) is not None:
         ends = trial.t[[0, -1]]
-        lines += [line(ends, [at] * 2, "switch heading", LIMIT, 1.1, **dotted) for at in (switch, -switch)]
-    return panels([Panel(lines, "time, s", axis("heading change and rudder, deg", zero=True))], height)
+        lines += [
+            line(ends, [at] * 2, "switch heading", LIMIT, 1.1, **dotted)
+            for at in (switch, -switch)
+        ]
+    return panels(
+        [Panel(lines, "time, s", axis("heading change and rudder, deg", zero=True))],
+        height,
+    )
 
 
-def turning_figure(trial: Trial, length: float | None = None, height: int = 480) -> Figure:
+def turning_figure(
+    trial: Trial, length: float | None = None, height: int = 480
+) -> Figure:
     """A turning circle seen from above, with advance, transfer and tactical diameter marked.
 
-    In ship lengths, from the position and along the heading at which the rudder was ordered. The trial has x,
-    y, psi, u, v, r and delta (or delta_command); `length` is that between perpendiculars, m, by default the
-    trial's own. Raises InputError if a channel or the length is missing.
+    In ship lengths, from the position and along the heading at which the rudder was
+    ordered. The trial has x, y, psi, u, v, r and delta (or delta_command); `length` is
+    that between perpendiculars, m, by default the trial's own. Raises InputError if a
+    channel or the length is missing.
     """
     indices, lpp = turning_indices(trial, length), ship_length(trial, length)
     ahead, aside, turned = track_from_order(trial, lpp)
@@ -50,12 +73,21 @@ def turning_figure(trial: Trial, length: float | None = None, height: int = 480)
     if advance is not None and transfer is not None:
         far = side * transfer
         lines += [
-            _dimension([far, far], [0.0, advance], f"advance {advance:.2f} L", PALETTE[1]),
-            _dimension([0.0, far], [advance, advance], f"transfer {transfer:.2f} L", PALETTE[2]),
+            _dimension(
+                [far, far], [0.0, advance], f"advance {advance:.2f} L", PALETTE[1]
+            ),
+            _dimension(
+                [0.0, far], [advance, advance], f"transfer {transfer:.2f} L", PALETTE[2]
+            ),
         ]
     if (diameter := indices.tactical_diameter_lengths) is not None:
-        level, name = float(np.interp(np.pi, side * turned, ahead)), f"tactical diameter {diameter:.2f} L"
-        lines.append(_dimension([0.0, side * diameter], [level, level], name, PALETTE[3]))
+        level, name = (
+            float(np.interp(np.pi, side * turned, ahead)),
+            f"tactical diameter {diameter:.2f} L",
+        )
+        lines.append(
+            _dimension([0.0, side * diameter], [level, level], name, PALETTE[3])
+        )
     ahead_axis = axis("ahead, ship lengths", zero=True, scaleanchor="x", scaleratio=1)
     seen = Panel(lines, axis("to starboard, ship lengths", zero=True), ahead_axis)
     return panels([seen], height, hovermode="closest")
@@ -75,7 +107,10 @@ def spiral_figure(spiral: Spiral, height: int = 420) -> Figure:
     ways = {"reverse spiral": (slice(None), MODEL)}
     if spiral.method == "direct":
         turn = turning_point(angles)
-        ways = {"there": (slice(0, turn + 1), MODEL), "and back": (slice(turn, None), PALETTE[1])}
+        ways = {
+            "there": (slice(0, turn + 1), MODEL),
+            "and back": (slice(turn, None), PALETTE[1]),
+        }
     lines = [
         line(angles[part], rates[part], name, colour, 1.6, "lines+markers", **points)
         for name, (part, colour) in ways.items()
@@ -87,7 +122,10 @@ def spiral_figure(spiral: Spiral, height: int = 420) -> Figure:
         width = middle = 0.0
     step = float(np.abs(np.diff(angles)).min()) if spiral.method == "direct" else 0.0
     if width > step:
-        ends, name = [middle - width / 2, middle + width / 2], f"loop, {width:.2f} deg wide"
+        ends, name = (
+            [middle - width / 2, middle + width / 2],
+            f"loop, {width:.2f} deg wide",
+        )
         lines.append(line(ends, [0.0, 0.0], name, LIMIT, 2.6, hoverinfo="name"))
     axes = axis("rudder, deg", zero=True), axis("yaw rate, deg/s", zero=True)
     return panels([Panel(lines, *axes)], height, hovermode="closest")
@@ -96,7 +134,8 @@ def spiral_figure(spiral: Spiral, height: int = 420) -> Figure:
 def pull_out_figure(trials: dict[str, Trial], height: int = 340) -> Figure:
     """Yaw rate of pull-outs over the time since the rudder was put amidships; those of a stable ship meet.
 
-    The trials, usually one from each side, by the label of their line. InputError if one has no pull-out.
+    The trials, usually one from each side, by the label of their line. InputError if
+    one has no pull-out.
     """
     lines = []
     for (name, trial), colour in zip(trials.items(), PALETTE, strict=False):
@@ -105,34 +144,55 @@ def pull_out_figure(trials: dict[str, Trial], height: int = 340) -> Figure:
         release = trial.t[int(np.flatnonzero(angle > 0.5 * angle.max())[-1]) + 1]
         part = thinned(trial)
         residual = f"{name}: {left:.3f} deg/s left"
-        lines.append(line(trial.t[part] - release, np.degrees(trial["r"][part]), residual, colour))
+        lines.append(
+            line(
+                trial.t[part] - release, np.degrees(trial["r"][part]), residual, colour
+            )
+        )
     time_axis = axis("time since the rudder was put amidships, s", zero=True)
     return panels([Panel(lines, time_axis, axis("yaw rate, deg/s", zero=True))], height)
 
 
-def speed_figure(trial: Trial, length: float | None = None, height: int = 380) -> Figure:
+def speed_figure(
+    trial: Trial, length: float | None = None, height: int = 380
+) -> Figure:
     """A stop or an acceleration: surge speed and shaft over time, and speed over the distance sailed.
 
-    The trial has u and v, and n where the ship has a shaft; `length` as in `turning_figure`.
+    The trial has u and v, and n where the ship has a shaft; `length` as in
+    `turning_figure`.
     """
     sailed = distance_sailed(trial) / ship_length(trial, length)
     part = thinned(trial)
     t, u, shaft = trial.t[part], trial["u"][part], quantity(trial, "n")
     speed_axis, plain = axis(AXES["u"][0], zero=True), axis(zero=True)
     shown = [
-        Panel([line(sailed[part], u, "surge speed", MODEL)], "distance sailed, ship lengths", speed_axis),
+        Panel(
+            [line(sailed[part], u, "surge speed", MODEL)],
+            "distance sailed, ship lengths",
+            speed_axis,
+        ),
         Panel([line(t, u, "surge speed", MODEL)], "time, s", plain),
     ]
     if shaft is not None:
         turned = line(t, shaft[part], "shaft", MEASURED)
         shown.append(Panel([turned], "time, s", axis(AXES["n"][0], zero=True)))
-    return panels(shown, height, len(shown), grid={"horizontal_spacing": 0.09}, hovermode="closest")
+    return panels(
+        shown,
+        height,
+        len(shown),
+        grid={"horizontal_spacing": 0.09},
+        hovermode="closest",
+    )
 
 
 def excitation_figure(trial: Trial) -> Figure:
     """A manoeuvre for identification, such as `prbs_rudder`: orders above the ship's response."""
-    orders = [name for name in ORDERS if name in trial.channels and np.ptp(trial[name]) > 0.0]
-    figure = history_figure({"simulated": trial}, (*orders, "psi", "r", "speed", "drift"))
+    orders = [
+        name for name in ORDERS if name in trial.channels and np.ptp(trial[name]) > 0.0
+    ]
+    figure = history_figure(
+        {"simulated": trial}, (*orders, "psi", "r", "speed", "drift")
+    )
     figure.update_layout(showlegend=False)
     return figure
 
@@ -147,9 +207,13 @@ def manoeuvre_figure(sailed: Trial | Spiral) -> Figure:
     if sailed.kind == "pull-out":
         return pull_out_figure({sailed.name: sailed})
     known: dict[str | None, Callable[[Trial], Figure]] = {
-        "zigzag": zigzag_figure, "turning-circle": turning_figure, "straight": speed_figure,
+        "zigzag": zigzag_figure,
+        "turning-circle": turning_figure,
+        "straight": speed_figure,
         "random": excitation_figure,
-    }  # fmt: skip
+    }
     if sailed.kind in known:
         return known[sailed.kind](sailed)
-    return history_figure({sailed.name: sailed}, ("psi", "delta", "r", "speed", "drift"))
+    return history_figure(
+        {sailed.name: sailed}, ("psi", "delta", "r", "speed", "drift")
+    )

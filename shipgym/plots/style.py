@@ -30,7 +30,9 @@ def graph_objects() -> Any:
     return library("plotly.graph_objects", "report", USE)
 
 
-def subplots(rows: int, columns: int, titles: Sequence[str] = (), **settings: Any) -> Figure:
+def subplots(
+    rows: int, columns: int, titles: Sequence[str] = (), **settings: Any
+) -> Figure:
     """A figure of panels, rows by columns, with a title above each where given."""
     figure = library("plotly.subplots", "report", USE).make_subplots(
         rows=rows, cols=columns, subplot_titles=list(titles) or None, **settings
@@ -49,19 +51,28 @@ class Panel(NamedTuple):
 
 
 def panels(
-    shown: Sequence[Panel], height: int, columns: int = 1, *,
-    outer: bool = False, grid: Mapping[str, Any] | None = None, **changes: Any,
-) -> Figure:  # fmt: skip
+    shown: Sequence[Panel],
+    height: int,
+    columns: int = 1,
+    *,
+    outer: bool = False,
+    grid: Mapping[str, Any] | None = None,
+    **changes: Any,
+) -> Figure:
     """A figure of panels in the shared style, row by row.
 
-    Its height is in pixels; with `outer`, titles of axes stand below the last row and beside the first column
-    only. `grid` has settings of plotly's `make_subplots`, and `changes` those of `layout`.
+    Its height is in pixels; with `outer`, titles of axes stand below the last row and
+    beside the first column only. `grid` has settings of plotly's `make_subplots`, and
+    `changes` those of `layout`.
     """
     columns = min(columns, len(shown)) or 1
     rows = -(-len(shown) // columns) or 1
-    titles = [panel.title for panel in shown] if any(panel.title for panel in shown) else []
+    titles = (
+        [panel.title for panel in shown] if any(panel.title for panel in shown) else []
+    )
     spacing = {"vertical_spacing": 0.36 / max(rows, 2)} | dict(grid or {})
-    # as plain dicts, since plotly checks a whole figure faster than one change after the other
+    # as plain dicts, since plotly checks a whole figure faster than one change after
+    # the other
     figure = subplots(rows, columns, titles, **spacing)
     drawn = figure.layout.to_plotly_json()
     traces, names = [], set[str]()
@@ -71,31 +82,48 @@ def panels(
             if trace.legendgroup is not None and trace.showlegend is not False:
                 trace.showlegend = trace.legendgroup not in names
                 names.add(trace.legendgroup)
-            traces.append(trace.to_plotly_json() | {"xaxis": f"x{number}", "yaxis": f"y{number}"})
-        x, y = (axis(told) if isinstance(told, str) else told for told in (panel.x, panel.y))
-        drawn[f"xaxis{number}"] |= x | UNTITLED if outer and k // columns < rows - 1 else x
+            traces.append(
+                trace.to_plotly_json() | {"xaxis": f"x{number}", "yaxis": f"y{number}"}
+            )
+        x, y = (
+            axis(told) if isinstance(told, str) else told for told in (panel.x, panel.y)
+        )
+        drawn[f"xaxis{number}"] |= (
+            x | UNTITLED if outer and k // columns < rows - 1 else x
+        )
         drawn[f"yaxis{number}"] |= y | UNTITLED if outer and k % columns else y
     figure.layout = drawn | layout(height, titled=bool(titles), **changes)
     figure.add_traces(traces)
     return figure
 
 
-def layout(height: int, *, titled: bool = False, left: int = 62, **changes: Any) -> dict[str, Any]:
+def layout(
+    height: int, *, titled: bool = False, left: int = 62, **changes: Any
+) -> dict[str, Any]:
     """The layout that all figures share: white, a light grid, the legend above.
 
-    Height and left margin in pixels (the width is that of the page); `titled` makes room for titles of panels
-    below the legend; `changes` are entries of a plotly layout that replace these.
+    Height and left margin in pixels (the width is that of the page); `titled` makes
+    room for titles of panels below the legend; `changes` are entries of a plotly layout
+    that replace these.
     """
     shared = {
-        "height": height, "template": "none", "font": {"family": FONT, "size": 12, "color": INK},
-        "paper_bgcolor": "white", "plot_bgcolor": "white",
+        "height": height,
+        "template": "none",
+        "font": {"family": FONT, "size": 12, "color": INK},
+        "paper_bgcolor": "white",
+        "plot_bgcolor": "white",
         "margin": {"l": left, "r": 18, "t": 64 if titled else 36, "b": 46},
         "legend": {
-            "orientation": "h", "x": 0.0, "y": 1.0, "yref": "container", "yanchor": "top",
+            "orientation": "h",
+            "x": 0.0,
+            "y": 1.0,
+            "yref": "container",
+            "yanchor": "top",
             "font": {"size": 12},
         },
-        "hoverlabel": {"font": {"family": FONT, "size": 12}}, "hovermode": "x unified",
-    }  # fmt: skip
+        "hoverlabel": {"font": {"family": FONT, "size": 12}},
+        "hovermode": "x unified",
+    }
     return shared | changes
 
 
@@ -103,9 +131,16 @@ def axis(title: str = "", zero: bool = False, **changes: Any) -> dict[str, Any]:
     """An axis in the shared style, with its title (quantity and unit) and perhaps a line at zero."""
     shared = {
         "title": {"text": title, "font": {"size": 12, "color": MUTED}, "standoff": 8},
-        "gridcolor": GRID, "zeroline": zero, "zerolinecolor": GRID, "linecolor": "#c5ccd6", "showline": True,
-        "ticks": "outside", "ticklen": 4, "tickcolor": "#c5ccd6", "tickfont": {"size": 11, "color": MUTED},
-    }  # fmt: skip
+        "gridcolor": GRID,
+        "zeroline": zero,
+        "zerolinecolor": GRID,
+        "linecolor": "#c5ccd6",
+        "showline": True,
+        "ticks": "outside",
+        "ticklen": 4,
+        "tickcolor": "#c5ccd6",
+        "tickfont": {"size": 11, "color": MUTED},
+    }
     return shared | changes
 
 
@@ -118,8 +153,15 @@ def line_styles(labels: Iterable[str]) -> dict[str, dict[str, Any]]:
     """Line of each label: measurements thin and dark, the others by the palette in their order."""
     labels = list(labels)
     others = [label for label in labels if label != "measured"]
-    styles = {label: {"colour": PALETTE[k % len(PALETTE)], "width": 2.0} for k, label in enumerate(others)}
-    return styles | {label: {"colour": MEASURED, "width": 1.5} for label in labels if label == "measured"}
+    styles = {
+        label: {"colour": PALETTE[k % len(PALETTE)], "width": 2.0}
+        for k, label in enumerate(others)
+    }
+    return styles | {
+        label: {"colour": MEASURED, "width": 1.5}
+        for label in labels
+        if label == "measured"
+    }
 
 
 def translucent(colour: str, opacity: float) -> str:
@@ -129,15 +171,36 @@ def translucent(colour: str, opacity: float) -> str:
 
 
 def line(
-    x: ArrayLike, y: ArrayLike, name: str, colour: str, width: float = 1.9, mode: str = "lines", **more: Any
+    x: ArrayLike,
+    y: ArrayLike,
+    name: str,
+    colour: str,
+    width: float = 1.9,
+    mode: str = "lines",
+    **more: Any,
 ) -> Any:
     """A line; `more` are settings of plotly's `Scatter`."""
     return graph_objects().Scatter(
-        x=compact(x), y=compact(y), name=name, legendgroup=name, mode=mode,
-        line={"color": colour, "width": width}, **more,
-    )  # fmt: skip
+        x=compact(x),
+        y=compact(y),
+        name=name,
+        legendgroup=name,
+        mode=mode,
+        line={"color": colour, "width": width},
+        **more,
+    )
 
 
-def points(x: ArrayLike, y: ArrayLike, name: str, colour: str, size: float = 7.0, **more: Any) -> Any:
+def points(
+    x: ArrayLike, y: ArrayLike, name: str, colour: str, size: float = 7.0, **more: Any
+) -> Any:
     """Markers; `more` are settings of plotly's `Scatter`."""
-    return line(x, y, name, colour, mode="markers", marker={"color": colour, "size": size}, **more)
+    return line(
+        x,
+        y,
+        name,
+        colour,
+        mode="markers",
+        marker={"color": colour, "size": size},
+        **more,
+    )

@@ -1,7 +1,8 @@
 """Weather: what current, wind and waves do to a ship.
 
-What a user gives is in `conditions`; what becomes of it for one ship in `wind`, `gusts`, `waves`,
-`motions`, `drift` and `weather_column`. The public names stand in `__init__.pyi`.
+What a user gives is in `conditions`; what becomes of it for one ship in `wind`,
+`gusts`, `waves`, `motions`, `drift` and `weather_column`. The public names stand in
+`__init__.pyi`.
 """
 
 from lazy_loader import attach_stub

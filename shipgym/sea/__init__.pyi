@@ -22,5 +22,5 @@ from .waves import wave_filter as wave_filter
 from .waves import wave_spectrum as wave_spectrum
 from .wind import AIR_DENSITY as AIR_DENSITY
 from .wind import WindCurves as WindCurves
-from .wind import wind_curves as wind_curves
 from .wind import WindTable as WindTable
+from .wind import wind_curves as wind_curves

@@ -8,8 +8,14 @@ from dataclasses import asdict, dataclass
 from typing import Any, Literal
 
 from shipgym.checks import (
-    check_choice, check_flag, check_number, check_table, check_text, did_you_mean, quoted,
-)  # fmt: skip
+    check_choice,
+    check_flag,
+    check_number,
+    check_table,
+    check_text,
+    did_you_mean,
+    quoted,
+)
 from shipgym.errors import InputError
 from shipgym.sea.wind import WindTable, check_coefficients
 
@@ -27,9 +33,11 @@ class Current:
     speed : float
         Mean, m/s.
     towards_deg : float or None
-        Direction it flows to, degrees clockwise from north; None: drawn for each episode of an environment.
+        Direction it flows to, degrees clockwise from north; None: drawn for each
+        episode of an environment.
     variation : float
-        Standard deviation of each of the north and east components about the mean, m/s; 0 is steady.
+        Standard deviation of each of the north and east components about the mean, m/s;
+        0 is steady.
     time_constant : float
         Of the first-order Gauss-Markov process of the variation, s.
     """
@@ -41,7 +49,9 @@ class Current:
 
     def __post_init__(self) -> None:
         _check(self, "current", "towards_deg", speed=(0.0, 10.0), variation=(0.0, 5.0))
-        check_number(self.time_constant, "current time_constant", above=0.0, hint="in s")
+        check_number(
+            self.time_constant, "current time_constant", above=0.0, hint="in s"
+        )
 
     @property
     def calm(self) -> bool:
@@ -58,14 +68,15 @@ class Wind:
     speed : float
         Mean over an hour, 10 m above the sea, m/s.
     from_deg : float or None
-        Direction it comes from, degrees clockwise from north; None: drawn for each episode of an environment.
+        Direction it comes from, degrees clockwise from north; None: drawn for each
+        episode of an environment.
     gust : bool
         Whether the speed varies about its mean.
     spectrum : {"harris", "davenport", "norsok"}
         Of the gusts (`shipgym.sea.gusts`).
     coefficients : str or WindTable
-        "blendermann" (type of ship guessed from its fullness), "blendermann-" and a type of
-        `BLENDERMANN`, "isherwood", or a table of your own.
+        "blendermann" (type of ship guessed from its fullness), "blendermann-" and a
+        type of `BLENDERMANN`, "isherwood", or a table of your own.
     """
 
     speed: float
@@ -97,14 +108,16 @@ class Waves:
     peak_period : float
         Tp, period of the peak of the spectrum, s.
     from_deg : float or None
-        Where they come from, degrees clockwise from north; None: drawn for each episode of an environment.
+        Where they come from, degrees clockwise from north; None: drawn for each episode
+        of an environment.
     spectrum : {"jonswap", "pierson-moskowitz"}
         Of a growing or of a fully developed sea.
     peak_enhancement : float
         gamma of JONSWAP, 1 to 20.
     spreading : {"cosine-squared", "long-crested"}
-        How the energy is spread over directions about the mean: (2 / pi) cos^2 within 90 degrees to either
-        side, as wind seas are (DNV-RP-C205, section 3.5.8), or not at all, as in a tank or a swell.
+        How the energy is spread over directions about the mean: (2 / pi) cos^2 within
+        90 degrees to either side, as wind seas are (DNV-RP-C205, section 3.5.8), or not
+        at all, as in a tank or a swell.
     """
 
     significant_height: float
@@ -115,16 +128,25 @@ class Waves:
     spreading: Literal["cosine-squared", "long-crested"] = "cosine-squared"
 
     def __post_init__(self) -> None:
-        _check(self, "waves", "from_deg", significant_height=(0.0, 20.0), peak_enhancement=(1.0, 20.0))
-        check_number(self.peak_period, "waves peak_period", above=0.0, at_most=40.0, hint="in s")
+        _check(
+            self,
+            "waves",
+            "from_deg",
+            significant_height=(0.0, 20.0),
+            peak_enhancement=(1.0, 20.0),
+        )
+        check_number(
+            self.peak_period, "waves peak_period", above=0.0, at_most=40.0, hint="in s"
+        )
         check_choice(self.spectrum, WAVE_SPECTRA, "waves spectrum")
         check_choice(self.spreading, SPREADINGS, "waves spreading")
         length = 9.80665 * self.peak_period**2 / (2.0 * math.pi)
         if self.significant_height > length / 10.0:
             raise InputError(
-                f"waves significant_height: {self.significant_height:g} found with peak_period "
-                f"{self.peak_period:g}, expected at most {length / 10.0:.3g} m: steeper waves break; give a "
-                "lower height or a longer period"
+                f"waves significant_height: {self.significant_height:g} found with"
+                f" peak_period {self.peak_period:g}, expected at most"
+                f" {length / 10.0:.3g} m: steeper waves break; give a lower height or a"
+                " longer period"
             )
 
     @property
@@ -158,8 +180,9 @@ def _wind_at_10_m(knots: float) -> float:
     return float(knots * 1852.0 / 3600.0 * (10.0 / 19.5) ** (1.0 / 7.0))
 
 
-# Heights, most probable modal periods and sustained winds: Bales 1983, Designing ships to the natural
-# environment, Naval Engineers Journal 95(2), open ocean North Atlantic (also Lee & Bales, STANAG 4194).
+# Heights, most probable modal periods and sustained winds: Bales 1983, Designing ships
+# to the natural environment, Naval Engineers Journal 95(2), open ocean North Atlantic
+# (also Lee & Bales, STANAG 4194).
 _SEA_STATES = (
     SeaState("calm", 0, 0.0, 0.0, 0.0, 0.0, 0.0),
     SeaState("slight", 3, 0.5, 1.25, 0.88, 7.5, _wind_at_10_m(13.5)),
@@ -191,18 +214,23 @@ class Weather:
             value = getattr(self, part)
             if value is not None and not isinstance(value, kind):
                 raise InputError(
-                    f"weather {part}: {value!r} found, expected shipgym.{kind.__name__}(...) or None"
+                    f"weather {part}: {value!r} found, expected"
+                    f" shipgym.{kind.__name__}(...) or None"
                 )
 
     @classmethod
     def from_sea_state(
-        cls, name: str | int, from_deg: float | None = 45.0, current: Current | None = None
+        cls,
+        name: str | int,
+        from_deg: float | None = 45.0,
+        current: Current | None = None,
     ) -> Weather:
         """Wind and waves of WMO code table 3700: "calm", "slight", "moderate", "rough", or 0, 3, 4, 5.
 
-        Wind and waves come from `from_deg`, degrees clockwise from north, by default north-east; None: drawn
-        anew for each episode of an environment. A current may be given beside them. Raises InputError for a
-        sea state that is not in the table.
+        Wind and waves come from `from_deg`, degrees clockwise from north, by default
+        north-east; None: drawn anew for each episode of an environment. A current may
+        be given beside them. Raises InputError for a sea state that is not in the
+        table.
         """
         state = _find_sea_state(name)
         if state.wind_speed == 0.0:
@@ -213,35 +241,50 @@ class Weather:
     @property
     def calm(self) -> bool:
         """Whether nothing is on."""
-        return all(part is None or part.calm for part in (self.current, self.wind, self.waves))
+        return all(
+            part is None or part.calm for part in (self.current, self.wind, self.waves)
+        )
 
     def to_dict(self) -> dict[str, Any]:
         """Return the parts by name, ready for JSON; :meth:`from_dict` reads it."""
         return {"name": self.name} | {
-            part: None if getattr(self, part) is None else asdict(getattr(self, part)) for part in _PARTS
+            part: None if getattr(self, part) is None else asdict(getattr(self, part))
+            for part in _PARTS
         }
 
     @classmethod
     def from_dict(cls, mapping: Mapping[str, Any], where: str = "weather") -> Weather:
         """Read what :meth:`to_dict` wrote; absent parts are off.
 
-        InputError, beginning with `where`, for an unknown key, a missing value or one that no weather has.
+        InputError, beginning with `where`, for an unknown key, a missing value or one
+        that no weather has.
         """
         table = check_table(mapping, where, ("name", *_PARTS))
-        parts = {part: _part(kind, table.get(part), f"{where} {part}") for part, kind in _PARTS.items()}
+        parts = {
+            part: _part(kind, table.get(part), f"{where} {part}")
+            for part, kind in _PARTS.items()
+        }
         return cls(**parts, name=table.get("name", "weather"))
 
 
 _PARTS: dict[str, type[Any]] = {"current": Current, "wind": Wind, "waves": Waves}
-_NEEDED = {Current: ("speed",), Wind: ("speed",), Waves: ("significant_height", "peak_period")}
+_NEEDED = {
+    Current: ("speed",),
+    Wind: ("speed",),
+    Waves: ("significant_height", "peak_period"),
+}
 
 
 def _part(kind: type[Any], content: Any, where: str) -> Any:
     if content is None:
         return None
-    values = dict(check_table(content, where, tuple(kind.__dataclass_fields__), _NEEDED[kind]))
+    values = dict(
+        check_table(content, where, tuple(kind.__dataclass_fields__), _NEEDED[kind])
+    )
     if isinstance(values.get("coefficients"), Mapping):
-        values["coefficients"] = WindTable.from_dict(values["coefficients"], f"{where} coefficients")
+        values["coefficients"] = WindTable.from_dict(
+            values["coefficients"], f"{where} coefficients"
+        )
     return kind(**values)
 
 
@@ -252,15 +295,24 @@ def _find_sea_state(name: str | int) -> SeaState:
     codes = ", ".join(str(state.code) for state in _SEA_STATES)
     hint = did_you_mean(name, sea_states()) if isinstance(name, str) else ""
     raise InputError(
-        f"sea state: {name!r} found, expected one of {quoted(sea_states())}, or their WMO codes {codes}; "
-        f"for another sea give Weather(wind=Wind(...), waves=Waves(...)).{hint}"
+        f"sea state: {name!r} found, expected one of {quoted(sea_states())}, or their"
+        f" WMO codes {codes}; for another sea give Weather(wind=Wind(...),"
+        f" waves=Waves(...)).{hint}"
     )
 
 
-def _check(part: Any, where: str, direction: str, **bounds: tuple[float, float]) -> None:
+def _check(
+    part: Any, where: str, direction: str, **bounds: tuple[float, float]
+) -> None:
     """Make numbers of a part's fields, which must be within their bounds, and of its direction, if any."""
     given = {} if getattr(part, direction) is None else {direction: (-360.0, 360.0)}
     for name, (low, high) in (bounds | given).items():
         hint = "degrees clockwise from north" if name == direction else ""
-        value = check_number(getattr(part, name), f"{where} {name}", at_least=low, at_most=high, hint=hint)
+        value = check_number(
+            getattr(part, name),
+            f"{where} {name}",
+            at_least=low,
+            at_most=high,
+            hint=hint,
+        )
         object.__setattr__(part, name, value)

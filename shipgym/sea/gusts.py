@@ -19,8 +19,8 @@ NORSOK_BAND = (1.0 / 2400.0, 0.5)
 class GaussMarkov(NamedTuple):
     """A first-order Gauss-Markov process of mean zero.
 
-    Its autocorrelation is standard_deviation^2 exp(-|lag| / time_constant), its one-sided spectrum
-    4 s^2 T / (1 + (2 pi f T)^2) per Hz.
+    Its autocorrelation is standard_deviation^2 exp(-|lag| / time_constant), its
+    one-sided spectrum 4 s^2 T / (1 + (2 pi f T)^2) per Hz.
     """
 
     time_constant: float  # s
@@ -33,29 +33,38 @@ class GaussMarkov(NamedTuple):
         return 4.0 * self.standard_deviation**2 * T / (1.0 + (2.0 * np.pi * f * T) ** 2)
 
 
-def gust_spectrum(frequency: ArrayLike, speed: float, spectrum: str = "harris") -> Floats:
+def gust_spectrum(
+    frequency: ArrayLike, speed: float, spectrum: str = "harris"
+) -> Floats:
     """One-sided spectral density of the wind speed about its mean, 10 m above the sea, (m/s)^2 / Hz.
 
-    Frequency in Hz, above 0, mean speed in m/s. With x = f L / V and the surface drag coefficient k: Harris
-    1971, f S / (k V^2) = 4 x / (2 + x^2)^(5/6), L = 1800 m; Davenport 1961, 4 x^2 / (1 + x^2)^(4/3) with L =
-    1200 m; NORSOK N-003 (2007), Froya spectrum, S = 320 (V/10)^2 / (1 + y^n)^(5/(3n)) with y = 172 f
-    (V/10)^(-3/4), n = 0.468.
+    Frequency in Hz, above 0, mean speed in m/s. With x = f L / V and the surface drag
+    coefficient k: Harris 1971, f S / (k V^2) = 4 x / (2 + x^2)^(5/6), L = 1800 m;
+    Davenport 1961, 4 x^2 / (1 + x^2)^(4/3) with L = 1200 m; NORSOK N-003 (2007), Froya
+    spectrum, S = 320 (V/10)^2 / (1 + y^n)^(5/(3n)) with y = 172 f (V/10)^(-3/4), n =
+    0.468.
     """
     f = np.asarray(frequency, dtype=float)
     if spectrum == "norsok":
         y = 172.0 * f * (speed / 10.0) ** -0.75
-        froya: Floats = 320.0 * (speed / 10.0) ** 2 / (1.0 + y**0.468) ** (5.0 / (3.0 * 0.468))
+        froya: Floats = (
+            320.0 * (speed / 10.0) ** 2 / (1.0 + y**0.468) ** (5.0 / (3.0 * 0.468))
+        )
         return froya
     x = f * LENGTHS[spectrum] / speed
-    shape = x / (1.0 + x * x) ** (4.0 / 3.0) if spectrum == "davenport" else (2.0 + x * x) ** (-5.0 / 6.0)
+    shape = (
+        x / (1.0 + x * x) ** (4.0 / 3.0)
+        if spectrum == "davenport"
+        else (2.0 + x * x) ** (-5.0 / 6.0)
+    )
     return 4.0 * SURFACE_DRAG * speed * LENGTHS[spectrum] * shape
 
 
 def gust_variance(speed: float, spectrum: str = "harris") -> float:
     """Variance of the wind speed, the integral of :func:`gust_spectrum`, (m/s)^2.
 
-    Harris: 2^(2/3) B(1/2, 1/3) k V^2 = 6.677 k V^2 (B is Euler's beta function); Davenport: 6 k V^2; NORSOK:
-    over the band for which it is given.
+    Harris: 2^(2/3) B(1/2, 1/3) k V^2 = 6.677 k V^2 (B is Euler's beta function);
+    Davenport: 6 k V^2; NORSOK: over the band for which it is given.
     """
     if spectrum == "davenport":
         return 6.0 * SURFACE_DRAG * speed**2
@@ -69,9 +78,10 @@ def gust_variance(speed: float, spectrum: str = "harris") -> float:
 def gust_filter(wind: Wind) -> GaussMarkov:
     """First-order process with the variance of the gusts (m/s)^2 and the same most energetic frequency.
 
-    f S(f) of a Gauss-Markov process is largest at f = 1 / (2 pi T); Harris's at sqrt(3) V / 1800 m,
-    Davenport's at sqrt(3) V / 1200 m, so T = 165.4 m / V and 110.3 m / V; NORSOK's is found by search.
-    `docs/weather.md` says how far the filter is from the full spectra. Without gusts the deviation is 0.
+    f S(f) of a Gauss-Markov process is largest at f = 1 / (2 pi T); Harris's at sqrt(3)
+    V / 1800 m, Davenport's at sqrt(3) V / 1200 m, so T = 165.4 m / V and 110.3 m / V;
+    NORSOK's is found by search. `docs/weather.md` says how far the filter is from the
+    full spectra. Without gusts the deviation is 0.
     """
     if not wind.gust or wind.calm:
         return GaussMarkov(1.0, 0.0)
@@ -80,4 +90,7 @@ def gust_filter(wind: Wind) -> GaussMarkov:
         peak = float(f[np.argmax(f * gust_spectrum(f, wind.speed, "norsok"))])
     else:
         peak = math.sqrt(3.0) * wind.speed / LENGTHS[wind.spectrum]
-    return GaussMarkov(1.0 / (2.0 * math.pi * peak), math.sqrt(gust_variance(wind.speed, wind.spectrum)))
+    return GaussMarkov(
+        1.0 / (2.0 * math.pi * peak),
+        math.sqrt(gust_variance(wind.speed, wind.spectrum)),
+    )

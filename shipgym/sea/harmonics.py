@@ -14,7 +14,8 @@ POINTS = 360
 class Harmonics(NamedTuple):
     """Fourier coefficients of the forces on a ship with port-starboard symmetry."""
 
-    X: Floats  # shape (n + 1,); cosine series, the mean first: X = sum over k of X[k] cos(k angle)
+    # shape (n + 1,); cosine series, the mean first: X = sum over k of X[k] cos(k angle)
+    X: Floats
     # shape (n,); sine series: Y = sum over k of Y[k - 1] sin(k angle), k from 1
     Y: Floats
     N: Floats

@@ -1,12 +1,14 @@
 """Current, wind and waves around one ship: the state of the sea, what it does to her, how it goes on.
 
-The ship's u, v are through the water. A current that is the same everywhere then only moves the frame; where
-it varies in time, the ship is carried along like the water she displaces (Froude-Krylov force and added
-mass; Fossen 2011, 8.3), so that u, v do not feel it either.
+The ship's u, v are through the water. A current that is the same everywhere then only
+moves the frame; where it varies in time, the ship is carried along like the water she
+displaces (Froude-Krylov force and added mass; Fossen 2011, 8.3), so that u, v do not
+feel it either.
 
-Wind and drift forces are worked out at the start of a step and held over it. Random processes are linear
-filters of white noise, taken from step to step by their exact discrete form (Van Loan 1978, Computing
-integrals involving the matrix exponential): their variances do not depend on the step.
+Wind and drift forces are worked out at the start of a step and held over it. Random
+processes are linear filters of white noise, taken from step to step by their exact
+discrete form (Van Loan 1978, Computing integrals involving the matrix exponential):
+their variances do not depend on the step.
 
 Forces are Fourier series over an angle, already divided by the ship's inertia.
 """
@@ -21,7 +23,9 @@ from shipgym.engine.record_code import loader, storer
 from shipgym.engine.records import LANES, Layout
 from shipgym.engine.specialise import Part
 
-SLOWEST_ENCOUNTER = 0.1  # of the wave frequency: in a following sea the filter keeps turning
+SLOWEST_ENCOUNTER = (
+    0.1  # of the wave frequency: in a following sea the filter keeps turning
+)
 LEAST = 1e-12
 
 
@@ -77,7 +81,8 @@ class SeaParameters(NamedTuple):
     wind_sway: Sines
     wind_yaw: Sines
     wind_roll: Sines
-    # accelerations by the mean drift force, variances of the first-order motion, over the angle of the waves
+    # accelerations by the mean drift force, variances of the first-order motion, over
+    # the angle of the waves
     drift_surge: Cosines
     drift_sway: Sines
     drift_yaw: Sines
@@ -117,7 +122,14 @@ def sine_series(cosine: float, sine: float, a: Sines) -> float:
     s4 = d * s3 - s2
     s5 = d * s4 - s3
     s6 = d * s5 - s4
-    return a.first * sine + a.second * s2 + a.third * s3 + a.fourth * s4 + a.fifth * s5 + a.sixth * s6
+    return (
+        a.first * sine
+        + a.second * s2
+        + a.third * s3
+        + a.fourth * s4
+        + a.fifth * s5
+        + a.sixth * s6
+    )
 
 
 def cosine_series(cosine: float, a: Cosines) -> float:
@@ -129,7 +141,12 @@ def cosine_series(cosine: float, a: Cosines) -> float:
     c5 = d * c4 - c3
     c6 = d * c5 - c4
     return a.mean + (
-        a.first * cosine + a.second * c2 + a.third * c3 + a.fourth * c4 + a.fifth * c5 + a.sixth * c6
+        a.first * cosine
+        + a.second * c2
+        + a.third * c3
+        + a.fourth * c4
+        + a.fifth * c5
+        + a.sixth * c6
     )
 
 
@@ -140,7 +157,8 @@ def push(motion: Motion, sea: Sea, p: SeaParameters) -> Push:
     u, v = motion.u, motion.v
     sine, cosine = sin_cos(motion.psi)
     speed = p.wind_speed + sea.gust
-    # where the air comes from, as felt on board: against the wind and against her way over ground
+    # where the air comes from, as felt on board: against the wind and against her way
+    # over ground
     north = speed * sea.wind_north + sea.current_north
     east = speed * sea.wind_east + sea.current_east
     ahead = north * cosine + east * sine + u
@@ -155,12 +173,17 @@ def push(motion: Motion, sea: Sea, p: SeaParameters) -> Push:
     yaw = square * sine_series(c, s, p.wind_yaw)
     roll = 0.0
     if HAS_ROLL:
-        roll = square * sine_series(c, s, p.wind_roll) + drift * sine_series(bow, beam, p.drift_roll)
+        roll = square * sine_series(c, s, p.wind_roll) + drift * sine_series(
+            bow, beam, p.drift_roll
+        )
     return Push(
         surge + drift * cosine_series(bow, p.drift_surge),
         sway + drift * sine_series(bow, beam, p.drift_sway),
-        yaw + drift * sine_series(bow, beam, p.drift_yaw), roll, sea.current_north, sea.current_east,
-    )  # fmt: skip
+        yaw + drift * sine_series(bow, beam, p.drift_yaw),
+        roll,
+        sea.current_north,
+        sea.current_east,
+    )
 
 
 def from_bow(sine: float, cosine: float, sea: Sea) -> tuple[float, float]:
@@ -193,11 +216,14 @@ def decay(x: float) -> float:
     return e * e * e * e
 
 
-def ring(turn: float, p: SeaParameters) -> tuple[float, float, float, float, float, float]:
+def ring(
+    turn: float, p: SeaParameters
+) -> tuple[float, float, float, float, float, float]:
     """Exact step of a lightly damped oscillator driven by white noise, with both states of variance 1.
 
-    z1' = w z2, z2' = -w z1 - 2 lambda w z2 + sqrt(4 lambda w) noise, over an angle w h of `turn`. Returns
-    P11, P12 = -P21 and P22 of the transition P, and the factors of the noise, whose covariance is I - P P'.
+    z1' = w z2, z2' = -w z1 - 2 lambda w z2 + sqrt(4 lambda w) noise, over an angle w h
+    of `turn`. Returns P11, P12 = -P21 and P22 of the transition P, and the factors of
+    the noise, whose covariance is I - P P'.
     """
     kept = decay(p.wave_damping * turn)
     sine, cosine = sin_cos(p.wave_ringing * turn)
@@ -212,28 +238,46 @@ def ring(turn: float, p: SeaParameters) -> tuple[float, float, float, float, flo
     return p11, swing, p22, n11, n12, n22
 
 
-def oscillated(z1: float, z2: float, w1: float, w2: float, step: Any) -> tuple[float, float]:
+def oscillated(
+    z1: float, z2: float, w1: float, w2: float, step: Any
+) -> tuple[float, float]:
     """An oscillator after a step of `ring` with two numbers of noise."""
     p11, p12, p22, n11, n12, n22 = step
     return p11 * z1 + p12 * z2 + n11 * w1 + n12 * w2, p22 * z2 - p12 * z1 + n22 * w2
 
 
-def with_waves(bow: float, beam: float, frequency: float, sea: Sea, p: SeaParameters) -> Sea:
+def with_waves(
+    bow: float, beam: float, frequency: float, sea: Sea, p: SeaParameters
+) -> Sea:
     """The sea with the first-order motion of a ship at an angle to the waves.
 
-    The angle is the oscillator's velocity, which is white noise through gain s / (s^2 + 2 lambda w s + w^2).
-    Its own derivative has no finite variance, so the rate is the part of it that swings, -w times the
-    displacement: of variance w^2 and a quarter of a period ahead, as in waves of one frequency.
+    The angle is the oscillator's velocity, which is white noise through gain s / (s^2 +
+    2 lambda w s + w^2). Its own derivative has no finite variance, so the rate is the
+    part of it that swings, -w times the displacement: of variance w^2 and a quarter of
+    a period ahead, as in waves of one frequency.
     """
     heading = sqrt(max(cosine_series(bow, p.heading_variance), 0.0))
     heel = sqrt(max(cosine_series(bow, p.roll_variance), 0.0)) if HAS_ROLL else 0.0
     return Sea(
-        sea.mean_north, sea.mean_east, sea.wind_north, sea.wind_east, sea.waves_north, sea.waves_east,
-        sea.current_north, sea.current_east, sea.gust, sea.drift, sea.heading_1, sea.heading_2, sea.roll_1,
-        sea.roll_2, psi_wave=heading * sea.heading_2, r_wave=-heading * frequency * sea.heading_1,
+        sea.mean_north,
+        sea.mean_east,
+        sea.wind_north,
+        sea.wind_east,
+        sea.waves_north,
+        sea.waves_east,
+        sea.current_north,
+        sea.current_east,
+        sea.gust,
+        sea.drift,
+        sea.heading_1,
+        sea.heading_2,
+        sea.roll_1,
+        sea.roll_2,
+        psi_wave=heading * sea.heading_2,
+        r_wave=-heading * frequency * sea.heading_1,
         phi_wave=heel * sea.roll_2 if HAS_ROLL else 0.0,
         p_wave=-heel * frequency * sea.roll_1 if HAS_ROLL else 0.0,
-    )  # fmt: skip
+    )
 
 
 def wandered(now: float, mean: float, filter: Filter, noise: float) -> float:
@@ -244,8 +288,8 @@ def wandered(now: float, mean: float, filter: Filter, noise: float) -> float:
 def evolve(motion: Motion, h: float, sea: Sea, word: Any, p: SeaParameters) -> Sea:
     """Current, gusts, drift force and first-order motion after a step of h seconds (as of the filters).
 
-    `motion` is the ship at the end of the step, `sea` that at its beginning, `word` (uint64) the state of its
-    random numbers, which then goes on by `EVOLVE_WORDS`.
+    `motion` is the ship at the end of the step, `sea` that at its beginning, `word`
+    (uint64) the state of its random numbers, which then goes on by `EVOLVE_WORDS`.
     """
     sine, cosine = sin_cos(motion.psi)
     bow, beam = from_bow(sine, cosine, sea)
@@ -260,13 +304,25 @@ def evolve(motion: Motion, h: float, sea: Sea, word: Any, p: SeaParameters) -> S
             sea.roll_1, sea.roll_2, normal(word, DRAW[6]), normal(word, DRAW[7]), step
         )
     after = Sea(
-        sea.mean_north, sea.mean_east, sea.wind_north, sea.wind_east, sea.waves_north, sea.waves_east,
+        sea.mean_north,
+        sea.mean_east,
+        sea.wind_north,
+        sea.wind_east,
+        sea.waves_north,
+        sea.waves_east,
         wandered(sea.current_north, sea.mean_north, p.current, normal(word, DRAW[0])),
         wandered(sea.current_east, sea.mean_east, p.current, normal(word, DRAW[1])),
         p.gust.kept * sea.gust + p.gust.shock * normal(word, DRAW[2]),
-        p.drift.kept * sea.drift + p.drift.shock * normal(word, DRAW[3]), heading_1, heading_2, roll_1,
-        roll_2, 0.0, 0.0, 0.0, 0.0,
-    )  # fmt: skip
+        p.drift.kept * sea.drift + p.drift.shock * normal(word, DRAW[3]),
+        heading_1,
+        heading_2,
+        roll_1,
+        roll_2,
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+    )
     return with_waves(bow, beam, frequency, after, p)
 
 
@@ -279,19 +335,36 @@ def direction(given: float, word: Any, draw: Any) -> float:
 def begin_sea(motion: Motion, word: Any, p: SeaParameters) -> Sea:
     """Directions, and processes from their stationary distributions, as if the weather had always been there.
 
-    Wind and waves without a direction come from the same one. `word` then goes on by `BEGIN_WORDS`.
+    Wind and waves without a direction come from the same one. `word` then goes on by
+    `BEGIN_WORDS`.
     """
     towards_east, towards_north = sin_cos(direction(p.current_towards, word, DRAW[0]))
-    mean_north, mean_east = p.current_speed * towards_north, p.current_speed * towards_east
+    mean_north, mean_east = (
+        p.current_speed * towards_north,
+        p.current_speed * towards_east,
+    )
     wind_east, wind_north = sin_cos(direction(p.wind_from, word, DRAW[1]))
     waves_east, waves_north = sin_cos(direction(p.waves_from, word, DRAW[1]))
     sea = Sea(
-        mean_north, mean_east, wind_north, wind_east, waves_north, waves_east,
+        mean_north,
+        mean_east,
+        wind_north,
+        wind_east,
+        waves_north,
+        waves_east,
         mean_north + p.current.deviation * normal(word, DRAW[2]),
-        mean_east + p.current.deviation * normal(word, DRAW[3]), p.gust.deviation * normal(word, DRAW[4]),
-        p.drift.deviation * normal(word, DRAW[5]), normal(word, DRAW[6]), normal(word, DRAW[7]),
-        normal(word, DRAW[8]), normal(word, DRAW[9]), 0.0, 0.0, 0.0, 0.0,
-    )  # fmt: skip
+        mean_east + p.current.deviation * normal(word, DRAW[3]),
+        p.gust.deviation * normal(word, DRAW[4]),
+        p.drift.deviation * normal(word, DRAW[5]),
+        normal(word, DRAW[6]),
+        normal(word, DRAW[7]),
+        normal(word, DRAW[8]),
+        normal(word, DRAW[9]),
+        0.0,
+        0.0,
+        0.0,
+        0.0,
+    )
     sine, cosine = sin_cos(motion.psi)
     bow, beam = from_bow(sine, cosine, sea)
     return with_waves(bow, beam, encounter(bow, beam, motion.u, motion.v, p), sea, p)
@@ -305,9 +378,12 @@ def sea_records(windy: bool) -> tuple[Any, Any]:
 def sea_functions(windy: bool) -> dict[str, Any]:
     """What takes the place of the functions that loops name for the sea."""
     return {
-        "HAS_SEA": windy, "push": Part(push), "evolve": Part(evolve),
-        "begin_sea": Part(begin_sea, inline=False), "encounter_frequency": Part(encounter_frequency),
-    }  # fmt: skip
+        "HAS_SEA": windy,
+        "push": Part(push),
+        "evolve": Part(evolve),
+        "begin_sea": Part(begin_sea, inline=False),
+        "encounter_frequency": Part(encounter_frequency),
+    }
 
 
 def sea_parts(windy: bool, lanes: int = LANES) -> dict[str, Any]:
@@ -317,6 +393,7 @@ def sea_parts(windy: bool, lanes: int = LANES) -> dict[str, Any]:
     """
     state, parameters = (Layout(sea=kind)["sea"] for kind in sea_records(windy))
     return sea_functions(windy) | {
-        "load_sea": loader(state, lanes), "store_sea": storer(state, lanes),
+        "load_sea": loader(state, lanes),
+        "store_sea": storer(state, lanes),
         "load_sea_parameters": loader(parameters, 1),
-    }  # fmt: skip
+    }

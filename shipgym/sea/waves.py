@@ -17,7 +17,8 @@ from shipgym.ships.particulars import Particulars
 class WaveFilter(NamedTuple):
     """h(s) = gain s / (s^2 + 2 damping w0 s + w0^2), driven by white noise of unit intensity.
 
-    Its output has unit variance: gain^2 = 4 damping w0. At sea w0, and so the gain, is that of encounter.
+    Its output has unit variance: gain^2 = 4 damping w0. At sea w0, and so the gain, is
+    that of encounter.
     """
 
     peak_frequency: float  # w0 for a ship at rest, rad/s
@@ -27,17 +28,22 @@ class WaveFilter(NamedTuple):
     def spectrum(self, omega: ArrayLike) -> Floats:
         """One-sided spectral density of the output per rad/s, whose integral is 1."""
         w, w0 = np.asarray(omega, dtype=float), self.peak_frequency
-        power = (self.gain * w) ** 2 / ((w0**2 - w**2) ** 2 + (2.0 * self.damping * w0 * w) ** 2)
+        power = (self.gain * w) ** 2 / (
+            (w0**2 - w**2) ** 2 + (2.0 * self.damping * w0 * w) ** 2
+        )
         return power / np.pi
 
 
 def pierson_moskowitz(omega: ArrayLike, Hs: float, Tp: float) -> Floats:
     """Spectrum of a fully developed sea (Pierson & Moskowitz 1964) by Hs, m, and Tp, s.
 
-    One-sided density of the elevation, m2 s/rad, over omega, rad/s; 0 at 0. Its integral is Hs^2 / 16.
+    One-sided density of the elevation, m2 s/rad, over omega, rad/s; 0 at 0. Its
+    integral is Hs^2 / 16.
     """
     peak = 2.0 * np.pi / Tp
-    ratio = np.maximum(np.asarray(omega, dtype=float), 0.02 * peak) / peak  # exp(-1.25 * 50^4) is 0
+    ratio = (
+        np.maximum(np.asarray(omega, dtype=float), 0.02 * peak) / peak
+    )  # exp(-1.25 * 50^4) is 0
     density: Floats = 5.0 / 16.0 * Hs**2 / peak * ratio**-5 * np.exp(-1.25 * ratio**-4)
     return density
 
@@ -45,11 +51,13 @@ def pierson_moskowitz(omega: ArrayLike, Hs: float, Tp: float) -> Floats:
 def jonswap(omega: ArrayLike, Hs: float, Tp: float, gamma: float = 3.3) -> Floats:
     """Spectrum of a growing sea (Hasselmann et al. 1973), normalised to Hs; as `pierson_moskowitz`.
 
-    The factor 1 - 0.287 ln(gamma) of the literature (DNV-RP-C205) is replaced by the exact integral; a peak
-    enhancement gamma of 1 gives :func:`pierson_moskowitz`.
+    The factor 1 - 0.287 ln(gamma) of the literature (DNV-RP-C205) is replaced by the
+    exact integral; a peak enhancement gamma of 1 gives :func:`pierson_moskowitz`.
     """
     ratio = np.asarray(omega, dtype=float) * Tp / (2.0 * np.pi)
-    return pierson_moskowitz(omega, Hs, Tp) * _enhancement(ratio, gamma) / _enhanced(gamma)
+    return (
+        pierson_moskowitz(omega, Hs, Tp) * _enhancement(ratio, gamma) / _enhanced(gamma)
+    )
 
 
 def _enhancement(ratio: Floats, gamma: float) -> Floats:
@@ -63,7 +71,10 @@ def _enhanced(gamma: float) -> float:
     logarithm = np.linspace(np.log(0.2), np.log(50.0), 4001)
     ratio = np.exp(logarithm)
     plain = pierson_moskowitz(ratio, 4.0, 2.0 * np.pi) * ratio
-    return float(np.trapezoid(plain * _enhancement(ratio, gamma), logarithm) / np.trapezoid(plain, logarithm))
+    return float(
+        np.trapezoid(plain * _enhancement(ratio, gamma), logarithm)
+        / np.trapezoid(plain, logarithm)
+    )
 
 
 def wave_spectrum(waves: Waves, omega: ArrayLike) -> Floats:
@@ -79,21 +90,23 @@ def frequencies(waves: Waves) -> Floats:
 def over_directions(curve: Floats, waves: Waves) -> Floats:
     """A curve over :func:`shipgym.sea.harmonics.circle` averaged over the directions of a sea's waves.
 
-    The curve is what waves from one direction do (a variance or a mean force, which add up), the average over
-    the mean direction.
+    The curve is what waves from one direction do (a variance or a mean force, which add
+    up), the average over the mean direction.
     """
     if waves.spreading == "long-crested":
         return curve
     mu = circle(len(curve))
     weight = np.where(np.cos(mu) > 0.0, np.cos(mu) ** 2, 0.0)
-    return np.fft.irfft(np.fft.rfft(curve) * np.fft.rfft(weight / weight.sum()), n=len(curve))
+    return np.fft.irfft(
+        np.fft.rfft(curve) * np.fft.rfft(weight / weight.sum()), n=len(curve)
+    )
 
 
 def encounter_frequency(omega: ArrayLike, speed: ArrayLike, chi: ArrayLike) -> Floats:
     """Frequency of encounter of a ship under way in deep water: |omega + omega^2 U cos(chi) / g|, rad/s.
 
-    `omega` is of the waves, rad/s, `speed` the ship's, m/s; `chi`, rad, is where the waves come from, seen
-    from the bow: 0 ahead, pi / 2 from starboard.
+    `omega` is of the waves, rad/s, `speed` the ship's, m/s; `chi`, rad, is where the
+    waves come from, seen from the bow: 0 ahead, pi / 2 from starboard.
     """
     w = np.asarray(omega, dtype=float)
     met: Floats = np.abs(w + w * w * np.asarray(speed) * np.cos(chi) / GRAVITY)
@@ -103,9 +116,10 @@ def encounter_frequency(omega: ArrayLike, speed: ArrayLike, chi: ArrayLike) -> F
 def wave_filter(waves: Waves) -> WaveFilter:
     """Second-order filter whose output has the shape of the wave spectrum and unit variance.
 
-    The relative damping is fitted by least squares to the spectrum of unit variance; it depends on the peak
-    enhancement alone. Saelid, Jenssen & Balchen 1983 (Design and analysis of a dynamic positioning system
-    based on Kalman filtering and optimal control, IEEE Trans. Automatic Control 28); Fossen 2011, 8.2.
+    The relative damping is fitted by least squares to the spectrum of unit variance; it
+    depends on the peak enhancement alone. Saelid, Jenssen & Balchen 1983 (Design and
+    analysis of a dynamic positioning system based on Kalman filtering and optimal
+    control, IEEE Trans. Automatic Control 28); Fossen 2011, 8.2.
     """
     peak = 2.0 * np.pi / waves.peak_period
     damping = _fitted_damping(waves.gamma)
@@ -129,9 +143,9 @@ def _fitted_damping(gamma: float) -> float:
 def draught_attenuation(omega: ArrayLike, draught: float) -> Floats:
     """Share of the drift force of an infinitely deep hull that one of this draught (m) takes up.
 
-    pi^2 I1^2 / (pi^2 I1^2 + K1^2) of k T, from 0 in long to 1 in short waves (Fujii & Takahashi 1975,
-    Experimental study on the resistance increase of a ship in regular oblique waves, 14th ITTC); omega in
-    rad/s.
+    pi^2 I1^2 / (pi^2 I1^2 + K1^2) of k T, from 0 in long to 1 in short waves (Fujii &
+    Takahashi 1975, Experimental study on the resistance increase of a ship in regular
+    oblique waves, 14th ITTC); omega in rad/s.
     """
     from scipy.special import i1e, k1e
 
@@ -143,19 +157,25 @@ def draught_attenuation(omega: ArrayLike, draught: float) -> Floats:
 def slow_drift(waves: Waves, particulars: Particulars) -> GaussMarkov:
     """Process s(t) of the slowly varying drift force, mean force * (1 + s); s is without unit.
 
-    By Newman's approximation (Newman 1974, Second order slowly varying forces on vessels in irregular waves)
-    the force is the squared envelope of a narrow-banded process with spectrum S(w) c(w), where c is the mean
-    force by squared amplitude. The squared envelope of a Gaussian process is exponentially distributed: its
-    standard deviation is its mean, so that of s is 1. Its spectrum at zero frequency, 8 integral S^2 c^2 dw
-    (Faltinsen 1990, Sea Loads, equation 5.45), gives the integral time scale pi integral S^2 c^2 dw /
-    (integral S c dw)^2, s. For c the attenuation with draught is taken. The Gaussian s lacks the long tail of
-    the exponential distribution and falls below -1 for 16 % of the time.
+    By Newman's approximation (Newman 1974, Second order slowly varying forces on
+    vessels in irregular waves) the force is the squared envelope of a narrow-banded
+    process with spectrum S(w) c(w), where c is the mean force by squared amplitude. The
+    squared envelope of a Gaussian process is exponentially distributed: its standard
+    deviation is its mean, so that of s is 1. Its spectrum at zero frequency, 8 integral
+    S^2 c^2 dw (Faltinsen 1990, Sea Loads, equation 5.45), gives the integral time scale
+    pi integral S^2 c^2 dw / (integral S c dw)^2, s. For c the attenuation with draught
+    is taken. The Gaussian s lacks the long tail of the exponential distribution and
+    falls below -1 for 16 % of the time.
     """
     if waves.calm:
         return GaussMarkov(1.0, 0.0)
     omega = frequencies(waves)
     draught = weather_particulars(particulars).require("draught")
-    shape = jonswap(omega, 1.0, waves.peak_period, waves.gamma)  # the height does not matter
+    shape = jonswap(
+        omega, 1.0, waves.peak_period, waves.gamma
+    )  # the height does not matter
     weighted = shape * draught_attenuation(omega, draught)
-    time_constant = np.pi * np.trapezoid(weighted**2, omega) / np.trapezoid(weighted, omega) ** 2
+    time_constant = (
+        np.pi * np.trapezoid(weighted**2, omega) / np.trapezoid(weighted, omega) ** 2
+    )
     return GaussMarkov(float(time_constant), 1.0)

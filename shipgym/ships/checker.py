@@ -21,7 +21,11 @@ from shipgym.trials.trial import Trial
 SAMPLES = 512
 #: Range of the states looked at, in service speed and service speed by length.
 SURGE, SWAY, YAW_RATE = (0.2, 1.1), 0.3, 0.8
-ROLL_RATE, HEEL, MEMORY = 0.5, np.radians(15.0), 0.5  # the memory of yaw by (service speed by length)^2
+ROLL_RATE, HEEL, MEMORY = (
+    0.5,
+    np.radians(15.0),
+    0.5,
+)  # the memory of yaw by (service speed by length)^2
 CAPSIZED = np.radians(60.0)
 STEP = 0.02  # of the time to sail a ship length
 STRAIGHT_LENGTHS, TURN_LENGTHS = 30.0, 40.0
@@ -36,25 +40,30 @@ SPEED_KEPT = (0.7, 1.3)  # straight ahead, of service speed
 class ModelCheck(Findings):
     """What a check of a model found."""
 
-    # root mean square of the accelerations' port/starboard difference over twice their own, over states that
-    # a manoeuvre passes: 0 for a symmetric ship; nan where it could not be evaluated
+    # root mean square of the accelerations' port/starboard difference over twice their
+    # own, over states that a manoeuvre passes: 0 for a symmetric ship; nan where it
+    # could not be evaluated
     asymmetry: float = field(kw_only=True)
 
     @property
     def verdict(self) -> str:
         """Whether it is sound, and how far port and starboard differ."""
-        return f"{super().verdict}; port/starboard asymmetry {100.0 * self.asymmetry:.1f} %"
+        return (
+            f"{super().verdict}; port/starboard asymmetry"
+            f" {100.0 * self.asymmetry:.1f} %"
+        )
 
 
 def check_ship_model(model: ShipModel | str | Path) -> ModelCheck:
     """Check a model for errors.
 
-    The file and its coefficients; the inertia; accelerations over the states that a manoeuvre passes
-    (finite, as the table of terms says, alike to both sides); straight running; the side to which the rudder
-    turns the ship; hard turns to both sides; the covariance.
+    The file and its coefficients; the inertia; accelerations over the states that a
+    manoeuvre passes (finite, as the table of terms says, alike to both sides); straight
+    running; the side to which the rudder turns the ship; hard turns to both sides; the
+    covariance.
 
-    Given is a model, a shipped model's name or the path of a model file. A file that cannot be loaded,
-    because a coefficient is missing for instance, is a problem found.
+    Given is a model, a shipped model's name or the path of a model file. A file that
+    cannot be loaded, because a coefficient is missing for instance, is a problem found.
     """
     name = str(model)
     try:
@@ -84,10 +93,15 @@ def _states(model: ShipModel) -> dict[str, Floats]:
 
     u = speed * drawn(*SURGE)
     return {
-        "u": u, "delta": model.steering.limit * drawn(), "v": SWAY * u * drawn(),
-        "r": YAW_RATE * u / length * drawn(), "p": ROLL_RATE * u / length * drawn(), "phi": HEEL * drawn(),
-        "q": MEMORY * (speed / length) ** 2 * drawn(), "n": np.full(SAMPLES, model.service_shaft_speed),
-    }  # fmt: skip
+        "u": u,
+        "delta": model.steering.limit * drawn(),
+        "v": SWAY * u * drawn(),
+        "r": YAW_RATE * u / length * drawn(),
+        "p": ROLL_RATE * u / length * drawn(),
+        "phi": HEEL * drawn(),
+        "q": MEMORY * (speed / length) ** 2 * drawn(),
+        "n": np.full(SAMPLES, model.service_shaft_speed),
+    }
 
 
 def _rates(model: ShipModel) -> list[str]:
@@ -106,15 +120,22 @@ def _wrong_accelerations(model: ShipModel) -> Iterator[str]:
     found = _accelerations(model, channels)
     if not np.all(np.isfinite(found)):
         row, axis = np.argwhere(~np.isfinite(found))[0]
-        known = [name for name in (*EQUATION_NAMES, "phi", "delta") if name in model.state_names]
+        known = [
+            name
+            for name in (*EQUATION_NAMES, "phi", "delta")
+            if name in model.state_names
+        ]
         state = ", ".join(f"{name} = {channels[name][row]:.4g}" for name in known)
         look = "for coefficients that are far too large"
         if isinstance(model.dynamics, ShipEquations):
             there = {name: float(values[row]) for name, values in channels.items()}
-            look = f"at {model.dynamics.fault(there, model.coefficients, ship_of(model))}"
+            look = (
+                f"at {model.dynamics.fault(there, model.coefficients, ship_of(model))}"
+            )
         yield (
-            f"derivatives: {found[row, axis]} found for the acceleration of '{_rates(model)[axis]}' at "
-            f"{state} (SI units), expected a number; look {look}"
+            f"derivatives: {found[row, axis]} found for the acceleration of"
+            f" '{_rates(model)[axis]}' at {state} (SI units), expected a number; look"
+            f" {look}"
         )
         return
     if isinstance(model.dynamics, Structure):
@@ -123,24 +144,30 @@ def _wrong_accelerations(model: ShipModel) -> Iterator[str]:
         worst = float((np.abs(found - written) / scale).max())
         if not worst < AGREEMENT:
             yield (
-                f"derivatives: the compiled accelerations differ by {worst:.1e} from those of the table, "
-                f"expected less than {AGREEMENT:g}; empty the cache of compiled ships"
+                f"derivatives: the compiled accelerations differ by {worst:.1e} from"
+                f" those of the table, expected less than {AGREEMENT:g}; empty the"
+                " cache of compiled ships"
             )
 
 
-def _from_table(model: ShipModel, table: Structure, channels: dict[str, Floats]) -> Floats:
+def _from_table(
+    model: ShipModel, table: Structure, channels: dict[str, Floats]
+) -> Floats:
     """Accelerations as sums of the table's terms, shape (n, n_rates)."""
     ship = model.particulars, model.service_shaft_speed
     found = {name: np.zeros(SAMPLES) for name in _rates(model)}
     found |= {name: -channels[name] / model.travel_time for name in "vr"}
     weights = np.split(
-        table.term_numbers(model.coefficients, *ship), np.cumsum([len(t) for t in table.equations.values()])
+        table.term_numbers(model.coefficients, *ship),
+        np.cumsum([len(t) for t in table.equations.values()]),
     )
     for equation, theta in zip(table.equations, weights, strict=False):
         found[equation] = table.features(equation, channels, *ship) @ theta
     if isinstance(table, GreyBox):
         for equation, known in table.converted_accelerations(channels, *ship).items():
-            found[equation] = known + (found[equation] if equation in table.equations else 0.0)
+            found[equation] = known + (
+                found[equation] if equation in table.equations else 0.0
+            )
     elif "q" in found:
         found["r"] = found["r"] + channels["q"]
     return np.stack([*found.values()], axis=-1)
@@ -153,17 +180,27 @@ def _asymmetry(model: ShipModel) -> float:
     mirrored = channels | {name: -channels[name] for name in odd}
     rates = _rates(model)
     sign = [-1.0 if name in odd else 1.0 for name in rates]
-    ours, image = _accelerations(model, channels), _accelerations(model, mirrored) * sign
+    ours, image = (
+        _accelerations(model, channels),
+        _accelerations(model, mirrored) * sign,
+    )
     length, speed = model.particulars["length"], model.particulars["speed"]
-    unit = [(length if q in ANGULAR else 1.0) * (length / speed if q == "q" else 1.0) for q in rates]
+    unit = [
+        (length if q in ANGULAR else 1.0) * (length / speed if q == "q" else 1.0)
+        for q in rates
+    ]
     difference, size = (ours - image) * unit, (ours * unit)
     total = float(np.sqrt(np.mean(size**2)))
-    return float(np.sqrt(np.mean(difference**2))) / (2.0 * total) if total > 0.0 else 0.0
+    return (
+        float(np.sqrt(np.mean(difference**2))) / (2.0 * total) if total > 0.0 else 0.0
+    )
 
 
 def _run(model: ShipModel, rudder: float, lengths: float) -> Trial:
     """From service with the rudder held, over so many ship lengths at service speed."""
-    return model.simulate(orders(model, np.full(round(lengths / STEP), rudder)), STEP * model.travel_time)
+    return model.simulate(
+        orders(model, np.full(round(lengths / STEP), rudder)), STEP * model.travel_time
+    )
 
 
 def _wrong_courses(model: ShipModel) -> Iterator[str]:
@@ -176,58 +213,76 @@ def _wrong_courses(model: ShipModel) -> Iterator[str]:
     for name, (rudder, lengths) in courses.items():
         try:
             trial = _run(model, rudder, lengths)
-            wrong, heel = "", float(np.abs(trial["phi"]).max()) if "phi" in trial else 0.0
+            wrong, heel = (
+                "",
+                float(np.abs(trial["phi"]).max()) if "phi" in trial else 0.0,
+            )
         except UnstableModelError as error:
             wrong, heel = str(error), abs(error.state.get("phi", 0.0))
         if not heel < CAPSIZED:
             yield (
-                f"{name}: heel of {np.degrees(heel):.3g} deg found, expected less than "
-                f"{np.degrees(CAPSIZED):.0f} deg: look at the terms of roll, whose coefficient of phi "
-                "rights the ship where it is negative; identify it from trials with more roll"
+                f"{name}: heel of {np.degrees(heel):.3g} deg found, expected less than"
+                f" {np.degrees(CAPSIZED):.0f} deg: look at the terms of roll, whose"
+                " coefficient of phi rights the ship where it is negative; identify it"
+                " from trials with more roll"
             )
         elif wrong:
-            yield f"{name}: {wrong}; identify it from trials with larger rudder angles, or with fewer terms"
+            yield (
+                f"{name}: {wrong}; identify it from trials with larger rudder angles,"
+                " or with fewer terms"
+            )
 
 
 def _wrong_rudder(model: ShipModel) -> Iterator[str]:
     if not _steers(model):
         return
     try:
-        turned = [_run(model, side * SMALL_RUDDER, RESPONSE_LENGTHS)["r"][-1] for side in (1.0, -1.0)]
+        turned = [
+            _run(model, side * SMALL_RUDDER, RESPONSE_LENGTHS)["r"][-1]
+            for side in (1.0, -1.0)
+        ]
     except UnstableModelError:
         return  # the courses say so
     if not turned[0] > turned[1]:
         port, starboard = np.degrees(turned[1]), np.degrees(turned[0])
         yield (
-            f"rudder: {np.degrees(SMALL_RUDDER):.0f} deg to starboard give a yaw rate of {starboard:.3g} "
-            f"deg/s, as much to port {port:.3g} deg/s, expected the first to be larger: a positive rudder "
-            "turns to starboard; read the trials with rudder_positive='port', or turn the signs of the terms "
-            "odd in the rudder"
+            f"rudder: {np.degrees(SMALL_RUDDER):.0f} deg to starboard give a yaw rate"
+            f" of {starboard:.3g} deg/s, as much to port {port:.3g} deg/s, expected the"
+            " first to be larger: a positive rudder turns to starboard; read the"
+            " trials with rudder_positive='port', or turn the signs of the terms odd"
+            " in the rudder"
         )
 
 
 def _steers(model: ShipModel) -> bool:
     """Whether the model has a rudder and can turn."""
     table = model.dynamics
-    return not isinstance(table, Structure) or (table.has_rudder and "r" in table.equations)
+    return not isinstance(table, Structure) or (
+        table.has_rudder and "r" in table.equations
+    )
 
 
 def _unusual(model: ShipModel, asymmetry: float) -> Iterator[str]:
     if asymmetry > ASYMMETRIC:
         yield (
-            f"port and starboard differ by {100.0 * asymmetry:.0f} % of the accelerations: more than the "
-            "propeller of a single-screw ship explains; identify from trials that begin to both sides"
+            f"port and starboard differ by {100.0 * asymmetry:.0f} % of the"
+            " accelerations: more than the propeller of a single-screw ship explains;"
+            " identify from trials that begin to both sides"
         )
     if not _steers(model):
         yield "no rudder turns this model: an autopilot has nothing to do on it"
     try:
-        final = float(_run(model, 0.0, STRAIGHT_LENGTHS)["u"][-1]) / model.particulars["speed"]
+        final = (
+            float(_run(model, 0.0, STRAIGHT_LENGTHS)["u"][-1])
+            / model.particulars["speed"]
+        )
     except UnstableModelError:
         return
     if not SPEED_KEPT[0] < final < SPEED_KEPT[1]:
         yield (
-            f"straight ahead with the rudder amidships its speed becomes {100.0 * final:.0f} % of service "
-            "speed: look at the terms of surge, the service speed and the shaft speed"
+            "straight ahead with the rudder amidships its speed becomes"
+            f" {100.0 * final:.0f} % of service speed: look at the terms of surge, the"
+            " service speed and the shaft speed"
         )
 
 
@@ -242,4 +297,7 @@ def _wrong_covariance(model: ShipModel) -> Iterator[str]:
     scale = np.where(variances > 0.0, np.sqrt(variances), 1.0)
     least = float(np.linalg.eigvalsh(model.covariance / np.outer(scale, scale)).min())
     if not least > -1e-6:
-        yield f"covariance: least eigenvalue of the correlations {least:.2g}, expected none below 0"
+        yield (
+            f"covariance: least eigenvalue of the correlations {least:.2g}, expected"
+            " none below 0"
+        )

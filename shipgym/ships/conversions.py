@@ -1,11 +1,13 @@
 """A ship's steering from one form into another: state space, Nomoto's forms, prime system, and back.
 
-    any ShipModel  ->  steering_state_space, state_space  ->  nomoto (second order, with T of the first)
-    (A, B)  ->  nomoto_of;  linear_steering_ship          nomoto1_ship, nomoto2_ship  ->  any of the above
-    prime  <->  SI: prime_matrices, si_matrices           another length and speed: scale_model
+    any ShipModel  ->  steering_state_space, state_space  ->  nomoto (second order, with
+    T of the first) (A, B)  ->  nomoto_of;  linear_steering_ship          nomoto1_ship,
+    nomoto2_ship  ->  any of the above prime  <->  SI: prime_matrices, si_matrices
+    another length and speed: scale_model
 
-Of a ship with surge or roll the linear forms keep sway and yaw; from a linear form comes back a ship that
-keeps her speed. From Nomoto's form sway cannot come back: two ships that drift otherwise may turn alike.
+Of a ship with surge or roll the linear forms keep sway and yaw; from a linear form
+comes back a ship that keeps her speed. From Nomoto's form sway cannot come back: two
+ships that drift otherwise may turn alike.
 """
 
 from collections.abc import Mapping
@@ -18,8 +20,14 @@ from shipgym.arrays import Floats
 from shipgym.checks import check_number
 from shipgym.errors import InputError
 from shipgym.ships.linear import (
-    Nomoto, StraightRunning, linearise, nomoto, nomoto_of, steering_state_space, straight_running,
-)  # fmt: skip
+    Nomoto,
+    StraightRunning,
+    linearise,
+    nomoto,
+    nomoto_of,
+    steering_state_space,
+    straight_running,
+)
 from shipgym.ships.particulars import Particulars
 from shipgym.ships.ship_model import ShipModel
 from shipgym.ships.steering import SteeringGear
@@ -31,22 +39,37 @@ if TYPE_CHECKING:
 Known = Particulars | Mapping[str, Any]
 
 __all__ = [
-    "Nomoto", "StraightRunning", "linear_steering_ship", "linearise", "nomoto", "nomoto1_ship",
-    "nomoto2_ship", "nomoto_of", "prime_matrices", "si_matrices", "state_space", "steering_state_space",
-    "straight_running", "transfer_function",
-]  # fmt: skip
+    "Nomoto",
+    "StraightRunning",
+    "linear_steering_ship",
+    "linearise",
+    "nomoto",
+    "nomoto1_ship",
+    "nomoto2_ship",
+    "nomoto_of",
+    "prime_matrices",
+    "si_matrices",
+    "state_space",
+    "steering_state_space",
+    "straight_running",
+    "transfer_function",
+]
 
 
 def state_space(
-    model: ShipModel, heading: bool = False, gear: bool = False, speed: float | None = None
+    model: ShipModel,
+    heading: bool = False,
+    gear: bool = False,
+    speed: float | None = None,
 ) -> "StateSpace":
     """A ship's steering about straight running as a linear system.
 
-    States are v (q in a table with a memory of yaw), r, and psi and delta where `heading` and `gear` ask for
-    them: deviations from straight running in SI units, rudder positive to starboard. The input is `delta`, or
-    with the gear's lag (without its limit and rate) `delta_command`; the outputs are the states. The speed,
-    m/s, is the service speed by default. Raises InputError if the model has no straight course, or its gear
-    no lag to make a state of.
+    States are v (q in a table with a memory of yaw), r, and psi and delta where
+    `heading` and `gear` ask for them: deviations from straight running in SI units,
+    rudder positive to starboard. The input is `delta`, or with the gear's lag (without
+    its limit and rate) `delta_command`; the outputs are the states. The speed, m/s, is
+    the service speed by default. Raises InputError if the model has no straight course,
+    or its gear no lag to make a state of.
     """
     import control  # here, because it takes a second to import
 
@@ -60,23 +83,30 @@ def state_space(
         lag = model.steering.time_constant
         if not lag > 0.0:
             raise InputError(
-                f"steering of {model.name!r}: no lag found, expected a time_constant above 0: a ramp of "
-                "constant rate is not linear; leave gear=False"
+                f"steering of {model.name!r}: no lag found, expected a time_constant"
+                " above 0: a ramp of constant rate is not linear; leave gear=False"
             )
         A = np.block([[A, B], [np.zeros((1, len(A))), np.array([[-1.0 / lag]])]])
         B = np.vstack([np.zeros_like(B), [[1.0 / lag]]])
         names.append("delta")
     return control.ss(
-        A, B, np.eye(len(A)), np.zeros((len(A), 1)), name=model.name.replace(".", "-"),
-        states=names, outputs=names, inputs=["delta_command" if gear else "delta"],
-    )  # fmt: skip
+        A,
+        B,
+        np.eye(len(A)),
+        np.zeros((len(A), 1)),
+        name=model.name.replace(".", "-"),
+        states=names,
+        outputs=names,
+        inputs=["delta_command" if gear else "delta"],
+    )
 
 
 def transfer_function(form: Nomoto, order: int = 2) -> "TransferFunction":
     """Nomoto's transfer function from rudder to yaw rate, both in rad.
 
-    Order 2 is K (1 + T3 s) / ((1 + T1 s) (1 + T2 s)), order 1 is K / (1 + T s). Raises InputError for another
-    order, or a form of second order whose poles are a complex pair.
+    Order 2 is K (1 + T3 s) / ((1 + T1 s) (1 + T2 s)), order 1 is K / (1 + T s). Raises
+    InputError for another order, or a form of second order whose poles are a complex
+    pair.
     """
     import control
 
@@ -86,29 +116,41 @@ def transfer_function(form: Nomoto, order: int = 2) -> "TransferFunction":
         raise InputError(f"order: {order!r} found, expected 2 or 1")
     _need_time_constants(form)
     denominator = np.polymul([form.T1, 1.0], [form.T2, 1.0])
-    return control.tf([form.K * form.T3, form.K], denominator, inputs=["delta"], outputs=["r"])
+    return control.tf(
+        [form.K * form.T3, form.K], denominator, inputs=["delta"], outputs=["r"]
+    )
 
 
 def nomoto1_ship(
-    K: float, T: float, particulars: Known, steering: SteeringGear | None = None, name: str = "nomoto"
+    K: float,
+    T: float,
+    particulars: Known,
+    steering: SteeringGear | None = None,
+    name: str = "nomoto",
 ) -> ShipModel:
     """The ship of Nomoto's first-order form, T rdot + r = K delta, as a model of structure `nomoto`.
 
-    K is in 1/s, positive to starboard, T in s; both are negative for a ship unstable on her course. She keeps
-    the service speed of the particulars. Raises InputError for a number that is not finite or is zero, or a
-    rudder that turns to the wrong side (K / T < 0).
+    K is in 1/s, positive to starboard, T in s; both are negative for a ship unstable on
+    her course. She keeps the service speed of the particulars. Raises InputError for a
+    number that is not finite or is zero, or a rudder that turns to the wrong side (K /
+    T < 0).
     """
     if not check_number(K, "K") * check_number(T, "T") > 0.0:
         raise InputError(
-            "K and T: of different sign, or zero, expected both positive (a stable ship) or both negative: a "
-            "positive rudder turns to starboard"
+            "K and T: of different sign, or zero, expected both positive (a stable"
+            " ship) or both negative: a positive rudder turns to starboard"
         )
     coefficients = {"c_r": -1.0 / T, "c_d": K / T}
-    return ShipModel(name, "nomoto", _ship(particulars), steering or SteeringGear(), coefficients)
+    return ShipModel(
+        name, "nomoto", _ship(particulars), steering or SteeringGear(), coefficients
+    )
 
 
 def nomoto2_ship(
-    form: Nomoto, particulars: Known, steering: SteeringGear | None = None, name: str = "nomoto2"
+    form: Nomoto,
+    particulars: Known,
+    steering: SteeringGear | None = None,
+    name: str = "nomoto2",
 ) -> ShipModel:
     """The ship of Nomoto's second-order form, of structure `nomoto2`: she does not drift. T is not used.
 
@@ -119,58 +161,80 @@ def nomoto2_ship(
     if product == 0.0 or form.K == 0.0:
         raise InputError(f"nomoto: {form} found, expected K, T1 and T2 other than 0")
     coefficients = {
-        "c_r": -(form.T1 + form.T2) / product, "c_d": form.K * form.T3 / product,
-        "e_r": -1.0 / product, "e_d": form.K / product,
-    }  # fmt: skip
-    return ShipModel(name, "nomoto2", _ship(particulars), steering or SteeringGear(), coefficients)
+        "c_r": -(form.T1 + form.T2) / product,
+        "c_d": form.K * form.T3 / product,
+        "e_r": -1.0 / product,
+        "e_d": form.K / product,
+    }
+    return ShipModel(
+        name, "nomoto2", _ship(particulars), steering or SteeringGear(), coefficients
+    )
 
 
 def linear_steering_ship(
-    A: ArrayLike, B: ArrayLike, particulars: Known, steering: SteeringGear | None = None,
+    A: ArrayLike,
+    B: ArrayLike,
+    particulars: Known,
+    steering: SteeringGear | None = None,
     name: str = "linear-steering",
-) -> ShipModel:  # fmt: skip
+) -> ShipModel:
     """The ship of d/dt (v, r) = A (v, r) + B delta at service speed, of structure `linear-steering`.
 
-    A has shape (2, 2) and B (2, 1), SI units, delta positive to starboard, as `steering_state_space` gives
-    them; at another speed her derivatives follow by the prime system. Raises InputError for other shapes or
-    values that are not finite.
+    A has shape (2, 2) and B (2, 1), SI units, delta positive to starboard, as
+    `steering_state_space` gives them; at another speed her derivatives follow by the
+    prime system. Raises InputError for other shapes or values that are not finite.
     """
     ship = _ship(particulars)
     a, b = prime_matrices(A, B, ship.require("length"), ship.require("speed"))
     names = get_structure("linear-steering").coefficient_names
     coefficients = dict(zip(names, np.hstack([a, b]).ravel().tolist(), strict=True))
-    return ShipModel(name, "linear-steering", ship, steering or SteeringGear(), coefficients)
+    return ShipModel(
+        name, "linear-steering", ship, steering or SteeringGear(), coefficients
+    )
 
 
 def _ship(particulars: Known) -> Particulars:
     """Particulars, made of a mapping where they are one, as `identify` takes them."""
-    return particulars if isinstance(particulars, Particulars) else Particulars.from_mapping(particulars)
+    return (
+        particulars
+        if isinstance(particulars, Particulars)
+        else Particulars.from_mapping(particulars)
+    )
 
 
-def prime_matrices(A: ArrayLike, B: ArrayLike, length: float, speed: float) -> tuple[Floats, Floats]:
+def prime_matrices(
+    A: ArrayLike, B: ArrayLike, length: float, speed: float
+) -> tuple[Floats, Floats]:
     """Linear steering in the prime system: v by U, r by U / L, time by L / U.
 
-    A of shape (2, 2) and B of shape (2, 1) in SI units, length in m, speed in m/s. Raises InputError for
-    matrices of another shape, or a length or speed that is not positive.
+    A of shape (2, 2) and B of shape (2, 1) in SI units, length in m, speed in m/s.
+    Raises InputError for matrices of another shape, or a length or speed that is not
+    positive.
     """
     a, b, unit_a, unit_b = _with_units(A, B, length, speed)
     return a / unit_a, b / unit_b
 
 
-def si_matrices(A: ArrayLike, B: ArrayLike, length: float, speed: float) -> tuple[Floats, Floats]:
+def si_matrices(
+    A: ArrayLike, B: ArrayLike, length: float, speed: float
+) -> tuple[Floats, Floats]:
     """Linear steering dynamics of the prime system in SI units, the inverse of `prime_matrices`."""
     a, b, unit_a, unit_b = _with_units(A, B, length, speed)
     return a * unit_a, b * unit_b
 
 
-def _with_units(A: ArrayLike, B: ArrayLike, length: float, speed: float) -> tuple[Floats, ...]:
+def _with_units(
+    A: ArrayLike, B: ArrayLike, length: float, speed: float
+) -> tuple[Floats, ...]:
     """The matrices, checked, and the unit of each entry."""
     check_number(length, "length", above=0.0, hint="in m")
     check_number(speed, "speed", above=0.0, hint="in m/s")
     a, b = np.asarray(A, dtype=float), np.asarray(B, dtype=float)
     for name, matrix, shape in (("A", a, (2, 2)), ("B", b, (2, 1))):
         if matrix.shape != shape or not np.all(np.isfinite(matrix)):
-            raise InputError(f"{name}: shape {matrix.shape} found, expected {shape} finite numbers")
+            raise InputError(
+                f"{name}: shape {matrix.shape} found, expected {shape} finite numbers"
+            )
     state, time = np.array([speed, speed / length]), length / speed
     return a, b, state[:, None] / state / time, state[:, None] / time
 
@@ -178,6 +242,6 @@ def _with_units(A: ArrayLike, B: ArrayLike, length: float, speed: float) -> tupl
 def _need_time_constants(form: Nomoto) -> None:
     if not np.all(np.isfinite([form.K, form.T1, form.T2, form.T3])):
         raise InputError(
-            f"nomoto: {form} found, expected numbers: poles that are a complex pair have no two time "
-            "constants; use state_space"
+            f"nomoto: {form} found, expected numbers: poles that are a complex pair"
+            " have no two time constants; use state_space"
         )

@@ -1,7 +1,7 @@
 """The operating envelope of a model: the velocities and rudder angles of the data it was identified from.
 
-Outside it the model extrapolates. The summary is a box and, because v and r go together in every
-manoeuvre, the smallest ellipsoid around the data.
+Outside it the model extrapolates. The summary is a box and, because v and r go together
+in every manoeuvre, the smallest ellipsoid around the data.
 """
 
 from dataclasses import dataclass
@@ -23,16 +23,21 @@ class Envelope:
     low: Floats
     high: Floats
     centre: Floats  # shape (4,); centre of the ellipsoid
-    shape: Floats  # shape (4, 4); upper triangular W; a state z is inside where |W (z - centre)| <= 1
+    # shape (4, 4); upper triangular W; a state z is inside where |W (z - centre)| <= 1
+    shape: Floats
 
     @classmethod
-    def from_samples(cls, u: ArrayLike, v: ArrayLike, r: ArrayLike, delta: ArrayLike) -> Self:
+    def from_samples(
+        cls, u: ArrayLike, v: ArrayLike, r: ArrayLike, delta: ArrayLike
+    ) -> Self:
         """Envelope of samples, each of shape (n_samples,), SI units.
 
-        A channel that hardly moves is given a thousandth of the ellipsoid's mean width, so that the
-        ellipsoid has a volume.
+        A channel that hardly moves is given a thousandth of the ellipsoid's mean width,
+        so that the ellipsoid has a volume.
         """
-        samples = np.stack([np.asarray(channel, dtype=float) for channel in (u, v, r, delta)], axis=-1)
+        samples = np.stack(
+            [np.asarray(channel, dtype=float) for channel in (u, v, r, delta)], axis=-1
+        )
         low, high = samples.min(axis=0), samples.max(axis=0)
         width = np.maximum(high - low, 1e-6)
         centre, quadratic = smallest_ellipsoid((samples - low) / width)
@@ -42,26 +47,37 @@ class Envelope:
         reach = np.linalg.norm((samples - middle) @ shape.T, axis=-1).max()
         return cls(low, high, middle, shape / reach)
 
-    def distance(self, u: ArrayLike, v: ArrayLike, r: ArrayLike, delta: ArrayLike) -> Floats:
+    def distance(
+        self, u: ArrayLike, v: ArrayLike, r: ArrayLike, delta: ArrayLike
+    ) -> Floats:
         """How far out states of one shape, SI units, are: 1 on the ellipsoid, 2 at twice its size."""
-        z = np.stack(np.broadcast_arrays(*map(np.asarray, (u, v, r, delta))), axis=-1) - self.centre
+        z = (
+            np.stack(np.broadcast_arrays(*map(np.asarray, (u, v, r, delta))), axis=-1)
+            - self.centre
+        )
         distance: Floats = np.linalg.norm(z @ self.shape.T, axis=-1)
         return distance
 
     def to_dict(self) -> dict[str, Any]:
         """As it stands in a model file."""
         return {
-            "channels": list(CHANNELS), "low": self.low.tolist(), "high": self.high.tolist(),
-            "centre": self.centre.tolist(), "shape": self.shape.tolist(),
-        }  # fmt: skip
+            "channels": list(CHANNELS),
+            "low": self.low.tolist(),
+            "high": self.high.tolist(),
+            "centre": self.centre.tolist(),
+            "shape": self.shape.tolist(),
+        }
 
 
-def smallest_ellipsoid(points: Floats, tolerance: float = 1e-3) -> tuple[Floats, Floats]:
+def smallest_ellipsoid(
+    points: Floats, tolerance: float = 1e-3
+) -> tuple[Floats, Floats]:
     """Ellipsoid of least volume around points, by Khachiyan's algorithm (Todd & Yildirim 2007).
 
-    The points, shape (n_points, n_dimensions), are scaled to ranges near 1; the algorithm stops at a relative
-    excess `tolerance` of the largest distance. Returns the centre c, shape (n_dimensions,), and the positive
-    definite Q of (z - c)' Q (z - c) <= 1.
+    The points, shape (n_points, n_dimensions), are scaled to ranges near 1; the
+    algorithm stops at a relative excess `tolerance` of the largest distance. Returns
+    the centre c, shape (n_dimensions,), and the positive definite Q of (z - c)' Q (z -
+    c) <= 1.
     """
     d = points.shape[1]
     floor = 1e-6 * np.eye(d)
@@ -70,12 +86,16 @@ def smallest_ellipsoid(points: Floats, tolerance: float = 1e-3) -> tuple[Floats,
     ridge = np.diag([*np.diag(floor), 0.0])
     moment = lifted.T @ lifted / len(points)
     for _ in range(1000):
-        distances = np.einsum("ij,ij->i", lifted @ np.linalg.inv(moment + ridge), lifted)
+        distances = np.einsum(
+            "ij,ij->i", lifted @ np.linalg.inv(moment + ridge), lifted
+        )
         farthest = int(np.argmax(distances))
         excess = distances[farthest] / (d + 1.0) - 1.0
         if excess <= tolerance:
             break
-        step = (distances[farthest] - d - 1.0) / ((d + 1.0) * (distances[farthest] - 1.0))
+        step = (distances[farthest] - d - 1.0) / (
+            (d + 1.0) * (distances[farthest] - 1.0)
+        )
         weights *= 1.0 - step
         weights[farthest] += step
         moment += step * (np.outer(lifted[farthest], lifted[farthest]) - moment)

@@ -1,8 +1,9 @@
 """Ships with equations of their own: a record of coefficients and functions that read like the publication.
 
-A file with such a ship defines `Coefficients`, a `NamedTuple` of numbers with their published values,
-`accelerations(motion, c, ship)`, where the speed of the shaft is a state `shaft_acceleration(n, command, c,
-ship)`, and `SHIP`, which says the rest. The functions are plain Python; `shipgym.engine` compiles them.
+A file with such a ship defines `Coefficients`, a `NamedTuple` of numbers with their
+published values, `accelerations(motion, c, ship)`, where the speed of the shaft is a
+state `shaft_acceleration(n, command, c, ship)`, and `SHIP`, which says the rest. The
+functions are plain Python; `shipgym.engine` compiles them.
 """
 
 import importlib
@@ -22,7 +23,13 @@ from shipgym.engine.records import Record, field_types, is_record
 from shipgym.engine.specialise import Part
 from shipgym.engine.vessel import Vessel, vessel_of
 from shipgym.errors import InputError
-from shipgym.python_files import asked, check_function, load_file, place_of, refuse_closure
+from shipgym.python_files import (
+    asked,
+    check_function,
+    load_file,
+    place_of,
+    refuse_closure,
+)
 from shipgym.ships.particulars import Particulars
 from shipgym.ships.steering import SteeringGear
 
@@ -44,85 +51,127 @@ class ShipEquations:
 
     name: str  # by which `load_model` and model files know the ship
     source: str  # where the equations were published
-    coefficients_record: Record  # a `NamedTuple` of floats, each with its published value as the default
-    # from (motion, coefficients, ship), see `Motion` and `Ship` of `shipgym.engine.motion`, to udot, vdot in
-    # m/s^2, rdot, pdot in rad/s^2, and the rate of the memory of yaw, 0 as a rule; body frame, origin midship
+    coefficients_record: (
+        Record  # a `NamedTuple` of floats, each with its published value as the default
+    )
+    # from (motion, coefficients, ship), see `Motion` and `Ship` of
+    # `shipgym.engine.motion`, to udot, vdot in m/s^2, rdot, pdot in rad/s^2, and the
+    # rate of the memory of yaw, 0 as a rule; body frame, origin midship
     accelerations: Accelerations
     particulars: Particulars  # with length and service speed
     steering: SteeringGear
     _: KW_ONLY
-    # from (n, command, coefficients, ship) to the acceleration of the shaft, 1/s^2: then its speed is a
-    # state. Without it the shaft turns as commanded
+    # from (n, command, coefficients, ship) to the acceleration of the shaft, 1/s^2:
+    # then its speed is a state. Without it the shaft turns as commanded
     shaft_acceleration: Callable[[float, float, Any, Any], float] | None = None
     # 1/s; 0 without a propeller of her own, her only command then the rudder
     service_shaft_speed: float = 0.0
     rolls: bool = False  # whether roll rate and heel are among her states
     shallow_water: bool = False  # whether the equations know the depth of the water
     astern: bool = False  # whether the propeller holds for a shaft that turns astern
-    # coefficients that choose between forms of the equations: the functions read them as constants of the
-    # same name in their file, which are compiled in
+    # coefficients that choose between forms of the equations: the functions read them
+    # as constants of the same name in their file, which are compiled in
     switches: tuple[str, ...] = ()
     path: Path | None = field(default=None, repr=False)
-    normalisation: ClassVar[str] = "own"  # as a model file has it: the publication's units
+    normalisation: ClassVar[str] = (
+        "own"  # as a model file has it: the publication's units
+    )
     quantity: ClassVar[str] = "force"  # what the coefficients make up
-    scales: ClassVar[bool] = False  # whether the dimensions are those of the particulars
+    scales: ClassVar[bool] = (
+        False  # whether the dimensions are those of the particulars
+    )
 
     def __post_init__(self) -> None:
         check_text(self.name, "ship equations: name")
         where = f"equations of {self.name!r}"
         check_text(self.source, f"{where}: source")
         record = self.coefficients_record
-        if not is_record(record) or any(kind is not float for kind in field_types(record).values()):
+        if not is_record(record) or any(
+            kind is not float for kind in field_types(record).values()
+        ):
             raise InputError(
-                f"{where}: coefficients_record {record!r} found, expected a NamedTuple of floats"
+                f"{where}: coefficients_record {record!r} found, expected a NamedTuple"
+                " of floats"
             )
         valued = record._field_defaults  # type: ignore[attr-defined]
         for name in self.coefficient_names:
             if name not in valued:
-                raise InputError(f"{where}: coefficient {name!r} has no value, expected a default")
+                raise InputError(
+                    f"{where}: coefficient {name!r} has no value, expected a default"
+                )
             check_number(valued[name], f"{where}: coefficient {name!r}")
-        for name in self.switches if isinstance(self.switches, tuple) else (self.switches,):
+        for name in (
+            self.switches if isinstance(self.switches, tuple) else (self.switches,)
+        ):
             if name not in self.coefficient_names:
                 raise InputError(
-                    f"{where}: switches: {name!r} found, expected a tuple of names of coefficients"
+                    f"{where}: switches: {name!r} found, expected a tuple of names of"
+                    " coefficients"
                 )
         for name in ("rolls", "shallow_water", "astern"):
             check_flag(getattr(self, name), f"{where}: {name}")
-        check_function(self.accelerations, 3, f"{where}: accelerations", "a function (motion, c, ship)")
+        check_function(
+            self.accelerations,
+            3,
+            f"{where}: accelerations",
+            "a function (motion, c, ship)",
+        )
         if self.shaft_acceleration is not None:
             what = "a function (n, command, c, ship)"
-            check_function(self.shaft_acceleration, 4, f"{where}: shaft_acceleration", what)
+            check_function(
+                self.shaft_acceleration, 4, f"{where}: shaft_acceleration", what
+            )
         if self.shaft_acceleration is not None or self.service_shaft_speed:
-            check_number(self.service_shaft_speed, f"{where}: service_shaft_speed", above=0.0)
+            check_number(
+                self.service_shaft_speed, f"{where}: service_shaft_speed", above=0.0
+            )
         self.particulars.require("speed")
         self._try(where)
 
     def _try(self, where: str) -> None:
         """Work out the accelerations of one state as plain Python, whose messages are the clearest."""
         L, U = self.particulars["length"], self.particulars["speed"]
-        n, limit, rate = self.service_shaft_speed, self.steering.limit, self.steering.rate
+        n, limit, rate = (
+            self.service_shaft_speed,
+            self.steering.limit,
+            self.steering.rate,
+        )
         ship = Ship(L, U, limit, rate, 0.0, n, math.inf, U)
-        motion = Motion(0.0, 0.0, 0.1, 0.9 * U, 0.1 * U, 0.1 * U / L, 0.01, 0.01, 0.0, 0.1, n)
+        motion = Motion(
+            0.0, 0.0, 0.1, 0.9 * U, 0.1 * U, 0.1 * U / L, 0.01, 0.01, 0.0, 0.1, n
+        )
         coefficients = self.coefficients_record()
         with placed(where):
             found = asked(self.accelerations, motion, coefficients, ship)
             if not isinstance(found, tuple) or len(found) != len(RATES):
                 raise InputError(
-                    f"accelerations returns {found!r}, expected five numbers, a tuple: udot, vdot, rdot, "
-                    "pdot, qdot, 0 for those that the ship does not have"
+                    f"accelerations returns {found!r}, expected five numbers, a tuple:"
+                    " udot, vdot, rdot, pdot, qdot, 0 for those that the ship does not"
+                    " have"
                 )
             rates = dict(zip(RATES, found, strict=True))
             if self.shaft_acceleration is not None:
-                rates["shaft_acceleration"] = asked(self.shaft_acceleration, n, 0.9 * n, coefficients, ship)
+                rates["shaft_acceleration"] = asked(
+                    self.shaft_acceleration, n, 0.9 * n, coefficients, ship
+                )
             for name, value in rates.items():
                 if not isinstance(value, (int, float)):
-                    raise InputError(f"{name} is {value!r}, expected a number, int or float")
+                    raise InputError(
+                        f"{name} is {value!r}, expected a number, int or float"
+                    )
 
-    def fault(self, state: Mapping[str, float], coefficients: Mapping[str, float], ship: Ship) -> str:
+    def fault(
+        self, state: Mapping[str, float], coefficients: Mapping[str, float], ship: Ship
+    ) -> str:
         """Where plain Python fails at a state, and why; the place of the accelerations if it does not."""
         motion = Motion(*[state.get(name, 0.0) for name in Motion._fields])
         try:
-            asked(self.accelerations, motion, self.coefficients_record(**coefficients), ship)
+            asked(
+                self.accelerations,
+                motion,
+                self.coefficients_record(**coefficients),
+                ship,
+            )
         except InputError as error:
             return str(error)
         return place_of(self.accelerations)
@@ -142,7 +191,10 @@ class ShipEquations:
     @property
     def coefficients(self) -> dict[str, float]:
         """The published coefficients."""
-        return {name: float(value) for name, value in self.coefficients_record()._asdict().items()}  # type: ignore[attr-defined]
+        return {
+            name: float(value)
+            for name, value in self.coefficients_record()._asdict().items()
+        }  # type: ignore[attr-defined]
 
     @property
     def command_names(self) -> tuple[str, ...]:
@@ -162,10 +214,19 @@ class ShipEquations:
         parts |= {name: bool(coefficients[name]) for name in self.switches}
         if self.shaft_acceleration is not None:
             parts["shaft_acceleration"] = Part(self.shaft_acceleration)
-        return vessel_of(self.name, self.state_names, self.coefficients_record, tuple(parts.items()), lag)
+        return vessel_of(
+            self.name,
+            self.state_names,
+            self.coefficients_record,
+            tuple(parts.items()),
+            lag,
+        )
 
     def numbers(
-        self, coefficients: Mapping[str, float], particulars: Particulars, shaft_speed: float = 0.0
+        self,
+        coefficients: Mapping[str, float],
+        particulars: Particulars,
+        shaft_speed: float = 0.0,
     ) -> Floats:
         """Numbers of the coefficients' record."""
         return np.array([coefficients[name] for name in self.coefficient_names])
@@ -182,7 +243,9 @@ def read_ship_equations(path: str | Path) -> ShipEquations:
     """
     path = Path(path).resolve()
     written = "SHIP = ShipEquations(...)"
-    ship = getattr(load_file(path, f"a Python file that defines {written}"), "SHIP", None)
+    ship = getattr(
+        load_file(path, f"a Python file that defines {written}"), "SHIP", None
+    )
     if not isinstance(ship, ShipEquations):
         raise InputError(f"{path}: SHIP = {ship!r} found, expected {written}")
     for one in (ship.accelerations, ship.shaft_acceleration):

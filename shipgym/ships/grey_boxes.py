@@ -1,8 +1,8 @@
 """The grey box: the accelerations of a reference ship, converted by similarity, and a table of terms.
 
-Source: Mei, Sun & Shi 2019, Ship maneuvering prediction using grey box framework via adaptive RM-SVM with
-minor rudder. Their equation 11 adds accelerations of two different ships; here those of the reference ship
-are converted back to the target first.
+Source: Mei, Sun & Shi 2019, Ship maneuvering prediction using grey box framework via
+adaptive RM-SVM with minor rudder. Their equation 11 adds accelerations of two different
+ships; here those of the reference ship are converted back to the target first.
 """
 
 from collections.abc import Mapping
@@ -21,14 +21,18 @@ from shipgym.errors import InputError
 from shipgym.ships.manoeuvring_model import ManoeuvringModel
 from shipgym.ships.particulars import Particulars
 from shipgym.ships.structures import WITH_REFERENCE
-from shipgym.ships.term_functions import accelerations_function, accelerations_source, coefficients_record
+from shipgym.ships.term_functions import (
+    accelerations_function,
+    accelerations_source,
+    coefficients_record,
+)
 from shipgym.ships.term_table import ALWAYS_MEASURED, MEASURED, Structure
 from shipgym.ships.terms import read_terms
 
 GREY_BOX = WITH_REFERENCE
 SOURCE = (
-    "Mei, Sun & Shi 2019, Ship maneuvering prediction using grey box framework via adaptive RM-SVM with "
-    "minor rudder"
+    "Mei, Sun & Shi 2019, Ship maneuvering prediction using grey box framework via"
+    " adaptive RM-SVM with minor rudder"
 )
 LINEAR = read_terms("du, v, r, delta, 1")
 
@@ -37,19 +41,22 @@ LINEAR = read_terms("du, v, r, delta, 1")
 class GreyBox(Structure):
     """A reference ship's accelerations plus a table of terms.
 
-    The target's state is converted to the reference ship by the prime system of the service speeds (u and v
-    by the ratio of the speeds, r and p by that of speed over length, heel and rudder as they are), and the
-    reference ship's accelerations back to the target. The terms are added. Water is deep. The shaft turns as
-    commanded, whatever lag the reference ship's has.
+    The target's state is converted to the reference ship by the prime system of the
+    service speeds (u and v by the ratio of the speeds, r and p by that of speed over
+    length, heel and rudder as they are), and the reference ship's accelerations back to
+    the target. The terms are added. Water is deep. The shaft turns as commanded,
+    whatever lag the reference ship's has.
 
-    Raises InputError for a table of forces, and for a reference ship that is a grey box itself or has no
-    rudder.
+    Raises InputError for a table of forces, and for a reference ship that is a grey box
+    itself or has no rudder.
     """
 
-    # the reference ship: with equations of its own or a table of terms, without heave or trim
+    # the reference ship: with equations of its own or a table of terms, without heave
+    # or trim
     reference: ManoeuvringModel | None = None
-    # whether the target's shaft speed is known: then the reference ship's is that times the ratio of the
-    # shaft speeds at service speed. If not, its shaft turns as at service speed
+    # whether the target's shaft speed is known: then the reference ship's is that times
+    # the ratio of the shaft speeds at service speed. If not, its shaft turns as at
+    # service speed
     shaft: bool = False
 
     def __post_init__(self) -> None:
@@ -57,22 +64,24 @@ class GreyBox(Structure):
         where = f"structure '{self.name}'"
         if self.reference is None:
             raise InputError(
-                f"{where}: no reference found, expected a ManoeuvringModel, or the name of a shipped model"
+                f"{where}: no reference found, expected a ManoeuvringModel, or the name"
+                " of a shipped model"
             )
         if isinstance(self.reference.dynamics, GreyBox):
             raise InputError(
-                f"{where}: reference {self.reference.name!r} is a grey box itself, expected a reference ship "
-                "or a table of terms; take that grey box's own reference"
+                f"{where}: reference {self.reference.name!r} is a grey box itself,"
+                " expected a reference ship or a table of terms; take that grey box's"
+                " own reference"
             )
         if self.quantity != "acceleration":
             raise InputError(
-                f"{where}: quantity 'force' found, expected 'acceleration': the terms are added to the "
-                "reference ship's accelerations"
+                f"{where}: quantity 'force' found, expected 'acceleration': the terms"
+                " are added to the reference ship's accelerations"
             )
         if self.shaft and "n" not in self.reference.command_names:
             raise InputError(
-                f"{where}: shaft true found, but reference {self.reference.name!r} has no shaft speed; "
-                "leave it out"
+                f"{where}: shaft true found, but reference {self.reference.name!r} has"
+                " no shaft speed; leave it out"
             )
 
     @property
@@ -117,16 +126,24 @@ class GreyBox(Structure):
     def vessel(self, coefficients: Mapping[str, float], lag: bool) -> Vessel:
         """What is compiled of a ship with this grey box: the reference ship's functions and the terms."""
         terms = coefficients_record(len(self._terms), "GreyBoxTerms")
-        return self._vessel(terms, {"term_accelerations": Part(accelerations_function(self._source))}, lag)
+        return self._vessel(
+            terms,
+            {"term_accelerations": Part(accelerations_function(self._source))},
+            lag,
+        )
 
-    def _vessel(self, terms: Record, functions: dict[str, Any], lag: bool, **summed: Any) -> Vessel:
+    def _vessel(
+        self, terms: Record, functions: dict[str, Any], lag: bool, **summed: Any
+    ) -> Vessel:
         """Functions of the reference ship, of the terms with their record of coefficients, and their sum."""
         reference = self.ship.vessel
         parts = {
-            **reference.functions, "accelerations": Part(accelerations),
-            "reference_accelerations": reference.functions["accelerations"], "KNOWS_SHAFT": self.shaft,
+            **reference.functions,
+            "accelerations": Part(accelerations),
+            "reference_accelerations": reference.functions["accelerations"],
+            "KNOWS_SHAFT": self.shaft,
             **functions,
-        }  # fmt: skip
+        }
         parts.pop("shaft_acceleration", None)  # the shaft turns as commanded
         record = _coefficients(reference.coefficients, terms)
         named = tuple(parts.items()), lag, tuple(summed.items())
@@ -138,37 +155,67 @@ class GreyBox(Structure):
         return accelerations_source(self._sums, damped=False)
 
     def numbers(
-        self, coefficients: Mapping[str, float], particulars: Particulars, shaft_speed: float = 0.0
+        self,
+        coefficients: Mapping[str, float],
+        particulars: Particulars,
+        shaft_speed: float = 0.0,
     ) -> Floats:
         """Numbers of the vessel's coefficients: the reference ship's, then those of the terms."""
         terms = self.term_numbers(coefficients, particulars, shaft_speed)
         return np.concatenate([self.ship.ship_numbers(), terms])
 
     def converted_accelerations(
-        self, channels: Mapping[str, Any], particulars: Particulars, shaft_speed: float = 0.0
+        self,
+        channels: Mapping[str, Any],
+        particulars: Particulars,
+        shaft_speed: float = 0.0,
     ) -> dict[str, Floats]:
         """Accelerations of the reference ship, evaluated at and converted back to the target.
 
-        The channels of the target are u, v, r, delta, and n, p, phi where known, each of shape (n_samples,),
-        SI units; its particulars give length and service speed, the shaft speed is that at service speed,
-        1/s. Returns arrays of shape (n_samples,) by equation `u`, `v`, `r`, and `q` where the reference ship
-        has a memory of yaw.
+        The channels of the target are u, v, r, delta, and n, p, phi where known, each
+        of shape (n_samples,), SI units; its particulars give length and service speed,
+        the shaft speed is that at service speed, 1/s. Returns arrays of shape
+        (n_samples,) by equation `u`, `v`, `r`, and `q` where the reference ship has a
+        memory of yaw.
         """
         ship = self.ship
         fast = ship.particulars["speed"] / particulars["speed"]
         quick = fast * particulars["length"] / ship.particulars["length"]
-        scale = {"u": fast, "v": fast, "r": quick, "p": quick, "phi": 1.0, "q": quick**2, "delta": 1.0}
-        values = {name: scale[name] * np.asarray(channels[name]) for name in scale if name in channels}
+        scale = {
+            "u": fast,
+            "v": fast,
+            "r": quick,
+            "p": quick,
+            "phi": 1.0,
+            "q": quick**2,
+            "delta": 1.0,
+        }
+        values = {
+            name: scale[name] * np.asarray(channels[name])
+            for name in scale
+            if name in channels
+        }
         values["n"] = np.full_like(values["u"], ship.service_shaft_speed)
         if self.shaft:
-            values["n"] = np.asarray(channels["n"]) * (ship.service_shaft_speed / shaft_speed)
-        back = {"u": 1.0 / (fast * quick), "v": 1.0 / (fast * quick), "r": quick**-2, "q": quick**-3}
+            values["n"] = np.asarray(channels["n"]) * (
+                ship.service_shaft_speed / shaft_speed
+            )
+        back = {
+            "u": 1.0 / (fast * quick),
+            "v": 1.0 / (fast * quick),
+            "r": quick**-2,
+            "q": quick**-3,
+        }
         rates = ship.rates(values)
         return {q: rates[q] * back[q] for q in back if q in rates}
 
     def to_dict(self) -> dict[str, Any]:
         """The table and the whole reference ship, as they stand in a model file."""
-        return {**super().to_dict(), "shaft": self.shaft, "reference": self.ship.to_dict()}
+        return {
+            **super().to_dict(),
+            "shaft": self.shaft,
+            "reference": self.ship.to_dict(),
+        }
 
 
 KNOWS_SHAFT = False  # whether the reference ship's shaft turns with the target's
@@ -182,22 +229,35 @@ def term_accelerations(motion: Motion, c: Any, ship: Ship) -> Any:
     """A part: the sum of the terms."""
 
 
-def accelerations(motion: Motion, c: Any, ship: Ship) -> tuple[float, float, float, float, float]:
+def accelerations(
+    motion: Motion, c: Any, ship: Ship
+) -> tuple[float, float, float, float, float]:
     """The reference ship's at the converted state, converted back, and the terms."""
     fast = c.known.speed / ship.speed
     quick = fast * ship.length / c.known.length
     at = Motion(
-        x=0.0, y=0.0, psi=0.0, u=fast * motion.u, v=fast * motion.v, r=quick * motion.r, p=quick * motion.p,
-        phi=motion.phi, q=quick * quick * motion.q, delta=motion.delta,
+        x=0.0,
+        y=0.0,
+        psi=0.0,
+        u=fast * motion.u,
+        v=fast * motion.v,
+        r=quick * motion.r,
+        p=quick * motion.p,
+        phi=motion.phi,
+        q=quick * quick * motion.q,
+        delta=motion.delta,
         n=motion.n * (c.known.shaft / ship.shaft) if KNOWS_SHAFT else c.known.shaft,
-    )  # fmt: skip
+    )
     surge, sway, yaw, roll, memory = reference_accelerations(at, c.reference, c.known)
     udot, vdot, rdot, _, _ = term_accelerations(motion, c.terms, ship)
     linear, angular = 1.0 / (fast * quick), 1.0 / (quick * quick)
     return (
-        udot + linear * surge, vdot + linear * sway, rdot + angular * yaw, angular * roll,
+        udot + linear * surge,
+        vdot + linear * sway,
+        rdot + angular * yaw,
+        angular * roll,
         angular * memory / quick,
-    )  # fmt: skip
+    )
 
 
 @cache

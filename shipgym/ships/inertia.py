@@ -12,10 +12,10 @@ from shipgym.ships.term_table import inertia as prime_inertia
 def inertia(model: ManoeuvringModel, water_depth: float = np.inf) -> Floats:
     """Mass and added mass with which the model's equations divide its forces, shape (3, 4), SI units.
 
-    From the accelerations in surge, sway, yaw and roll to surge force, sway force and yaw moment about
-    midship. A reference ship has them in its own numbers (the tanker's grow in shallow water, depth in m), an
-    identified structure in its particulars, estimated where absent. Raises InputError if these do not tell
-    the mass.
+    From the accelerations in surge, sway, yaw and roll to surge force, sway force and
+    yaw moment about midship. A reference ship has them in its own numbers (the tanker's
+    grow in shallow water, depth in m), an identified structure in its particulars,
+    estimated where absent. Raises InputError if these do not tell the mass.
     """
     own = {"container": _container, "kvlcc2": _mmg, "mmg": _mmg}
     if model.structure == "tanker":
@@ -28,7 +28,11 @@ def rigid_inertia(model: ManoeuvringModel) -> tuple[float, float, float]:
     numbers = model.coefficients
     if model.structure == "container":
         unit = _prime_mass(model)
-        return numbers["m"] * unit, 0.0, numbers["Iz"] * unit * model.particulars["length"] ** 2
+        return (
+            numbers["m"] * unit,
+            0.0,
+            numbers["Iz"] * unit * model.particulars["length"] ** 2,
+        )
     if model.structure == "kvlcc2":
         mass = model.particulars["water_density"] * numbers["volume"]
         gyradius, xg = 0.25 * numbers["L"], numbers["xG"]
@@ -53,7 +57,9 @@ def _particulars(model: ManoeuvringModel) -> Floats:
 
 def particulars_inertia(p: Particulars) -> Floats:
     """The same, by the particulars of a ship, which are complete; nothing in roll."""
-    return 0.5 * p.require("water_density") * p.length**3 * _with_arms(prime_inertia(p), p)
+    return (
+        0.5 * p.require("water_density") * p.length**3 * _with_arms(prime_inertia(p), p)
+    )
 
 
 def _with_arms(prime: Floats, p: Particulars) -> Floats:
@@ -78,7 +84,9 @@ def _mmg(model: ManoeuvringModel) -> Floats:
     """Yasukawa & Yoshimura 2015, equations 6 and 7."""
     c, p = model.coefficients, model.particulars
     length, draught = c.get("L", p.length), c.get("d", p.draught)
-    added = 0.5 * p.require("water_density") * length**2 * (draught or p.require("draught"))
+    added = (
+        0.5 * p.require("water_density") * length**2 * (draught or p.require("draught"))
+    )
     mass, static, yaw = rigid_inertia(model)
     rows = [
         [mass + c["mx"] * added, 0.0, 0.0, 0.0],
@@ -91,7 +99,9 @@ def _mmg(model: ManoeuvringModel) -> Floats:
 def _tanker(model: ManoeuvringModel, water_depth: float) -> Floats:
     """Van Berlekom & Goddard 1972, bis system: by the ship's mass, its yaw inertia by mass and length^2."""
     c, p = model.coefficients, model.particulars
-    shallow = 0.0 if np.isposinf(water_depth) else p["draught"] / (water_depth - p["draught"])
+    shallow = (
+        0.0 if np.isposinf(water_depth) else p["draught"] / (water_depth - p["draught"])
+    )
     masses = [c["m11"] - c["X_udotz"] * shallow, c["m22"] - c["Y_vdotz"] * shallow]
     yaw = (c["m33"] - c["N_rdotz"] * shallow) * p["length"] ** 2
     return float(p["mass"]) * np.diag([*masses, yaw, 0.0])[:3]

@@ -1,9 +1,10 @@
 """A reference ship, and radial basis functions that correct her accelerations and fade outside their data.
 
-Source: Suykens, Van Gestel, De Brabanter, De Moor & Vandewalle 2002, Least squares support vector machines,
-chapter 6 (fixed-size LS-SVM: a kernel on a few centres, Nystroem features), on what a reference ship leaves
-of the accelerations (RM-SVM, Mei, Sun & Shi 2019). With a linear reference fitted to the same trials it is a
-kernel ship of its own, a black box.
+Source: Suykens, Van Gestel, De Brabanter, De Moor & Vandewalle 2002, Least squares
+support vector machines, chapter 6 (fixed-size LS-SVM: a kernel on a few centres,
+Nystroem features), on what a reference ship leaves of the accelerations (RM-SVM, Mei,
+Sun & Shi 2019). With a linear reference fitted to the same trials it is a kernel ship
+of its own, a black box.
 """
 
 from collections.abc import Mapping
@@ -30,13 +31,17 @@ from shipgym.ships.terms import Term
 
 RBF = "rbf"
 SIZES = (32, 64, 100)  # centres of what is compiled; others have weight 0
-ROW = 8  # numbers of a centre: coordinates, minus half their square, weights of surge, sway and yaw
+# numbers of a centre: coordinates, minus half their square, weights of surge, sway and
+# yaw
+ROW = 8
 SLOWEST = 0.05  # of service speed; slower, v and r are divided by it
-PER_ROOT_LN_2 = 1.0 / sqrt(np.log(2.0))  # of coordinates, so that the kernel is a power of 2
+PER_ROOT_LN_2 = 1.0 / sqrt(
+    np.log(2.0)
+)  # of coordinates, so that the kernel is a power of 2
 
 SOURCE = (
-    "Suykens, Van Gestel, De Brabanter, De Moor & Vandewalle 2002, Least squares support vector machines, "
-    "chapter 6; Mei, Sun & Shi 2019"
+    "Suykens, Van Gestel, De Brabanter, De Moor & Vandewalle 2002, Least squares"
+    " support vector machines, chapter 6; Mei, Sun & Shi 2019"
 )
 
 
@@ -67,13 +72,20 @@ class Kernel:
     basis: Floats  # of the features in the functions, shape (n_centres, n_features)
 
     def __post_init__(self) -> None:
-        shapes = [np.shape(a) for a in (self.offset, self.scale, self.centres, self.basis)]
+        shapes = [
+            np.shape(a) for a in (self.offset, self.scale, self.centres, self.basis)
+        ]
         n = len(self.centres)
-        whole = shapes[:3] == [(4,), (4,), (n, 4)] and np.ndim(self.basis) == 2 and len(self.basis) == n
+        whole = (
+            shapes[:3] == [(4,), (4,), (n, 4)]
+            and np.ndim(self.basis) == 2
+            and len(self.basis) == n
+        )
         if not whole or not 0 < n <= SIZES[-1] or not np.all(self.scale > 0.0):
             raise InputError(
-                f"kernel: offset, scale, centres and basis of shapes {shapes} found, expected (4,), (4,) "
-                f"above 0, (n, 4) and (n, n_features) with n at most {SIZES[-1]}"
+                f"kernel: offset, scale, centres and basis of shapes {shapes} found,"
+                " expected (4,), (4,) above 0, (n, 4) and (n, n_features) with n at"
+                f" most {SIZES[-1]}"
             )
 
     @property
@@ -88,12 +100,17 @@ class Kernel:
 
     def to_dict(self) -> dict[str, Any]:
         """Plain numbers, as a model file has them."""
-        return {name: getattr(self, name).tolist() for name in ("offset", "scale", "centres", "basis")}
+        return {
+            name: getattr(self, name).tolist()
+            for name in ("offset", "scale", "centres", "basis")
+        }
 
 
 def kernel_inputs(channels: Mapping[str, Any], particulars: Particulars) -> Floats:
     """Inputs v / U, r L / U, rudder angle and U / U0 of samples, shape (n_samples, 4)."""
-    u, v, r, delta = (np.asarray(channels[name], dtype=float) for name in ("u", "v", "r", "delta"))
+    u, v, r, delta = (
+        np.asarray(channels[name], dtype=float) for name in ("u", "v", "r", "delta")
+    )
     speed = particulars["speed"]
     U = np.maximum(np.hypot(u, v), SLOWEST * speed)
     return np.stack([v / U, r * particulars["length"] / U, delta, U / speed], axis=-1)
@@ -101,7 +118,9 @@ def kernel_inputs(channels: Mapping[str, Any], particulars: Particulars) -> Floa
 
 def gaussians(x: Floats, centres: Floats) -> Floats:
     """exp(-|x - centre|^2 / 2), shape (n_samples, n_centres)."""
-    squares = (x**2).sum(axis=1)[:, None] - 2.0 * x @ centres.T + (centres**2).sum(axis=1)
+    squares = (
+        (x**2).sum(axis=1)[:, None] - 2.0 * x @ centres.T + (centres**2).sum(axis=1)
+    )
     return np.asarray(np.exp(-0.5 * np.maximum(squares, 0.0)))
 
 
@@ -116,24 +135,38 @@ class KernelBox(GreyBox):
 
     def __post_init__(self) -> None:
         if not isinstance(self.kernel, Kernel):
-            raise InputError(f"structure '{self.name}': no kernel found, expected a Kernel")
+            raise InputError(
+                f"structure '{self.name}': no kernel found, expected a Kernel"
+            )
         super().__post_init__()
 
     def features(
-        self, equation: str, channels: Mapping[str, Any], particulars: Particulars, shaft_speed: float = 0.0
+        self,
+        equation: str,
+        channels: Mapping[str, Any],
+        particulars: Particulars,
+        shaft_speed: float = 0.0,
     ) -> Floats:
         """As of `Structure`: the features of the kernel by U^2, shape (n_samples, n_features)."""
         u, v = (np.asarray(channels[name], dtype=float) for name in ("u", "v"))
-        return np.asarray((u * u + v * v)[:, None] * self.kernel.features(channels, particulars))
+        return np.asarray(
+            (u * u + v * v)[:, None] * self.kernel.features(channels, particulars)
+        )
 
     def vessel(self, coefficients: Mapping[str, float], lag: bool) -> Vessel:
         """What is compiled: the reference ship's functions and the sum over centres, read at run time."""
         size = self.kernel.size
-        functions = {"N_CENTRES": size, "term_accelerations": Part(kernel_accelerations)}
+        functions = {
+            "N_CENTRES": size,
+            "term_accelerations": Part(kernel_accelerations),
+        }
         return self._vessel(_kernel_record(size), functions, lag, **SUMMED, N_ROWS=size)
 
     def numbers(
-        self, coefficients: Mapping[str, float], particulars: Particulars, shaft_speed: float = 0.0
+        self,
+        coefficients: Mapping[str, float],
+        particulars: Particulars,
+        shaft_speed: float = 0.0,
     ) -> Floats:
         """Numbers of the vessel's coefficients: the reference ship's, scales, offset and table of centres."""
         kernel = self.kernel
@@ -144,7 +177,9 @@ class KernelBox(GreyBox):
         rows[:, 4] = -0.5 * (rows[:, :4] ** 2).sum(axis=1)
         rows[:, 5:] = kernel.basis @ weights.reshape(3, -1).T
         per_scale = PER_ROOT_LN_2 / kernel.scale
-        return np.concatenate([self.ship.ship_numbers(), per_scale, kernel.offset, table.ravel()])
+        return np.concatenate(
+            [self.ship.ship_numbers(), per_scale, kernel.offset, table.ravel()]
+        )
 
     def to_dict(self) -> dict[str, Any]:
         """Reference ship and kernel, as they stand in a model file."""
@@ -156,7 +191,16 @@ def kernel_box(box: GreyBox, kernel: Kernel) -> KernelBox:
     """The reference ship of a grey box with a kernel in place of its terms."""
     terms = tuple(KernelTerm(f"k{i + 1}", (), i) for i in range(kernel.basis.shape[1]))
     table = dict.fromkeys("uvr", terms)
-    return KernelBox(box.name, SOURCE, table, "prime", "acceleration", box.reference, box.shaft, kernel)
+    return KernelBox(
+        box.name,
+        SOURCE,
+        table,
+        "prime",
+        "acceleration",
+        box.reference,
+        box.shaft,
+        kernel,
+    )
 
 
 class KernelCoefficients(NamedTuple):
@@ -196,7 +240,9 @@ def add_centre(at: Point, sums: Sums, c: KernelCoefficients, number: int) -> Sum
     return Sums(sums.u + value * u, sums.v + value * v, sums.r + value * r)
 
 
-def sum_accelerations(motion: Motion, sums: Sums, ship: Ship) -> tuple[float, float, float]:
+def sum_accelerations(
+    motion: Motion, sums: Sums, ship: Ship
+) -> tuple[float, float, float]:
     """Surge, sway and yaw of the sums."""
     square = motion.u * motion.u + motion.v * motion.v
     return square * sums.u, square * sums.v, square * sums.r
@@ -214,9 +260,12 @@ def kernel_accelerations(
 
 
 SUMMED = {
-    "sail_lanes": Part(stages.sail_lanes, inline=False), "term_accelerations": Part(accelerations),
-    "point_of": Part(coordinates), "row_sums": Part(add_centre), "sum_accelerations": Part(sum_accelerations),
-}  # fmt: skip
+    "sail_lanes": Part(stages.sail_lanes, inline=False),
+    "term_accelerations": Part(accelerations),
+    "point_of": Part(coordinates),
+    "row_sums": Part(add_centre),
+    "sum_accelerations": Part(sum_accelerations),
+}
 
 
 @cache

@@ -1,11 +1,12 @@
 """Mariner class cargo ship, 3 degrees of freedom, Abkowitz form.
 
-Coefficients: Chislett & Strom-Tejsen 1965 (Hydro- and Aerodynamics Laboratory, Lyngby, report Hy-5),
-as in the `mariner` function of the MSS toolbox (Fossen 1994).
+Coefficients: Chislett & Strom-Tejsen 1965 (Hydro- and Aerodynamics Laboratory, Lyngby,
+report Hy-5), as in the `mariner` function of the MSS toolbox (Fossen 1994).
 
-The literature writes the polynomials for a rudder positive to port (N_delta < 0). Here every odd power
-of the rudder changes its sign, so that a positive rudder turns the ship to starboard. The centripetal
-terms are inside the coefficients: Y_r is Y_r' - m', X_vr is m', and so on.
+The literature writes the polynomials for a rudder positive to port (N_delta < 0). Here
+every odd power of the rudder changes its sign, so that a positive rudder turns the ship
+to starboard. The centripetal terms are inside the coefficients: Y_r is Y_r' - m', X_vr
+is m', and so on.
 """
 
 from math import sqrt
@@ -20,17 +21,51 @@ WATER_DENSITY = 1025.0
 MASS, INERTIA, XG = 798e-5, 39.2e-5, -0.023  # prime system, inertia about midship
 
 X = {
-    "u": -184, "uu": -110, "uuu": -215, "vv": -899, "rr": 18, "dd": -95, "udd": -190, "vr": 798,
-    "vd": 93, "uvd": 93,
-}  # fmt: skip
+    "u": -184,
+    "uu": -110,
+    "uuu": -215,
+    "vv": -899,
+    "rr": 18,
+    "dd": -95,
+    "udd": -190,
+    "vr": 798,
+    "vd": 93,
+    "uvd": 93,
+}
 Y = {
-    "0": -4, "0u": -8, "0uu": -4, "v": -1160, "r": -499, "d": 278, "vvv": -8078, "ddd": -90,
-    "vvr": 15356, "vvd": 1190, "vdd": -4, "ud": 556, "uv": -1160, "ur": -499, "uud": 278,
-}  # fmt: skip
+    "0": -4,
+    "0u": -8,
+    "0uu": -4,
+    "v": -1160,
+    "r": -499,
+    "d": 278,
+    "vvv": -8078,
+    "ddd": -90,
+    "vvr": 15356,
+    "vvd": 1190,
+    "vdd": -4,
+    "ud": 556,
+    "uv": -1160,
+    "ur": -499,
+    "uud": 278,
+}
 N = {
-    "0": 3, "0u": 6, "0uu": 3, "v": -264, "r": -166, "d": -139, "vvv": 1636, "ddd": 45,
-    "vvr": -5483, "vvd": -489, "vdd": 13, "ud": -278, "uv": -264, "ur": -166, "uud": -139,
-}  # fmt: skip
+    "0": 3,
+    "0u": 6,
+    "0uu": 3,
+    "v": -264,
+    "r": -166,
+    "d": -139,
+    "vvv": 1636,
+    "ddd": 45,
+    "vvr": -5483,
+    "vvd": -489,
+    "vdd": 13,
+    "ud": -278,
+    "uv": -264,
+    "ur": -166,
+    "uud": -139,
+}
 
 
 def mariner(service_speed: float = 7.7175) -> ShipModel:
@@ -41,14 +76,36 @@ def mariner(service_speed: float = 7.7175) -> ShipModel:
         for term, value in table.items()
     }
     particulars = Particulars(
-        name="Mariner class cargo ship", length=LENGTH, beam=23.17, draught=8.23,
-        mass=MASS * 0.5 * WATER_DENSITY * LENGTH**3, xg=XG * LENGTH,
-        yaw_gyradius=LENGTH * sqrt(INERTIA / MASS - XG**2), speed=service_speed, water_density=WATER_DENSITY,
-        X_udot=-42e-5, Y_vdot=-748e-5, Y_rdot=-9.354e-5, N_vdot=4.646e-5, N_rdot=-43.8e-5,
-    )  # fmt: skip
+        name="Mariner class cargo ship",
+        length=LENGTH,
+        beam=23.17,
+        draught=8.23,
+        mass=MASS * 0.5 * WATER_DENSITY * LENGTH**3,
+        xg=XG * LENGTH,
+        yaw_gyradius=LENGTH * sqrt(INERTIA / MASS - XG**2),
+        speed=service_speed,
+        water_density=WATER_DENSITY,
+        X_udot=-42e-5,
+        Y_vdot=-748e-5,
+        Y_rdot=-9.354e-5,
+        N_vdot=4.646e-5,
+        N_rdot=-43.8e-5,
+    )
     return ShipModel(
-        name="mariner", structure="abkowitz", particulars=particulars,
-        steering=SteeringGear(rudder_limit_deg=40.0, rudder_rate_deg_s=5.0, time_constant=1.0),
-        coefficients={name: coefficients[name] for name in get_structure("abkowitz").coefficient_names},
-        provenance={"source": "Chislett & Strom-Tejsen 1965, in the form of the MSS toolbox (Fossen 1994)"},
-    )  # fmt: skip
+        name="mariner",
+        structure="abkowitz",
+        particulars=particulars,
+        steering=SteeringGear(
+            rudder_limit_deg=40.0, rudder_rate_deg_s=5.0, time_constant=1.0
+        ),
+        coefficients={
+            name: coefficients[name]
+            for name in get_structure("abkowitz").coefficient_names
+        },
+        provenance={
+            "source": (
+                "Chislett & Strom-Tejsen 1965, in the form of the MSS toolbox (Fossen"
+                " 1994)"
+            )
+        },
+    )

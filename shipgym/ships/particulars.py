@@ -29,15 +29,18 @@ class Particulars(Mapping[str, Any]):
     name : str
         The ship's name.
     length, beam, draught : float
-        Length between perpendiculars, beam and draught, m; all but the length are optional.
+        Length between perpendiculars, beam and draught, m; all but the length are
+        optional.
     mass, xg, yaw_gyradius : float, optional
-        Displacement mass, kg; centre of gravity forward of midship, m; radius of gyration in yaw about it, m.
+        Displacement mass, kg; centre of gravity forward of midship, m; radius of
+        gyration in yaw about it, m.
     block_coefficient, speed : float, optional
         Displaced volume divided by length * beam * draught; service speed, m/s.
     rudder_area, propeller_diameter : float, optional
         Movable area of the rudder, of all rudders together, m2; m.
     rudder_aspect_ratio, propeller_pitch_ratio : float, optional
-        Squared span of a rudder divided by its area; pitch of the propeller divided by its diameter.
+        Squared span of a rudder divided by its area; pitch of the propeller divided by
+        its diameter.
     rudders, propellers : float, optional
         How many; 1 where not given.
     length_overall, frontal_area, lateral_area : float, optional
@@ -49,8 +52,8 @@ class Particulars(Mapping[str, Any]):
     water_density : float, optional
         kg/m3.
     X_udot, Y_vdot, Y_rdot, N_vdot, N_rdot : float, optional
-        Added-mass derivatives in the prime system: the first two by rho L^3 / 2, Y_rdot and N_vdot by
-        rho L^4 / 2, N_rdot by rho L^5 / 2; about midship.
+        Added-mass derivatives in the prime system: the first two by rho L^3 / 2, Y_rdot
+        and N_vdot by rho L^4 / 2, N_rdot by rho L^5 / 2; about midship.
     estimated : frozenset of str
         Names of the values that were estimated.
     """
@@ -102,25 +105,39 @@ class Particulars(Mapping[str, Any]):
         return len(FIELDS)
 
     @classmethod
-    def from_mapping(cls, mapping: Mapping[str, Any], where: str = "particulars") -> Self:
+    def from_mapping(
+        cls, mapping: Mapping[str, Any], where: str = "particulars"
+    ) -> Self:
         """Make particulars from the keys of the ship file's ``[ship]``.
 
-        Added masses stand there or in a table ``added_mass``; ``estimated`` is as :meth:`to_dict` writes it;
-        None stands for a value that is not known. Raises InputError, beginning with `where`, for an unknown
-        key, a missing length, a wrong type or a value that no ship has.
+        Added masses stand there or in a table ``added_mass``; ``estimated`` is as
+        :meth:`to_dict` writes it; None stands for a value that is not known. Raises
+        InputError, beginning with `where`, for an unknown key, a missing length, a
+        wrong type or a value that no ship has.
         """
         table = dict(check_table(mapping, where, (*FIELDS, "added_mass", "estimated")))
-        added = check_table(table.pop("added_mass", None) or {}, f"{where} added_mass", ADDED_MASSES)
+        added = check_table(
+            table.pop("added_mass", None) or {}, f"{where} added_mass", ADDED_MASSES
+        )
         twice = table.keys() & added.keys()
         if twice:
-            raise InputError(f"{where} added_mass: {min(twice)} is given twice, expected it in one place")
+            raise InputError(
+                f"{where} added_mass: {min(twice)} is given twice, expected it in one"
+                " place"
+            )
         values = {**table, **added}
         estimated = values.pop("estimated", None) or ()
         names = isinstance(estimated, list | tuple | set | frozenset)
         if not names or not all(name in FIELDS for name in estimated):
-            raise InputError(f"{where} estimated: {estimated!r} found, expected a list of names of values")
+            raise InputError(
+                f"{where} estimated: {estimated!r} found, expected a list of names of"
+                " values"
+            )
         if values.get("length") is None:
-            raise InputError(f"{where} length: missing, expected the length between perpendiculars in m")
+            raise InputError(
+                f"{where} length: missing, expected the length between perpendiculars"
+                " in m"
+            )
         return cls(**_checked(values, where), estimated=frozenset(estimated))
 
     @classmethod
@@ -130,20 +147,29 @@ class Particulars(Mapping[str, Any]):
 
     def to_dict(self) -> dict[str, Any]:
         """Return the values by name, ready for JSON, None where not known; :meth:`from_mapping` reads it."""
-        found = {name: value for name, value in self.items() if value is not None or name not in LATER}
+        found = {
+            name: value
+            for name, value in self.items()
+            if value is not None or name not in LATER
+        }
         return {**found, "estimated": sorted(self.estimated)}
 
     def require(self, name: str) -> float:
         """Return a value that must be known; InputError where it is None."""
         value = self[name]
         if value is None:
-            raise InputError(f"particulars of {self.name}: {name} is needed and not known; give it in [ship]")
+            raise InputError(
+                f"particulars of {self.name}: {name} is needed and not known; give it"
+                " in [ship]"
+            )
         return float(value)
 
     @property
     def mass_prime(self) -> float:
         """Mass by rho L^3 / 2."""
-        return self.require("mass") / (0.5 * self.require("water_density") * self.length**3)
+        return self.require("mass") / (
+            0.5 * self.require("water_density") * self.length**3
+        )
 
     @property
     def xg_prime(self) -> float:
@@ -153,21 +179,27 @@ class Particulars(Mapping[str, Any]):
     @property
     def inertia_prime(self) -> float:
         """Yaw inertia about MIDSHIP by rho L^5 / 2: that about the centre of gravity and m xg^2."""
-        return self.mass_prime * ((self.require("yaw_gyradius") / self.length) ** 2 + self.xg_prime**2)
+        return self.mass_prime * (
+            (self.require("yaw_gyradius") / self.length) ** 2 + self.xg_prime**2
+        )
 
     def completed(self) -> "Particulars":
         """Return particulars with mass, inertia and added masses estimated where absent, and marked so.
 
-        Water density 1025 kg/m3, centre of gravity at midship, yaw gyradius L/4, mass from the block
-        coefficient, X_udot five per cent of the mass, the other added masses by the regressions of Clarke,
-        Gedling and Hine 1983 (The application of manoeuvring criteria in hull design using linear theory,
-        Transactions of RINA 125). Raises InputError, naming what is missing, where not even that is possible.
+        Water density 1025 kg/m3, centre of gravity at midship, yaw gyradius L/4, mass
+        from the block coefficient, X_udot five per cent of the mass, the other added
+        masses by the regressions of Clarke, Gedling and Hine 1983 (The application of
+        manoeuvring criteria in hull design using linear theory, Transactions of RINA
+        125). Raises InputError, naming what is missing, where not even that is
+        possible.
         """
         return with_estimates(self, _ESTIMATES)
 
 
 #: Names of all values, in the order of the ship file.
-FIELDS: tuple[str, ...] = tuple(item.name for item in fields(Particulars) if item.name != "estimated")
+FIELDS: tuple[str, ...] = tuple(
+    item.name for item in fields(Particulars) if item.name != "estimated"
+)
 
 #: Left out of files where not known, so that hashes of models from before them stay.
 LATER = ("rudder_aspect_ratio", "propeller_pitch_ratio", "rudders", "propellers")
@@ -179,7 +211,10 @@ def with_estimates(ship: Particulars, estimates: Estimates) -> Particulars:
     """A ship with what is absent estimated in turn, and marked so, where an estimate has an answer."""
     for name, estimate in estimates.items():
         if ship[name] is None and (value := estimate(ship)) is not None:
-            changes: dict[str, Any] = {name: value, "estimated": ship.estimated | {name}}
+            changes: dict[str, Any] = {
+                name: value,
+                "estimated": ship.estimated | {name},
+            }
             ship = replace(ship, **changes)
     return ship
 
@@ -189,8 +224,8 @@ def clarke_added_masses(
 ) -> dict[str, float]:
     """Added masses in sway and yaw from a hull's proportions, in the prime system, about midship.
 
-    Regressions of Clarke, Gedling and Hine 1983, by pi (T/L)^2. Dimensions in m; the block coefficient is
-    the displaced volume by length * beam * draught.
+    Regressions of Clarke, Gedling and Hine 1983, by pi (T/L)^2. Dimensions in m; the
+    block coefficient is the displaced volume by length * beam * draught.
     """
     scale = -math.pi * (draught / length) ** 2
     fullness = block_coefficient * beam / draught
@@ -206,12 +241,23 @@ def clarke_added_masses(
 def _block_coefficient(ship: Particulars) -> float | None:
     if ship.mass is None or ship.beam is None or ship.draught is None:
         return None
-    return ship.mass / (ship.require("water_density") * ship.length * ship.beam * ship.draught)
+    return ship.mass / (
+        ship.require("water_density") * ship.length * ship.beam * ship.draught
+    )
 
 
 def _mass(ship: Particulars) -> float:
-    _check_known(ship, "mass", "give mass (kg), or beam, draught and block_coefficient, in [ship]")
-    volume = ship.length * ship.require("beam") * ship.require("draught") * ship.require("block_coefficient")
+    _check_known(
+        ship,
+        "mass",
+        "give mass (kg), or beam, draught and block_coefficient, in [ship]",
+    )
+    volume = (
+        ship.length
+        * ship.require("beam")
+        * ship.require("draught")
+        * ship.require("block_coefficient")
+    )
     return ship.require("water_density") * volume
 
 
@@ -223,12 +269,15 @@ def _clarke(name: str) -> Callable[[Particulars], float]:
         )
         _check_known(ship, name, remedy)
         beam, draught = ship.require("beam"), ship.require("draught")
-        value = clarke_added_masses(ship.length, beam, draught, ship.require("block_coefficient"))[name]
+        value = clarke_added_masses(
+            ship.length, beam, draught, ship.require("block_coefficient")
+        )[name]
         if name in ("Y_vdot", "N_rdot") and value >= 0.0:
             raise InputError(
-                f"particulars of {ship.name}: length/beam {ship.length / beam:.2f} and beam/draught "
-                f"{beam / draught:.2f} found, for which the regression of {name} gives {value:.3g}, expected "
-                "< 0: the proportions are outside its range; check them, or give [ship.added_mass]"
+                f"particulars of {ship.name}: length/beam {ship.length / beam:.2f} and"
+                f" beam/draught {beam / draught:.2f} found, for which the regression of"
+                f" {name} gives {value:.3g}, expected < 0: the proportions are outside"
+                " its range; check them, or give [ship.added_mass]"
             )
         return value
 
@@ -237,20 +286,27 @@ def _clarke(name: str) -> Callable[[Particulars], float]:
 
 def _check_known(ship: Particulars, name: str, remedy: str) -> None:
     """Refuse to estimate `name` from proportions of the hull that are not all known."""
-    absent = [other for other in ("beam", "draught", "block_coefficient") if ship[other] is None]
+    absent = [
+        other
+        for other in ("beam", "draught", "block_coefficient")
+        if ship[other] is None
+    ]
     if absent:
         raise InputError(
-            f"particulars of {ship.name}: {name} is not given and cannot be estimated without "
-            f"{', '.join(absent)}; {remedy}"
+            f"particulars of {ship.name}: {name} is not given and cannot be estimated"
+            f" without {', '.join(absent)}; {remedy}"
         )
 
 
 _ESTIMATES: Estimates = {  # in this order
-    "water_density": lambda ship: 1025.0, "xg": lambda ship: 0.0,
+    "water_density": lambda ship: 1025.0,
+    "xg": lambda ship: 0.0,
     "yaw_gyradius": lambda ship: 0.25 * ship.length,
-    "block_coefficient": _block_coefficient, "mass": _mass, "X_udot": lambda ship: -0.05 * ship.mass_prime,
+    "block_coefficient": _block_coefficient,
+    "mass": _mass,
+    "X_udot": lambda ship: -0.05 * ship.mass_prime,
     **{name: _clarke(name) for name in ("Y_vdot", "Y_rdot", "N_vdot", "N_rdot")},
-}  # fmt: skip
+}
 
 
 def _checked(values: Mapping[str, Any], where: str) -> dict[str, Any]:
@@ -260,10 +316,18 @@ def _checked(values: Mapping[str, Any], where: str) -> dict[str, Any]:
     for name, value in checked.items():
         if name == "name" or (value is None and name != "length"):
             continue
-        place = f"{where} added_mass {name}" if name in ADDED_MASSES else f"{where} {name}"
-        given = {key: bound for key, bound in BOUNDS[name].items() if key in ("above", "below", "hint")}
+        place = (
+            f"{where} added_mass {name}" if name in ADDED_MASSES else f"{where} {name}"
+        )
+        given = {
+            key: bound
+            for key, bound in BOUNDS[name].items()
+            if key in ("above", "below", "hint")
+        }
         checked[name] = check_number(value, place, **given)
-    _check_together({k: v for k, v in checked.items() if k != "name" and v is not None}, where)
+    _check_together(
+        {k: v for k, v in checked.items() if k != "name" and v is not None}, where
+    )
     return checked
 
 
@@ -271,18 +335,22 @@ def _check_together(values: Mapping[str, float], where: str) -> None:
     """Refuse values that do not fit each other: most often a wrong unit."""
     length = values["length"]
     for name, value in values.items():
-        share, power = (BOUNDS[name].get(key, usual) for key, usual in (("share", math.inf), ("growth", 0)))
+        share, power = (
+            BOUNDS[name].get(key, usual)
+            for key, usual in (("share", math.inf), ("growth", 0))
+        )
         if abs(value) > share * length**power:
             raise InputError(
-                f"{where} {name}: {value:g} found with length {length:g}, expected at most {share:g} of "
-                f"the length{' squared' * (power - 1)}; check the units (m{'2' * (power - 1)})"
+                f"{where} {name}: {value:g} found with length {length:g}, expected at"
+                f" most {share:g} of the length{' squared' * (power - 1)}; check the"
+                f" units (m{'2' * (power - 1)})"
             )
     if "mass" in values:
         low, high, reason = _mass_range(values)
         if not low <= values["mass"] <= high:
             raise InputError(
-                f"{where} mass: {values['mass']:g} found, expected {low:.4g} to {high:.4g} kg ({reason}); "
-                "check the units (kg, not tonnes)"
+                f"{where} mass: {values['mass']:g} found, expected {low:.4g} to"
+                f" {high:.4g} kg ({reason}); check the units (kg, not tonnes)"
             )
 
 

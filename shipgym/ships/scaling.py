@@ -14,16 +14,20 @@ from shipgym.ships.term_table import Structure
 
 
 def scale_model(
-    model: ShipModel, length: float, speed: float | None = None, water_density: float | None = None
+    model: ShipModel,
+    length: float,
+    speed: float | None = None,
+    water_density: float | None = None,
 ) -> ShipModel:
     """A geometrically similar ship of another length, at another service speed.
 
-    What is dimensionless stays: the manoeuvre is the same in ship lengths sailed. Speeds go with the ratio of
-    the service speeds, times with that of the times to sail a ship length; the steering gear follows.
-    Scale effects (friction, wake) are not estimated.
+    What is dimensionless stays: the manoeuvre is the same in ship lengths sailed.
+    Speeds go with the ratio of the service speeds, times with that of the times to sail
+    a ship length; the steering gear follows. Scale effects (friction, wake) are not
+    estimated.
 
-    Raises InputError for a length, speed or density that is not positive, and for reference ships, whose
-    equations are written for one length.
+    Raises InputError for a length, speed or density that is not positive, and for
+    reference ships, whose equations are written for one length.
 
     Parameters
     ----------
@@ -38,15 +42,17 @@ def scale_model(
 
     Notes
     -----
-    Froude's law: speed as the root of the length, so that gravity and inertia stay in proportion (ITTC
-    Recommended Procedure 7.5-02-06-01). At another Froude number the righting moment of a table with roll,
-    which is gravity's, does not follow the speed: keep to the default there.
+    Froude's law: speed as the root of the length, so that gravity and inertia stay in
+    proportion (ITTC Recommended Procedure 7.5-02-06-01). At another Froude number the
+    righting moment of a table with roll, which is gravity's, does not follow the speed:
+    keep to the default there.
     """
     table = model.dynamics
     if not table.scales:
         raise InputError(
-            f"model {model.name!r}: the equations of reference ship '{table.name}' found, which are written "
-            "for one length; expected a model with a table of terms, such as one identified from its trials"
+            f"model {model.name!r}: the equations of reference ship '{table.name}'"
+            " found, which are written for one length; expected a model with a table"
+            " of terms, such as one identified from its trials"
         )
     check_number(length, "length", above=0.0, hint="in m")
     size = length / model.particulars.length
@@ -54,25 +60,44 @@ def scale_model(
     check_number(speed, "speed", above=0.0, hint="in m/s")
     fast = float(speed) / model.particulars["speed"]
     quick, gear = fast / size, model.steering
-    gear = SteeringGear(gear.rudder_limit_deg, gear.rudder_rate_deg_s * quick, gear.time_constant / quick)
+    gear = SteeringGear(
+        gear.rudder_limit_deg,
+        gear.rudder_rate_deg_s * quick,
+        gear.time_constant / quick,
+    )
     factors = dict.fromkeys(model.coefficients, 1.0)  # those without unit
     if isinstance(table, Structure) and table.normalisation == "si":
         factors = _coefficient_factors(table, size, fast)
     scale = np.array(list(factors.values()))
     box, unit = model.envelope, np.array([fast, fast, quick, 1.0])
-    origin = {"from_length": model.particulars.length, "from_speed": model.particulars["speed"]}
+    origin = {
+        "from_length": model.particulars.length,
+        "from_speed": model.particulars["speed"],
+    }
     return replace(
-        model, steering=gear,
+        model,
+        steering=gear,
         particulars=_particulars(model.particulars, size, float(speed), water_density),
-        coefficients={name: value * factors[name] for name, value in model.coefficients.items()},
-        covariance=None if model.covariance is None else model.covariance * np.outer(scale, scale),
-        envelope=box and Envelope(box.low * unit, box.high * unit, box.centre * unit, box.shape / unit),
+        coefficients={
+            name: value * factors[name] for name, value in model.coefficients.items()
+        },
+        covariance=(
+            None
+            if model.covariance is None
+            else model.covariance * np.outer(scale, scale)
+        ),
+        envelope=box
+        and Envelope(
+            box.low * unit, box.high * unit, box.centre * unit, box.shape / unit
+        ),
         provenance=(model.provenance or {}) | {"scaled": origin},
         service_shaft_speed=model.service_shaft_speed * fast / size,
-    )  # fmt: skip
+    )
 
 
-def _coefficient_factors(table: Structure, size: float, fast: float) -> dict[str, float]:
+def _coefficient_factors(
+    table: Structure, size: float, fast: float
+) -> dict[str, float]:
     """What each coefficient of a table in SI units is multiplied by: the change of units."""
     similar = replace(table, normalisation="service")
     return {
@@ -82,11 +107,25 @@ def _coefficient_factors(table: Structure, size: float, fast: float) -> dict[str
     }
 
 
-def _particulars(ship: Particulars, size: float, speed: float, water_density: float | None) -> Particulars:
-    growth = {name: given["growth"] for name, given in BOUNDS.items() if "growth" in given}
-    changes = {name: ship[name] * size**power for name, power in growth.items() if ship[name] is not None}
+def _particulars(
+    ship: Particulars, size: float, speed: float, water_density: float | None
+) -> Particulars:
+    growth = {
+        name: given["growth"] for name, given in BOUNDS.items() if "growth" in given
+    }
+    changes = {
+        name: ship[name] * size**power
+        for name, power in growth.items()
+        if ship[name] is not None
+    }
     density = ship.water_density if water_density is None else water_density
     if ship.mass is not None:
-        denser = 1.0 if water_density is None else water_density / ship.require("water_density")
+        denser = (
+            1.0
+            if water_density is None
+            else water_density / ship.require("water_density")
+        )
         changes["mass"] = ship.mass * size**3 * denser
-    return replace(ship, length=ship.length * size, speed=speed, water_density=density, **changes)
+    return replace(
+        ship, length=ship.length * size, speed=speed, water_density=density, **changes
+    )

@@ -42,22 +42,28 @@ class ShipModel(ManoeuvringModel):
     envelope : Envelope or None
         Of the data it was identified from.
     provenance : dict or None
-        Method, settings, software version and trials it came from, or the source of a reference ship.
+        Method, settings, software version and trials it came from, or the source of a
+        reference ship.
     own_table : Structure, ShipEquations or None
-        The table of terms a model file came with, or a registered table or ship; by default what is shipped
-        under the structure's name.
+        The table of terms a model file came with, or a registered table or ship; by
+        default what is shipped under the structure's name.
     service_shaft_speed : float
         Shaft speed at service speed, 1/s; 0 where the model knows no shaft.
     """
 
     def simulate(
-        self, commands: ArrayLike, dt: float, state: ArrayLike | None = None, water_depth: float = np.inf,
-        weather: Weather | str | None = None, seed: Seed = 0,
-    ) -> Trial:  # fmt: skip
+        self,
+        commands: ArrayLike,
+        dt: float,
+        state: ArrayLike | None = None,
+        water_depth: float = np.inf,
+        weather: Weather | str | None = None,
+        seed: Seed = 0,
+    ) -> Trial:
         """Simulate with commands held over each step (classical Runge-Kutta).
 
-        Raises UnstableModelError where the ship leaves every physical range; carries the time and the last
-        physical state.
+        Raises UnstableModelError where the ship leaves every physical range; carries
+        the time and the last physical state.
 
         Parameters
         ----------
@@ -77,13 +83,16 @@ class ShipModel(ManoeuvringModel):
         Returns
         -------
         Trial
-            n_steps + 1 samples with the state and the commands (`delta_command`). In weather x and y are over
-            ground, u and v through the water; psi, r, p and phi are without the first-order motion in waves,
-            which is in `psi_wave`, `r_wave`, `phi_wave`, `p_wave`; `current_north`, `current_east`,
-            `wind_speed` and `wind_from` tell the weather. What instruments show of it all:
-            `shipgym.trials.sensors.Sensors`.
+            n_steps + 1 samples with the state and the commands (`delta_command`). In
+            weather x and y are over ground, u and v through the water; psi, r, p and
+            phi are without the first-order motion in waves, which is in `psi_wave`,
+            `r_wave`, `phi_wave`, `p_wave`; `current_north`, `current_east`,
+            `wind_speed` and `wind_from` tell the weather. What instruments show of it
+            all: `shipgym.trials.sensors.Sensors`.
         """
-        return simulate(self, commands, dt, state, water_depth, weather=weather, seed=seed)
+        return simulate(
+            self, commands, dt, state, water_depth, weather=weather, seed=seed
+        )
 
     def sample(self, n: int, seed: int | np.random.Generator) -> list[Self]:
         """N models whose coefficients are drawn from the identified covariance; the same for the same seed.
@@ -92,23 +101,29 @@ class ShipModel(ManoeuvringModel):
         """
         if self.covariance is None:
             raise InputError(
-                f"model {self.name!r} has no covariance: only identified models can be sampled from"
+                f"model {self.name!r} has no covariance: only identified models can be"
+                " sampled from"
             )
         mean = np.array(list(self.coefficients.values()))
         deviation = np.sqrt(np.diag(self.covariance))
         scale = np.where(deviation > 0.0, deviation, 1.0)
-        # of the correlations: coefficients of 1e-5 and of 1 have to be drawn equally well
+        # of the correlations: coefficients of 1e-5 and of 1 have to be drawn equally
+        # well
         values, vectors = np.linalg.eigh(self.covariance / np.outer(scale, scale))
         root = scale[:, None] * vectors * np.sqrt(np.clip(values, 0.0, None))
         rng = np.random.default_rng(seed)
         draws = mean + rng.standard_normal((n, len(mean))) @ root.T
         tables, drawn = self._drawn_tables(n, rng), map(self.with_coefficients, draws)
         return [
-            replace(model, name=f"{self.name}-draw-{i}", covariance=None, own_table=table)
+            replace(
+                model, name=f"{self.name}-draw-{i}", covariance=None, own_table=table
+            )
             for i, (model, table) in enumerate(zip(drawn, tables, strict=True))
         ]
 
-    def _drawn_tables(self, n: int, rng: np.random.Generator) -> list[Structure | ShipEquations | None]:
+    def _drawn_tables(
+        self, n: int, rng: np.random.Generator
+    ) -> list[Structure | ShipEquations | None]:
         """Its table n times, with a fitted reference ship drawn anew each time."""
         box = self.own_table
         if not isinstance(box, GreyBox) or box.ship.covariance is None:
@@ -124,7 +139,9 @@ class ShipModel(ManoeuvringModel):
     def load(cls, path: str | Path) -> Self:
         """Read a model file; InputError, naming the file and the field at fault."""
         file = Path(path)
-        fields = read_json(file, "model file", "identify the model again or take another copy")
+        fields = read_json(
+            file, "model file", "identify the model again or take another copy"
+        )
         with placed(str(file)):
             return read_model(fields, str(file), cls)
 

@@ -9,8 +9,9 @@ from shipgym.checks import check_number, check_table
 
 _BOUNDS: dict[str, dict[str, Any]] = {
     "rudder_limit_deg": {"above": 0.0, "at_most": 90.0},
-    "rudder_rate_deg_s": {"above": 0.0}, "time_constant": {"at_least": 0.0},
-}  # fmt: skip
+    "rudder_rate_deg_s": {"above": 0.0},
+    "time_constant": {"at_least": 0.0},
+}
 
 SHORTEST_LAG = 0.45  # of a step of simulations
 
@@ -19,9 +20,11 @@ SHORTEST_LAG = 0.45  # of a step of simulations
 class SteeringGear:
     """Limits and lag of the steering gear.
 
-    With a time constant of zero the rudder moves towards its order at the full rate (a ramp); otherwise
+    With a time constant of zero the rudder moves towards its order at the full rate (a
+    ramp); otherwise
 
-        d(delta)/dt = clip((clip(order, -limit, limit) - delta) / time_constant, -rate, rate).
+        d(delta)/dt = clip((clip(order, -limit, limit) - delta) / time_constant, -rate,
+        rate).
 
     In simulations the lag is at least 0.45 of a step (`frequency`).
 
@@ -32,7 +35,8 @@ class SteeringGear:
     rudder_limit_deg : float
         Largest rudder order, degrees, above 0 and at most 90. 35 is usual.
     rudder_rate_deg_s : float
-        Largest rudder rate, degrees per second, above 0. SOLAS II-1 asks for 65 degrees in 28 s.
+        Largest rudder rate, degrees per second, above 0. SOLAS II-1 asks for 65 degrees
+        in 28 s.
     time_constant : float
         Lag, s; 0 for a gear of constant rate.
     """
@@ -47,10 +51,13 @@ class SteeringGear:
             object.__setattr__(self, name, value)
 
     @classmethod
-    def from_mapping(cls, mapping: Mapping[str, Any], where: str = "steering gear") -> Self:
+    def from_mapping(
+        cls, mapping: Mapping[str, Any], where: str = "steering gear"
+    ) -> Self:
         """A steering gear from keys of the ship file's ``[steering]``, which are this class's fields.
 
-        Raises InputError, beginning with `where`, for an unknown key or a value out of bounds.
+        Raises InputError, beginning with `where`, for an unknown key or a value out of
+        bounds.
         """
         table = check_table(mapping, where, _BOUNDS)
         for name, value in table.items():
@@ -74,7 +81,12 @@ class SteeringGear:
     def frequency(self, step: float = 0.0) -> float:
         """Inverse of the time constant in steps of some seconds, 1/s; 0 for a gear without lag.
 
-        A lag shorter than 0.45 of a step is taken as that: the Runge-Kutta method does not follow it, and is
-        unstable where it is shorter than 0.36 of a step (Hairer & Wanner 1996, IV.2).
+        A lag shorter than 0.45 of a step is taken as that: the Runge-Kutta method does
+        not follow it, and is unstable where it is shorter than 0.36 of a step (Hairer &
+        Wanner 1996, IV.2).
         """
-        return 1.0 / max(self.time_constant, SHORTEST_LAG * step) if self.time_constant else 0.0
+        return (
+            1.0 / max(self.time_constant, SHORTEST_LAG * step)
+            if self.time_constant
+            else 0.0
+        )

@@ -12,12 +12,19 @@ from shipgym.ships.shared_structure import read_shares, shared_structure
 from shipgym.ships.term_table import Structure
 from shipgym.ships.terms import Term, read_terms, short_terms
 
-WITH_REFERENCE = "grey-box"  # a table that stands on a reference ship, which only a user can name
+# a table that stands on a reference ship, which only a user can name
+WITH_REFERENCE = "grey-box"
 Read = TypeVar("Read")
-USUAL = {"source": "own", "normalisation": "si", "quantity": "acceleration"}  # where a table does not say
+USUAL = {
+    "source": "own",
+    "normalisation": "si",
+    "quantity": "acceleration",
+}  # where a table does not say
 
 
-def _read_printed(name: str, table: dict[str, Any], papers: Mapping[str, str]) -> Structure:
+def _read_printed(
+    name: str, table: dict[str, Any], papers: Mapping[str, str]
+) -> Structure:
     """A structure of `structures.toml`, whose terms are formulas, letters or shares of coefficients."""
     source = table.pop("source").format(**papers)
     if "shares" in table:
@@ -36,7 +43,9 @@ def _by_axis(texts: Mapping[str, str], read: Callable[[str], Read]) -> dict[str,
 
 _TABLES = shipped_toml("shipgym.ships", "structures.toml")
 _PAPERS = _TABLES.pop("papers")
-STRUCTURES = {name: _read_printed(name, USUAL | table, _PAPERS) for name, table in _TABLES.items()}
+STRUCTURES = {
+    name: _read_printed(name, USUAL | table, _PAPERS) for name, table in _TABLES.items()
+}
 PRINTED = frozenset(STRUCTURES)
 
 SHIPPED_EQUATIONS: dict[str, ShipEquations] = {
@@ -54,17 +63,19 @@ def list_structures() -> list[str]:
 def get_structure(name: str) -> Structure:
     """An identified structure by name.
 
-    Raises InputError if there is none of that name, it is the grey box, which takes a reference ship, or the
-    MMG form, which is no table.
+    Raises InputError if there is none of that name, it is the grey box, which takes a
+    reference ship, or the MMG form, which is no table.
     """
     if name == mmg.MMG:
         raise InputError(
-            "structure: 'mmg' found, which is no table of terms; choose one, such as 'abkowitz' or 'cubic'"
+            "structure: 'mmg' found, which is no table of terms; choose one, such as"
+            " 'abkowitz' or 'cubic'"
         )
     if name == WITH_REFERENCE:
         raise InputError(
-            "structure: 'grey-box' found, which is a reference ship and a table of terms; give the reference "
-            "ship: identify(..., structure='grey-box', reference_model='tanker'), or shipgym.ships.grey_box"
+            "structure: 'grey-box' found, which is a reference ship and a table of"
+            " terms; give the reference ship: identify(..., structure='grey-box',"
+            " reference_model='tanker'), or shipgym.ships.grey_box"
         )
     return STRUCTURES[check_choice(name, list_structures(), "structure")]
 
@@ -75,25 +86,30 @@ def get_dynamics(name: str) -> Structure | ShipEquations:
 
 
 def register_structure(
-    name: str, equations: Mapping[str, str | Sequence[Term]], source: str = "own", normalisation: str = "si",
+    name: str,
+    equations: Mapping[str, str | Sequence[Term]],
+    source: str = "own",
+    normalisation: str = "si",
     quantity: str = "acceleration",
-) -> Structure:  # fmt: skip
+) -> Structure:
     """Register a table of terms by name, so that it works wherever a structure does.
 
-    Models and their files carry their table, so only the process that identifies has to register it.
+    Models and their files carry their table, so only the process that identifies has to
+    register it.
 
-    Raises InputError for a formula that cannot be read, a table that cannot be computed, or a name that
-    another table has.
+    Raises InputError for a formula that cannot be read, a table that cannot be
+    computed, or a name that another table has.
 
     Parameters
     ----------
     name : str
         Name for `identify` and `ShipModel`.
     equations : dict of str to str
-        Formulas of surge `u`, sway `v`, yaw `r`, roll `p` and the memory `q` of yaw (see `Structure`), or
-        some of them, separated by commas: symbols side by
-        side with spaces between, powers after `^`; `du` is the surge speed above service speed, `U` the
-        speed through the water: `{"v": "v, r, |v| r, delta", "r": "v, r, v^2 r/U, delta"}`. See `read_terms`.
+        Formulas of surge `u`, sway `v`, yaw `r`, roll `p` and the memory `q` of yaw
+        (see `Structure`), or some of them, separated by commas: symbols side by side
+        with spaces between, powers after `^`; `du` is the surge speed above service
+        speed, `U` the speed through the water: `{"v": "v, r, |v| r, delta", "r": "v, r,
+        v^2 r/U, delta"}`. See `read_terms`.
     source : str
         Where it comes from.
     normalisation : {"si", "prime", "service"}
@@ -114,15 +130,24 @@ def own_structure(table: Any, where: str) -> Structure:
     for key in ("name", "equations"):
         if key not in own:
             raise InputError(
-                f'{where}: no {key} found, expected a name and equations, such as r = "r, delta"'
+                f"{where}: no {key} found, expected a name and equations, such as r ="
+                ' "r, delta"'
             )
     given = check_table(own["equations"], f"{where}: equations")
-    own["equations"] = {q: _terms(formulas, f"{where}: equations.{q}") for q, formulas in given.items()}
+    own["equations"] = {
+        q: _terms(formulas, f"{where}: equations.{q}") for q, formulas in given.items()
+    }
     with placed(where):
         structure = Structure(**own)
     name = structure.name
-    if name in (*EQUATIONS, WITH_REFERENCE, "auto") or STRUCTURES.get(name, structure) != structure:
-        raise InputError(f"{where}: name {name!r} found, which is another structure's; expected a new name")
+    if (
+        name in (*EQUATIONS, WITH_REFERENCE, "auto")
+        or STRUCTURES.get(name, structure) != structure
+    ):
+        raise InputError(
+            f"{where}: name {name!r} found, which is another structure's; expected a"
+            " new name"
+        )
     return structure
 
 
@@ -130,12 +155,18 @@ def _terms(given: Any, where: str) -> tuple[Term, ...]:
     """Terms from formulas, or terms as they are."""
     if isinstance(given, str):
         if not given.strip():
-            raise InputError(f"{where}: no terms found, expected formulas such as 'v, |v| r, delta'")
+            raise InputError(
+                f"{where}: no terms found, expected formulas such as 'v, |v| r, delta'"
+            )
         with placed(where):
             return read_terms(given)
     if not isinstance(given, Sequence):
-        raise InputError(f"{where}: {given!r} found, expected formulas such as 'v, |v| r, delta'")
+        raise InputError(
+            f"{where}: {given!r} found, expected formulas such as 'v, |v| r, delta'"
+        )
     for term in given:
         if not isinstance(term, Term):
-            raise InputError(f"{where}: {term!r} found, expected a formula in one text, or Terms")
+            raise InputError(
+                f"{where}: {term!r} found, expected a formula in one text, or Terms"
+            )
     return tuple(given)

@@ -1,8 +1,9 @@
 """Esso 190 000 dwt tanker, 3 degrees of freedom with shaft, in deep and shallow water.
 
-Source: van Berlekom & Goddard 1972, Maneuvering of large tankers, Trans. SNAME 80, appendix A; in the
-form of the function `tanker` of the MSS toolbox (Fossen 1994). Bis system: per unit mass, dimensional.
-The source's rudder is positive to port; here it is turned.
+Source: van Berlekom & Goddard 1972, Maneuvering of large tankers, Trans. SNAME 80,
+appendix A; in the form of the function `tanker` of the MSS toolbox (Fossen 1994). Bis
+system: per unit mass, dimensional. The source's rudder is positive to port; here it is
+turned.
 """
 
 from math import copysign, fabs
@@ -18,26 +19,62 @@ LENGTH, DRAUGHT = 304.8, 18.46  # m
 SHAFT_LIMIT, SHAFT_LAG = 80.0 / 60.0, 50.0  # 1/s, s
 VERY_SHALLOW = 0.8  # T / (h - T) from which Y_uvz acts
 
-#: As published; the index z is by draught over water below the keel, c by the speed of the race.
-Coefficients = record_of({
-    # thrust
-    "t": 0.22, "c_un": 0.605, "c_nn": 38.2, "T_uu": -0.00695, "T_un": -0.00063, "T_nn": 0.0000354,
-    # hull and rudder
-    "X_uu": -0.0377, "X_vv": 0.3, "X_ccdd": -0.093, "X_ccbd": 0.152,
-    "Y_uv": -1.205, "Y_vv": -2.400, "Y_ccd": 0.208, "Y_ccbbd": -2.16, "Y_T": 0.04,
-    "N_uv": -0.451, "N_vr": -0.300, "N_ccd": -0.098, "N_ccbbd": 0.688, "N_T": -0.02,
-    "d11": 2.020, "d22": -0.752, "d33": -0.231,
-    # mass and added mass by mass
-    "m11": 1.050, "m22": 2.020, "m33": 0.1232,
-    # shallow water
-    "X_udotz": -0.05, "Y_vdotz": -0.387, "N_rdotz": -0.0045,
-    "X_uuz": -0.0061, "X_vrz": 0.387, "X_vvzz": 0.0125,
-    "Y_urz": 0.182, "Y_vvz": -1.5, "Y_uvz": -0.85, "Y_ccbbdz": -0.191,
-    "N_urz": -0.047, "N_vrz": -0.120, "N_uvz": -0.241, "N_ccbbdz": 0.344,
-}, __name__)  # fmt: skip
+#: As published; the index z is by draught over water below the keel, c by the speed of
+#: the race.
+Coefficients = record_of(
+    {
+        # thrust
+        "t": 0.22,
+        "c_un": 0.605,
+        "c_nn": 38.2,
+        "T_uu": -0.00695,
+        "T_un": -0.00063,
+        "T_nn": 0.0000354,
+        # hull and rudder
+        "X_uu": -0.0377,
+        "X_vv": 0.3,
+        "X_ccdd": -0.093,
+        "X_ccbd": 0.152,
+        "Y_uv": -1.205,
+        "Y_vv": -2.400,
+        "Y_ccd": 0.208,
+        "Y_ccbbd": -2.16,
+        "Y_T": 0.04,
+        "N_uv": -0.451,
+        "N_vr": -0.300,
+        "N_ccd": -0.098,
+        "N_ccbbd": 0.688,
+        "N_T": -0.02,
+        "d11": 2.020,
+        "d22": -0.752,
+        "d33": -0.231,
+        # mass and added mass by mass
+        "m11": 1.050,
+        "m22": 2.020,
+        "m33": 0.1232,
+        # shallow water
+        "X_udotz": -0.05,
+        "Y_vdotz": -0.387,
+        "N_rdotz": -0.0045,
+        "X_uuz": -0.0061,
+        "X_vrz": 0.387,
+        "X_vvzz": 0.0125,
+        "Y_urz": 0.182,
+        "Y_vvz": -1.5,
+        "Y_uvz": -0.85,
+        "Y_ccbbdz": -0.191,
+        "N_urz": -0.047,
+        "N_vrz": -0.120,
+        "N_uvz": -0.241,
+        "N_ccbbdz": 0.344,
+    },
+    __name__,
+)
 
 
-def accelerations(motion: Motion, c: Any, ship: Ship) -> tuple[float, float, float, float, float]:
+def accelerations(
+    motion: Motion, c: Any, ship: Ship
+) -> tuple[float, float, float, float, float]:
     """Accelerations in surge, sway and yaw, body frame, origin midship."""
     u, v, r, n, L = motion.u, motion.v, motion.r, motion.n, LENGTH
     d = -motion.delta
@@ -49,27 +86,53 @@ def accelerations(motion: Motion, c: Any, ship: Ship) -> tuple[float, float, flo
     uvz = c.Y_uvz * (1.0 - VERY_SHALLOW / z) if z >= VERY_SHALLOW else 0.0
 
     X = (
-        (c.X_uu * u * u + c.X_vv * v * v + c.X_ccdd * cc * d * d + c.X_ccbd * cc * beta * d
-         + c.X_uuz * u * u * z + c.X_vvzz * v * v * z * z) * (1.0 / L)
-        + (c.d11 + c.X_vrz * z) * v * r + (1.0 - c.t) * gT
-    )  # fmt: skip
-    Y = (
-        (c.Y_uv * u * v + c.Y_vv * fabs(v) * v + c.Y_ccd * cc * d + c.Y_ccbbd * drift
-         + uvz * u * v * z + c.Y_vvz * fabs(v) * v * z + c.Y_ccbbdz * drift * z) * (1.0 / L)
-        + (c.d22 + c.Y_urz * z) * u * r + c.Y_T * gT
-    )  # fmt: skip
-    N = (
-        (c.N_uv * u * v + c.N_ccd * cc * d + c.N_ccbbd * drift + c.N_uvz * u * v * z + c.N_ccbbdz * drift * z)
-        * (1.0 / (L * L))
-        + (c.N_vr * fabs(v) * r + c.d33 * u * r + c.N_urz * u * r * z + c.N_vrz * fabs(v) * r * z
-           + c.N_T * gT)
+        (
+            c.X_uu * u * u
+            + c.X_vv * v * v
+            + c.X_ccdd * cc * d * d
+            + c.X_ccbd * cc * beta * d
+            + c.X_uuz * u * u * z
+            + c.X_vvzz * v * v * z * z
+        )
         * (1.0 / L)
-    )  # fmt: skip
+        + (c.d11 + c.X_vrz * z) * v * r
+        + (1.0 - c.t) * gT
+    )
+    Y = (
+        (
+            c.Y_uv * u * v
+            + c.Y_vv * fabs(v) * v
+            + c.Y_ccd * cc * d
+            + c.Y_ccbbd * drift
+            + uvz * u * v * z
+            + c.Y_vvz * fabs(v) * v * z
+            + c.Y_ccbbdz * drift * z
+        )
+        * (1.0 / L)
+        + (c.d22 + c.Y_urz * z) * u * r
+        + c.Y_T * gT
+    )
+    N = (
+        c.N_uv * u * v
+        + c.N_ccd * cc * d
+        + c.N_ccbbd * drift
+        + c.N_uvz * u * v * z
+        + c.N_ccbbdz * drift * z
+    ) * (1.0 / (L * L)) + (
+        c.N_vr * fabs(v) * r
+        + c.d33 * u * r
+        + c.N_urz * u * r * z
+        + c.N_vrz * fabs(v) * r * z
+        + c.N_T * gT
+    ) * (1.0 / L)
     # as products, because the masses are the same in all stages of a step
     return (
-        X * (1.0 / (c.m11 - c.X_udotz * z)), Y * (1.0 / (c.m22 - c.Y_vdotz * z)),
-        N * (1.0 / (c.m33 - c.N_rdotz * z)), 0.0, 0.0,
-    )  # fmt: skip
+        X * (1.0 / (c.m11 - c.X_udotz * z)),
+        Y * (1.0 / (c.m22 - c.Y_vdotz * z)),
+        N * (1.0 / (c.m33 - c.N_rdotz * z)),
+        0.0,
+        0.0,
+    )
 
 
 def shaft_acceleration(n: float, command: float, c: Any, ship: Ship) -> float:
@@ -80,11 +143,21 @@ def shaft_acceleration(n: float, command: float, c: Any, ship: Ship) -> float:
 SHIP = ShipEquations(
     "tanker",
     "van Berlekom & Goddard 1972, Maneuvering of large tankers",
-    Coefficients, accelerations,
+    Coefficients,
+    accelerations,
     Particulars(
-        name="Esso 190 000 dwt tanker", length=LENGTH, beam=47.17, draught=DRAUGHT, mass=220_000.0 * 1025.0,
-        block_coefficient=0.83, speed=8.225749013527, water_density=1025.0,
+        name="Esso 190 000 dwt tanker",
+        length=LENGTH,
+        beam=47.17,
+        draught=DRAUGHT,
+        mass=220_000.0 * 1025.0,
+        block_coefficient=0.83,
+        speed=8.225749013527,
+        water_density=1025.0,
     ),
     SteeringGear(rudder_rate_deg_s=2.33, time_constant=1.0),
-    shaft_acceleration=shaft_acceleration, service_shaft_speed=80.0 / 60.0, shallow_water=True, astern=True,
-)  # fmt: skip
+    shaft_acceleration=shaft_acceleration,
+    service_shaft_speed=80.0 / 60.0,
+    shallow_water=True,
+    astern=True,
+)

@@ -2,36 +2,44 @@
 
 A task file defines (`shipgym/tasks/course_keeping.py` is one)
 
-* `Settings`, `State`, `Reward` and `Observation`, named tuples of floats. `Settings` has defaults, which are
-  keywords of its environment; a last field annotated `Numbers` is a list. The reward is the sum of the fields
-  of `Reward`, which `info` has as `reward_NAME`. Each field of `Observation` is annotated with a `Seen`.
+* `Settings`, `State`, `Reward` and `Observation`, named tuples of floats. `Settings`
+  has defaults, which are keywords of its environment; a last field annotated `Numbers`
+  is a list. The reward is the sum of the fields of `Reward`, which `info` has as
+  `reward_NAME`. Each field of `Observation` is annotated with a `Seen`.
 * `begin(ship, settings, random, plan) -> (Motion, State)`: how an episode begins.
-* `step(motion, state, interval, ship, settings) -> (State, Reward, failed, arrived)`: after an interval.
-* `observe(readings, state, interval, ship, settings) -> Observation`: what the autopilot sees, in SI units.
+* `step(motion, state, interval, ship, settings) -> (State, Reward, failed, arrived)`:
+  after an interval.
+* `observe(readings, state, interval, ship, settings) -> Observation`: what the
+  autopilot sees, in SI units.
 
 and may define
 
-* `due(motion, state, interval, ship, settings) -> bool` and
-  `on_event(motion, state, interval, ship, settings, random, plan) -> State`: what comes seldom, such as the
-  next set-point.
-* `worst_cost(settings) -> float`: the largest cost of a step. A ship that is lost pays it for the rest of the
-  episode, so that ending early never pays.
+* `due(motion, state, interval, ship, settings) -> bool` and `on_event(motion, state,
+  interval, ship, settings, random, plan) -> State`: what comes seldom, such as the next
+  set-point.
+* `worst_cost(settings) -> float`: the largest cost of a step. A ship that is lost pays
+  it for the rest of the episode, so that ending early never pays.
 * `NAME`, by default that of the file, and `EPISODE_STEPS`, by default 600.
-* `REPORTED`: names of fields of `State` that `info` has; those annotated `Flag` as true or false.
-* `plan_length(settings) -> int`: how many numbers `plan` holds, an array that lasts over an episode.
-* `check(settings, model)`: raises `InputError` for settings that do not fit, first without a ship, `model`
-  None, then with one; `listed(value)`: what a keyword
-  of another kind, such as a list of waypoints, means as numbers.
+* `REPORTED`: names of fields of `State` that `info` has; those annotated `Flag` as true
+  or false.
+* `plan_length(settings) -> int`: how many numbers `plan` holds, an array that lasts
+  over an episode.
+* `check(settings, model)`: raises `InputError` for settings that do not fit, first
+  without a ship, `model` None, then with one; `listed(value)`: what a keyword of
+  another kind, such as a list of waypoints, means as numbers.
 
-A field `course` of `State`, rad, is the course to steer in `physical_state()` and in pictures.
+A field `course` of `State`, rad, is the course to steer in `physical_state()` and in
+pictures.
 
-A reward file defines `Reward` and `reward(motion, state, interval, ship, settings) -> Reward`, where `state`
-is the task's after the interval, and may define `worst_cost`. A sensor file defines `Settings`, `Memory`,
-`measure` and `readings` (`shipgym/instruments/perfect.py` is one); its settings are keywords too.
+A reward file defines `Reward` and `reward(motion, state, interval, ship, settings) ->
+Reward`, where `state` is the task's after the interval, and may define `worst_cost`. A
+sensor file defines `Settings`, `Memory`, `measure` and `readings`
+(`shipgym/instruments/perfect.py` is one); its settings are keywords too.
 
-`step`, `observe`, `reward`, `measure` and `readings` are compiled into a loop over ships: they call functions
-of `math` that the compiler vectorises (`sqrt`, `fabs`) and those of `shipgym.engine.mathematics`, and choose
-by `pick` or a conditional expression. The other functions are called ship by ship and may do what Numba can.
+`step`, `observe`, `reward`, `measure` and `readings` are compiled into a loop over
+ships: they call functions of `math` that the compiler vectorises (`sqrt`, `fabs`) and
+those of `shipgym.engine.mathematics`, and choose by `pick` or a conditional expression.
+The other functions are called ship by ship and may do what Numba can.
 """
 
 from collections.abc import Callable
@@ -74,7 +82,9 @@ class Interval(NamedTuple):
     rudder_before: float  # rad, rudder at its beginning
     rudder_command: float  # part of the limit
     shaft_command: float  # part of the shaft speed at service speed
-    envelope_distance: float  # how many times further out than the training data (`Envelope.distance`)
+    envelope_distance: (
+        float  # how many times further out than the training data (`Envelope.distance`)
+    )
     extrapolating: float  # 1 where the ship was outside that data
 
 
@@ -146,6 +156,22 @@ def at_service_speed(x: float, y: float, psi: float, ship: Ship) -> Motion:
 
 
 __all__ = [
-    "NO_NUMBERS", "Flag", "Interval", "Motion", "Numbers", "Random", "Readings", "Scale", "Seen",
-    "Setting", "Ship", "arctan2", "at_service_speed", "clip", "drawn", "pick", "sin_cos", "wrap",
-]  # fmt: skip
+    "NO_NUMBERS",
+    "Flag",
+    "Interval",
+    "Motion",
+    "Numbers",
+    "Random",
+    "Readings",
+    "Scale",
+    "Seen",
+    "Setting",
+    "Ship",
+    "arctan2",
+    "at_service_speed",
+    "clip",
+    "drawn",
+    "pick",
+    "sin_cos",
+    "wrap",
+]

@@ -1,8 +1,9 @@
 """Course keeping: hold a heading, and change it when the set-point changes.
 
-The reward is minus the squares of heading error, rudder angle (weight 0.1) and rudder rate (weight 0.01), all
-in units of 30 degrees, the rate per ship length sailed (Norrbin 1972; van Amerongen 1982). Losing control
-costs as much as the rest of the episode at the largest heading error, so that it never pays to end early.
+The reward is minus the squares of heading error, rudder angle (weight 0.1) and rudder
+rate (weight 0.01), all in units of 30 degrees, the rate per ship length sailed (Norrbin
+1972; van Amerongen 1982). Losing control costs as much as the rest of the episode at
+the largest heading error, so that it never pays to end early.
 """
 
 from math import fabs, floor, pi, radians
@@ -11,11 +12,25 @@ from typing import Annotated, NamedTuple
 from shipgym.engine.mathematics import wrap
 from shipgym.engine.motion import Motion, Ship
 from shipgym.tasks.contract import (
-    NO_NUMBERS, Interval, Numbers, Random, Readings, Setting, at_service_speed, drawn,
-)  # fmt: skip
+    NO_NUMBERS,
+    Interval,
+    Numbers,
+    Random,
+    Readings,
+    Setting,
+    at_service_speed,
+    drawn,
+)
 from shipgym.tasks.steering import (
-    Extras, Helm, SteeringReward, Weights, extras, helm, integrated, steering_reward,
-)  # fmt: skip
+    Extras,
+    Helm,
+    SteeringReward,
+    Weights,
+    extras,
+    helm,
+    integrated,
+    steering_reward,
+)
 
 NAME = "CourseKeeping"
 REPORTED = ("heading_error",)
@@ -27,22 +42,34 @@ class Settings(NamedTuple):
     course_change_deg: Annotated[
         float,
         Setting(
-            "Largest change of the set-point, degrees; 0 keeps the first course.", at_least=0.0, at_most=90.0
+            "Largest change of the set-point, degrees; 0 keeps the first course.",
+            at_least=0.0,
+            at_most=90.0,
         ),
     ] = 30.0
     change_interval_steps: Annotated[
         int,
-        Setting("Mean number of control intervals between changes of the set-point.", at_least=1, whole=True),
+        Setting(
+            "Mean number of control intervals between changes of the set-point.",
+            at_least=1,
+            whole=True,
+        ),
     ] = 200
     max_heading_error_deg: Annotated[
-        float, Setting("Heading error beyond which control is lost, degrees.", above=0.0, at_most=180.0)
+        float,
+        Setting(
+            "Heading error beyond which control is lost, degrees.",
+            above=0.0,
+            at_most=180.0,
+        ),
     ] = 90.0
     weights: Weights = Weights()
     course_changes_deg: Annotated[
         Numbers,
         Setting(
-            "Successive changes of the set-point, degrees, positive to starboard, instead of random "
-            "ones: the first at the start, the others every `change_interval_steps`.",
+            "Successive changes of the set-point, degrees, positive to starboard,"
+            " instead of random ones: the first at the start, the others every"
+            " `change_interval_steps`.",
             at_least=-180.0,
             at_most=180.0,
         ),
@@ -73,39 +100,57 @@ class Observation(NamedTuple):
     extras: Extras
 
 
-def begin(ship: Ship, settings: Settings, random: Random, plan: Numbers) -> tuple[Motion, State]:
+def begin(
+    ship: Ship, settings: Settings, random: Random, plan: Numbers
+) -> tuple[Motion, State]:
     """On a random heading, with a first set-point."""
     heading = drawn(random, 0, -pi, pi)
     motion = at_service_speed(0.0, 0.0, heading, ship)
     state = changed(State(heading, 0.0, 0.0, 0.0, 0.0), 0.0, settings, random)
-    return motion, State(state.course, state.next_change, 1.0, 0.0, wrap(state.course - heading))
+    return motion, State(
+        state.course, state.next_change, 1.0, 0.0, wrap(state.course - heading)
+    )
 
 
 def changed(state: State, steps: float, settings: Settings, random: Random) -> State:
     """The next heading to keep, listed or drawn, and the step at which it changes again."""
-    number = int(max(0.0, state.changes))  # not before the first, whatever a checkpoint holds
+    number = int(
+        max(0.0, state.changes)
+    )  # not before the first, whatever a checkpoint holds
     largest = radians(settings.course_change_deg)
     change = drawn(random, 1 + 2 * number, -largest, largest)
-    wait = floor(settings.change_interval_steps * drawn(random, 2 + 2 * number, 0.5, 1.5))
+    wait = floor(
+        settings.change_interval_steps * drawn(random, 2 + 2 * number, 0.5, 1.5)
+    )
     listed = settings.course_changes_deg
     if len(listed) > 0:
         change = radians(listed[number]) if number < len(listed) else 0.0
         wait = settings.change_interval_steps
     return State(
-        state.course + change, steps + max(wait, 1.0), state.changes + 1.0, state.integral,
+        state.course + change,
+        steps + max(wait, 1.0),
+        state.changes + 1.0,
+        state.integral,
         state.heading_error,
-    )  # fmt: skip
+    )
 
 
-def due(motion: Motion, state: State, interval: Interval, ship: Ship, settings: Settings) -> bool:
+def due(
+    motion: Motion, state: State, interval: Interval, ship: Ship, settings: Settings
+) -> bool:
     """Whether the set-point changes."""
     return interval.steps >= state.next_change
 
 
 def on_event(
-    motion: Motion, state: State, interval: Interval, ship: Ship, settings: Settings, random: Random,
+    motion: Motion,
+    state: State,
+    interval: Interval,
+    ship: Ship,
+    settings: Settings,
+    random: Random,
     plan: Numbers,
-) -> State:  # fmt: skip
+) -> State:
     """A new set-point."""
     return changed(state, interval.steps, settings, random)
 
@@ -117,9 +162,16 @@ def step(
     error = wrap(state.course - motion.psi)
     integral = integrated(state.integral, error, interval, ship, settings.weights)
     scaled = error * (1.0 / radians(settings.weights.heading_scale_deg))
-    reward = Reward(-scaled * scaled, steering_reward(motion, interval, ship, settings.weights))
+    reward = Reward(
+        -scaled * scaled, steering_reward(motion, interval, ship, settings.weights)
+    )
     lost = fabs(error) > radians(settings.max_heading_error_deg)
-    return State(state.course, state.next_change, state.changes, integral, error), reward, lost, False
+    return (
+        State(state.course, state.next_change, state.changes, integral, error),
+        reward,
+        lost,
+        False,
+    )
 
 
 def worst_cost(settings: Settings) -> float:
@@ -133,5 +185,6 @@ def observe(
 ) -> Observation:
     """What every autopilot sees."""
     return Observation(
-        helm(state.course, state.integral, readings, interval, ship), extras(readings, interval, ship)
+        helm(state.course, state.integral, readings, interval, ship),
+        extras(readings, interval, ship),
     )

@@ -11,27 +11,55 @@ from typing import Any
 
 import numpy as np
 
-from shipgym.checks import check_choice, check_number, check_text, check_whole, did_you_mean, quoted, shown
+from shipgym.checks import (
+    check_choice,
+    check_number,
+    check_text,
+    check_whole,
+    did_you_mean,
+    quoted,
+    shown,
+)
 from shipgym.engine.places import reward_of_another, step_of_task
 from shipgym.engine.records import Record, field_types, is_record, leaves
 from shipgym.engine.specialise import is_shipped
 from shipgym.errors import InputError
 from shipgym.python_files import asked, check_function
 from shipgym.tasks.contract import Seen
-from shipgym.tasks.source import Configurable, annotated, check_namespace, keywords, read_source  # fmt: skip
+from shipgym.tasks.source import (
+    Configurable,
+    annotated,
+    check_namespace,
+    keywords,
+    read_source,
+)
 
 RECORDS = ("Settings", "State", "Reward", "Observation")
 MOMENT = ("motion", "state", "interval", "ship", "settings")
 FUNCTIONS = {
-    "begin": ("ship", "settings", "random", "plan"), "step": MOMENT, "observe": ("readings", *MOMENT[1:]),
-    "due": MOMENT, "on_event": (*MOMENT, "random", "plan"), "worst_cost": ("settings",),
-    "plan_length": ("settings",), "check": ("settings", "model"), "listed": ("value",),
-}  # fmt: skip
+    "begin": ("ship", "settings", "random", "plan"),
+    "step": MOMENT,
+    "observe": ("readings", *MOMENT[1:]),
+    "due": MOMENT,
+    "on_event": (*MOMENT, "random", "plan"),
+    "worst_cost": ("settings",),
+    "plan_length": ("settings",),
+    "check": ("settings", "model"),
+    "listed": ("value",),
+}
 NEEDED = ("begin", "step", "observe")
-#: What shows an observation beside the others: an environment with `roll`, or with orders to the shaft.
+#: What shows an observation beside the others: an environment with `roll`, or with
+#: orders to the shaft.
 OPTIONS = ("", "roll", "shaft", "shaft speed")
 #: Names in `info` that are the engine's.
-TAKEN = ("reward", "terminated", "truncated", "envelope_distance", "extrapolating", "end")
+TAKEN = (
+    "reward",
+    "terminated",
+    "truncated",
+    "envelope_distance",
+    "extrapolating",
+    "end",
+)
 #: Registered tasks: name to module name.
 TASKS = {
     "CourseKeeping": "shipgym.tasks.course_keeping",
@@ -45,7 +73,15 @@ def never_due(motion: Any, state: Any, interval: Any, ship: Any, settings: Any) 
     return False
 
 
-def no_event(motion: Any, state: Any, interval: Any, ship: Any, settings: Any, random: Any, plan: Any) -> Any:
+def no_event(
+    motion: Any,
+    state: Any,
+    interval: Any,
+    ship: Any,
+    settings: Any,
+    random: Any,
+    plan: Any,
+) -> Any:
     """Of a task without events."""
     return state
 
@@ -99,7 +135,11 @@ class TaskDefinition(Configurable):
     def flags(self) -> tuple[str, ...]:
         """Reported fields that are true or false."""
         kinds = field_types(self.State, notes=True)
-        return tuple(name for name in self.reported if bool in getattr(kinds[name], "__metadata__", ()))
+        return tuple(
+            name
+            for name in self.reported
+            if bool in getattr(kinds[name], "__metadata__", ())
+        )
 
     @cached_property
     def reward_names(self) -> tuple[str, ...]:
@@ -114,7 +154,10 @@ class TaskDefinition(Configurable):
     @property
     def reward_source(self) -> str:
         """The file of its reward, for messages."""
-        return str(getattr(sys.modules.get(self.Reward.__module__), "__file__", None) or self.source)
+        return str(
+            getattr(sys.modules.get(self.Reward.__module__), "__file__", None)
+            or self.source
+        )
 
     def make_settings(self, options: Mapping[str, Any]) -> Any:
         """Settings by keywords; InputError for an unknown one, or a value that does not fit."""
@@ -127,11 +170,16 @@ def _seen(record: Record, prefix: str = "") -> dict[str, Any]:
     """How the fields of a record, and of those within it, are observed, by their paths."""
     paths: dict[str, Any] = {}
     for name, kind, seen in annotated(record, Seen):
-        paths |= _seen(kind, f"{prefix}{name}.") if is_record(kind) else {prefix + name: seen}
+        paths |= (
+            _seen(kind, f"{prefix}{name}.")
+            if is_record(kind)
+            else {prefix + name: seen}
+        )
     return paths
 
 
-#: Definitions by themselves: one that is read again is the same object, so that it is looked at once.
+#: Definitions by themselves: one that is read again is the same object, so that it is
+#: looked at once.
 _KNOWN: dict[TaskDefinition, TaskDefinition] = {}
 
 
@@ -143,11 +191,14 @@ def read_definition(source: Any, reward: Any = None) -> TaskDefinition:
     Parameters
     ----------
     source : str, Path or module
-        A name, the path of a Python file, or a module or object with the names of the contract.
+        A name, the path of a Python file, or a module or object with the names of the
+        contract.
     reward : str, Path or module, optional
         The path of a file, or a module, whose reward takes the place of the task's.
     """
-    definition = source if isinstance(source, TaskDefinition) else _definition(*_named(source))
+    definition = (
+        source if isinstance(source, TaskDefinition) else _definition(*_named(source))
+    )
     if reward is not None:
         definition = _with_reward(definition, reward)
     _check_names(definition)
@@ -159,8 +210,8 @@ def _named(source: Any) -> tuple[Any, str]:
         return read_source(importlib.import_module(TASKS[source]))
     if isinstance(source, str) and Path(source).suffix != ".py":
         raise InputError(
-            f"task: {source!r} found, expected the path of a .py file or one of {quoted(TASKS)}."
-            f"{did_you_mean(source, TASKS)}"
+            f"task: {source!r} found, expected the path of a .py file or one of"
+            f" {quoted(TASKS)}.{did_you_mean(source, TASKS)}"
         )
     return read_source(source)
 
@@ -176,13 +227,16 @@ def _definition(namespace: Any, where: str) -> TaskDefinition:
         if name not in found["State"]._fields or name in TAKEN:
             raise InputError(f"{where}: REPORTED: {shown(name)} found, {expected}")
     definition = TaskDefinition(
-        name=check_text(getattr(namespace, "NAME", Path(where).stem), f"{where}: NAME"), source=where,
+        name=check_text(getattr(namespace, "NAME", Path(where).stem), f"{where}: NAME"),
+        source=where,
         reported=tuple(reported),
         episode_steps=check_whole(
-            getattr(namespace, "EPISODE_STEPS", 600), f"{where}: EPISODE_STEPS", at_least=1
+            getattr(namespace, "EPISODE_STEPS", 600),
+            f"{where}: EPISODE_STEPS",
+            at_least=1,
         ),
         **found,
-    )  # fmt: skip
+    )
     for path, seen in definition.seen.items():
         _check_seen(seen, f"{where}: Observation.{path}")
     return definition
@@ -190,13 +244,18 @@ def _definition(namespace: Any, where: str) -> TaskDefinition:
 
 def _check_seen(seen: Seen | None, where: str) -> None:
     if seen is None:
-        raise InputError(f"{where}: no bounds found, expected Annotated[float, Seen(low, high, unit, scale)]")
+        raise InputError(
+            f"{where}: no bounds found, expected Annotated[float, Seen(low, high, unit,"
+            " scale)]"
+        )
     check_number(seen.low, f"{where}: lower bound")
     check_number(seen.high, f"{where}: upper bound", above=seen.low)
     check_choice(seen.option, OPTIONS, f"{where}: option")
     check_text(seen.unit, f"{where}: unit")
     if callable(seen.scale):
-        check_function(seen.scale, 2, f"{where}: scale", "a function of ship and settings")
+        check_function(
+            seen.scale, 2, f"{where}: scale", "a function of ship and settings"
+        )
     else:
         check_number(seen.scale, f"{where}: scale", above=0.0)
 
@@ -205,13 +264,18 @@ def _check_names(definition: TaskDefinition) -> None:
     seen = tuple(path.rpartition(".")[2] for path in definition.seen)
     settings = tuple(name for name, *_ in keywords(definition.Settings))
     rewards = ("end", *definition.reward_names)
-    for kind, names in (("Reward", rewards), ("Settings", settings), ("Observation", seen)):
+    for kind, names in (
+        ("Reward", rewards),
+        ("Settings", settings),
+        ("Observation", seen),
+    ):
         twice = [name for name in names if names.count(name) > 1]
         if twice:
             also = "; the engine has one of that name" if twice[0] == "end" else ""
             where = definition.reward_source if kind == "Reward" else definition.source
             raise InputError(
-                f"{where}: {kind}: two fields named {twice[0]!r} found, expected names that differ{also}"
+                f"{where}: {kind}: two fields named {twice[0]!r} found, expected names"
+                f" that differ{also}"
             )
 
 
@@ -219,20 +283,35 @@ def _check_names(definition: TaskDefinition) -> None:
 _FILLED: dict[Any, FunctionType] = {}
 
 
-def rewarded_step(motion: Any, state: Any, interval: Any, ship: Any, settings: Any) -> Any:
+def rewarded_step(
+    motion: Any, state: Any, interval: Any, ship: Any, settings: Any
+) -> Any:
     """What the task does in an interval, and what another's reward gives for it."""
     after, _, failed, arrived = step_of_task(motion, state, interval, ship, settings)
-    return after, reward_of_another(motion, after, interval, ship, settings), failed, arrived
+    return (
+        after,
+        reward_of_another(motion, after, interval, ship, settings),
+        failed,
+        arrived,
+    )
 
 
 def _with_reward(definition: TaskDefinition, source: Any) -> TaskDefinition:
     """A task with the reward of another file: `Reward` and `reward`, or `Reward` and a whole `step`."""
     namespace, where = read_source(source)
-    name = "step" if hasattr(namespace, "step") and not hasattr(namespace, "reward") else "reward"
+    name = (
+        "step"
+        if hasattr(namespace, "step") and not hasattr(namespace, "reward")
+        else "reward"
+    )
     functions = {name: MOMENT, "worst_cost": ("settings",)}
     found = check_namespace(namespace, where, ("Reward",), functions, ("worst_cost",))
     if name == "reward":
-        places = {"__name__": __name__, "step_of_task": definition.step, "reward_of_another": found.pop(name)}
+        places = {
+            "__name__": __name__,
+            "step_of_task": definition.step,
+            "reward_of_another": found.pop(name),
+        }
         step = FunctionType(rewarded_step.__code__, places, "rewarded_step")
         found["step"] = _FILLED.setdefault(tuple(places.values()), step)
     return replace(definition, **found)

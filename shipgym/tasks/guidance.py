@@ -1,8 +1,9 @@
 """Paths of waypoints, where a ship stands on them, and the course that leads back: line of sight.
 
-Sources: Fossen 2011, Handbook of Marine Craft Hydrodynamics and Motion Control, 10.3 (line of sight, circle
-of acceptance); Borhaug, Pavlov & Pettersen 2008, Integral LOS control for path following of underactuated
-marine surface vessels in the presence of constant ocean currents (integral line of sight).
+Sources: Fossen 2011, Handbook of Marine Craft Hydrodynamics and Motion Control, 10.3
+(line of sight, circle of acceptance); Borhaug, Pavlov & Pettersen 2008, Integral LOS
+control for path following of underactuated marine surface vessels in the presence of
+constant ocean currents (integral line of sight).
 """
 
 from dataclasses import dataclass
@@ -35,8 +36,8 @@ class PathPosition(NamedTuple):
 class Path:
     """Straight legs from waypoint to waypoint.
 
-    Raises InputError for fewer than two waypoints, one that is not finite, or one that repeats the one before
-    it.
+    Raises InputError for fewer than two waypoints, one that is not finite, or one that
+    repeats the one before it.
     """
 
     waypoints: Floats  # shape (n_waypoints, 2); north and east, m
@@ -80,25 +81,32 @@ class Path:
         turns = np.abs(self.turns)
         for row in np.flatnonzero(turns > SHARPEST_TURN)[:1] + 1:
             raise InputError(
-                f"waypoints: the path doubles back at row {row}, by {np.degrees(turns[row - 1]):.0f} deg, "
-                f"expected turns of {np.degrees(SHARPEST_TURN):.0f} deg at most"
+                f"waypoints: the path doubles back at row {row}, by"
+                f" {np.degrees(turns[row - 1]):.0f} deg, expected turns of"
+                f" {np.degrees(SHARPEST_TURN):.0f} deg at most"
             )
-        corners = np.concatenate([[0], np.flatnonzero(turns > NO_TURN) + 1, [self.n_legs]])
+        corners = np.concatenate(
+            [[0], np.flatnonzero(turns > NO_TURN) + 1, [self.n_legs]]
+        )
         tangents = radius * np.tan(0.5 * np.append(0.0, turns)[corners])
         found = np.diff(np.append(0.0, np.cumsum(self.lengths))[corners])
         needed = tangents[:-1] + tangents[1:]
         for k in np.flatnonzero(found < needed * (1.0 - 1e-9))[:1]:
             raise InputError(
-                f"waypoints: rows {corners[k]} and {corners[k + 1]} are {found[k]:.6g} m apart, expected at "
-                f"least {needed[k]:.6g} m, which turns with a radius of {radius:.6g} m take; set them "
-                "further apart, or set a smaller turn_radius"
+                f"waypoints: rows {corners[k]} and {corners[k + 1]} are {found[k]:.6g}"
+                f" m apart, expected at least {needed[k]:.6g} m, which turns with a"
+                f" radius of {radius:.6g} m take; set them further apart, or set a"
+                " smaller turn_radius"
             )
 
     def position(self, x: ArrayLike, y: ArrayLike, leg: ArrayLike) -> PathPosition:
         """Where ships at x north and y east, m, stand on legs by their numbers, from 0; arrays alike."""
         legs = np.asarray(leg)
         course = self.courses[legs]
-        north, east = np.asarray(x) - self.waypoints[legs, 0], np.asarray(y) - self.waypoints[legs, 1]
+        north, east = (
+            np.asarray(x) - self.waypoints[legs, 0],
+            np.asarray(y) - self.waypoints[legs, 1],
+        )
         along = north * np.cos(course) + east * np.sin(course)
         across = east * np.cos(course) - north * np.sin(course)
         return PathPosition(along, across, course, self.lengths[legs] - along)
@@ -117,17 +125,30 @@ def line_of_sight(where: PathPosition, lookahead: ArrayLike) -> Floats:
 
 
 def integral_line_of_sight(
-    where: PathPosition, lookahead: ArrayLike, integral: ArrayLike, gain: float, dt: float
+    where: PathPosition,
+    lookahead: ArrayLike,
+    integral: ArrayLike,
+    gain: float,
+    dt: float,
 ) -> tuple[Floats, Floats]:
     """Course that also counters a steady drift, and the integral one interval later (Borhaug 2008, 12).
 
-    `integral` is that of the cross-track error, m, `lookahead` is above 0 m, `gain`, 1/s, is sigma of the
-    source over the lookahead, and `dt` is the interval, s. The course is in rad; the integral, m, grows
-    slower the further the ship is off, so that it does not wind up.
+    `integral` is that of the cross-track error, m, `lookahead` is above 0 m, `gain`,
+    1/s, is sigma of the source over the lookahead, and `dt` is the interval, s. The
+    course is in rad; the integral, m, grows slower the further the ship is off, so that
+    it does not wind up.
     """
     offset = where.cross_track + np.asarray(integral)
-    rate = gain * np.square(lookahead) * where.cross_track / (np.square(offset) + np.square(lookahead))
-    return where.course - np.arctan2(offset, lookahead), np.asarray(integral) + dt * rate
+    rate = (
+        gain
+        * np.square(lookahead)
+        * where.cross_track
+        / (np.square(offset) + np.square(lookahead))
+    )
+    return (
+        where.course - np.arctan2(offset, lookahead),
+        np.asarray(integral) + dt * rate,
+    )
 
 
 def wrapped(angle: ArrayLike) -> Floats:
@@ -136,12 +157,20 @@ def wrapped(angle: ArrayLike) -> Floats:
 
 
 def random_path(
-    random: np.random.Generator, n_legs: int, leg_length: tuple[float, float], largest_turn_deg: float
+    random: np.random.Generator,
+    n_legs: int,
+    leg_length: tuple[float, float],
+    largest_turn_deg: float,
 ) -> Path:
     """A path from the origin, its first course, lengths of legs, m, and turns at waypoints drawn evenly."""
     check_whole(n_legs, "n_legs", at_least=1)
     check_number(leg_length[0], "leg_length", above=0.0, hint="in m")
-    check_number(leg_length[1], "leg_length", at_least=leg_length[0], hint="the least length first")
+    check_number(
+        leg_length[1],
+        "leg_length",
+        at_least=leg_length[0],
+        hint="the least length first",
+    )
     lengths = random.uniform(*leg_length, n_legs)
     turns = np.radians(largest_turn_deg) * random.uniform(-1.0, 1.0, n_legs - 1)
     courses = np.cumsum(np.append(random.uniform(-np.pi, np.pi), turns))
@@ -158,11 +187,20 @@ def track(waypoints: Floats | None, turn_radius: float | None) -> Floats | None:
         return waypoints
     path = Path(waypoints)
     pieces = [path.waypoints[:1]]
-    for corner, course, turn in zip(path.waypoints[1:-1], path.courses, path.turns, strict=False):
+    for corner, course, turn in zip(
+        path.waypoints[1:-1], path.courses, path.turns, strict=False
+    ):
         courses = course + np.linspace(0.0, turn, 2 + int(abs(turn) / ARC_POINTS))
-        ahead, aside = np.sin(courses) - np.sin(course), np.cos(course) - np.cos(courses)
+        ahead, aside = (
+            np.sin(courses) - np.sin(course),
+            np.cos(course) - np.cos(courses),
+        )
         tangent = abs(np.tan(0.5 * turn)) * np.array([np.cos(course), np.sin(course)])
-        pieces.append(corner + turn_radius * (np.sign(turn) * np.stack([ahead, aside], axis=-1) - tangent))
+        pieces.append(
+            corner
+            + turn_radius
+            * (np.sign(turn) * np.stack([ahead, aside], axis=-1) - tangent)
+        )
     return np.concatenate([*pieces, path.waypoints[-1:]])
 
 
@@ -173,16 +211,22 @@ def _waypoints(given: Any) -> Floats:
         points = np.empty(0)
     if points.ndim != 2 or points.shape[1:] != (2,) or len(points) < 2:
         raise InputError(
-            f"waypoints: shape {points.shape} found, expected at least 2 rows of north and east in m: (n, 2)"
+            f"waypoints: shape {points.shape} found, expected at least 2 rows of north"
+            " and east in m: (n, 2)"
         )
     for row in np.flatnonzero(~np.isfinite(points).all(axis=1))[:1]:
-        raise InputError(f"waypoints: row {row} is {points[row].tolist()}, expected finite numbers in m")
+        raise InputError(
+            f"waypoints: row {row} is {points[row].tolist()}, expected finite numbers"
+            " in m"
+        )
     for row in np.flatnonzero((np.abs(points) > FURTHEST).any(axis=1))[:1]:
         raise InputError(
-            f"waypoints: row {row} is {points[row].tolist()}, expected m within {FURTHEST:g} of the origin"
+            f"waypoints: row {row} is {points[row].tolist()}, expected m within"
+            f" {FURTHEST:g} of the origin"
         )
     for row in np.flatnonzero(np.all(np.diff(points, axis=0) == 0.0, axis=1))[:1] + 1:
         raise InputError(
-            f"waypoints: row {row} repeats {points[row].tolist()} of the row before, expected another point"
+            f"waypoints: row {row} repeats {points[row].tolist()} of the row before,"
+            " expected another point"
         )
     return points

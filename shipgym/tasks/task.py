@@ -25,8 +25,16 @@ Sea = str | Weather
 LONGEST_INTERVAL = 5.0  # ship lengths at service speed
 #: Keywords of environments of one ship, and of many.
 ENV_OPTIONS = ("model", "task", "reward", "render_mode", "allow_unstable")
-VECTOR_OPTIONS = ("num_envs", *ENV_OPTIONS, "autoreset_mode", "threads", "max_episode_steps")
-STEPS_PER_LENGTH = 20.0  # control intervals in the time to travel one ship length, about
+VECTOR_OPTIONS = (
+    "num_envs",
+    *ENV_OPTIONS,
+    "autoreset_mode",
+    "threads",
+    "max_episode_steps",
+)
+STEPS_PER_LENGTH = (
+    20.0  # control intervals in the time to travel one ship length, about
+)
 
 ACTIONS = ("rudder", "rudder-discrete", "rudder-shaft")
 #: Rudder orders of a discrete action, parts of the rudder limit.
@@ -57,30 +65,33 @@ class Task:
     settings : NamedTuple
         Its settings.
     sea : {"calm", "slight", "moderate", "rough"}, Weather, or a sequence of them
-        Sea state, whose wind and waves come from a direction drawn for each episode, or any weather; of
-        several one is drawn for each episode.
+        Sea state, whose wind and waves come from a direction drawn for each episode, or
+        any weather; of several one is drawn for each episode.
     dt : float or None
-        Control interval, s; by default about a twentieth of the time to travel one ship length,
-        rounded to 1, 2 or 5 times a power of ten.
+        Control interval, s; by default about a twentieth of the time to travel one ship
+        length, rounded to 1, 2 or 5 times a power of ten.
     episode_steps : int
         Control intervals after which an episode is truncated.
     max_envelope_distance : float
-        How many times further out than the training data the model may be taken before the episode
-        ends (see `Envelope.distance`).
+        How many times further out than the training data the model may be taken before
+        the episode ends (see `Envelope.distance`).
     action : {"rudder", "rudder-discrete", "rudder-shaft"}
-        What is commanded: the rudder, one of the orders in `RUDDER_ORDERS`, or rudder and shaft speed. A
-        shaft whose propeller is known ahead only is stopped by an order astern.
+        What is commanded: the rudder, one of the orders in `RUDDER_ORDERS`, or rudder
+        and shaft speed. A shaft whose propeller is known ahead only is stopped by an
+        order astern.
     roll : bool
         Whether roll angle and rate are observed.
     noise : float
-        Noise of heading, yaw rate, speeds and position, in multiples of a sea trial's sensors (`SEA_TRIAL`).
+        Noise of heading, yaw rate, speeds and position, in multiples of a sea trial's
+        sensors (`SEA_TRIAL`).
     measurement : {"raw", "filtered"}
-        Whether heading and yaw rate are shown with the first-order motion in waves or through a notch filter
-        at the frequency of encounter.
+        Whether heading and yaw rate are shown with the first-order motion in waves or
+        through a notch filter at the frequency of encounter.
     water_depth : float
         m; for ships that know shallow water.
     sensors : SensorSet, optional
-        Instruments of a user's own in place of `noise` and `measurement`; as a keyword, their file.
+        Instruments of a user's own in place of `noise` and `measurement`; as a keyword,
+        their file.
     sensor_settings : NamedTuple, optional
         Their settings.
     options : mapping
@@ -114,8 +125,9 @@ class Task:
         check_number(self.noise, "noise", at_least=0.0)
         if self.sensors is not None and (self.noise > 0.0 or self.measurement != "raw"):
             raise InputError(
-                f"sensors: {self.sensors.source} and noise or measurement found, expected one of the two: "
-                "noise and filters of a sensor set of your own are its own settings"
+                f"sensors: {self.sensors.source} and noise or measurement found,"
+                " expected one of the two: noise and filters of a sensor set of your"
+                " own are its own settings"
             )
 
     @classmethod
@@ -125,31 +137,55 @@ class Task:
         Raises InputError for a keyword that it does not have, or a value out of range.
         """
         task = read_definition(definition, options.pop("reward", None))
-        sensors = None if options.get("sensors") is None else read_sensors(options["sensors"])
+        sensors = (
+            None if options.get("sensors") is None else read_sensors(options["sensors"])
+        )
         check_keys(options, cls.option_names(task, sensors), f"{task.name} options")
         own = {name: value for name, value in options.items() if name in task.settings}
-        common = {name: value for name, value in options.items() if name in cls.common_names()}
-        common |= {"episode_steps": options.get("episode_steps", task.episode_steps), "sensors": sensors}
+        common = {
+            name: value for name, value in options.items() if name in cls.common_names()
+        }
+        common |= {
+            "episode_steps": options.get("episode_steps", task.episode_steps),
+            "sensors": sensors,
+        }
         if sensors is not None:
-            of_sensors = {name: value for name, value in options.items() if name in sensors.settings}
+            of_sensors = {
+                name: value
+                for name, value in options.items()
+                if name in sensors.settings
+            }
             common["sensor_settings"] = sensors.make_settings(of_sensors)
         return cls(task, task.make_settings(own), **common, options=options)
 
     @classmethod
     def common_names(cls) -> tuple[str, ...]:
         """Keywords of all tasks."""
-        return tuple(item.name for item in fields(cls)[2:] if item.name not in ("sensor_settings", "options"))
+        return tuple(
+            item.name
+            for item in fields(cls)[2:]
+            if item.name not in ("sensor_settings", "options")
+        )
 
     @classmethod
-    def option_names(cls, definition: TaskDefinition, sensors: SensorSet | None = None) -> tuple[str, ...]:
+    def option_names(
+        cls, definition: TaskDefinition, sensors: SensorSet | None = None
+    ) -> tuple[str, ...]:
         """Keywords of a task with a sensor set; InputError if two of them have one name."""
         names = (*definition.settings, *cls.common_names())
         if sensors is not None:
             names = (*names, *sensors.settings)
         for name in names:
             if names.count(name) > 1 or name in VECTOR_OPTIONS:
-                where = sensors.source if sensors and name in sensors.settings else definition.source
-                raise InputError(f"{where}: Settings.{name} found, which is a keyword already; rename it")
+                where = (
+                    sensors.source
+                    if sensors and name in sensors.settings
+                    else definition.source
+                )
+                raise InputError(
+                    f"{where}: Settings.{name} found, which is a keyword already;"
+                    " rename it"
+                )
         return names
 
     def changed(self, **options: Any) -> Self:
@@ -169,7 +205,9 @@ class Task:
     @cached_property
     def seas(self) -> tuple[Weather, ...]:
         """The weathers of which each episode has one."""
-        several: Sequence[Any] = self.sea if isinstance(self.sea, list | tuple) else [self.sea]
+        several: Sequence[Any] = (
+            self.sea if isinstance(self.sea, list | tuple) else [self.sea]
+        )
         return tuple(as_weather(one, "sea", None) for one in several)
 
     @property
@@ -193,38 +231,71 @@ class Task:
         """Refuse a ship that lacks what the task needs; InputError names the argument."""
         model.check_depth(self.water_depth)
         if self.dt is not None:
-            longest = LONGEST_INTERVAL * model.particulars["length"] / model.particulars["speed"]
-            check_number(self.dt, "dt", at_most=longest, hint=f"s: {LONGEST_INTERVAL:g} ship lengths")
+            longest = (
+                LONGEST_INTERVAL
+                * model.particulars["length"]
+                / model.particulars["speed"]
+            )
+            check_number(
+                self.dt,
+                "dt",
+                at_most=longest,
+                hint=f"s: {LONGEST_INTERVAL:g} ship lengths",
+            )
         if not getattr(model.dynamics, "has_rudder", True):
-            raise InputError(f"model: {model.name!r} has no rudder, expected a ship that is steered by one")
+            raise InputError(
+                f"model: {model.name!r} has no rudder, expected a ship that is steered"
+                " by one"
+            )
         if self.roll and "phi" not in model.state_names:
             raise InputError(
-                f"roll: {model.name!r} does not roll; leave it out, or take a ship with 4 degrees of freedom"
+                f"roll: {model.name!r} does not roll; leave it out, or take a ship with"
+                " 4 degrees of freedom"
             )
         if self.action == "rudder-shaft" and not model.service_shaft_speed > 0.0:
-            raise InputError(f"action: 'rudder-shaft' found, but {model.name!r} has no shaft speed")
+            raise InputError(
+                f"action: 'rudder-shaft' found, but {model.name!r} has no shaft speed"
+            )
         asked(self.definition.check, self.settings, model)
         for quantity in self.observed(model):
-            where = f"{self.definition.source}: Observation.{quantity.path}: scale for {model.name!r}"
+            where = (
+                f"{self.definition.source}: Observation.{quantity.path}: scale for"
+                f" {model.name!r}"
+            )
             check_number(quantity.scale, where, above=0.0)
         where = f"{self.definition.source}: plan_length"
-        check_whole(asked(self.definition.plan_length, self.settings), where, at_least=0)
+        check_whole(
+            asked(self.definition.plan_length, self.settings), where, at_least=0
+        )
 
     def observed(self, model: ShipModel) -> tuple[Observed, ...]:
         """What is observed of a ship, in order."""
         ship = ship_of(model, self.water_depth)
         shaft = self.action == "rudder-shaft"
         speed = shaft and "n" in model.state_names
-        shown = ("", *["roll"] * self.roll, *["shaft"] * shaft, *["shaft speed"] * speed)
+        shown = (
+            "",
+            *["roll"] * self.roll,
+            *["shaft"] * shaft,
+            *["shaft speed"] * speed,
+        )
         return tuple(
-            Observed(path.rpartition(".")[2], seen.low, seen.high, self.scale(path, ship), path)
+            Observed(
+                path.rpartition(".")[2],
+                seen.low,
+                seen.high,
+                self.scale(path, ship),
+                path,
+            )
             for path, seen in self.definition.seen.items()
             if seen.option in shown
         )
 
     def instruments(self, windy: bool) -> SensorSet:
         """What shows the ship, in weather or in calm water."""
-        return self.sensors or shipped_sensors(windy, self.noise > 0.0, self.measurement == "filtered")
+        return self.sensors or shipped_sensors(
+            windy, self.noise > 0.0, self.measurement == "filtered"
+        )
 
     def scale(self, path: str, ship: Ship) -> float:
         """Physical value of an observation of 1."""
@@ -260,7 +331,10 @@ class Task:
         """A setting by its name."""
         if name.startswith("_") or name in ("definition", "settings", "seas"):
             raise AttributeError(name)
-        for record in (self.settings, *(value for value in self.settings if hasattr(value, "_fields"))):
+        for record in (
+            self.settings,
+            *(value for value in self.settings if hasattr(value, "_fields")),
+        ):
             if name in record._fields:
                 return getattr(record, name)
         raise AttributeError(f"task {self.definition.name!r} has no setting {name!r}")
@@ -275,7 +349,10 @@ def rounded_interval(length_time: float) -> float:
     """The same for a ship that travels her length in so many seconds."""
     wanted = length_time / STEPS_PER_LENGTH
     power = 10.0 ** np.floor(np.log10(wanted))
-    return float(min((1.0, 2.0, 5.0, 10.0), key=lambda step: abs(np.log(step * power / wanted))) * power)
+    return float(
+        min((1.0, 2.0, 5.0, 10.0), key=lambda step: abs(np.log(step * power / wanted)))
+        * power
+    )
 
 
 def course_keeping_task(**options: Any) -> Task:
@@ -290,4 +367,6 @@ def path_following_task(**options: Any) -> Task:
 
 def observation_scales(model: ShipModel) -> Floats:
     """Physical value of a course-keeping observation of 1, in the order of `OBSERVATION_NAMES`, SI units."""
-    return np.array([quantity.scale for quantity in course_keeping_task().observed(model)])
+    return np.array(
+        [quantity.scale for quantity in course_keeping_task().observed(model)]
+    )

@@ -9,11 +9,13 @@ from shipgym.errors import InputError
 from shipgym.trials.clock_texts import DAY, clock_text, read_clock
 from shipgym.trials.resampling import Log
 
-#: A rudder this far, rad, from its usual place is active; quiet for this long, s, it ends a manoeuvre.
+#: A rudder this far, rad, from its usual place is active; quiet for this long, s, it
+#: ends a manoeuvre.
 ACTIVE, QUIET_S = float(np.radians(3.0)), 60.0
 _BEFORE_S, _SHORTEST_S = 30.0, 30.0
 _EXPECTED = (
-    'expected cut = "rudder", or stretches in seconds or clock time: [[60, 360], ["09:30:00", "09:41:30"]]'
+    'expected cut = "rudder", or stretches in seconds or clock time: [[60, 360],'
+    ' ["09:30:00", "09:41:30"]]'
 )
 
 
@@ -21,7 +23,9 @@ def check_cut(cut: Any, where: str) -> None:
     """InputError unless this is None, "rudder" or a list of pairs of numbers or texts."""
     pairs = cut if isinstance(cut, list) and cut else [None]
     if cut not in (None, "rudder") and not all(
-        isinstance(pair, list) and len(pair) == 2 and all(type(end) in (int, float, str) for end in pair)
+        isinstance(pair, list)
+        and len(pair) == 2
+        and all(type(end) in (int, float, str) for end in pair)
         for pair in pairs
     ):
         raise InputError(f"{where} cut: {shown(cut)} found, {_EXPECTED}")
@@ -34,13 +38,16 @@ def cut_log(cut: Any, log: Log, where: str) -> list[slice]:
     found = []
     for ends in _active_stretches(log, where) if cut == "rudder" else cut:
         first, last = (_seconds(moment, log, where) for moment in ends)
-        part = slice(int(np.searchsorted(log.t, first)), int(np.searchsorted(log.t, last, side="right")))
+        part = slice(
+            int(np.searchsorted(log.t, first)),
+            int(np.searchsorted(log.t, last, side="right")),
+        )
         if part.stop - part.start < 3:
             clock = (clock_text((log.start or 0.0) + log.t[k]) for k in (0, -1))
             raise InputError(
-                f"{where} cut: {ends[0]} to {ends[1]} holds no trial, expected stretches of the log, which "
-                f"goes from {log.t[0]:g} to {log.t[-1]:g} s"
-                + (f", {' to '.join(clock)}" if log.start else "")
+                f"{where} cut: {ends[0]} to {ends[1]} holds no trial, expected"
+                f" stretches of the log, which goes from {log.t[0]:g} to"
+                f" {log.t[-1]:g} s" + (f", {' to '.join(clock)}" if log.start else "")
             )
         found.append(part)
     return found
@@ -55,7 +62,10 @@ def _seconds(when: float | str, log: Log, where: str) -> float:
     except ValueError:
         raise InputError(f"{where} cut: {when!r} found, {_EXPECTED}") from None
     if log.start is None:
-        raise InputError(f"{where} cut: {when!r} found, but the log has no clock; write seconds of its time")
+        raise InputError(
+            f"{where} cut: {when!r} found, but the log has no clock; write seconds of"
+            " its time"
+        )
     if dated:
         return float(seconds - log.start)
     after = float((seconds - log.start) % DAY)
@@ -67,11 +77,20 @@ def _active_stretches(log: Log, where: str) -> list[tuple[float, float]]:
     delta = log.channels.get("delta", np.zeros(log.t.size))
     active = log.t[np.abs(delta - np.median(delta)) > ACTIVE]
     breaks = np.flatnonzero(np.diff(active) > QUIET_S)
-    ends = zip(active[np.r_[0, breaks + 1]], active[np.r_[breaks, -1]], strict=True) if active.size else ()
-    found = [(float(a) - _BEFORE_S, float(b) + _BEFORE_S) for a, b in ends if b - a > _SHORTEST_S]
+    ends = (
+        zip(active[np.r_[0, breaks + 1]], active[np.r_[breaks, -1]], strict=True)
+        if active.size
+        else ()
+    )
+    found = [
+        (float(a) - _BEFORE_S, float(b) + _BEFORE_S)
+        for a, b in ends
+        if b - a > _SHORTEST_S
+    ]
     if not found:
         raise InputError(
-            f'{where} cut: "rudder" found, but no rudder that is more than 3 deg from its usual place for '
-            f"over {_SHORTEST_S:g} s, expected manoeuvres; give the stretches, or read another log"
+            f'{where} cut: "rudder" found, but no rudder that is more than 3 deg from'
+            f" its usual place for over {_SHORTEST_S:g} s, expected manoeuvres; give"
+            " the stretches, or read another log"
         )
     return found

@@ -45,26 +45,40 @@ class GuessedTrial(NamedTuple):
 def guess_columns(table: Table) -> list[Guess]:
     """The channels of a table; none where no column has a name that is known.
 
-    A column whose name ends with a unit of another quantity is not taken: a gyro in deg/s is no heading.
+    A column whose name ends with a unit of another quantity is not taken: a gyro in
+    deg/s is no heading.
     """
     found: dict[str, Guess] = {}
     for channel, pattern in WORDS["names"].items():
         for name in table.header:
             text = name.lower().replace("_", " ")
-            forms = (re.sub(r"[\[(].*", "", text).strip(), re.sub(r"[\[\]() ]+", " ", text).strip())
+            forms = (
+                re.sub(r"[\[(].*", "", text).strip(),
+                re.sub(r"[\[\]() ]+", " ", text).strip(),
+            )
             unit = _unit_named(text, QUANTITIES[channel])
-            known = name not in found and any(re.fullmatch(pattern, form) for form in forms)
+            known = name not in found and any(
+                re.fullmatch(pattern, form) for form in forms
+            )
             if known and unit is not None:
-                found[name] = Guess(channel, name, unit, _NAMED) if unit else _by_size(table, channel, name)
+                found[name] = (
+                    Guess(channel, name, unit, _NAMED)
+                    if unit
+                    else _by_size(table, channel, name)
+                )
                 break
     return list(found.values())
 
 
 def _unit_named(name: str, quantity: str) -> str | None:
     """The unit of a quantity with which a name ends, empty where it ends with none; None: another's."""
-    ends = {unit: rf"(.*[\[( ])?({words})[\]) ]*" for unit, words in WORDS["units"].items()}
+    ends = {
+        unit: rf"(.*[\[( ])?({words})[\]) ]*" for unit, words in WORDS["units"].items()
+    }
     found = [unit for unit, end in ends.items() if re.fullmatch(end, name)]
-    other = None if max(map(len, found), default=0) > 1 else ""  # one letter may be no unit: "Heading M"
+    other = (
+        None if max(map(len, found), default=0) > 1 else ""
+    )  # one letter may be no unit: "Heading M"
     return next((unit for unit in found if unit in UNITS[quantity]), other)
 
 
@@ -75,12 +89,16 @@ def _by_size(table: Table, channel: str, name: str) -> Guess:
     except InputError:  # clock times, degrees and minutes
         values = np.zeros(0)
     largest = float(np.max(np.abs(values[np.isfinite(values)]), initial=0.0))
-    limit, unit = WORDS["large"].get(channel) or WORDS["large"].get(quantity) or (np.inf, "")
+    limit, unit = (
+        WORDS["large"].get(channel) or WORDS["large"].get(quantity) or (np.inf, "")
+    )
     if largest <= limit:
         unit = next(iter(UNITS[quantity]))
     if unit == "unix" and largest > 1e11:
         unit = "unix ms"
-    reason = f"from its size, up to {largest:.4g}" if values.size else "from its content"
+    reason = (
+        f"from its size, up to {largest:.4g}" if values.size else "from its content"
+    )
     return Guess(channel, name, unit, reason)
 
 
@@ -90,25 +108,38 @@ def guess_trial(path: str | Path) -> GuessedTrial:
     Raises InputError, as the readers do, for a log that cannot be read so.
     """
     table = read_log(path)
-    guesses = {one.channel: one for one in guess_columns(table)} if table.time_unit == "s" else {}
+    guesses = (
+        {one.channel: one for one in guess_columns(table)}
+        if table.time_unit == "s"
+        else {}
+    )
     changed: dict[str, Any] = {}
     tried: set[tuple[str, str]] = set()
     while True:
-        columns = {one.channel: {"column": one.column, "unit": one.unit} for one in guesses.values()} or None
+        columns = {
+            one.channel: {"column": one.column, "unit": one.unit}
+            for one in guesses.values()
+        } or None
         conventions = Conventions(**changed, where=f"{path}:")
         try:
             trial = read_trials([table], columns, conventions, name=Path(path).name)[0]
             break
         except InputError as error:
-            fixed = QUANTITIES.keys() - {one.channel for one in guesses.values() if one.reason != _NAMED}
-            left = [one for one in error.instead if one not in tried and one[0] not in fixed]
+            fixed = QUANTITIES.keys() - {
+                one.channel for one in guesses.values() if one.reason != _NAMED
+            }
+            left = [
+                one for one in error.instead if one not in tried and one[0] not in fixed
+            ]
             if not left:
                 raise
             tried.add(left[0])
             name, value = left[0]
             if name in guesses:
                 _, column, unit, reason = guesses[name]
-                guesses[name] = Guess(name, column, value, f"by the check that refused {unit} ({reason})")
+                guesses[name] = Guess(
+                    name, column, value, f"by the check that refused {unit} ({reason})"
+                )
             else:
                 changed[name] = value
     used = [one.column for one in guesses.values()] or QUANTITIES

@@ -1,8 +1,9 @@
 """The options of an identification, each said once: its name, type, default, and what else is known of it.
 
-They are the keywords of `identification.identify`, the keys of the table [identify] of a ship file, the
-options of `shipgym identify` and the tables of `docs/identification.md`: all are made from `Options` and from
-`identify_table.toml`, which says of each field what it sets and which values it may have.
+They are the keywords of `identification.identify`, the keys of the table [identify] of
+a ship file, the options of `shipgym identify` and the tables of
+`docs/identification.md`: all are made from `Options` and from `identify_table.toml`,
+which says of each field what it sets and which values it may have.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -10,7 +11,14 @@ from dataclasses import dataclass, field
 from numbers import Real
 from typing import Any, Self
 
-from shipgym.checks import check_choice, check_number, check_table, check_text, did_you_mean, quoted
+from shipgym.checks import (
+    check_choice,
+    check_number,
+    check_table,
+    check_text,
+    did_you_mean,
+    quoted,
+)
 from shipgym.errors import InputError
 from shipgym.files import shipped_toml
 
@@ -35,7 +43,8 @@ class Option:
 
 #: Every option by name.
 OPTIONS: dict[str, Option] = {
-    name: Option(**entry) for name, entry in shipped_toml("shipgym.trials", "identify_table.toml").items()
+    name: Option(**entry)
+    for name, entry in shipped_toml("shipgym.trials", "identify_table.toml").items()
 }
 
 
@@ -43,8 +52,9 @@ OPTIONS: dict[str, Option] = {
 class Options:
     """The options of `identify`; `OPTIONS` says what each of them is.
 
-    Settings of the method are None where they were not given: the method has defaults of its own. Raises
-    InputError for an unknown uncertainty, and for settings of a prior without one.
+    Settings of the method are None where they were not given: the method has defaults
+    of its own. Raises InputError for an unknown uncertainty, and for settings of a
+    prior without one.
     """
 
     structure: Any = "abkowitz"
@@ -115,7 +125,10 @@ class Options:
         for name, unset in (("prior_strength", None), ("prior_folds", "trials")):
             found = getattr(self, name)
             if self.prior is None and found != unset and self.structure != "mmg":
-                raise InputError(f"{name}: {found!r} found without a prior; name one, or leave it out")
+                raise InputError(
+                    f"{name}: {found!r} found without a prior; name one, or leave"
+                    " it out"
+                )
 
     @classmethod
     def of(cls, given: Mapping[str, Any]) -> Self:
@@ -128,36 +141,53 @@ class Options:
 
     def settings(self) -> dict[str, Any]:
         """The settings of the method that were given."""
-        given = {name: getattr(self, name) for name, option in OPTIONS.items() if option.setting}
+        given = {
+            name: getattr(self, name)
+            for name, option in OPTIONS.items()
+            if option.setting
+        }
         return {name: value for name, value in given.items() if value is not None}
 
     def own(self) -> dict[str, Any]:
         """The options of `identify` itself."""
-        return {name: getattr(self, name) for name, option in OPTIONS.items() if not option.setting}
+        return {
+            name: getattr(self, name)
+            for name, option in OPTIONS.items()
+            if not option.setting
+        }
 
 
 def _is(value: Any, *kinds: type) -> bool:
     """Whether a value is of one of some types; a truth value is no number, and a blank no text."""
     if isinstance(value, bool):
         return bool in kinds
-    return isinstance(value, kinds) and not (isinstance(value, str) and not value.strip())
+    return isinstance(value, kinds) and not (
+        isinstance(value, str) and not value.strip()
+    )
 
 
 #: How each kind of value is recognised in a file; the words stand in messages.
 KINDS: dict[str, Callable[[Any], bool]] = {
-    TEXT: lambda value: _is(value, str), FLAG: lambda value: _is(value, bool),
-    NUMBER: lambda value: _is(value, Real), WHOLE: lambda value: _is(value, int),
-    TEXTS: lambda value: isinstance(value, list) and all(_is(one, str) for one in value),
-    TWO_NUMBERS: lambda value: isinstance(value, list) and [_is(one, Real) for one in value] == [True] * 2,
-    WHOLE_OR_TEXT: lambda value: _is(value, int, str), TEXT_OR_TABLE: lambda value: _is(value, str, Mapping),
-}  # fmt: skip
+    TEXT: lambda value: _is(value, str),
+    FLAG: lambda value: _is(value, bool),
+    NUMBER: lambda value: _is(value, Real),
+    WHOLE: lambda value: _is(value, int),
+    TEXTS: lambda value: (
+        isinstance(value, list) and all(_is(one, str) for one in value)
+    ),
+    TWO_NUMBERS: lambda value: (
+        isinstance(value, list) and [_is(one, Real) for one in value] == [True] * 2
+    ),
+    WHOLE_OR_TEXT: lambda value: _is(value, int, str),
+    TEXT_OR_TABLE: lambda value: _is(value, str, Mapping),
+}
 
 
 def check_options(table: Any, where: str) -> dict[str, Any]:
     """Check names, kinds and bounds of options; which of them fit together is known to the methods.
 
-    Raises InputError, which begins with `where` (``"ship.toml: [identify]"``), for an unknown option, a value
-    of another kind or out of bounds.
+    Raises InputError, which begins with `where` (``"ship.toml: [identify]"``), for an
+    unknown option, a value of another kind or out of bounds.
     """
     options = check_table(table, where, OPTIONS)
     for name, value in options.items():
@@ -165,7 +195,10 @@ def check_options(table: Any, where: str) -> dict[str, Any]:
         if option.kind == TEXT:
             check_text(value, f"{where} {name}")
         if not KINDS[option.kind](value):
-            raise InputError(f"{where} {name}: {value!r} found, expected {option.kind}: {option.meaning}")
+            raise InputError(
+                f"{where} {name}: {value!r} found, expected {option.kind}:"
+                f" {option.meaning}"
+            )
         if option.bounds and (value != float("inf") or "at_most" in option.bounds):
             check_number(value, f"{where} {name}", **option.bounds)
     return dict(options)

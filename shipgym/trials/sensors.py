@@ -20,9 +20,9 @@ FEWEST_SAMPLES = 3  # of a trial
 class Sensor:
     """One sensor, in the SI unit of its channel. The default is a perfect one.
 
-    The reading at time t is the signal at t - latency_s, plus drift and white noise, now and then an outlier,
-    rounded to the resolution. Raises InputError for a negative or infinite number, a probability above 1, or
-    a drift without correlation time.
+    The reading at time t is the signal at t - latency_s, plus drift and white noise,
+    now and then an outlier, rounded to the resolution. Raises InputError for a negative
+    or infinite number, a probability above 1, or a drift without correlation time.
 
     Attributes
     ----------
@@ -53,25 +53,40 @@ class Sensor:
     def __post_init__(self) -> None:
         for item in fields(self):
             most = 1.0 if item.name == "outlier_probability" else None
-            check_number(getattr(self, item.name), f"sensor {item.name}", at_least=0.0, at_most=most)
+            check_number(
+                getattr(self, item.name),
+                f"sensor {item.name}",
+                at_least=0.0,
+                at_most=most,
+            )
         check_number(self.drift_time_s, "sensor drift_time_s", above=0.0)
 
-    def read(self, times: Floats, t: Floats, signal: Floats, rng: np.random.Generator) -> Floats:
+    def read(
+        self, times: Floats, t: Floats, signal: Floats, rng: np.random.Generator
+    ) -> Floats:
         """Readings at some times of a signal known at times t, straight between them; all times in s."""
         reading: Floats = np.interp(times - self.latency_s, t, signal)
         if self.drift:
             reading += self.drift * gauss_markov(times, self.drift_time_s, rng)
         reading += self.noise * rng.standard_normal(len(times))
         wrong = rng.random(len(times)) < self.outlier_probability
-        reading += self.outlier_size * np.where(wrong, rng.standard_normal(len(times)), 0.0)
-        return np.round(reading / self.resolution) * self.resolution if self.resolution else reading
+        reading += self.outlier_size * np.where(
+            wrong, rng.standard_normal(len(times)), 0.0
+        )
+        return (
+            np.round(reading / self.resolution) * self.resolution
+            if self.resolution
+            else reading
+        )
 
 
-def gauss_markov(t: Floats, correlation_time_s: float, rng: np.random.Generator) -> Floats:
+def gauss_markov(
+    t: Floats, correlation_time_s: float, rng: np.random.Generator
+) -> Floats:
     """First-order Gauss-Markov process of unit variance at times in s, stationary from the first sample on.
 
-    Its autocorrelation is exp(-|lag| / correlation time), whatever the steps (Gelb 1974, Applied Optimal
-    Estimation, 3.8).
+    Its autocorrelation is exp(-|lag| / correlation time), whatever the steps (Gelb
+    1974, Applied Optimal Estimation, 3.8).
     """
     decay = np.exp(-np.diff(t) / correlation_time_s)
     shocks = rng.standard_normal(len(t))
@@ -84,16 +99,23 @@ def gauss_markov(t: Floats, correlation_time_s: float, rng: np.random.Generator)
 
 GNSS = Sensor(noise=0.3, drift=0.8, drift_time_s=300.0)
 
-#: The sensors of a sea trial: satellite position, gyro compass, Doppler log, rate gyro, inclinometer, rudder
-#: feedback and shaft pick-up. Orders are logged as they were given.
+#: The sensors of a sea trial: satellite position, gyro compass, Doppler log, rate gyro,
+#: inclinometer, rudder feedback and shaft pick-up. Orders are logged as they were
+#: given.
 SEA_TRIAL: Mapping[str, Sensor] = MappingProxyType(
     {
-        "x": GNSS, "y": GNSS, "psi": Sensor(noise=0.1 * DEGREE), "u": Sensor(noise=0.03),
-        "v": Sensor(noise=0.02), "r": Sensor(noise=0.02 * DEGREE), "p": Sensor(noise=0.02 * DEGREE),
-        "phi": Sensor(noise=0.1 * DEGREE), "delta": Sensor(resolution=0.1 * DEGREE),
+        "x": GNSS,
+        "y": GNSS,
+        "psi": Sensor(noise=0.1 * DEGREE),
+        "u": Sensor(noise=0.03),
+        "v": Sensor(noise=0.02),
+        "r": Sensor(noise=0.02 * DEGREE),
+        "p": Sensor(noise=0.02 * DEGREE),
+        "phi": Sensor(noise=0.1 * DEGREE),
+        "delta": Sensor(resolution=0.1 * DEGREE),
         "n": Sensor(resolution=0.1 / 60.0),
     }
-)  # fmt: skip
+)
 
 
 @dataclass(frozen=True)
@@ -103,13 +125,16 @@ class Sensors:
     Attributes
     ----------
     by_channel : mapping of str to Sensor
-        Channels without a sensor are logged as they are. By default those of a sea trial (`SEA_TRIAL`).
+        Channels without a sensor are logged as they are. By default those of a sea
+        trial (`SEA_TRIAL`).
     sampling_s : float or None
-        Time between logged samples, s, on straight lines between those of the trial; None: as in the trial.
+        Time between logged samples, s, on straight lines between those of the trial;
+        None: as in the trial.
     dropout_probability : float
         Of each sample to begin a gap in the log.
     dropout_samples : float
-        Mean length of a gap, samples. A gap leaves the samples out of the measured trial.
+        Mean length of a gap, samples. A gap leaves the samples out of the measured
+        trial.
     """
 
     by_channel: Mapping[str, Sensor] = field(default_factory=lambda: SEA_TRIAL)
@@ -121,20 +146,28 @@ class Sensors:
         for channel, sensor in self.by_channel.items():
             check_channel(channel, "sensors", time=False)
             if not isinstance(sensor, Sensor):
-                raise InputError(f"sensors: {channel}: {sensor!r} found, expected a Sensor")
+                raise InputError(
+                    f"sensors: {channel}: {sensor!r} found, expected a Sensor"
+                )
         if self.sampling_s is not None:
             check_number(self.sampling_s, "sensors sampling_s", above=0.0)
-        check_number(self.dropout_probability, "sensors dropout_probability", at_least=0.0, below=1.0)
+        check_number(
+            self.dropout_probability,
+            "sensors dropout_probability",
+            at_least=0.0,
+            below=1.0,
+        )
         check_number(self.dropout_samples, "sensors dropout_samples", at_least=1.0)
         object.__setattr__(self, "by_channel", MappingProxyType(dict(self.by_channel)))
 
     def measure(self, trial: Trial, seed: int = 0) -> Trial:
         """What the log of a trial, the true motion, would hold.
 
-        The same seed gives the same readings, channel by channel: a sensor more or less changes no other.
-        Channels and name are the trial's; samples in gaps are left out. Heading, heel and their rates have
-        the first-order motion in waves in them; the weather itself is not measured. Raises InputError if the
-        seed is not a whole number >= 0, or sampling and gaps leave fewer than three samples.
+        The same seed gives the same readings, channel by channel: a sensor more or less
+        changes no other. Channels and name are the trial's; samples in gaps are left
+        out. Heading, heel and their rates have the first-order motion in waves in them;
+        the weather itself is not measured. Raises InputError if the seed is not a whole
+        number >= 0, or sampling and gaps leave fewer than three samples.
         """
         check_whole(seed, "seed", at_least=0)
         t = self._sampled(trial)
@@ -142,12 +175,17 @@ class Sensors:
         for name, values in on_board(trial).items():
             rng = np.random.default_rng([seed, CHANNELS.index(name)])
             sensor, signal = self.by_channel.get(name, PERFECT), (t, trial.t, values)
-            readings[name] = orders_at(*signal) if name in ORDERS else sensor.read(*signal, rng)
-        kept = self._logged(len(t), np.random.default_rng([seed, CHANNELS.index(WEATHER[0])]))
+            readings[name] = (
+                orders_at(*signal) if name in ORDERS else sensor.read(*signal, rng)
+            )
+        kept = self._logged(
+            len(t), np.random.default_rng([seed, CHANNELS.index(WEATHER[0])])
+        )
         if kept.sum() < FEWEST_SAMPLES:
             raise InputError(
-                f"trial {trial.name!r}: {kept.sum()} of {len(t)} samples outside the gaps, expected at least "
-                f"{FEWEST_SAMPLES}; give a smaller dropout_probability"
+                f"trial {trial.name!r}: {kept.sum()} of {len(t)} samples outside the"
+                f" gaps, expected at least {FEWEST_SAMPLES}; give a smaller"
+                " dropout_probability"
             )
         facts = ("name", "kind", "use", "derived", "length", "over_ground")
         logged = {name: values[kept] for name, values in readings.items()}
@@ -160,8 +198,8 @@ class Sensors:
         count = int(np.floor(trial.duration / self.sampling_s * (1.0 + 1e-12))) + 1
         if count < FEWEST_SAMPLES:
             raise InputError(
-                f"sensors sampling_s: {self.sampling_s:g} s found, expected at most half of the "
-                f"{trial.duration:g} s of trial {trial.name!r}"
+                f"sensors sampling_s: {self.sampling_s:g} s found, expected at most"
+                f" half of the {trial.duration:g} s of trial {trial.name!r}"
             )
         return np.asarray(trial.t[0] + self.sampling_s * np.arange(count))
 
@@ -184,7 +222,9 @@ def on_board(trial: Trial) -> dict[str, Floats]:
     """What there is to measure: first-order motion in waves added, the weather left out."""
     channels = trial.channels
     return {
-        name: values + channels[f"{name}_wave"] if f"{name}_wave" in channels else values
+        name: (
+            values + channels[f"{name}_wave"] if f"{name}_wave" in channels else values
+        )
         for name, values in channels.items()
         if name not in WEATHER
     }

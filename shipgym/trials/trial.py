@@ -14,7 +14,14 @@ import numpy as np
 import numpy.typing as npt
 
 from shipgym.arrays import Floats
-from shipgym.checks import check_choice, check_finite, check_number, check_text, did_you_mean, quoted
+from shipgym.checks import (
+    check_choice,
+    check_finite,
+    check_number,
+    check_text,
+    did_you_mean,
+    quoted,
+)
 from shipgym.errors import InputError
 from shipgym.files import write_text
 from shipgym.trials.csv_reader import Table
@@ -24,8 +31,17 @@ from shipgym.trials.tables import from_frame, read_log
 from shipgym.trials.trial_import import Conventions, import_tables
 from shipgym.trials.units import CHANNELS, check_channel
 
-#: Kinds of manoeuvre that a trial may name; `shipgym.manoeuvres.register_manoeuvre` adds a user's own.
-KINDS = ["zigzag", "turning-circle", "spiral", "pull-out", "straight", "captive", "random"]
+#: Kinds of manoeuvre that a trial may name; `shipgym.manoeuvres.register_manoeuvre`
+#: adds a user's own.
+KINDS = [
+    "zigzag",
+    "turning-circle",
+    "spiral",
+    "pull-out",
+    "straight",
+    "captive",
+    "random",
+]
 
 #: What a trial is used for.
 USES = ("fit", "validate", "skip")
@@ -34,14 +50,16 @@ USES = ("fit", "validate", "skip")
 class Trial:
     """One recorded or simulated manoeuvre, immutable.
 
-    Channels, all in SI units: ``x`` north and ``y`` east of midship (m), heading ``psi`` (rad, clockwise,
-    without jumps), surge ``u`` and sway ``v`` of midship (m/s; forward, to starboard), yaw rate ``r`` and
-    roll rate ``p`` (rad/s), heel ``phi`` (rad), rudder ``delta`` (rad, positive steers to starboard) and
-    shaft speed ``n`` (rev/s), with the orders ``delta_command`` and ``n_command``; of captive tests the
-    forces ``X`` ahead and ``Y`` to starboard (N) and the yaw moment ``N`` about midship (N m). Simulated in
-    weather: first-order motion in waves ``psi_wave``, ``r_wave``, ``phi_wave`` and ``p_wave``, which is not
-    in psi, r, phi and p, the current ``current_north`` and ``current_east`` (m/s) and the wind
-    ``wind_speed`` (m/s) and ``wind_from`` (rad). Raises InputError for unknown channels, lengths that differ,
+    Channels, all in SI units: ``x`` north and ``y`` east of midship (m), heading
+    ``psi`` (rad, clockwise, without jumps), surge ``u`` and sway ``v`` of midship (m/s;
+    forward, to starboard), yaw rate ``r`` and roll rate ``p`` (rad/s), heel ``phi``
+    (rad), rudder ``delta`` (rad, positive steers to starboard) and shaft speed ``n``
+    (rev/s), with the orders ``delta_command`` and ``n_command``; of captive tests the
+    forces ``X`` ahead and ``Y`` to starboard (N) and the yaw moment ``N`` about midship
+    (N m). Simulated in weather: first-order motion in waves ``psi_wave``, ``r_wave``,
+    ``phi_wave`` and ``p_wave``, which is not in psi, r, phi and p, the current
+    ``current_north`` and ``current_east`` (m/s) and the wind ``wind_speed`` (m/s) and
+    ``wind_from`` (rad). Raises InputError for unknown channels, lengths that differ,
     values that are not finite, or time that goes back.
 
     Parameters
@@ -59,14 +77,17 @@ class Trial:
     derived : collection of str, optional
         Names of the channels that were not measured but computed from others.
     length : float, optional
-        Length of the ship between perpendiculars, m; indices of manoeuvres are given in it.
+        Length of the ship between perpendiculars, m; indices of manoeuvres are given in
+        it.
     repaired : mapping of str to int, optional
-        How many values of a channel were filled in, because they were missing or outliers.
+        How many values of a channel were filled in, because they were missing or
+        outliers.
     raw : Trial, optional
         The trial before it was smoothed or repaired.
     over_ground : bool, optional
-        Whether `u` and `v` are velocities over ground, with the current in them, and not through the water.
-        By default where one of them was derived, as it is from positions.
+        Whether `u` and `v` are velocities over ground, with the current in them, and
+        not through the water. By default where one of them was derived, as it is from
+        positions.
     notes : sequence of str, optional
         Remarks of the reader: what it corrected, left out or found amiss.
     """
@@ -83,29 +104,57 @@ class Trial:
     notes: tuple[str, ...]
 
     def __init__(
-        self, t: npt.ArrayLike, channels: Mapping[str, npt.ArrayLike], *, name: str = "trial",
-        kind: str | None = None, use: str = "fit", derived: Collection[str] = (),
-        length: float | None = None, repaired: Mapping[str, int] | None = None, raw: Trial | None = None,
-        over_ground: bool | None = None, notes: Sequence[str] = (),
-    ) -> None:  # fmt: skip
+        self,
+        t: npt.ArrayLike,
+        channels: Mapping[str, npt.ArrayLike],
+        *,
+        name: str = "trial",
+        kind: str | None = None,
+        use: str = "fit",
+        derived: Collection[str] = (),
+        length: float | None = None,
+        repaired: Mapping[str, int] | None = None,
+        raw: Trial | None = None,
+        over_ground: bool | None = None,
+        notes: Sequence[str] = (),
+    ) -> None:
         check_text(name, "trial: name")
         where = f"trial '{name}'"
         times = _frozen_array(t, f"{where}: t")
         _check_time(times, where)
         arrays = _frozen_channels(channels, times.shape, where)
         if unknown := sorted(set(derived) - arrays.keys()):
-            raise InputError(f"{where}: derived: {quoted(unknown)} found, expected some of {quoted(arrays)}")
+            raise InputError(
+                f"{where}: derived: {quoted(unknown)} found, expected some of"
+                f" {quoted(arrays)}"
+            )
         vars(self).update(
-            t=times, channels=MappingProxyType(arrays), name=name, derived=frozenset(derived),
+            t=times,
+            channels=MappingProxyType(arrays),
+            name=name,
+            derived=frozenset(derived),
             kind=None if kind is None else check_choice(kind, KINDS, f"{where}: kind"),
             use=check_choice(use, USES, f"{where}: use"),
-            length=None if length is None else check_number(length, f"{where}: length", above=0.0),
-            repaired=MappingProxyType(dict(repaired or {})), notes=tuple(notes), _raw=raw,
-            over_ground=bool({"u", "v"} & set(derived)) if over_ground is None else bool(over_ground),
-        )  # fmt: skip
+            length=(
+                None
+                if length is None
+                else check_number(length, f"{where}: length", above=0.0)
+            ),
+            repaired=MappingProxyType(dict(repaired or {})),
+            notes=tuple(notes),
+            _raw=raw,
+            over_ground=(
+                bool({"u", "v"} & set(derived))
+                if over_ground is None
+                else bool(over_ground)
+            ),
+        )
 
     def __setattr__(self, name: str, value: Any) -> None:
-        raise AttributeError(f"a trial is immutable: {name} cannot be set; `with_` returns a changed copy")
+        raise AttributeError(
+            f"a trial is immutable: {name} cannot be set; `with_` returns a changed"
+            " copy"
+        )
 
     @property
     def raw(self) -> Trial:
@@ -142,14 +191,16 @@ class Trial:
             return self.channels[channel]
         except KeyError:
             raise InputError(
-                f"trial '{self.name}': no channel '{channel}'.{did_you_mean(str(channel), self.channels)} "
-                f"Channels present: {quoted(self.channels)}"
+                f"trial '{self.name}': no channel"
+                f" '{channel}'.{did_you_mean(str(channel), self.channels)} Channels"
+                f" present: {quoted(self.channels)}"
             ) from None
 
     def __repr__(self) -> str:
         return (
-            f"Trial(name={self.name!r}, kind={self.kind!r}, use={self.use!r}, samples={len(self)}, "
-            f"duration={self.duration:g} s, channels={list(self.channels)})"
+            f"Trial(name={self.name!r}, kind={self.kind!r}, use={self.use!r},"
+            f" samples={len(self)}, duration={self.duration:g} s,"
+            f" channels={list(self.channels)})"
         )
 
     def _settings(self) -> dict[str, Any]:
@@ -163,22 +214,28 @@ class Trial:
         known = ("name", "kind", "use", "length", "over_ground")
         if unknown := changes.keys() - set(known):
             raise InputError(
-                f"trial '{self.name}': cannot change {quoted(sorted(unknown))}, only {', '.join(known)}"
+                f"trial '{self.name}': cannot change {quoted(sorted(unknown))}, only"
+                f" {', '.join(known)}"
             )
         return Trial(self.t, self.channels, **(self._settings() | changes))
 
     def with_channels(
-        self, channels: Mapping[str, npt.ArrayLike], *,
-        t: npt.ArrayLike | None = None, repaired: Mapping[str, int] | None = None,
-    ) -> Trial:  # fmt: skip
+        self,
+        channels: Mapping[str, npt.ArrayLike],
+        *,
+        t: npt.ArrayLike | None = None,
+        repaired: Mapping[str, int] | None = None,
+    ) -> Trial:
         """Return a copy with some channels replaced, of which this trial is the raw one.
 
-        With other times `t`, s, all channels are given. `repaired` counts filled values by channel, on top of
-        those filled before. Raises InputError as for a new trial.
+        With other times `t`, s, all channels are given. `repaired` counts filled values
+        by channel, on top of those filled before. Raises InputError as for a new trial.
         """
         counts = Counter(self.repaired) + Counter(repaired or {})
         settings = self._settings() | {"repaired": counts, "raw": self}
-        return Trial(self.t if t is None else t, {**self.channels, **channels}, **settings)
+        return Trial(
+            self.t if t is None else t, {**self.channels, **channels}, **settings
+        )
 
     def part(self, rows: slice, name: str | None = None) -> Trial:
         """Some of the samples, which are no manoeuvre, as a trial to fit, by the same name or another."""
@@ -187,26 +244,39 @@ class Trial:
 
     @classmethod
     def from_csv(
-        cls, path: str | Path | Table, columns: Mapping[str, str | Mapping[str, str]] | None = None,
-        rudder_positive: str = "starboard", velocity_frame: str = "body", *, origin: str = "midship",
-        xg: float | None = None, repair: str | None = None, name: str | None = None,
-        kind: str | None = None, use: str = "fit", length: float | None = None,
+        cls,
+        path: str | Path | Table,
+        columns: Mapping[str, str | Mapping[str, str]] | None = None,
+        rudder_positive: str = "starboard",
+        velocity_frame: str = "body",
+        *,
+        origin: str = "midship",
+        xg: float | None = None,
+        repair: str | None = None,
+        name: str | None = None,
+        kind: str | None = None,
+        use: str = "fit",
+        length: float | None = None,
         sensors: Mapping[str, Any] | None = None,
-    ) -> Trial:  # fmt: skip
+    ) -> Trial:
         """Read a trial from a log and convert it to SI units and the project's signs.
 
-        Channels that follow from others are derived where absent: ``r`` from ``psi``; ``u`` and ``v`` from
-        ``sog`` and ``cog``, else from position; ``psi`` from ``r`` where there is no position (relative to
-        the start). ``lat`` and ``lon`` become ``x`` and ``y``; ``stw``, speed through the water, is ``u``.
-        An InputError for anything wrong with file or arguments names file, line, column, value and remedy.
+        Channels that follow from others are derived where absent: ``r`` from ``psi``;
+        ``u`` and ``v`` from ``sog`` and ``cog``, else from position; ``psi`` from ``r``
+        where there is no position (relative to the start). ``lat`` and ``lon`` become
+        ``x`` and ``y``; ``stw``, speed through the water, is ``u``. An InputError for
+        anything wrong with file or arguments names file, line, column, value and
+        remedy.
 
         Parameters
         ----------
         path : str or Path
-            CSV with one header line, NMEA 0183, Excel (.xlsx), Parquet or MATLAB (.mat).
+            CSV with one header line, NMEA 0183, Excel (.xlsx), Parquet or MATLAB
+            (.mat).
         columns : mapping of str to str or mapping, optional
-            For each channel (``t`` included) its column, or ``{"column": name, "unit": unit}``. By default
-            every column that is named like a channel, in SI units. Of ``t`` also ``"date"`` and ``"zone"``.
+            For each channel (``t`` included) its column, or ``{"column": name, "unit":
+            unit}``. By default every column that is named like a channel, in SI units.
+            Of ``t`` also ``"date"`` and ``"zone"``.
         rudder_positive : {"starboard", "port"}
             Side to which a positive rudder angle of the file steers.
         velocity_frame : {"body", "earth"}
@@ -216,8 +286,8 @@ class Trial:
         xg : float, optional
             Centre of gravity forward of midship, m.
         repair : {"interpolate"}, optional
-            Fill missing values (nan, empty cells) from their neighbours; rows at either end that lack a value
-            are left out. Without it a missing value is an error.
+            Fill missing values (nan, empty cells) from their neighbours; rows at either
+            end that lack a value are left out. Without it a missing value is an error.
         name, kind, use, length : optional
             As in :class:`Trial`; the name is the file's by default.
         sensors : mapping, optional
@@ -226,38 +296,56 @@ class Trial:
         table = read_log(path)
         where = f"{table.path}:"
         tools = Instruments.from_mapping(sensors or {}, f"{where} sensors")
-        conventions = Conventions(rudder_positive, velocity_frame, origin, xg, repair, where, tools)
+        conventions = Conventions(
+            rudder_positive, velocity_frame, origin, xg, repair, where, tools
+        )
         name = table.path.name if name is None else name
-        return read_trials([table], columns, conventions, name=name, kind=kind, use=use, length=length)[0]
+        return read_trials(
+            [table], columns, conventions, name=name, kind=kind, use=use, length=length
+        )[0]
 
     @classmethod
     def from_frame(
-        cls, frame: Any, columns: Mapping[str, str | Mapping[str, str]] | None = None, **settings: Any
+        cls,
+        frame: Any,
+        columns: Mapping[str, str | Mapping[str, str]] | None = None,
+        **settings: Any,
     ) -> Trial:
         """A trial from a pandas frame, whose index is a column where it is no plain count of rows.
 
-        `columns` and the other keywords are those of :meth:`from_csv`. Raises InputError as that does.
+        `columns` and the other keywords are those of :meth:`from_csv`. Raises
+        InputError as that does.
         """
         return cls.from_csv(from_frame(frame), columns, **settings)
 
     def to_csv(self, path: str | Path) -> None:
         """Write time and all channels in SI units; :meth:`from_csv` reads back the very same numbers.
 
-        The file, replaced where it exists, is never there in part. InputError if it cannot be written.
+        The file, replaced where it exists, is never there in part. InputError if it
+        cannot be written.
         """
         names = ["t", *self.channels]
         rows = zip(*(self[name].tolist() for name in names), strict=True)
-        text = "\n".join([",".join(names), *(",".join(map(repr, row)) for row in rows)]) + "\n"
+        text = (
+            "\n".join([",".join(names), *(",".join(map(repr, row)) for row in rows)])
+            + "\n"
+        )
         write_text(text, Path(path))
 
 
 def read_trials(
-    tables: Sequence[Table], columns: Mapping[str, Any] | None, conventions: Conventions, cut: Any = None,
-    *, name: str, **facts: Any,
-) -> list[Trial]:  # fmt: skip
+    tables: Sequence[Table],
+    columns: Mapping[str, Any] | None,
+    conventions: Conventions,
+    cut: Any = None,
+    *,
+    name: str,
+    **facts: Any,
+) -> list[Trial]:
     """The trials in the tables of one log: one, or those that `cut` makes of it (:func:`.cuts.cut_log`).
 
-    `name`, `kind`, `use` and `length` are as in :class:`Trial`; a part is named by its seconds.
+    `name`, `kind`, `use` and `length` are as in :class:`Trial`; a part is named by its
+    seconds.
     """
     found = import_tables(tables, columns, conventions)
     trials = []
@@ -266,11 +354,16 @@ def read_trials(
         called = name if cut is None else f"{name} {t[0]:.0f}-{t[-1]:.0f} s"
         trials.append(
             Trial(
-                t, {channel: values[part] for channel, values in found.channels.items()}, name=called,
-                derived=found.derived, repaired=found.repaired, over_ground=found.over_ground,
-                notes=found.notes, **facts,
+                t,
+                {channel: values[part] for channel, values in found.channels.items()},
+                name=called,
+                derived=found.derived,
+                repaired=found.repaired,
+                over_ground=found.over_ground,
+                notes=found.notes,
+                **facts,
             )
-        )  # fmt: skip
+        )
     return trials
 
 
@@ -279,14 +372,17 @@ def _frozen_channels(
 ) -> dict[str, Floats]:
     """The channels as read-only arrays, after checking names and lengths."""
     if not channels:
-        raise InputError(f"{where}: no channel found, expected at least one of {quoted(CHANNELS)}")
+        raise InputError(
+            f"{where}: no channel found, expected at least one of {quoted(CHANNELS)}"
+        )
     arrays = {}
     for channel, values in channels.items():
         check_channel(channel, where, time=False)
         arrays[channel] = _frozen_array(values, f"{where}: {channel}")
         if arrays[channel].shape != shape:
             raise InputError(
-                f"{where}: {channel} has {arrays[channel].size} samples, expected {shape[0]} as in t"
+                f"{where}: {channel} has {arrays[channel].size} samples, expected"
+                f" {shape[0]} as in t"
             )
     return arrays
 
@@ -296,7 +392,9 @@ def _frozen_array(values: npt.ArrayLike, where: str) -> Floats:
     hint = 'leave such samples out, or import the file with repair = "interpolate"'
     array = check_finite(values, where, hint)
     if array.ndim != 1:
-        raise InputError(f"{where}: array of shape {array.shape} found, expected (n_samples,)")
+        raise InputError(
+            f"{where}: array of shape {array.shape} found, expected (n_samples,)"
+        )
     return array
 
 
@@ -307,6 +405,6 @@ def _check_time(t: Floats, where: str) -> None:
     if back.any():
         index = int(np.argmax(back))
         raise InputError(
-            f"{where}: t goes from {t[index]:g} to {t[index + 1]:g} s at sample {index + 1}, "
-            "expected strictly increasing time"
+            f"{where}: t goes from {t[index]:g} to {t[index + 1]:g} s at sample"
+            f" {index + 1}, expected strictly increasing time"
         )

@@ -8,7 +8,8 @@ from shipgym.files import shipped_toml
 
 DEGREE, KNOT = math.pi / 180.0, 1852.0 / 3600.0
 
-#: Factor from each unit to SI, by the quantity measured. The first unit of each is the SI one.
+#: Factor from each unit to SI, by the quantity measured. The first unit of each is the
+#: SI one.
 UNITS: dict[str, dict[str, float]] = shipped_toml("shipgym.trials", "units.toml")
 
 _CHANNELS = shipped_toml("shipgym.trials", "channels.toml")
@@ -16,15 +17,20 @@ _CHANNELS = shipped_toml("shipgym.trials", "channels.toml")
 #: The quantity that each channel measures.
 QUANTITIES: dict[str, str] = {name: row["quantity"] for name, row in _CHANNELS.items()}
 
-#: What a file may hold and a trial does not: position, speed and course over ground, speed through the water.
+#: What a file may hold and a trial does not: position, speed and course over ground,
+#: speed through the water.
 INPUTS = tuple(name for name, row in _CHANNELS.items() if "log_only" in row)
 
 #: Names of the channels of a trial, without time.
-CHANNELS: tuple[str, ...] = tuple(name for name in QUANTITIES if name not in ("t", *INPUTS))
+CHANNELS: tuple[str, ...] = tuple(
+    name for name in QUANTITIES if name not in ("t", *INPUTS)
+)
 
 #: Largest magnitude of each channel that can be a ship's, or a small model's; SI units.
 LIMITS: dict[str, float] = {
-    name: row["largest"] * (UNITS[row["quantity"]][row["unit"]] if "unit" in row else 1.0)
+    name: (
+        row["largest"] * (UNITS[row["quantity"]][row["unit"]] if "unit" in row else 1.0)
+    )
     for name, row in _CHANNELS.items()
 }
 
@@ -34,7 +40,9 @@ def check_channel(name: str, where: str, *, time: bool = True) -> str:
     known = tuple(QUANTITIES) if time else CHANNELS  # a file's, or a trial's
     if name not in known:
         hint = did_you_mean(str(name), known)
-        raise InputError(f"{where}: unknown channel {name!r}.{hint} Known channels: {quoted(known)}")
+        raise InputError(
+            f"{where}: unknown channel {name!r}.{hint} Known channels: {quoted(known)}"
+        )
     return name
 
 
@@ -49,6 +57,17 @@ def si_factor(channel: str, unit: str, where: str = "unit") -> float:
     fitting = UNITS[quantity]
     if isinstance(unit, str) and unit in fitting:
         return fitting[unit]
-    others = [other for other, units in UNITS.items() if isinstance(unit, str) and unit in units]
-    hint = f" '{unit}' is a unit of {others[0]}" if others else did_you_mean(str(unit), fitting)
-    raise InputError(f"{where}: unit {unit!r} found, expected a unit of {quantity}: {quoted(fitting)}.{hint}")
+    others = [
+        other
+        for other, units in UNITS.items()
+        if isinstance(unit, str) and unit in units
+    ]
+    hint = (
+        f" '{unit}' is a unit of {others[0]}"
+        if others
+        else did_you_mean(str(unit), fitting)
+    )
+    raise InputError(
+        f"{where}: unit {unit!r} found, expected a unit of {quantity}:"
+        f" {quoted(fitting)}.{hint}"
+    )

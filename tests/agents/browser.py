@@ -8,14 +8,24 @@ from typing import Any
 
 from playwright.sync_api import Error, sync_playwright
 
-COMMAND = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+COMMAND = next(
+    filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))),
+    None,
+)
 FLAGS = (
-    "--headless", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage",
-    "--disable-background-networking", "--disable-component-update", "--disable-sync",
+    "--headless",
+    "--no-sandbox",
+    "--disable-gpu",
+    "--disable-dev-shm-usage",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
     "--host-resolver-rules=MAP * ~NOTFOUND, EXCLUDE 127.0.0.1",
-)  # fmt: skip
+)
 PATIENCE = 60.0  # s, for an answer
-FRAME = "new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))"
+FRAME = (
+    "new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))"
+)
 
 
 class Browser:
@@ -26,8 +36,12 @@ class Browser:
         self.requests: list[str] = []
         self._playwright = sync_playwright().start()
         try:
-            self._browser = self._playwright.chromium.launch(executable_path=COMMAND, args=list(FLAGS))
-            self.page = self._browser.new_page(viewport={"width": width, "height": height})
+            self._browser = self._playwright.chromium.launch(
+                executable_path=COMMAND, args=list(FLAGS)
+            )
+            self.page = self._browser.new_page(
+                viewport={"width": width, "height": height}
+            )
         except BaseException:
             self._playwright.stop()
             raise
@@ -79,14 +93,19 @@ class Browser:
         """Click an element, so far across it from its left."""
         box = self.page.locator(selector).first.bounding_box()
         assert box is not None
-        self.page.mouse.click(box["x"] + across * box["width"], box["y"] + 0.5 * box["height"])
+        self.page.mouse.click(
+            box["x"] + across * box["width"], box["y"] + 0.5 * box["height"]
+        )
 
     def resize(self, width: int, height: int, mobile: bool = False) -> None:
         """Another window, or the screen of a telephone."""
         self.ask(
             "Emulation.setDeviceMetricsOverride",
-            width=width, height=height, deviceScaleFactor=1, mobile=mobile,
-        )  # fmt: skip
+            width=width,
+            height=height,
+            deviceScaleFactor=1,
+            mobile=mobile,
+        )
 
     def close(self) -> None:
         """End the browser."""

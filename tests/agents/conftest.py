@@ -18,7 +18,9 @@ def chain(tmp_path_factory):
 
     folder = tmp_path_factory.mktemp("chain") / "report"
     stages = []
-    result = build_autopilot(DEMO, folder, draws=DRAWS, seed=1, progress=lambda *told: stages.append(told))
+    result = build_autopilot(
+        DEMO, folder, draws=DRAWS, seed=1, progress=lambda *told: stages.append(told)
+    )
     return folder, result, stages
 
 
@@ -27,7 +29,9 @@ def unstable_ship(tmp_path_factory):
     """A ship file whose one fitted trial, a turning circle, cannot tell 40 coefficients apart."""
     head, *trials = DEMO.read_text().replace("tls-svm", "ls").split("[[trials]]")
     uses = [text.replace('"fit"', '"validate"') for text in trials]
-    uses = [t.replace('"validate"', '"fit"') if "turning_circle" in t else t for t in uses]
+    uses = [
+        t.replace('"validate"', '"fit"') if "turning_circle" in t else t for t in uses
+    ]
     text = "[[trials]]".join([head, *uses])
     path = tmp_path_factory.mktemp("unstable") / "ship.toml"
     path.write_text(text.replace('file = "', f'file = "{DEMO.parent}/'))

@@ -18,7 +18,9 @@ def random_network(*sizes, seed=0, activation="relu", output="linear"):
         (random.normal(0.0, n_in**-0.5, (n_out, n_in)), random.normal(0.0, 0.1, n_out))
         for n_in, n_out in pairwise(sizes)
     ]
-    single = tuple((weight.astype(np.float32), bias.astype(np.float32)) for weight, bias in layers)
+    single = tuple(
+        (weight.astype(np.float32), bias.astype(np.float32)) for weight, bias in layers
+    )
     return Network(single, activation, output)
 
 

@@ -8,7 +8,11 @@ from agents import LQ, LineOfSight, sail
 from agents.cli.terminal import ranking_table
 from agents.engines.jobs import JobEngine
 from agents.verification.chain import build_autopilot, verify
-from agents.verification.index_uncertainty import nominal_runs, sail_draws, uncertainty_of
+from agents.verification.index_uncertainty import (
+    nominal_runs,
+    sail_draws,
+    uncertainty_of,
+)
 from agents.verification.page import write_report
 from agents.verification.result import verification_metrics
 from agents.verification.tracks import keep_track
@@ -23,9 +27,15 @@ def test_the_folder_holds_report_model_metrics_and_all_autopilots(chain):
     folder, _, _ = chain
     found = sorted(path.name for path in folder.iterdir())
     assert found == [
-        "lq-scheduled.json", "lq.json", "metrics.json", "model.json", "pid.json", "report.html",
-        "turn-rate.json", "wheel-over.json",
-    ]  # fmt: skip
+        "lq-scheduled.json",
+        "lq.json",
+        "metrics.json",
+        "model.json",
+        "pid.json",
+        "report.html",
+        "turn-rate.json",
+        "wheel-over.json",
+    ]
     assert list(folder.parent.iterdir()) == [folder]
 
 
@@ -42,7 +52,9 @@ def test_metrics_tell_probabilities_margins_and_ranking(chain):
     folder, result, _ = chain
     metrics = json.loads((folder / "metrics.json").read_text())
     assert metrics["draws"]["count"] == 24
-    assert metrics["draws"]["unstable"] == int(result.verification.manoeuvres.unstable.sum())
+    assert metrics["draws"]["unstable"] == int(
+        result.verification.manoeuvres.unstable.sum()
+    )
     assert metrics["imo"]["advance"]["probability"] == 1.0
     assert metrics["imo"]["tactical_diameter"]["probability"] == 0.0
     assert sorted(metrics["ranking"]) == ["lq", "lq-scheduled", "pid", "turn-rate"]
@@ -62,18 +74,26 @@ def test_wheel_over_keeps_to_the_track_in_a_current_on_every_model_drawn(chain):
     assert track.largest.max() < 0.5 * length
     told = result.metrics["tracks"]["wheel-over"]
     assert told["cross_track_largest_m"] == track.largest[0]
-    late = replace(track.controller, gains={**track.controller.gains, "turn_reach": 1.0})
+    late = replace(
+        track.controller, gains={**track.controller.gains, "turn_reach": 1.0}
+    )
     assert keep_track(late, [result.model]).largest[0] > 1.5 * track.largest[0]
 
 
-def test_only_what_is_asked_for_is_designed_and_a_path_autopilot_alone_is_refused(chain):
+def test_only_what_is_asked_for_is_designed_and_a_path_autopilot_alone_is_refused(
+    chain,
+):
     model = chain[1].model
     found = verify(model, 4, 1, designs=("lqg", "lqg"))
     assert [pilot.key for pilot in found.pilots] == ["lqg"]
     assert found.tracks == ()
-    with pytest.raises(InputError, match=r"no autopilot that keeps a heading .*'wheel-over' found"):
+    with pytest.raises(
+        InputError, match=r"no autopilot that keeps a heading .*'wheel-over' found"
+    ):
         verify(model, 4, 1, designs=("wheel-over",))
-    with pytest.raises(InputError, match="autopilots: 'wheelover' found, expected one of"):
+    with pytest.raises(
+        InputError, match="autopilots: 'wheelover' found, expected one of"
+    ):
         build_autopilot("examples/mariner/ship.toml", "out", designs=["wheelover"])
 
 
@@ -84,7 +104,9 @@ def test_the_saved_model_is_the_identified_one(chain):
 
 def test_a_learned_guest_flies_beside_them_without_gains_and_margins(chain, tmp_path):
     result = chain[1]
-    guest = random_policy(result.model, base=LQ.from_model(result.model), authority=0.01)
+    guest = random_policy(
+        result.model, base=LQ.from_model(result.model), authority=0.01
+    )
     found = verify(result.model, 24, 1, guests=[guest])
     told = verification_metrics(found)["controllers"]
     alone = sail(guest, result.model.sample(24, 1), seeds=1 + np.arange(24))
@@ -92,7 +114,10 @@ def test_a_learned_guest_flies_beside_them_without_gains_and_margins(chain, tmp_
     assert told["learned"]["gains"] is told["learned"]["margins"] is None
     assert told["lq"] == verification_metrics(result.verification)["controllers"]["lq"]
     write_report(replace(result, verification=found), tmp_path / "report.html")
-    assert "LEARNED was trained earlier, on another model" in (tmp_path / "report.html").read_text()
+    assert (
+        "LEARNED was trained earlier, on another model"
+        in (tmp_path / "report.html").read_text()
+    )
     table = ranking_table(replace(result, verification=found))
     rows = dict(zip(table.columns[0].cells, table.columns[5].cells, strict=True))
     assert rows["LEARNED"] == "-"
@@ -101,22 +126,37 @@ def test_a_learned_guest_flies_beside_them_without_gains_and_margins(chain, tmp_
 
 def test_guests_of_one_name_are_told_apart(chain):
     model = chain[1].model
-    guests = [LQ.from_model(model, integral_lengths=20.0), LQ.from_model(model, integral_lengths=80.0)]
-    told = verification_metrics(verify(model, 4, 1, guests=guests, designs=("pid", "lq")))
-    assert set(told["controllers"]) == set(told["ranking"]) == {"pid", "lq", "lq-2", "lq-3"}
+    guests = [
+        LQ.from_model(model, integral_lengths=20.0),
+        LQ.from_model(model, integral_lengths=80.0),
+    ]
+    told = verification_metrics(
+        verify(model, 4, 1, guests=guests, designs=("pid", "lq"))
+    )
+    assert (
+        set(told["controllers"])
+        == set(told["ranking"])
+        == {"pid", "lq", "lq-2", "lq-3"}
+    )
     assert told["controllers"]["lq-2"]["gains"] == guests[0].gains
 
 
 @pytest.mark.parametrize("made_for", ["paths", "another ship"])
-def test_a_guest_of_another_environment_or_ship_is_wrong_input(demo, tmp_path, made_for):
+def test_a_guest_of_another_environment_or_ship_is_wrong_input(
+    demo, tmp_path, made_for
+):
     path = tmp_path / "guest.json"
     if made_for == "paths":
-        LineOfSight.from_model(load_model("mariner"), autopilot=LQ.from_model(load_model("mariner"))).save(
-            path
-        )
+        LineOfSight.from_model(
+            load_model("mariner"), autopilot=LQ.from_model(load_model("mariner"))
+        ).save(path)
     else:
         random_policy(load_model("kvlcc2")).save(path)
-    said = "cross_track.*for paths there is" if made_for == "paths" else "the scale of '.*' is"
+    said = (
+        "cross_track.*for paths there is"
+        if made_for == "paths"
+        else "the scale of '.*' is"
+    )
     with pytest.raises(InputError, match=f"agent '.*guest.json': .*{said}"):
         build_autopilot(demo, tmp_path / "out", draws=4, agents=[path])
     assert not (tmp_path / "out").exists()
@@ -124,15 +164,22 @@ def test_a_guest_of_another_environment_or_ship_is_wrong_input(demo, tmp_path, m
 
 def test_a_cluster_that_does_not_answer_is_no_fault_of_the_model(demo, tmp_path):
     where = JobEngine(engine="ray", address="127.0.0.1:1")
-    with pytest.raises(InputError, match=r"^address: no ray cluster answers|not installed"):
+    with pytest.raises(
+        InputError, match=r"^address: no ray cluster answers|not installed"
+    ):
         build_autopilot(demo, tmp_path / "out", draws=4, where=where)
     assert list(tmp_path.iterdir()) == []
 
 
 def test_an_unknown_guest_is_refused_with_the_nearest_name(tmp_path):
-    expected = "agent: 'mariner-clam-ppo' found, expected a file, or one of .*Did you mean 'mariner-calm-ppo'"
+    expected = (
+        "agent: 'mariner-clam-ppo' found, expected a file, or one of .*Did you mean"
+        " 'mariner-calm-ppo'"
+    )
     with pytest.raises(InputError, match=expected):
-        build_autopilot("examples/mariner/ship.toml", tmp_path / "out", agents=["mariner-clam-ppo"])
+        build_autopilot(
+            "examples/mariner/ship.toml", tmp_path / "out", agents=["mariner-clam-ppo"]
+        )
     assert list(tmp_path.iterdir()) == []
 
 
@@ -156,11 +203,19 @@ def test_every_autopilot_ends_on_the_new_course(chain):
         assert np.degrees(headings[:, -1]) == pytest.approx(20.0, abs=1.5)
 
 
-def test_an_unstable_model_gives_a_report_that_says_so_and_no_model(unstable_ship, tmp_path):
+def test_an_unstable_model_gives_a_report_that_says_so_and_no_model(
+    unstable_ship, tmp_path
+):
     result = build_autopilot(unstable_ship, tmp_path / "report", draws=10)
     assert not result.stable
-    assert sorted(path.name for path in (tmp_path / "report").iterdir()) == ["metrics.json", "report.html"]
-    assert "runs away" in json.loads((tmp_path / "report" / "metrics.json").read_text())["instability"]
+    assert sorted(path.name for path in (tmp_path / "report").iterdir()) == [
+        "metrics.json",
+        "report.html",
+    ]
+    assert (
+        "runs away"
+        in json.loads((tmp_path / "report" / "metrics.json").read_text())["instability"]
+    )
     page = (tmp_path / "report" / "report.html").read_text()
     assert "The identified model is unstable" in page
     assert "N_vvr" not in page
@@ -173,12 +228,18 @@ def test_too_few_draws_are_refused(demo, tmp_path):
 
 
 def test_a_rudder_of_the_wrong_sign_is_noticed(demo, tmp_path):
-    text = demo.read_text().replace('"starboard"', '"port"').replace('file = "', f'file = "{demo.parent}/')
+    text = (
+        demo.read_text()
+        .replace('"starboard"', '"port"')
+        .replace('file = "', f'file = "{demo.parent}/')
+    )
     (tmp_path / "ship.toml").write_text(text)
     with pytest.raises(InputError, match="opposite sign"):
         ShipFile.load(tmp_path / "ship.toml").trials()
     ship = ShipFile.load(demo)
-    trials = [trial.with_channels({"delta": -trial["delta"]}) for trial in ship.trials()]
+    trials = [
+        trial.with_channels({"delta": -trial["delta"]}) for trial in ship.trials()
+    ]
     result = identify(trials, particulars=ship.particulars, steering=ship.steering)
     assert "likely a wrong rudder_positive" in model_warnings(result)[0]
 
@@ -213,7 +274,10 @@ def verified(**changes: float) -> dict:
     coefficients = {**mariner.coefficients, **changes}
     spread = np.diag([(1e-4 * value) ** 2 for value in coefficients.values()])
     found = verify(
-        replace(mariner, coefficients=coefficients, covariance=spread), 4, 0, designs=("pid", "lq")
+        replace(mariner, coefficients=coefficients, covariance=spread),
+        4,
+        0,
+        designs=("pid", "lq"),
     )
     metrics = verification_metrics(found)
     json.dumps(metrics, allow_nan=False)

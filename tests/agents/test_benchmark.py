@@ -43,7 +43,9 @@ N = 4
 
 
 def shipgym(*arguments):
-    return CliRunner().invoke(app, ["benchmark", *(str(argument) for argument in arguments)])
+    return CliRunner().invoke(
+        app, ["benchmark", *(str(argument) for argument in arguments)]
+    )
 
 
 @pytest.fixture(scope="module")
@@ -79,7 +81,9 @@ def test_results_are_read_back_as_they_were_written(folder):
 
 def test_the_file_names_what_it_was_made_with(folder):
     summary = json.loads((folder / "results.json").read_text())
-    assert {"shipgym", "numpy", "numba", "python", "processor"} <= set(summary["versions"])
+    assert {"shipgym", "numpy", "numba", "python", "processor"} <= set(
+        summary["versions"]
+    )
     assert len(summary["suite"]["sha256"]) == 64
     assert len(summary["suite"]["tasks"]["mariner-calm"]["model_sha256"]) == 64
     assert summary["seeds"] == {"first": 1_000_000, "count": N}
@@ -94,7 +98,9 @@ def test_the_table_is_tidy(folder):
     assert table.num_rows == 2 * N
     assert table.column_names[:4] == ["contestant", "task", "run", "seed"]
     assert str(table.schema.field("success").type) == "bool"
-    assert table.column("cross_track_rmse_m").null_count == 2 * N  # course keeping has no path
+    assert (
+        table.column("cross_track_rmse_m").null_count == 2 * N
+    )  # course keeping has no path
     assert table.column("seed").to_pylist() == 2 * [1_000_000 + k for k in range(N)]
     assert table.column("run").to_pylist() == 2 * N * [0]
 
@@ -102,8 +108,14 @@ def test_the_table_is_tidy(folder):
 @pytest.mark.parametrize(
     ("asked", "said"),
     [
-        (("pdi", "mariner-calm"), "contestant: 'pdi' found, expected one of 'pid', 'lq'"),
-        (("pid", "mariner-clam"), "task: 'mariner-clam' found, expected one of 'mariner-calm'"),
+        (
+            ("pdi", "mariner-calm"),
+            "contestant: 'pdi' found, expected one of 'pid', 'lq'",
+        ),
+        (
+            ("pid", "mariner-clam"),
+            "task: 'mariner-clam' found, expected one of 'mariner-calm'",
+        ),
         (("pid", "mariner-calm", "cots"), "figure: 'cots' found"),
     ],
 )
@@ -113,7 +125,9 @@ def test_figures_of_nobody_are_refused(folder, asked, said):
 
 
 def test_workers_find_the_same_bit_for_bit(folder, tmp_path):
-    result = benchmark("pid,lq", tasks=TASKS, out=tmp_path / "two", workers=2, episodes=N)
+    result = benchmark(
+        "pid,lq", tasks=TASKS, out=tmp_path / "two", workers=2, episodes=N
+    )
     for name, column in load_results(folder).episodes.items():
         np.testing.assert_array_equal(column, result.episodes[name], err_msg=name)
 
@@ -133,8 +147,12 @@ def test_what_was_done_is_kept_and_not_done_again(folder, copy, monkeypatch):
     from agents.rollouts.metrics import evaluate as original
 
     result = benchmark("pid,lq,los", tasks=TASKS, out=copy, resume=True, episodes=N)
-    assert asked == ["lq"]  # los leads the LQ where there is no path; pid and lq are there
-    np.testing.assert_array_equal(result.figures("los", "mariner-calm"), result.figures("lq", "mariner-calm"))
+    assert asked == [
+        "lq"
+    ]  # los leads the LQ where there is no path; pid and lq are there
+    np.testing.assert_array_equal(
+        result.figures("los", "mariner-calm"), result.figures("lq", "mariner-calm")
+    )
     assert load_results(copy).summary["contestants"].keys() == {"pid", "lq", "los"}
 
 
@@ -164,8 +182,14 @@ def test_places_are_by_tasks_then_score_then_cost():
         entry(1, 3.0, 0.5),
         entry(2, None, None),
     )
-    for by_score, order in ((True, [dear, cheap, unknown, part]), (False, [cheap, dear, unknown, part])):
-        assert sorted([part, unknown, cheap, dear], key=partial(_place, by_score=by_score)) == order
+    for by_score, order in (
+        (True, [dear, cheap, unknown, part]),
+        (False, [cheap, dear, unknown, part]),
+    ):
+        assert (
+            sorted([part, unknown, cheap, dear], key=partial(_place, by_score=by_score))
+            == order
+        )
 
 
 def test_one_that_cannot_take_part_is_said_and_the_rest_go_on():
@@ -184,12 +208,21 @@ def test_where_nobody_can_take_part_there_are_no_results(tmp_path):
         if folder == "empty":
             out.mkdir()
         answer = shipgym(
-            "--controllers", "math:sqrt", "--tasks", "mariner-calm", "--episodes", 1, "--workers", 1,
-            "--out", out,
-        )  # fmt: skip
+            "--controllers",
+            "math:sqrt",
+            "--tasks",
+            "mariner-calm",
+            "--episodes",
+            1,
+            "--workers",
+            1,
+            "--out",
+            out,
+        )
         assert (answer.exit_code, answer.stdout) == (2, "")
         assert answer.stderr.startswith(
-            "error: controllers: nobody took part in any task; 'sqrt' in 'mariner-calm': TypeError: must be "
+            "error: controllers: nobody took part in any task; 'sqrt' in"
+            " 'mariner-calm': TypeError: must be "
         )
     assert [path.name for path in tmp_path.rglob("*")] == ["empty"]
 
@@ -201,33 +234,53 @@ def test_a_write_protected_folder_is_refused_before_the_work(tmp_path, monkeypat
     assert not list(tmp_path.iterdir())
 
 
-def test_an_agent_that_observes_what_no_task_shows_is_refused_before_anything_is_run(tmp_path):
+def test_an_agent_that_observes_what_no_task_shows_is_refused_before_anything_is_run(
+    tmp_path,
+):
     guide = WheelOver.from_model(load_model("mariner"))
     guide.save(tmp_path / "guide.json")
     with pytest.raises(InputError) as error:
-        benchmark(str(tmp_path / "guide.json"), tasks=TASKS, out=tmp_path / "out", episodes=2)
-    assert str(error.value) == (
-        f"controllers: 'guide' fits no task asked for: '{tmp_path / 'guide.json'}' on task 'mariner-calm': 8 "
-        "observations found, expected 13; in one and not in the other: cross_track, course_error_sin, "
-        "course_error_cos, turn_distance, turn_angle"
+        benchmark(
+            str(tmp_path / "guide.json"), tasks=TASKS, out=tmp_path / "out", episodes=2
+        )
+    assert (
+        str(error.value)
+        == f"controllers: 'guide' fits no task asked for: '{tmp_path / 'guide.json'}'"
+        " on task 'mariner-calm': 8 observations found, expected 13; in one and not"
+        " in the other: cross_track, course_error_sin, course_error_cos,"
+        " turn_distance, turn_angle"
     )
     assert not (tmp_path / "out").exists()
-    refused = benchmark({"guide": guide, "pid": "pid"}, tasks=TASKS, episodes=2).summary["contestants"]
-    assert refused["guide"]["refused"]["mariner-calm"].startswith("'guide' on task 'mariner-calm': 8 observ")
+    refused = benchmark(
+        {"guide": guide, "pid": "pid"}, tasks=TASKS, episodes=2
+    ).summary["contestants"]
+    assert refused["guide"]["refused"]["mariner-calm"].startswith(
+        "'guide' on task 'mariner-calm': 8 observ"
+    )
 
 
 def test_an_agent_of_the_first_suite_is_told_that_paths_of_the_second_show_more():
-    said = "that the agent learned with in shipgym/PathFollowing-v0: observation 11 is 'next_turn_distance'"
-    with pytest.raises(InputError, match=rf"fits no task asked for: .*: not those {said}"):
+    said = (
+        "that the agent learned with in shipgym/PathFollowing-v0: observation 11 is"
+        " 'next_turn_distance'"
+    )
+    with pytest.raises(
+        InputError, match=rf"fits no task asked for: .*: not those {said}"
+    ):
         benchmark(
-            str(PRETRAINED / "container-path-ppo.json"), "shipgym-v2", tasks=["sharp-turns"], episodes=2
+            str(PRETRAINED / "container-path-ppo.json"),
+            "shipgym-v2",
+            tasks=["sharp-turns"],
+            episodes=2,
         )
 
 
 def test_training_runs_of_one_contestant(tmp_path):
     ship = load_model("mariner")
     for run, frequency in enumerate((0.05, 0.08)):
-        PID.from_model(ship, frequency=frequency).save(tmp_path / f"mariner-calm-pid-{run}.json")
+        PID.from_model(ship, frequency=frequency).save(
+            tmp_path / f"mariner-calm-pid-{run}.json"
+        )
     result = benchmark(f"mine={tmp_path}/{{task}}-pid-*.json", tasks=TASKS, episodes=2)
     assert result.figures("mine", "mariner-calm").shape == (2, 2)
     assert result.summary["contestants"]["mine"]["runs"] == 2
@@ -238,22 +291,28 @@ def test_training_runs_of_one_contestant(tmp_path):
 
 def test_functions_of_ones_own(tmp_path, monkeypatch):
     (tmp_path / "my_autopilots.py").write_text(
-        "from agents import LQ\n\n\n"
-        "def gentle(task):\n    return LQ.from_model(task.ship, integral_lengths=50.0)\n"
+        "from agents import LQ\n\n\ndef gentle(task):\n    return"
+        " LQ.from_model(task.ship, integral_lengths=50.0)\n"
     )
     monkeypatch.chdir(tmp_path)
     before = list(sys.path)
     by_text = benchmark("my_autopilots:gentle", tasks=TASKS, episodes=2)
     by_function = benchmark(
-        {"gentle": lambda task: LQ.from_model(task.ship, integral_lengths=50.0)}, tasks=TASKS, episodes=2
+        {"gentle": lambda task: LQ.from_model(task.ship, integral_lengths=50.0)},
+        tasks=TASKS,
+        episodes=2,
     )
     assert sys.path == before  # the working folder is on it for this contestant only
     assert by_text.ranking == ["gentle"]
     np.testing.assert_array_equal(
-        by_text.figures("gentle", "mariner-calm"), by_function.figures("gentle", "mariner-calm")
+        by_text.figures("gentle", "mariner-calm"),
+        by_function.figures("gentle", "mariner-calm"),
     )
     assert len(by_text.summary["contestants"]["gentle"]["files"]) == 1
-    assert (by_text.allow_code, by_function.allow_code) == (("my_autopilots:gentle",), ())
+    assert (by_text.allow_code, by_function.allow_code) == (
+        ("my_autopilots:gentle",),
+        (),
+    )
 
 
 def test_settings_that_were_tuned_and_costs_that_are_kept(tmp_path, monkeypatch):
@@ -266,41 +325,71 @@ def test_settings_that_were_tuned_and_costs_that_are_kept(tmp_path, monkeypatch)
                 }
             }
         },
-        "best": {"mariner-calm": {"zero": 30.0, "costs": [float(k) for k in range(2)], "by": ["lq", "ppo"]}},
+        "best": {
+            "mariner-calm": {
+                "zero": 30.0,
+                "costs": [float(k) for k in range(2)],
+                "by": ["lq", "ppo"],
+            }
+        },
     }
     for name, content in kept.items():
         (tmp_path / f"{name}.json").write_text(json.dumps(content))
-    monkeypatch.setattr("agents.suites.reference.suite_file", lambda suite, what: tmp_path / f"{what}.json")
-    with pytest.raises(InputError, match=r"best\.json: mariner-calm: expected costs of 100 episodes"):
+    monkeypatch.setattr(
+        "agents.suites.reference.suite_file",
+        lambda suite, what: tmp_path / f"{what}.json",
+    )
+    with pytest.raises(
+        InputError, match=r"best\.json: mariner-calm: expected costs of 100 episodes"
+    ):
         reference_costs("shipgym-v1")
     look = benchmark("tuned-lq", tasks=TASKS, episodes=2)
-    assert look.summary["reference"] == {}  # costs of all episodes say nothing of the first two
+    assert (
+        look.summary["reference"] == {}
+    )  # costs of all episodes say nothing of the first two
     for place in ("agents.benchmarking.summary", "agents.suites.reference"):
         monkeypatch.setattr(f"{place}.N_EPISODES", 2)
-    result = benchmark("tuned-best,tuned-lq,tuned-mpc,best-known", tasks=TASKS, episodes=2)
+    result = benchmark(
+        "tuned-best,tuned-lq,tuned-mpc,best-known", tasks=TASKS, episodes=2
+    )
     own = benchmark(
-        {"own": lambda task: LQ.from_model(task.ship, integral_lengths=80.0)}, tasks=TASKS, episodes=2
+        {"own": lambda task: LQ.from_model(task.ship, integral_lengths=80.0)},
+        tasks=TASKS,
+        episodes=2,
     )
     for name in ("tuned-best", "tuned-lq"):
         np.testing.assert_array_equal(
-            result.figures(name, "mariner-calm"), own.figures("own", "mariner-calm"), err_msg=name
+            result.figures(name, "mariner-calm"),
+            own.figures("own", "mariner-calm"),
+            err_msg=name,
         )
     refused = result.summary["contestants"]["tuned-mpc"]["refused"]["mariner-calm"]
     assert "no tuned settings of 'mpc'" in refused
     found = result.summary["tasks"]["mariner-calm"]
-    assert found["best-known"]["score"]["value"] == 1.0  # its first two costs are 0 and 1
+    assert (
+        found["best-known"]["score"]["value"] == 1.0
+    )  # its first two costs are 0 and 1
     cost = found["tuned-lq"]["cost"]["value"]
     assert found["tuned-lq"]["score"]["value"] == pytest.approx((30.0 - cost) / 29.5)
     assert result.ranking == ["best-known", "tuned-best", "tuned-lq", "tuned-mpc"]
-    assert ranking_table(result).row_count == 4  # the best known, which acts in no time, too
+    assert (
+        ranking_table(result).row_count == 4
+    )  # the best known, which acts in no time, too
 
 
 def test_classical_controllers_are_designed_for_the_ship_of_the_task():
-    keeping, path = (load_suite().task(name) for name in ("mariner-calm", "mariner-current"))
-    assert design("lq", keeping) is design("lq", path)  # the same ship and interval: designed once
+    keeping, path = (
+        load_suite().task(name) for name in ("mariner-calm", "mariner-current")
+    )
+    assert design("lq", keeping) is design(
+        "lq", path
+    )  # the same ship and interval: designed once
     guided = design("ilos", path)
     assert guided.design["dt"] == path.task.interval(path.ship)
-    assert guided.observation_scales[8] == path.task.corridor * path.ship.particulars["length"]
+    assert (
+        guided.observation_scales[8]
+        == path.task.corridor * path.ship.particulars["length"]
+    )
     (led,) = contestants("ilos")[0].policies(keeping, "any")
     assert led.kind == "lq"
 
@@ -315,12 +404,18 @@ def test_classical_controllers_are_designed_for_the_ship_of_the_task():
         ("json:no_such_thing", "'json:no_such_thing' cannot be imported"),
         ("math:pi", r"'math:pi' is 3.14\d*, expected a controller"),
         ({"a": 3}, "'a' is 3, expected a controller"),
-        ({"a": [LQ.from_model(load_model("mariner")), 3]}, "'a' is 3, expected a controller"),
+        (
+            {"a": [LQ.from_model(load_model("mariner")), 3]},
+            "'a' is 3, expected a controller",
+        ),
         ([], "none found"),
         ("=pid", "name '' found, expected one without any of , = /"),
         ({"a,b": "pid"}, "name 'a,b' found, expected one without any of , = /"),
         ("a/b=pid", "name 'a/b' found, expected one without any of , = /"),
-        ("tests+nobody.json", r"'tests\+nobody.json' found, expected .* a file of an agent that is there"),
+        (
+            "tests+nobody.json",
+            r"'tests\+nobody.json' found, expected .* a file of an agent that is there",
+        ),
     ],
 )
 def test_wrong_contestants(given, said):
@@ -345,9 +440,15 @@ def test_contestants_are_told_by_texts_functions_controllers_and_names():
         (iterable, [("lq", iterable)]),
         (make, [("make", make)]),
         (Contestant("x", "lq"), [("x", "lq")]),
-        ([lazy, "pid", Contestant("x", make)], [("Broken", lazy), ("pid", "pid"), ("x", make)]),
+        (
+            [lazy, "pid", Contestant("x", make)],
+            [("Broken", lazy), ("pid", "pid"), ("x", make)],
+        ),
         ({"both": [pid, make]}, [("both", [pid, make])]),
-        ("{task}-pid-*.json", [("pid", "{task}-pid-*.json")]),  # found when a task is run
+        (
+            "{task}-pid-*.json",
+            [("pid", "{task}-pid-*.json")],
+        ),  # found when a task is run
         ("{task}.zip", [("agent", "{task}.zip")]),
     ):
         assert [(one.name, one.source) for one in contestants(given)] == expected
@@ -379,16 +480,22 @@ def test_a_path_is_like_a_pattern_of_as_many_folders():
     assert not _is_like(("runs", "a.json"), ("run", "*.json"))
 
 
-def test_files_that_have_the_name_of_a_contestant_are_not_its_own(tmp_path, monkeypatch):
+def test_files_that_have_the_name_of_a_contestant_are_not_its_own(
+    tmp_path, monkeypatch
+):
     monkeypatch.chdir(tmp_path)
     for name in ("pid", "best-known", "tuned-lq"):
         (tmp_path / name).write_text("")
-        assert Contestant(name, name).fingerprint(load_suite().task("mariner-calm")) == {}
+        assert (
+            Contestant(name, name).fingerprint(load_suite().task("mariner-calm")) == {}
+        )
 
 
 def test_an_agent_for_one_of_the_tasks_takes_part(tmp_path):
     tasks = [load_suite().task(name) for name in ("mariner-calm", "mariner-current")]
-    WheelOver.from_model(tasks[1].ship, task=tasks[1].task).save(tmp_path / "guide.json")
+    WheelOver.from_model(tasks[1].ship, task=tasks[1].task).save(
+        tmp_path / "guide.json"
+    )
     (guide,) = contestants(str(tmp_path / "guide.json"))
     check_agents(guide, tasks)
     with pytest.raises(InputError, match="'guide' fits no task asked for"):
@@ -399,8 +506,17 @@ def test_an_agent_for_one_of_the_tasks_takes_part(tmp_path):
     ("source", "said"),
     [
         ("td3", "there is no file of a pretrained td3 agent for task 'mariner-calm'"),
-        ("{task}-x.json", "there is no file of '{task}-x.json' for task 'mariner-calm'"),
-        (int, "int: 3 found for task 'mariner-calm', expected a controller with `predict`"),
+        (
+            "{task}-x.json",
+            "there is no file of '{task}-x.json' for task 'mariner-calm'",
+        ),
+        (
+            int,
+            (
+                "int: 3 found for task 'mariner-calm', expected a controller with"
+                " `predict`"
+            ),
+        ),
     ],
 )
 def test_one_that_cannot_be_made_for_a_task_is_told(source, said, monkeypatch):
@@ -415,14 +531,20 @@ def test_one_that_cannot_be_made_for_a_task_is_told(source, said, monkeypatch):
 def test_the_hash_of_a_controller_is_that_of_its_content(tmp_path):
     pid = PID.from_model(load_model("mariner"))
     pid.save(tmp_path / "pid.json")
-    content = json.dumps(json.loads((tmp_path / "pid.json").read_text()), sort_keys=True)
+    content = json.dumps(
+        json.loads((tmp_path / "pid.json").read_text()), sort_keys=True
+    )
     assert policy_hash(pid) == hashlib.sha256(content.encode()).hexdigest()
-    assert policy_hash(PID.from_model(load_model("mariner"), damping=0.9)) != policy_hash(pid)
+    assert policy_hash(
+        PID.from_model(load_model("mariner"), damping=0.9)
+    ) != policy_hash(pid)
     assert policy_hash(Broken()) is None
 
 
 def test_agents_in_the_box_are_found_by_task_and_algorithm():
-    assert [path.name for path in pretrained("container-path", "ppo")] == ["container-path-ppo.json"]
+    assert [path.name for path in pretrained("container-path", "ppo")] == [
+        "container-path-ppo.json"
+    ]
     runs = [path.name for path in pretrained("course-unstable", "ppo")]
     assert runs == [f"course-unstable-ppo-s{run}.json" for run in range(5)]
     assert pretrained("container", "ppo") == []
@@ -449,7 +571,9 @@ def test_what_the_results_say_is_true(folder):
         ({"tolerance": np.nan}, "tolerance: nan found"),
     ],
 )
-def test_a_sample_of_nothing_and_a_tolerance_below_zero_are_refused(folder, asked, said):
+def test_a_sample_of_nothing_and_a_tolerance_below_zero_are_refused(
+    folder, asked, said
+):
     with pytest.raises(InputError, match=said):
         verify(folder, **asked)
 
@@ -458,7 +582,10 @@ def test_results_of_another_version_of_a_suite_are_not_verified(copy):
     summary = json.loads((copy / "results.json").read_text())
     summary["suite"]["sha256"] = "0" * 64
     (copy / "results.json").write_text(json.dumps(summary))
-    with pytest.raises(InputError, match="another suite 'shipgym-v1' than that of this version of shipgym"):
+    with pytest.raises(
+        InputError,
+        match="another suite 'shipgym-v1' than that of this version of shipgym",
+    ):
         verify(copy)
 
 
@@ -468,7 +595,10 @@ def told_of(runs=1, source="a"):
     found = {name: {"runs": 0 if name == "idle" else runs} for name in sources}
     return SimpleNamespace(
         summary={
-            "contestants": {name: {"source": one if source else None} for name, one in sources.items()},
+            "contestants": {
+                name: {"source": one if source else None}
+                for name, one in sources.items()
+            },
             "tasks": dict.fromkeys(("one", "two", "three"), found),
         }
     )
@@ -485,7 +615,10 @@ def test_a_sample_takes_the_contestants_by_turns():
         assert _sampled(told_of(), 3, seed) == pairs[:3]
     assert len({tuple(_sampled(told_of(), 6, seed)) for seed in range(5)}) > 1
     for nothing in (told_of(runs=0), told_of(source=None)):
-        with pytest.raises(InputError, match="results: no contestant that can be made again; name them by"):
+        with pytest.raises(
+            InputError,
+            match="results: no contestant that can be made again; name them by",
+        ):
             _sampled(nothing, 8, 0)
     usual = inspect.signature(verify).parameters
     assert (usual["sample"].default, usual["seed"].default) == (8, 0)
@@ -499,7 +632,15 @@ def test_work_is_done_in_one_process_unless_more_are_asked_for(function):
 COSTS = np.array([100.0, 50.0, 0.0])
 
 
-def compared(cost=COSTS, turns=(1.0, np.nan, 3.0), *, source="pid", tolerance=None, numpy=None, runs=1):
+def compared(
+    cost=COSTS,
+    turns=(1.0, np.nan, 3.0),
+    *,
+    source="pid",
+    tolerance=None,
+    numpy=None,
+    runs=1,
+):
     """What a check says of a contestant whose file holds `COSTS`, when it is run again."""
     known = {**versions(), **({} if numpy is None else {"numpy": numpy})}
     summary = {
@@ -508,10 +649,23 @@ def compared(cost=COSTS, turns=(1.0, np.nan, 3.0), *, source="pid", tolerance=No
         "seeds": {"count": 3},
         "versions": known,
     }
-    table = {"contestant": np.array(["x"] * 3), "task": np.array(["calm"] * 3), "cost": COSTS}
-    result = BenchmarkResult(summary, {**table, "reversals": np.array([1.0, np.nan, 3.0])})
-    again = {"cost": np.array(cost), "reversals": np.array(turns), "unknown": np.zeros(3)}
-    found = {"refused": "" if runs else "it is gone", "runs": [{"episodes": again}] * runs}
+    table = {
+        "contestant": np.array(["x"] * 3),
+        "task": np.array(["calm"] * 3),
+        "cost": COSTS,
+    }
+    result = BenchmarkResult(
+        summary, {**table, "reversals": np.array([1.0, np.nan, 3.0])}
+    )
+    again = {
+        "cost": np.array(cost),
+        "reversals": np.array(turns),
+        "unknown": np.zeros(3),
+    }
+    found = {
+        "refused": "" if runs else "it is gone",
+        "runs": [{"episodes": again}] * runs,
+    }
     return _compared(result, "x", "calm", found, tolerance)
 
 
@@ -520,7 +674,11 @@ def test_a_check_passes_up_to_what_is_allowed():
     assert compared() == of(0.0, True, 0.0, "")
     near = COSTS + np.array([0.0, 50e-7, 0.0])
     found = compared(near)
-    assert (found.difference, found.allowed, found.passed) == (pytest.approx(1e-7, rel=1e-6), 0.0, False)
+    assert (found.difference, found.allowed, found.passed) == (
+        pytest.approx(1e-7, rel=1e-6),
+        0.0,
+        False,
+    )
     assert compared(near, tolerance=1.001e-7).passed
     assert not compared(near, tolerance=0.999e-7).passed
     learned = compared(near, source="agent.json")
@@ -541,7 +699,9 @@ def test_a_check_says_what_is_wrong_beside_the_costs():
     assert compared(turns=(1.0, np.nan, 4.0)) == of(np.inf, False, 0.0, note)
     note = "numpy differ from those of the file"
     assert compared(turns=(1.0, 2.0, 3.0), numpy="0.1") == of(np.inf, False, 1e-6, note)
-    assert compared(runs=2) == of(np.inf, False, 0.0, "2 training runs found, 1 in the file")
+    assert compared(runs=2) == of(
+        np.inf, False, 0.0, "2 training runs found, 1 in the file"
+    )
     assert compared(runs=0, source="a.zip") == of(np.inf, False, 1e-6, "it is gone")
 
 
@@ -574,7 +734,10 @@ def test_a_result_that_was_touched_up_is_found_out(copy):
 def renamed(copy, tmp_path, monkeypatch):
     """Results whose contestant LQ is said to be made of something else; a module that says if it was run."""
     monkeypatch.chdir(tmp_path)
-    code = "open('RAN', 'w').close()\nfrom agents import LQ\nmake = lambda task: LQ.from_model(task.ship)\n"
+    code = (
+        "open('RAN', 'w').close()\nfrom agents import LQ\nmake = lambda task:"
+        " LQ.from_model(task.ship)\n"
+    )
     for name in ("evil_code.py", "evil_code"):
         (tmp_path / name).write_text(code)
 
@@ -589,18 +752,31 @@ def renamed(copy, tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize(
-    "source", ["evil_code:make", "evil_code", "evil_code.py", "*", "/dev/zero", "lq+evil_code:make"]
+    "source",
+    [
+        "evil_code:make",
+        "evil_code",
+        "evil_code.py",
+        "*",
+        "/dev/zero",
+        "lq+evil_code:make",
+    ],
 )
 def test_results_run_no_code_that_they_name(renamed, source, tmp_path):
     folder, before = renamed(source), list(sys.path)
     checks = {check.contestant: check for check in verify(folder)}
     assert (checks["pid"].passed, checks["pid"].difference) == (True, 0.0)
     assert not checks["lq"].passed
-    assert "run only if you name it" in checks["lq"].note or "no such file took part" in checks["lq"].note
+    assert (
+        "run only if you name it" in checks["lq"].note
+        or "no such file took part" in checks["lq"].note
+    )
     answer = shipgym("--verify", folder, "--workers", 1, "--allow-code", "other:make")
     assert answer.exit_code == 1
     assert "1 of 2 differ: lq on mariner-calm" in answer.stderr
-    refused = rerun(load_results(folder), [EpisodeId("lq", "mariner-calm", 0, 1_000_000)]).refused
+    refused = rerun(
+        load_results(folder), [EpisodeId("lq", "mariner-calm", 0, 1_000_000)]
+    ).refused
     assert list(refused) == [("lq", "mariner-calm")]
     assert not (tmp_path / "RAN").exists()
     assert sys.path == before
@@ -608,14 +784,18 @@ def test_results_run_no_code_that_they_name(renamed, source, tmp_path):
 
 def test_a_contestant_that_cannot_be_made_again_is_allowed_no_difference(renamed):
     checks = {check.contestant: check for check in verify(renamed("evil_code:make"))}
-    note = "'evil_code:make' is code, run only if you name it: --allow-code evil_code:make"
+    note = (
+        "'evil_code:make' is code, run only if you name it: --allow-code evil_code:make"
+    )
     assert checks["lq"] == Check("lq", "mariner-calm", N, np.inf, False, 0.0, note)
     assert checks["lq"].to_dict()["difference"] is None
 
 
 def test_code_that_is_named_on_the_command_line_is_run(renamed, tmp_path):
     folder = renamed("evil_code:make")
-    answer = shipgym("--verify", folder, "--workers", 1, "--allow-code", "evil_code:make")
+    answer = shipgym(
+        "--verify", folder, "--workers", 1, "--allow-code", "evil_code:make"
+    )
     assert answer.exit_code == 0, answer.output
     assert (tmp_path / "RAN").exists()
     episode = EpisodeId("lq", "mariner-calm", 0, 1_000_000)
@@ -626,28 +806,61 @@ def test_code_that_is_named_on_the_command_line_is_run(renamed, tmp_path):
 def test_files_are_verified_by_their_hashes(tmp_path):
     ship = load_model("mariner")
     for run in range(2):
-        PID.from_model(ship, frequency=0.05 + 0.01 * run).save(tmp_path / f"mariner-calm-[pid]-{run}.json")
+        PID.from_model(ship, frequency=0.05 + 0.01 * run).save(
+            tmp_path / f"mariner-calm-[pid]-{run}.json"
+        )
     out = tmp_path / "results"
-    benchmark(f"mine={tmp_path}/{{task}}-[[]pid]-*.json", tasks=TASKS, episodes=2, out=out)
+    benchmark(
+        f"mine={tmp_path}/{{task}}-[[]pid]-*.json", tasks=TASKS, episodes=2, out=out
+    )
     assert [check.exact for check in verify(out)] == [True]
     LQ.from_model(ship).save(tmp_path / "mariner-calm-[pid]-1.json")
     (check,) = verify(out)
     assert (check.passed, check.episodes) == (False, 4)
-    assert check.note == f"'{tmp_path}/mariner-calm-[pid]-1.json' is not the file that took part"
+    assert (
+        check.note
+        == f"'{tmp_path}/mariner-calm-[pid]-1.json' is not the file that took part"
+    )
     (tmp_path / "mariner-calm-[pid]-0.json").unlink()
     (check,) = verify(out)
-    assert check.note == f"'{tmp_path}/mariner-calm-[pid]-0.json' is not the file that took part"
+    assert (
+        check.note
+        == f"'{tmp_path}/mariner-calm-[pid]-0.json' is not the file that took part"
+    )
 
 
 def test_an_episode_run_again_costs_the_same_to_a_billionth():
     costs = np.full(4, 1e6)
-    table = {"contestant": np.array(["a"] * 4), "task": np.array(["calm"] * 4), "cost": costs}
-    about = {"contestants": {"a": {}}, "tasks": {"calm": {}}, "seeds": {"first": 100, "count": 4}}
-    again = [1e6 + 0.99e-3, 1e6 + 1.05e-3, 1e6 - 1.05e-3, np.nan]  # the last failed at once
-    run = {"run": 0, "seeds": [100, 101, 102, 103], "costs": again, "episodes": [None] * 4}
-    found = {("a", "calm"): {"refused": "", "runs": [run]}, ("b", "calm"): {"refused": "it is gone"}}
+    table = {
+        "contestant": np.array(["a"] * 4),
+        "task": np.array(["calm"] * 4),
+        "cost": costs,
+    }
+    about = {
+        "contestants": {"a": {}},
+        "tasks": {"calm": {}},
+        "seeds": {"first": 100, "count": 4},
+    }
+    again = [
+        1e6 + 0.99e-3,
+        1e6 + 1.05e-3,
+        1e6 - 1.05e-3,
+        np.nan,
+    ]  # the last failed at once
+    run = {
+        "run": 0,
+        "seeds": [100, 101, 102, 103],
+        "costs": again,
+        "episodes": [None] * 4,
+    }
+    found = {
+        ("a", "calm"): {"refused": "", "runs": [run]},
+        ("b", "calm"): {"refused": "it is gone"},
+    }
     done = _gathered(BenchmarkResult(about, table), found)
-    assert done.different == tuple(EpisodeId("a", "calm", 0, seed) for seed in (101, 102))
+    assert done.different == tuple(
+        EpisodeId("a", "calm", 0, seed) for seed in (101, 102)
+    )
     assert (done.episodes, done.refused) == ({}, {("b", "calm"): "it is gone"})
 
 
@@ -655,9 +868,21 @@ def test_an_episode_run_again_costs_the_same_to_a_billionth():
     ("name", "damage", "said"),
     [
         ("results.json", lambda data: data[:500], "may be cut short"),
-        ("results.json", lambda data: data.replace(b'"format": 2', b'"format": 9'), "format 9 found"),
-        ("results.json", lambda data: data.replace(b'"ranking"', b'"rankings"'), "unknown key 'rankings'"),
-        ("episodes.parquet", lambda data: data[:-10], "is not the one that results.json was written with"),
+        (
+            "results.json",
+            lambda data: data.replace(b'"format": 2', b'"format": 9'),
+            "format 9 found",
+        ),
+        (
+            "results.json",
+            lambda data: data.replace(b'"ranking"', b'"rankings"'),
+            "unknown key 'rankings'",
+        ),
+        (
+            "episodes.parquet",
+            lambda data: data[:-10],
+            "is not the one that results.json was written with",
+        ),
     ],
 )
 def test_broken_results(copy, name, damage, said):
@@ -675,17 +900,23 @@ def test_results_that_do_not_agree_with_their_episodes_are_refused(copy):
     _rewritten(copy, one_more)
     with pytest.raises(InputError) as error:
         load_results(copy)
-    assert str(error.value) == (
-        f"{copy / 'results.json'}: 5 episodes of 'pid' on 'mariner-calm' found in episodes.parquet, expected "
-        "1 runs of 4; run `shipgym benchmark` again"
+    assert (
+        str(error.value)
+        == f"{copy / 'results.json'}: 5 episodes of 'pid' on 'mariner-calm' found in"
+        " episodes.parquet, expected 1 runs of 4; run `shipgym benchmark` again"
     )
-    (copy / "results.json").write_text(json.dumps({k: v for k, v in summary.items() if k != "seeds"}))
+    (copy / "results.json").write_text(
+        json.dumps({k: v for k, v in summary.items() if k != "seeds"})
+    )
     with pytest.raises(
-        InputError, match=r"results.json: field 'seeds' is missing; run `shipgym benchmark` again$"
+        InputError,
+        match=r"results.json: field 'seeds' is missing; run `shipgym benchmark` again$",
     ):
         load_results(copy)
     (copy / "results.json").write_text(json.dumps(summary | {"kind": "model"}))
-    with pytest.raises(InputError, match=r"kind 'model' found, expected .*: not benchmark results"):
+    with pytest.raises(
+        InputError, match=r"kind 'model' found, expected .*: not benchmark results"
+    ):
         load_results(copy / "results.json")
 
 
@@ -694,17 +925,27 @@ def test_contestants_of_the_file_and_of_the_table_are_the_same(copy):
         columns["contestant"][columns["contestant"] == "lq"] = "los"
 
     _rewritten(copy, exchange)
-    with pytest.raises(InputError, match=r"0 episodes of 'lq' on 'mariner-calm' .* expected 1 runs of 4"):
+    with pytest.raises(
+        InputError,
+        match=r"0 episodes of 'lq' on 'mariner-calm' .* expected 1 runs of 4",
+    ):
         load_results(copy)
 
 
 def test_rows_of_nobody_in_the_summary_are_refused(copy):
     result = load_results(copy)
-    columns = {name: np.append(values, values[:1]) for name, values in result.episodes.items()}
+    columns = {
+        name: np.append(values, values[:1]) for name, values in result.episodes.items()
+    }
     columns["contestant"][-1] = "los"
-    summary = result.summary | {"episodes": result.summary["episodes"] | {"rows": 2 * N + 1}}
+    summary = result.summary | {
+        "episodes": result.summary["episodes"] | {"rows": 2 * N + 1}
+    }
     BenchmarkResult(summary, columns).save(copy)
-    with pytest.raises(InputError, match=r"1 episodes of 'los' on 'mariner-calm' .* expected 0 runs of 4"):
+    with pytest.raises(
+        InputError,
+        match=r"1 episodes of 'los' on 'mariner-calm' .* expected 0 runs of 4",
+    ):
         load_results(copy)
 
 
@@ -713,16 +954,34 @@ def test_rows_of_nobody_in_the_summary_are_refused(copy):
     [
         (lambda one: one["seeds"].update(count=0), "r.json: seeds.count: 0 found"),
         (lambda one: one["seeds"].update(count="4"), "r.json: seeds.count: '4' "),
-        (lambda one: one["ranking"][0].update(name="los"), "r.json: name of a contestant: 'los' found"),
-        (lambda one: one["improvement"].update(los={}), "r.json: name of a contestant: 'los' found"),
-        (lambda one: one["profile"]["shares"].update(los=[]), "r.json: name of a contestant: 'los' found"),
-        (lambda one: one["tasks"].update(rough={}), "r.json: name of a task: 'rough' found"),
+        (
+            lambda one: one["ranking"][0].update(name="los"),
+            "r.json: name of a contestant: 'los' found",
+        ),
+        (
+            lambda one: one["improvement"].update(los={}),
+            "r.json: name of a contestant: 'los' found",
+        ),
+        (
+            lambda one: one["profile"]["shares"].update(los=[]),
+            "r.json: name of a contestant: 'los' found",
+        ),
+        (
+            lambda one: one["tasks"].update(rough={}),
+            "r.json: name of a task: 'rough' found",
+        ),
         (
             lambda one: one["reference"].update(rough={"zero": 1, "best": 0}),
             "r.json: name of a task: 'rough' found",
         ),
-        (lambda one: one["ranking"].pop(0), "r.json: tasks.mariner-calm: name of a contestant: 'lq' found"),
-        (lambda one: one["tasks"]["mariner-calm"]["lq"].pop("runs"), r"tasks.mariner-calm.lq.*runs"),
+        (
+            lambda one: one["ranking"].pop(0),
+            "r.json: tasks.mariner-calm: name of a contestant: 'lq' found",
+        ),
+        (
+            lambda one: one["tasks"]["mariner-calm"]["lq"].pop("runs"),
+            r"tasks.mariner-calm.lq.*runs",
+        ),
     ],
 )
 def test_a_summary_names_whom_and_what_it_knows(folder, change, said):
@@ -733,12 +992,18 @@ def test_a_summary_names_whom_and_what_it_knows(folder, change, said):
         check_summary(summary, "r.json")
 
 
-def test_what_the_table_of_episodes_needs_is_missed_before_the_work(folder, tmp_path, monkeypatch):
+def test_what_the_table_of_episodes_needs_is_missed_before_the_work(
+    folder, tmp_path, monkeypatch
+):
     result = load_results(folder)
     monkeypatch.setitem(sys.modules, "pyarrow.parquet", None)
-    for call in (lambda: check_new(tmp_path / "out", False, "v1"), lambda: result.save(tmp_path / "out")):
+    for call in (
+        lambda: check_new(tmp_path / "out", False, "v1"),
+        lambda: result.save(tmp_path / "out"),
+    ):
         with pytest.raises(
-            InputError, match=r"not installed, the table of episodes needs it: .*'shipgym\[bench"
+            InputError,
+            match=r"not installed, the table of episodes needs it: .*'shipgym\[bench",
         ):
             call()
     assert not (tmp_path / "out").exists()
@@ -755,26 +1020,35 @@ def test_results_are_written_to_folders_that_are_made(folder, tmp_path):
 def test_parts_alone_are_gone_on_with(tmp_path):
     (tmp_path / "parts").mkdir()
     assert check_new(tmp_path, True, "shipgym-v1") == tmp_path
-    with pytest.raises(InputError, match="already contains results; continue with --resume"):
+    with pytest.raises(
+        InputError, match="already contains results; continue with --resume"
+    ):
         check_new(tmp_path, False, "shipgym-v1")
 
 
 def test_a_folder_takes_the_results_of_one_suite_only(copy, tmp_path):
     assert check_new(tmp_path / "new", False, "shipgym-v1") == tmp_path / "new"
     assert check_new(copy, True, "shipgym-v1") == copy
-    with pytest.raises(InputError, match="already contains results; continue with --resume"):
+    with pytest.raises(
+        InputError, match="already contains results; continue with --resume"
+    ):
         check_new(copy, False, "shipgym-v1")
-    with pytest.raises(InputError, match="holds results of another suite than 'shipgym-v2'"):
+    with pytest.raises(
+        InputError, match="holds results of another suite than 'shipgym-v2'"
+    ):
         check_new(copy, True, "shipgym-v2")
     with pytest.raises(
-        InputError, match=r"results.json: is not a folder, expected one to write the results to"
+        InputError,
+        match=r"results.json: is not a folder, expected one to write the results to",
     ):
         check_new(copy / "results.json", False, "shipgym-v1")
     other = tmp_path / "other"
     other.mkdir()
     assert check_new(other, False, "shipgym-v1") == other
     (other / "letter.txt").write_text("")
-    with pytest.raises(InputError, match=r"holds 'letter.txt', not a result of a benchmark"):
+    with pytest.raises(
+        InputError, match=r"holds 'letter.txt', not a result of a benchmark"
+    ):
         check_new(other, True, "shipgym-v1")
 
 
@@ -791,10 +1065,14 @@ def test_a_part_that_was_kept_is_of_its_job():
         part(overshoot=np.zeros(2)),
         part(cost=np.zeros((2, 1))),
         part(cost=np.array(["1", "2"])),
-        {"refused": "", "runs": [*whole["runs"], *part(cost=np.zeros(2))["runs"]]},  # which knows less
+        {
+            "refused": "",
+            "runs": [*whole["runs"], *part(cost=np.zeros(2))["runs"]],
+        },  # which knows less
     ):
         with pytest.raises(
-            InputError, match="part of 'pid' on 'mariner-calm': expected cost and other figures"
+            InputError,
+            match="part of 'pid' on 'mariner-calm': expected cost and other figures",
         ):
             checked_part(wrong, job)
 
@@ -806,7 +1084,10 @@ def test_tasks_are_chosen_by_name_each_once():
     assert both == (whole[1], whole[0])
     with pytest.raises(InputError, match="tasks: none found, expected at least one"):
         _chosen("shipgym-v1", [])
-    for asked, ends in (("strong-current", ["", "-on-model", "-far"]), ("strong-current-far", ["-far"])):
+    for asked, ends in (
+        ("strong-current", ["", "-on-model", "-far"]),
+        ("strong-current-far", ["-far"]),
+    ):
         assert [one.name for one in _chosen("shipgym-v2", [asked])] == [
             f"strong-current{end}" for end in ends
         ]
@@ -821,32 +1102,60 @@ def test_as_many_episodes_are_run_as_are_scored_at_most(episodes):
 def test_a_summary_of_two_episodes_by_hand(monkeypatch):
     """Of two tasks with a ship, in one of which 0 and 1 cost the same, and one far from the design."""
     references = {"calm": (30.0, 20.0), "same": (5.0, 5.0), "calm-far": (40.0, 10.0)}
-    monkeypatch.setattr("agents.benchmarking.summary.reference_costs", lambda suite: references)
+    monkeypatch.setattr(
+        "agents.benchmarking.summary.reference_costs", lambda suite: references
+    )
     monkeypatch.setattr("agents.benchmarking.summary.N_EPISODES", 2)
 
     def runs(*costs):
-        known = {"refused": "", "runs": [_run({"cost": np.array(costs)}, "", 1e-6, None)]}
+        known = {
+            "refused": "",
+            "runs": [_run({"cost": np.array(costs)}, "", 1e-6, None)],
+        }
         return known if costs else {"refused": "no", "runs": []}
 
     done = {
-        ("a", "calm"): runs(25.0, 20.0), ("a", "same"): runs(5.0, 5.0), ("a", "calm-far"): runs(10.0, 10.0),
-        ("b", "calm"): runs(30.0, 30.0), ("b", "same"): runs(10.0, 10.0), ("b", "calm-far"): runs(),
-    }  # fmt: skip
+        ("a", "calm"): runs(25.0, 20.0),
+        ("a", "same"): runs(5.0, 5.0),
+        ("a", "calm-far"): runs(10.0, 10.0),
+        ("b", "calm"): runs(30.0, 30.0),
+        ("b", "same"): runs(10.0, 10.0),
+        ("b", "calm-far"): runs(),
+    }
     done["a", "calm"]["runs"] *= 2
-    done["a", "calm"]["runs"][1] = {**done["a", "calm"]["runs"][0], "seconds_per_action": 3e-6}
-    tasks = [SimpleNamespace(name=name, on="far" if "far" in name else "ship") for name in references]
+    done["a", "calm"]["runs"][1] = {
+        **done["a", "calm"]["runs"][0],
+        "seconds_per_action": 3e-6,
+    }
+    tasks = [
+        SimpleNamespace(name=name, on="far" if "far" in name else "ship")
+        for name in references
+    ]
     found = summary_of("mine", tasks, ["b", "a"], done)
     first, second = found["ranking"]
     assert (first["name"], first["tasks"], first["scored_tasks"]) == ("a", 2, 1)
-    assert (first["score"]["value"], first["relative_cost"]) == pytest.approx((0.75, 1.0))
-    assert (second["score"]["value"], second["relative_cost"]) == pytest.approx((0.0, np.sqrt(8.0 / 3.0)))
+    assert (first["score"]["value"], first["relative_cost"]) == pytest.approx(
+        (0.75, 1.0)
+    )
+    assert (second["score"]["value"], second["relative_cost"]) == pytest.approx(
+        (0.0, np.sqrt(8.0 / 3.0))
+    )
     assert first["elsewhere"]["far"]["score"]["value"] == pytest.approx(1.0)
-    assert (first["elsewhere"]["far"]["tasks"], second["elsewhere"]["far"]["tasks"]) == (1, 0)
+    assert (
+        first["elsewhere"]["far"]["tasks"],
+        second["elsewhere"]["far"]["tasks"],
+    ) == (1, 0)
     assert found["tasks"]["calm"]["a"]["microseconds_per_action"] == pytest.approx(2.0)
     assert found["reference"]["calm-far"] == {"zero": 40.0, "best": 10.0}
     thresholds, shares = found["profile"]["thresholds"], found["profile"]["shares"]
     at = [thresholds.index(one) for one in (-1.0, -0.05, 0.0, 0.5, 1.0)]
-    assert [shares["a"][k] for k in at] == [1.0, 1.0, 1.0, 0.5, 0.0]  # scores of 0.5 and 1 of `calm` alone
+    assert [shares["a"][k] for k in at] == [
+        1.0,
+        1.0,
+        1.0,
+        0.5,
+        0.0,
+    ]  # scores of 0.5 and 1 of `calm` alone
     assert [shares["b"][k] for k in at] == [1.0, 1.0, 0.0, 0.0, 0.0]
     assert found["improvement"]["a"]["b"]["value"] == 1.0
 
@@ -857,7 +1166,9 @@ def test_episodes_without_a_figure_are_not_counted():
     assert _count([{"episodes": {}}] * 20, "terminated") == 0
 
 
-def test_a_factory_may_raise_anything_and_best_known_costs_are_kept_by_task(monkeypatch):
+def test_a_factory_may_raise_anything_and_best_known_costs_are_kept_by_task(
+    monkeypatch,
+):
     task = load_suite("shipgym-v1").task("mariner-calm")
 
     def fails(one, task, suite):
@@ -869,55 +1180,106 @@ def test_a_factory_may_raise_anything_and_best_known_costs_are_kept_by_task(monk
         assert done == {"refused": "KeyError: 'gain'", "runs": []}
     with pytest.raises(KeyError):  # of ours it is a fault
         results_of(Contestant("pid", "pid"), task, "shipgym-v1", 2)
-    known = results_of(Contestant("best-known", "best-known"), task, "shipgym-v1", 3)["runs"][0]
-    np.testing.assert_array_equal(known["episodes"]["cost"], best_costs(task, "shipgym-v1")[:3])
+    known = results_of(Contestant("best-known", "best-known"), task, "shipgym-v1", 3)[
+        "runs"
+    ][0]
+    np.testing.assert_array_equal(
+        known["episodes"]["cost"], best_costs(task, "shipgym-v1")[:3]
+    )
     zero, one = reference_costs("shipgym-v1")["mariner-calm"]
     assert (zero, one) == (
         best_known("shipgym-v1")["mariner-calm"]["zero"],
         best_costs(task, "shipgym-v1").mean(),
     )
     with pytest.raises(
-        InputError, match="no best known costs are kept for task 'mine' of suite 'shipgym-v1'"
+        InputError,
+        match="no best known costs are kept for task 'mine' of suite 'shipgym-v1'",
     ):
         best_costs(replace(task, name="mine"), "shipgym-v1")
 
 
 def test_the_command_ranks_and_writes(tmp_path):
     answer = shipgym(
-        "--controllers", "pid", "--tasks", "mariner-calm", "--episodes", 2, "--workers", 1,
-        "--out", tmp_path / "r", "--no-page",
-    )  # fmt: skip
+        "--controllers",
+        "pid",
+        "--tasks",
+        "mariner-calm",
+        "--episodes",
+        2,
+        "--workers",
+        1,
+        "--out",
+        tmp_path / "r",
+        "--no-page",
+    )
     assert answer.exit_code == 0, answer.stderr
-    assert same_text("benchmark", answer.stdout + answer.stderr, r"(?m)(?<=  )\d+\.\d\d$")  # us by action
+    assert same_text(
+        "benchmark", answer.stdout + answer.stderr, r"(?m)(?<=  )\d+\.\d\d$"
+    )  # us by action
     assert "1 task of 2 episodes" in answer.stdout
     assert "for a quick look, not for a ranking" in answer.stderr
     assert load_results(tmp_path / "r").ranking == ["pid"]
     page = tmp_path / "r" / "index.html"
     page.touch()
     again = shipgym(
-        "--controllers", "pid", "--tasks", "mariner-calm", "--episodes", 2, "--workers", 1,
-        "--out", tmp_path / "r", "--resume", "--json", "--no-page",
-    )  # fmt: skip
+        "--controllers",
+        "pid",
+        "--tasks",
+        "mariner-calm",
+        "--episodes",
+        2,
+        "--workers",
+        1,
+        "--out",
+        tmp_path / "r",
+        "--resume",
+        "--json",
+        "--no-page",
+    )
     assert json.loads(again.stdout)["ranking"][0]["name"] == "pid"
     assert not page.exists()  # it would be of the results before
 
 
 def test_bad_input_is_told_in_one_line_and_nothing_is_written(tmp_path):
     out = tmp_path / "r"
-    cut, weightless, other = (tmp_path / f"{name}.json" for name in ("cut", "weightless", "other"))
+    cut, weightless, other = (
+        tmp_path / f"{name}.json" for name in ("cut", "weightless", "other")
+    )
     random_policy(load_model("kvlcc2")).save(other)
     weightless.write_bytes(other.read_bytes())
     cut.write_bytes(other.read_bytes()[:300])
     for arguments, said in (
         (["--controllers", "pdi", "--out", out], "Did you mean 'pid'"),
         (["--controllers", "pid"], "--out"),
-        (["--controllers", "pid", "--out", out, "--engine", "rai"], "engine: 'rai' found"),
+        (
+            ["--controllers", "pid", "--out", out, "--engine", "rai"],
+            "engine: 'rai' found",
+        ),
         (["--verify", out], "there is no such file of benchmark results"),
-        (["--verify", out, "--tasks", "mariner-calm"], "--tasks: found together with --verify, which"),
-        (["--submit", tmp_path / "s.json", "--episodes", 9, "--out", out], "--episodes: found together with"),
+        (
+            ["--verify", out, "--tasks", "mariner-calm"],
+            "--tasks: found together with --verify, which",
+        ),
+        (
+            ["--submit", tmp_path / "s.json", "--episodes", 9, "--out", out],
+            "--episodes: found together with",
+        ),
         (["--tasks", "mariner-calm,", "--out", out], "task: '' found, expected one of"),
-        (["--controllers", f"pid,{cut}", "--tasks", "mariner-calm", "--out", out], "may be cut short"),
-        (["--controllers", f"pid,{weightless}", "--tasks", "mariner-calm", "--out", out], "no such file"),
+        (
+            ["--controllers", f"pid,{cut}", "--tasks", "mariner-calm", "--out", out],
+            "may be cut short",
+        ),
+        (
+            [
+                "--controllers",
+                f"pid,{weightless}",
+                "--tasks",
+                "mariner-calm",
+                "--out",
+                out,
+            ],
+            "no such file",
+        ),
         (
             ["--controllers", f"pid,{other}", "--tasks", "mariner-calm", "--out", out],
             "fits no task asked for",

@@ -24,8 +24,12 @@ from agents.suites.suite import BenchmarkTask
 from shipgym import load_model
 from shipgym.tasks.guidance import wrapped
 
-KEEPING = BenchmarkTask("keeping", "course-keeping", "mariner", options={"episode_steps": 250})
-PATH = BenchmarkTask("path", "path-following", "mariner", options={"episode_steps": 450, "n_legs": 1})
+KEEPING = BenchmarkTask(
+    "keeping", "course-keeping", "mariner", options={"episode_steps": 250}
+)
+PATH = BenchmarkTask(
+    "path", "path-following", "mariner", options={"episode_steps": 450, "n_legs": 1}
+)
 SEEDS = np.arange(1_000_000, 1_000_006)
 
 
@@ -53,9 +57,15 @@ def test_costs_and_errors_are_those_of_course_keeping(lq):
     found = evaluate(lq, KEEPING, SEEDS).figures
     alone = sail(lq, KEEPING.ship, KEEPING.task, SEEDS)
     np.testing.assert_allclose(found["cost"], alone.cost, rtol=1e-14)
-    np.testing.assert_allclose(found["cost_rudder_rate"], alone.rudder_rate_cost, rtol=1e-14)
-    np.testing.assert_allclose(found["heading_rmse_deg"], alone.heading_rmse_deg, rtol=1e-14)
-    np.testing.assert_allclose(found["rudder_travel_deg_min"], alone.rudder_travel_deg_min, rtol=1e-12)
+    np.testing.assert_allclose(
+        found["cost_rudder_rate"], alone.rudder_rate_cost, rtol=1e-14
+    )
+    np.testing.assert_allclose(
+        found["heading_rmse_deg"], alone.heading_rmse_deg, rtol=1e-14
+    )
+    np.testing.assert_allclose(
+        found["rudder_travel_deg_min"], alone.rudder_travel_deg_min, rtol=1e-12
+    )
     np.testing.assert_array_equal(found["duration_s"], alone.duration_s)
 
 
@@ -71,7 +81,9 @@ def test_an_episode_does_not_depend_on_those_beside_it(lq):
 
 @pytest.mark.parametrize("task", [KEEPING, PATH], ids=lambda task: task.name)
 def test_the_worst_step_is_what_the_tasks_charge_for_the_rest(task):
-    found = evaluate(steady(1.0), task, SEEDS[:2])  # hard over: she turns until control is lost, or aground
+    found = evaluate(
+        steady(1.0), task, SEEDS[:2]
+    )  # hard over: she turns until control is lost, or aground
     end, steps = found.figures["cost_end"], found.run.steps
     assert found.figures["terminated"].all()
     np.testing.assert_allclose(
@@ -81,7 +93,10 @@ def test_the_worst_step_is_what_the_tasks_charge_for_the_rest(task):
 
 def test_straight_running_needs_the_fuel_of_straight_running():
     calm = BenchmarkTask(
-        "calm", "course-keeping", "kvlcc2", options={"course_change_deg": 0.0, "episode_steps": 100}
+        "calm",
+        "course-keeping",
+        "kvlcc2",
+        options={"course_change_deg": 0.0, "episode_steps": 100},
     )
     found = evaluate(LQ.from_model(calm.ship), calm, SEEDS[:2]).figures
     np.testing.assert_allclose(found["fuel"], 1.0, atol=2e-3)
@@ -93,7 +108,9 @@ def test_fuel_goes_by_the_cube_of_the_shaft_over_the_way():
     options = {"course_change_deg": 0.0, "episode_steps": 300, "action": "rudder-shaft"}
     slow = BenchmarkTask("slow", "course-keeping", "tanker", options=options)
     orders = np.array([[0.0, 0.5]], dtype=np.float32)
-    found = evaluate(Steers(lambda call, seen: np.repeat(orders, len(seen), axis=0)), slow, SEEDS[:2])
+    found = evaluate(
+        Steers(lambda call, seen: np.repeat(orders, len(seen), axis=0)), slow, SEEDS[:2]
+    )
     shaft, speed = found.run.states["n"][1:], found.run.states["u"][1:]
     power = np.mean((shaft / slow.ship.service_shaft_speed) ** 3, axis=0)
     expected = power * slow.ship.particulars["speed"] / speed.mean(axis=0)
@@ -104,27 +121,53 @@ def test_fuel_goes_by_the_cube_of_the_shaft_over_the_way():
 def made_up(task, way=None, **states):
     """Two episodes of 3 and 1 intervals of 10 s of a ship of 5 m/s and 2 1/s; later nothing counts."""
     sailing = np.array([[1, 1], [1, 0], [1, 0]], dtype=np.bool_)
-    known = {"u": np.full((4, 2), 5.0), "v": np.zeros((4, 2)), "n": np.full((4, 2), 2.0)}
-    model = SimpleNamespace(service_shaft_speed=2.0, state_names=("u", "n"), particulars={"speed": 5.0})
+    known = {
+        "u": np.full((4, 2), 5.0),
+        "v": np.zeros((4, 2)),
+        "n": np.full((4, 2), 2.0),
+    }
+    model = SimpleNamespace(
+        service_shaft_speed=2.0, state_names=("u", "n"), particulars={"speed": 5.0}
+    )
     infos = {"heading_error": np.zeros((4, 2)), "distance_made_good": way}
-    states = {name: np.array(value, dtype=np.float64) for name, value in (known | states).items()}
+    states = {
+        name: np.array(value, dtype=np.float64)
+        for name, value in (known | states).items()
+    }
     return SimpleNamespace(
-        task=task.task, model=model, dt=10.0, sailing=sailing, steps=sailing.sum(axis=0).astype(float),
-        states=states, infos=infos,
-    )  # fmt: skip
+        task=task.task,
+        model=model,
+        dt=10.0,
+        sailing=sailing,
+        steps=sailing.sum(axis=0).astype(float),
+        states=states,
+        infos=infos,
+    )
 
 
 def test_fuel_per_mile_by_hand():
     assert fuel_per_distance(made_up(KEEPING)) == pytest.approx([1.0, 1.0])
-    slow = made_up(KEEPING, u=[[9, 9], [5, 2.5], [5, 9], [2.5, 9]], n=[[9, 9], [2, 1], [2, 9], [0, 9]])
+    slow = made_up(
+        KEEPING,
+        u=[[9, 9], [5, 2.5], [5, 9], [2.5, 9]],
+        n=[[9, 9], [2, 1], [2, 9], [0, 9]],
+    )
     assert fuel_per_distance(slow) == pytest.approx([2.0 / 2.5, 0.125 / 0.5])
     drifting = made_up(KEEPING, v=np.full((4, 2), 5.0))
-    drifting.infos["heading_error"] += np.radians(30.0)  # the course is to starboard, and so she drifts
-    assert fuel_per_distance(drifting) == pytest.approx(1.0 / (np.cos(np.pi / 6) + np.sin(np.pi / 6)))
+    drifting.infos["heading_error"] += np.radians(
+        30.0
+    )  # the course is to starboard, and so she drifts
+    assert fuel_per_distance(drifting) == pytest.approx(
+        1.0 / (np.cos(np.pi / 6) + np.sin(np.pi / 6))
+    )
     drifting.model.state_names = ("u",)  # without a shaft its speed is that of service
     drifting.states["n"] *= 0.5
-    assert fuel_per_distance(drifting) == pytest.approx(1.0 / (np.cos(np.pi / 6) + np.sin(np.pi / 6)))
-    path = made_up(PATH, np.array([[0.0, 0.0], [60.0, 25.0], [100.0, 900.0], [90.0, 900.0]]))
+    assert fuel_per_distance(drifting) == pytest.approx(
+        1.0 / (np.cos(np.pi / 6) + np.sin(np.pi / 6))
+    )
+    path = made_up(
+        PATH, np.array([[0.0, 0.0], [60.0, 25.0], [100.0, 900.0], [90.0, 900.0]])
+    )
     assert fuel_per_distance(path) == pytest.approx([1.5, 2.0])
 
 
@@ -155,7 +198,11 @@ def test_reversals_within_the_dead_band_are_none():
     t = np.linspace(0.0, 4.0 * np.pi, 401)
     angle = np.radians(np.stack([5.0 * np.sin(t), 0.2 * np.sin(t), t], axis=1))
     counts = np.ones((400, 3), dtype=np.bool_)
-    assert reversals(angle, counts).tolist() == [4.0, 0.0, 0.0]  # two periods: four turns; a tremble; a ramp
+    assert reversals(angle, counts).tolist() == [
+        4.0,
+        0.0,
+        0.0,
+    ]  # two periods: four turns; a tremble; a ramp
     counts[100:] = False
     assert reversals(angle, counts).tolist() == [1.0, 0.0, 0.0]
     to_and_fro = np.radians(np.outer([0.0, 1.0, 0.0, 1.0, 0.0], [0.48, 0.52]))
@@ -166,12 +213,20 @@ def test_overshoot_and_settling_of_a_damped_oscillation():
     t = np.arange(0.0, 60.0, 0.1)
     for damping in (0.3, 0.6):
         damped = np.sqrt(1.0 - damping**2)
-        response = np.exp(-damping * t) * (np.cos(damped * t) + damping / damped * np.sin(damped * t))
+        response = np.exp(-damping * t) * (
+            np.cos(damped * t) + damping / damped * np.sin(damped * t)
+        )
         overshoot, settling, unsettled = step_figures(np.radians(-20.0) * response, 0.1)
-        assert overshoot == pytest.approx(100.0 * np.exp(-np.pi * damping / damped), abs=0.2)
+        assert overshoot == pytest.approx(
+            100.0 * np.exp(-np.pi * damping / damped), abs=0.2
+        )
         outside = t[np.abs(response) > 0.05].max()
         assert (settling, unsettled) == (pytest.approx(outside + 0.1), 0.0)
-    assert step_figures(np.radians([20.0, 15.0, 10.0]), 1.0) == (0.0, 2.0, 1.0)  # has not settled
+    assert step_figures(np.radians([20.0, 15.0, 10.0]), 1.0) == (
+        0.0,
+        2.0,
+        1.0,
+    )  # has not settled
 
 
 @pytest.mark.parametrize(
@@ -186,9 +241,14 @@ def test_changes_of_course_by_hand(error, expected):
     assert step_figures(np.radians(error), 2.0) == pytest.approx(expected)
 
 
-@pytest.mark.parametrize(("error_deg", "counts"), [(-5.1, True), (4.9, False), (355.1, False), (354.9, True)])
+@pytest.mark.parametrize(
+    ("error_deg", "counts"), [(-5.1, True), (4.9, False), (355.1, False), (354.9, True)]
+)
 def test_a_change_of_course_counts_from_five_degrees_on(error_deg, counts):
-    states = {"psi": np.zeros((3, 1)), "set_point": np.full((3, 1), np.radians(error_deg))}
+    states = {
+        "psi": np.zeros((3, 1)),
+        "set_point": np.full((3, 1), np.radians(error_deg)),
+    }
     run = SimpleNamespace(seeds=[0], steps=np.array([2.0]), states=states, dt=1.0)
     assert course_changes(run)["unsettled"].tolist() == pytest.approx(
         [1.0 if counts else np.nan], nan_ok=True
@@ -204,11 +264,15 @@ def test_an_episode_without_an_interval_has_no_change_of_course():
 def test_figures_of_steering_and_of_paths_by_hand():
     """Two episodes of 4 and 2 intervals of 3 s; what is recorded later or at the beginning does not count."""
     sailing = np.array([[1, 1], [1, 1], [1, 0], [1, 0]], dtype=np.bool_)
-    run = SimpleNamespace(sailing=sailing, steps=sailing.sum(axis=0).astype(float), dt=3.0)
+    run = SimpleNamespace(
+        sailing=sailing, steps=sailing.sum(axis=0).astype(float), dt=3.0
+    )
     run.states = {"delta": np.radians([[0, 0], [2, 1], [-2, 1], [1, 9], [1, 0]])}
     run.infos = {
         "heading_error": np.radians([[9, 9], [3, -1], [4, 1], [0, 9], [0, 9]]),
-        "cross_track": np.array([[9.0, 9.0], [3.0, -1.0], [-4.0, 1.0], [0.0, 9.0], [0.0, 9.0]]),
+        "cross_track": np.array(
+            [[9.0, 9.0], [3.0, -1.0], [-4.0, 1.0], [0.0, 9.0], [0.0, 9.0]]
+        ),
         "in_corridor": np.array([[0, 0], [1, 1], [0, 1], [0, 0], [1, 0]]),
         "grounded": np.array([[1, 1], [0, 0], [0, 0], [0, 1], [0, 1]]),
         "success": np.array([[0, 0], [0, 0], [0, 1], [1, 0], [1, 0]]),
@@ -219,9 +283,12 @@ def test_figures_of_steering_and_of_paths_by_hand():
     assert turned["rudder_reversals_min"] == pytest.approx([2.0 / 0.2, 0.0])
     followed = {name: values.tolist() for name, values in path_following(run).items()}
     assert followed == {
-        "cross_track_rmse_m": [2.5, 1.0], "outside_corridor": [0.5, 0.0], "left_corridor": [1.0, 0.0],
-        "grounded": [0.0, 0.0], "success": [1.0, 1.0],
-    }  # fmt: skip
+        "cross_track_rmse_m": [2.5, 1.0],
+        "outside_corridor": [0.5, 0.0],
+        "left_corridor": [1.0, 0.0],
+        "grounded": [0.0, 0.0],
+        "success": [1.0, 1.0],
+    }
 
 
 def test_what_is_recorded_after_an_episode_is_not_replayed(lq):
@@ -242,36 +309,60 @@ def test_what_is_recorded_after_an_episode_is_not_replayed(lq):
 
 def test_overshoot_and_settling_of_a_run_are_those_of_its_recorded_heading(lq):
     """One change of course of 20 degrees, which LQ makes with little overshoot well before the end."""
-    options = {"course_changes_deg": [20.0], "change_interval_steps": 400, "episode_steps": 300}
-    found = evaluate(lq, BenchmarkTask("change", "course-keeping", "mariner", options=options), SEEDS[:2])
+    options = {
+        "course_changes_deg": [20.0],
+        "change_interval_steps": 400,
+        "episode_steps": 300,
+    }
+    found = evaluate(
+        lq,
+        BenchmarkTask("change", "course-keeping", "mariner", options=options),
+        SEEDS[:2],
+    )
     error = np.degrees(wrapped(found.run.states["set_point"] - found.run.states["psi"]))
     np.testing.assert_allclose(error[0], 20.0)
-    np.testing.assert_allclose(found.figures["overshoot_percent"], -error.min(axis=0) / 20.0 * 100.0)
+    np.testing.assert_allclose(
+        found.figures["overshoot_percent"], -error.min(axis=0) / 20.0 * 100.0
+    )
     last_outside = np.array([np.flatnonzero(np.abs(one) > 1.0)[-1] for one in error.T])
-    np.testing.assert_allclose(found.figures["settling_s"], (last_outside + 1) * found.run.dt)
+    np.testing.assert_allclose(
+        found.figures["settling_s"], (last_outside + 1) * found.run.dt
+    )
     assert (found.figures["unsettled"] == 0.0).all()
     assert (found.figures["overshoot_percent"] < 20.0).all()
 
 
 def test_each_change_of_course_counts_once(lq):
     """Two changes that never settle, beside one too small to count."""
-    options = {"course_changes_deg": [20.0, 30.0, 2.0], "change_interval_steps": 50, "episode_steps": 150}
+    options = {
+        "course_changes_deg": [20.0, 30.0, 2.0],
+        "change_interval_steps": 50,
+        "episode_steps": 150,
+    }
     task = BenchmarkTask("changes", "course-keeping", "mariner", options=options)
     figures = evaluate(steady(0.0), task, SEEDS[:2]).figures
     np.testing.assert_allclose(figures["unsettled"], 1.0)
-    np.testing.assert_allclose(figures["settling_s"], 49.0 * task.engine(1).dt, rtol=0.05)
+    np.testing.assert_allclose(
+        figures["settling_s"], 49.0 * task.engine(1).dt, rtol=0.05
+    )
     np.testing.assert_allclose(figures["overshoot_percent"], 0.0, atol=1e-9)
 
 
 FAILURES = {
-    "nan for one ship": lambda call, seen: np.where(
-        (np.arange(len(seen)) == 1) & (call >= 50), np.nan, 0.0
-    ).reshape(-1, 1),
+    "nan for one ship": (
+        lambda call, seen: np.where(
+            (np.arange(len(seen)) == 1) & (call >= 50), np.nan, 0.0
+        ).reshape(-1, 1)
+    ),
     "another shape": lambda call, seen: np.zeros((len(seen), 1 if call < 50 else 2)),
     "an error": lambda call, seen: (
-        np.zeros((len(seen), 1)) / (0 if call < 0 else 1) if call < 50 else {}["missing"]
+        np.zeros((len(seen), 1)) / (0 if call < 0 else 1)
+        if call < 50
+        else {}["missing"]
     ),
-    "no numbers": lambda call, seen: np.zeros((len(seen), 1)) if call < 50 else [["port"]] * len(seen),
+    "no numbers": lambda call, seen: (
+        np.zeros((len(seen), 1)) if call < 50 else [["port"]] * len(seen)
+    ),
 }
 
 
@@ -279,17 +370,27 @@ FAILURES = {
 def test_a_controller_that_fails_is_charged_for_the_rest_and_the_others_go_on(how):
     sails = evaluate(steady(0.0), KEEPING, SEEDS[:3])
     found = evaluate(Steers(FAILURES[how]), KEEPING, SEEDS[:3])
-    concerned = np.array([False, True, False]) if how == "nan for one ship" else np.ones(3, dtype=np.bool_)
+    concerned = (
+        np.array([False, True, False])
+        if how == "nan for one ship"
+        else np.ones(3, dtype=np.bool_)
+    )
     assert (found.figures["failed"] > 0.0).tolist() == concerned.tolist()
     assert "step 50" in found.run.failure
     steps = found.run.steps
     assert (steps[concerned] == 50.0).all()
     np.testing.assert_allclose(
-        found.figures["cost_end"][concerned], (250 - 50) * worst_step_cost(KEEPING.task), rtol=1e-12
+        found.figures["cost_end"][concerned],
+        (250 - 50) * worst_step_cost(KEEPING.task),
+        rtol=1e-12,
     )
     for name, values in found.figures.items():
-        np.testing.assert_array_equal(values[~concerned], sails.figures[name][~concerned], err_msg=name)
-    assert (found.run.actions[~found.run.sailing] == 0.0).all()  # what is over is not steered
+        np.testing.assert_array_equal(
+            values[~concerned], sails.figures[name][~concerned], err_msg=name
+        )
+    assert (
+        found.run.actions[~found.run.sailing] == 0.0
+    ).all()  # what is over is not steered
 
 
 def test_the_time_of_a_command_is_that_of_a_call_by_the_ships_that_sail(monkeypatch):
@@ -298,7 +399,9 @@ def test_the_time_of_a_command_is_that_of_a_call_by_the_ships_that_sail(monkeypa
     monkeypatch.setattr(rollout_module.time, "process_time", lambda: next(clock))
     run = evaluate(steady(0.0), KEEPING, SEEDS[:2]).run
     calls = run.sailing.shape[0]
-    assert run.seconds_per_action == pytest.approx(0.5 * calls / run.sailing.sum(), rel=0.01)
+    assert run.seconds_per_action == pytest.approx(
+        0.5 * calls / run.sailing.sum(), rel=0.01
+    )
     failed = evaluate(Steers(lambda call, seen: None), KEEPING, SEEDS[:1]).run
     assert failed.seconds_per_action == 0.5  # it was asked once
 
@@ -306,8 +409,16 @@ def test_the_time_of_a_command_is_that_of_a_call_by_the_ships_that_sail(monkeypa
 def test_a_controller_that_fails_at_once_has_a_cost_and_no_figures():
     found = evaluate(Steers(lambda call, seen: None), KEEPING, SEEDS[:2])
     assert found.figures["failed"].all()
-    np.testing.assert_allclose(found.figures["cost"], 250 * worst_step_cost(KEEPING.task))
-    for name in ("heading_rmse_deg", "overshoot_percent", "settling_s", "unsettled", "fuel"):
+    np.testing.assert_allclose(
+        found.figures["cost"], 250 * worst_step_cost(KEEPING.task)
+    )
+    for name in (
+        "heading_rmse_deg",
+        "overshoot_percent",
+        "settling_s",
+        "unsettled",
+        "fuel",
+    ):
         assert np.isnan(found.figures[name]).all(), name
 
 
@@ -336,5 +447,12 @@ def test_a_shield_is_counted(lq):
     assert (found["interventions"] >= 1.0).all()
     assert (found["shielded"] > 0.0).all()
     never = evaluate(Shielded.from_model(KEEPING.ship, lq), KEEPING, SEEDS[:3]).figures
-    np.testing.assert_array_equal(never["cost"], evaluate(lq, KEEPING, SEEDS[:3]).figures["cost"])
-    assert evaluate(PID.from_model(KEEPING.ship), KEEPING, SEEDS[:3]).figures["interventions"].sum() == 0.0
+    np.testing.assert_array_equal(
+        never["cost"], evaluate(lq, KEEPING, SEEDS[:3]).figures["cost"]
+    )
+    assert (
+        evaluate(PID.from_model(KEEPING.ship), KEEPING, SEEDS[:3])
+        .figures["interventions"]
+        .sum()
+        == 0.0
+    )

@@ -54,9 +54,13 @@ def result():
     """PID, the same again, and one that is given as an object; scores as if the suite had references."""
     references = {"mariner-calm": (30.0, 20.0), "mariner-current": (3000.0, 900.0)}
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("agents.benchmarking.summary.reference_costs", lambda suite: references)
+        patch.setattr(
+            "agents.benchmarking.summary.reference_costs", lambda suite: references
+        )
         patch.setattr("agents.benchmarking.summary.N_EPISODES", N)
-        found = benchmark({"pid": "pid", "again": "pid", Lazy.name: Lazy()}, tasks=TASKS, episodes=N)
+        found = benchmark(
+            {"pid": "pid", "again": "pid", Lazy.name: Lazy()}, tasks=TASKS, episodes=N
+        )
     for by_name in found.summary["tasks"].values():
         for one in by_name.values():
             one["microseconds_per_action"] = 7.25  # which differs from run to run
@@ -93,7 +97,9 @@ def test_the_worst_come_first_and_the_hardest_is_hard_for_all(result):
     costs = result.figures("pid", "mariner-calm")[0]
     worst = worst_of(result, "pid", "mariner-calm", N)
     assert [episode.seed - FIRST for episode in worst] == np.argsort(-costs).tolist()
-    medians = np.median([result.figures(name, "mariner-calm")[0] for name in result.ranking], axis=0)
+    medians = np.median(
+        [result.figures(name, "mariner-calm")[0] for name in result.ranking], axis=0
+    )
     assert hardest_of(result, "mariner-calm") == FIRST + np.argmax(medians)
 
 
@@ -109,7 +115,9 @@ def test_each_is_shown_beside_the_best_in_the_same_episode(result):
     assert len(others) == 2 * 3
     for who, episodes in others:
         assert episodes[0].contestant == who
-        assert [episode.contestant for episode in episodes[1:]] == ([] if who == best else [best])
+        assert [episode.contestant for episode in episodes[1:]] == (
+            [] if who == best else [best]
+        )
         assert len({episode.seed for episode in episodes}) == 1
 
 
@@ -131,9 +139,14 @@ def test_what_is_run_again_costs_the_same(result):
     for episode in episodes:
         found = again.episodes[episode]
         cost = result.figures("pid", episode.task)[0, episode.seed - FIRST]
-        lost = result.figures("pid", episode.task, "terminated")[0, episode.seed - FIRST]
+        lost = result.figures("pid", episode.task, "terminated")[
+            0, episode.seed - FIRST
+        ]
         assert found.rewards.sum() == pytest.approx(-cost)
-        assert (found.seed, found.terminated) == (episode.seed, bool(lost) or bool(found.success))
+        assert (found.seed, found.terminated) == (
+            episode.seed,
+            bool(lost) or bool(found.success),
+        )
         assert (found.waypoints is None) == (episode.task == "mariner-calm")
         assert found.truncated == (not found.terminated)
 
@@ -146,15 +159,21 @@ def test_an_episode_run_again_is_that_of_the_single_environment():
     observation, _ = env.reset(seed=FIRST)
     rewards, states, over = [], [env.physical_state()], False
     while not over:
-        observation, reward, terminated, truncated, _ = env.step(pilot.predict(observation)[0])
+        observation, reward, terminated, truncated, _ = env.step(
+            pilot.predict(observation)[0]
+        )
         rewards.append(reward)
         states.append(env.physical_state())
         over = terminated or truncated
     assert (len(rewards), found.n_steps, found.dt) == (600, 200, 3.0 * env.dt)
-    assert found.rewards == pytest.approx(np.reshape(rewards, (200, 3)).sum(axis=1), abs=1e-9)
+    assert found.rewards == pytest.approx(
+        np.reshape(rewards, (200, 3)).sum(axis=1), abs=1e-9
+    )
     assert cost == pytest.approx(-sum(rewards))
     for name in ("x", "y", "psi", "u", "delta", "set_point"):
-        assert found.states[name] == pytest.approx([state[name] for state in states[::3]], abs=1e-6)
+        assert found.states[name] == pytest.approx(
+            [state[name] for state in states[::3]], abs=1e-6
+        )
 
 
 def test_the_last_interval_is_filled_up():
@@ -183,7 +202,9 @@ def test_a_controller_that_fails_is_shown_up_to_then():
     task = load_suite().task("mariner-calm")
 
     class Fails(Lazy):
-        def predict(self, observation, state=None, episode_start=None, deterministic=True):
+        def predict(
+            self, observation, state=None, episode_start=None, deterministic=True
+        ):
             if (state or 0) == 11:
                 raise ValueError
             return super().predict(observation)[0], (state or 0) + 1
@@ -205,7 +226,10 @@ def test_a_changed_result_is_reported(result):
 
 def test_objects_are_replayed_where_they_are_given(result):
     episode = EpisodeId(Lazy.name, "mariner-calm", 0, FIRST)
-    assert "given as an object" in rerun(result, [episode]).refused[Lazy.name, "mariner-calm"]
+    assert (
+        "given as an object"
+        in rerun(result, [episode]).refused[Lazy.name, "mariner-calm"]
+    )
 
     def fails(task):
         raise KeyError("gain")
@@ -230,9 +254,14 @@ def test_the_command_names_what_is_not_the_default(result):
 
 def test_the_whole_suite_is_the_default_of_the_command():
     tasks = dict.fromkeys(task.name for task in load_suite("shipgym-v1").tasks)
-    about = {"contestants": {"lq": {"source": "lq"}, "mine": {"source": None}}, "seeds": {"count": 100}}
+    about = {
+        "contestants": {"lq": {"source": "lq"}, "mine": {"source": None}},
+        "seeds": {"count": 100},
+    }
     about |= {"suite": {"name": "shipgym-v1"}, "tasks": tasks}
-    whole = "shipgym benchmark --controllers lq,mine=... --suite shipgym-v1 --out results"
+    whole = (
+        "shipgym benchmark --controllers lq,mine=... --suite shipgym-v1 --out results"
+    )
     assert command(SimpleNamespace(summary=about)) == whole
     tasks.popitem()
     some = command(SimpleNamespace(summary={**about, "seeds": {"count": 99}}))
@@ -245,9 +274,13 @@ def test_the_same_text_is_packed_the_same_whenever():
     assert packed[4:8] == bytes(4)  # the time at which it was packed
 
 
-def test_a_page_that_cannot_be_drawn_is_refused_before_episodes_are_run_again(result, tmp_path, monkeypatch):
+def test_a_page_that_cannot_be_drawn_is_refused_before_episodes_are_run_again(
+    result, tmp_path, monkeypatch
+):
     monkeypatch.setitem(sys.modules, "plotly.graph_objects", None)
-    monkeypatch.setattr(benchmark_page, "rerun", lambda *given: pytest.fail("was run again"))
+    monkeypatch.setattr(
+        benchmark_page, "rerun", lambda *given: pytest.fail("was run again")
+    )
     with pytest.raises(InputError, match="plotly is not installed"):
         write_page(result, tmp_path / "index.html")
 
@@ -257,7 +290,10 @@ def test_a_page_holds_three_hundred_runs_at_most():
     result = SimpleNamespace(
         ranking=["pid"],
         tasks=["calm"],
-        summary={"tasks": {"calm": {"pid": {"cost": {"value": 1.0}}}}, "seeds": {"first": FIRST}},
+        summary={
+            "tasks": {"calm": {"pid": {"cost": {"value": 1.0}}}},
+            "seeds": {"first": FIRST},
+        },
         figures=lambda name, task: costs,
     )
     usual = inspect.signature(write_page).parameters
@@ -268,16 +304,37 @@ def test_a_page_holds_three_hundred_runs_at_most():
 
 
 def test_a_task_that_only_the_best_known_ran_has_a_first_episode():
-    summary = {"tasks": {"calm": {"best-known": {"cost": {"value": 1.0}}}}, "seeds": {"first": FIRST}}
+    summary = {
+        "tasks": {"calm": {"best-known": {"cost": {"value": 1.0}}}},
+        "seeds": {"first": FIRST},
+    }
     result = SimpleNamespace(ranking=["best-known"], summary=summary)
     assert (hardest_of(result, "calm"), bests_of(result, "calm")) == (FIRST, [])
 
 
 def test_histories_are_as_fine_as_they_are_read():
     """Heel to 0.01 deg, shaft speed to 0.1 1/min, wind to 0.1 m/s and 1 deg, current to 0.01 m/s."""
-    fine = {"x": 0.1, "y": 0.1, "psi": 0.1, "delta": 0.1, "heading_error": 0.1, "course_order": 0.1}
-    fine |= {"rudder_order": 0.1, "cross_track_error": 0.1, "speed": 0.01, "yaw_rate": 0.001, "heel": 0.01}
-    fine |= {"shaft_speed": 0.1, "wind_speed": 0.1, "wind_from": 1.0, "current_speed": 0.01}
+    fine = {
+        "x": 0.1,
+        "y": 0.1,
+        "psi": 0.1,
+        "delta": 0.1,
+        "heading_error": 0.1,
+        "course_order": 0.1,
+    }
+    fine |= {
+        "rudder_order": 0.1,
+        "cross_track_error": 0.1,
+        "speed": 0.01,
+        "yaw_rate": 0.001,
+        "heel": 0.01,
+    }
+    fine |= {
+        "shaft_speed": 0.1,
+        "wind_speed": 0.1,
+        "wind_from": 1.0,
+        "current_speed": 0.01,
+    }
     fine |= {"current_towards": 1.0, "reward_so_far": 0.001}
     values = [123.45678, 123.98766]
     whole = {
@@ -314,7 +371,12 @@ def test_the_page_holds_its_numbers_and_where_they_are_from(result, page):
 
 def test_the_page_says_why_one_cannot_be_replayed(page):
     assert "Not to be replayed: a &lt;b&gt;lazy one" in page.read_text(encoding="utf-8")
-    names = {entry["who"] for entry in json.loads(unpacked(page, "replay-data"))["entries"]["mariner-calm"]}
+    names = {
+        entry["who"]
+        for entry in json.loads(unpacked(page, "replay-data"))["entries"][
+            "mariner-calm"
+        ]
+    }
     assert names == {"", "pid", "again"}
 
 
@@ -323,7 +385,9 @@ def test_an_episode_to_replay_has_its_cost_to_the_hundredth(result, page):
     assert len(data["entries"]["mariner-calm"]) == 1 + 2 * 2
     for task, entries in data["entries"].items():
         for entry in entries:
-            costs = result.figures(entry["who"] or data["runs"][entry["runs"][0]]["name"], task)
+            costs = result.figures(
+                entry["who"] or data["runs"][entry["runs"][0]]["name"], task
+            )
             assert entry["cost"] == round(float(costs[0, entry["seed"] - FIRST]), 2)
 
 
@@ -333,7 +397,9 @@ def test_a_page_that_cannot_be_written_is_refused_at_once(result, tmp_path):
 
 
 @pytest.mark.parametrize("there", [True, False])
-def test_the_command_writes_the_page_where_plotly_is_there(tmp_path, monkeypatch, there):
+def test_the_command_writes_the_page_where_plotly_is_there(
+    tmp_path, monkeypatch, there
+):
     if not there:
         monkeypatch.setitem(sys.modules, "plotly.graph_objects", None)
     out = tmp_path / "results"
@@ -386,7 +452,9 @@ def column(browser, table, number):
 
 
 def see(browser, name):
-    browser.run(f"document.getElementById('{name}').scrollIntoView({{ behavior: 'instant' }})")
+    browser.run(
+        f"document.getElementById('{name}').scrollIntoView({{ behavior: 'instant' }})"
+    )
 
 
 def test_a_click_on_a_head_sorts_and_another_turns_round(opened):
@@ -400,7 +468,10 @@ def test_a_click_on_a_head_sorts_and_another_turns_round(opened):
     opened.click(f"{head} button", 0.5)
     assert [float(key) for key in column(opened, "costs-table", 1)] == up[::-1]
     assert opened.run(f"document.querySelector('{head}').ariaSort") == "descending"
-    assert opened.run("document.querySelectorAll('#costs-table [aria-sort=none]').length") == 3
+    assert (
+        opened.run("document.querySelectorAll('#costs-table [aria-sort=none]').length")
+        == 3
+    )
 
 
 def test_a_key_sorts_texts_and_what_has_no_number_stays_last(opened):
@@ -415,7 +486,9 @@ def test_a_key_sorts_texts_and_what_has_no_number_stays_last(opened):
 
 
 def test_scores_come_with_the_best_first(opened):
-    opened.run("document.querySelector('#ranking-table thead th:nth-child(3) button').click()")
+    opened.run(
+        "document.querySelector('#ranking-table thead th:nth-child(3) button').click()"
+    )
     scores = [float(key) for key in column(opened, "ranking-table", 2)]
     assert scores == sorted(scores, reverse=True)
 
@@ -437,12 +510,17 @@ def test_all_figures_are_drawn_for_who_prints_without_scrolling(opened):
 
 
 def test_tabs_show_one_task_at_a_time(opened):
-    shown = "[...document.querySelectorAll('[role=tabpanel]')].filter((p) => !p.hidden).map((p) => p.id)"
+    shown = (
+        "[...document.querySelectorAll('[role=tabpanel]')].filter((p) =>"
+        " !p.hidden).map((p) => p.id)"
+    )
     assert opened.run(shown) == ["task-mariner-calm"]
     opened.run("document.querySelector('[role=tab]').focus()")
     opened.press("ArrowRight")
     assert opened.run(shown) == ["task-mariner-current"]
-    opened.run("document.querySelector('#costs-table a[href=\"#task-mariner-calm\"]').click()")
+    opened.run(
+        "document.querySelector('#costs-table a[href=\"#task-mariner-calm\"]').click()"
+    )
     opened.wait(f"{shown}[0] === 'task-mariner-calm'")
 
 
@@ -450,27 +528,39 @@ def test_a_chosen_episode_is_replayed_and_its_ship_moves(opened, result):
     opened.run("document.querySelector('[data-replay=\"mariner-current\"]').click()")
     ready = "document.getElementById('player').contentDocument?.querySelectorAll('.ship').length"
     opened.wait(f"{ready} === 2")  # PID twice, in the hardest episode
-    assert opened.run("document.getElementById('replay-task').value") == "mariner-current"
+    assert (
+        opened.run("document.getElementById('replay-task').value") == "mariner-current"
+    )
     other = result.ranking[1] if result.ranking[1] != Lazy.name else result.ranking[0]
     opened.run(
-        f"(() => {{ const who = document.getElementById('replay-who'); who.value = '{other}';"
-        " who.dispatchEvent(new Event('change')); })()"
+        "(() => { const who = document.getElementById('replay-who'); who.value ="
+        f" '{other}'; who.dispatchEvent(new Event('change')); }})()"
     )
     opened.wait(
-        f"{ready} === 2 && document.getElementById('player').contentDocument.readyState === 'complete'"
+        f"{ready} === 2 && document.getElementById('player').contentDocument.readyState"
+        " === 'complete'"
     )
     frame = "document.getElementById('player').contentDocument"
     where = f"{frame}.querySelector('.ship').getAttribute('transform')"
     begin = opened.run(where)
     opened.run(
-        f"(() => {{ const slider = {frame}.getElementById('time'); slider.value = slider.max / 2;"
-        " slider.dispatchEvent(new Event('input', { bubbles: true })); })()"
+        f"(() => {{ const slider = {frame}.getElementById('time'); slider.value ="
+        " slider.max / 2; slider.dispatchEvent(new Event('input', { bubbles: true"
+        " })); })()"
     )
     opened.wait(f"{where} !== '{begin}'")
-    chip = f"[...document.querySelectorAll('.chips button')].find((each) => each.dataset.name === '{other}')"
-    assert opened.run(f"{chip}.style.getPropertyValue('--run')") == COLOURS[result.ranking.index(other)]
+    chip = (
+        "[...document.querySelectorAll('.chips button')].find((each) =>"
+        f" each.dataset.name === '{other}')"
+    )
     assert (
-        opened.run(f"{frame}.querySelector('#legend li').style.getPropertyValue('--run')")
+        opened.run(f"{chip}.style.getPropertyValue('--run')")
+        == COLOURS[result.ranking.index(other)]
+    )
+    assert (
+        opened.run(
+            f"{frame}.querySelector('#legend li').style.getPropertyValue('--run')"
+        )
         == (COLOURS[result.ranking.index(other)])
     )
     legend = opened.run(f"{frame}.getElementById('legend').textContent")
@@ -487,7 +577,10 @@ def test_nothing_sticks_out(opened, width):
     opened.wait(f"innerWidth === {width}")
     for name in ("profile", "tasks", "replays"):
         see(opened, name)
-    opened.wait("document.getElementById('player').contentDocument?.querySelector('.ship') != null")
+    opened.wait(
+        "document.getElementById('player').contentDocument?.querySelector('.ship') !="
+        " null"
+    )
     assert opened.run("document.documentElement.scrollWidth") <= width
     inner = "document.getElementById('player').contentDocument.documentElement"
     assert opened.run(f"{inner}.scrollWidth <= {inner}.clientWidth")
@@ -496,7 +589,11 @@ def test_nothing_sticks_out(opened, width):
 def test_everything_that_can_be_operated_has_a_name(opened):
     tree = opened.ask("Accessibility.getFullAXTree")["nodes"]
     roles = {"button", "combobox", "tab", "link"}
-    operated = [node for node in tree if node.get("role", {}).get("value") in roles and not node["ignored"]]
+    operated = [
+        node
+        for node in tree
+        if node.get("role", {}).get("value") in roles and not node["ignored"]
+    ]
     assert len(operated) > 40
     unnamed = [node for node in operated if not node["name"]["value"].strip()]
     assert len(unnamed) <= 1  # the corner of the matrix
@@ -505,14 +602,18 @@ def test_everything_that_can_be_operated_has_a_name(opened):
 def test_runs_are_numbered_where_there_are_several():
     def called(runs):
         summary = {"tasks": {"calm": {"ppo": {"runs": runs}}}}
-        return page_replays._called(SimpleNamespace(summary=summary), EpisodeId("ppo", "calm", 1, FIRST))
+        return page_replays._called(
+            SimpleNamespace(summary=summary), EpisodeId("ppo", "calm", 1, FIRST)
+        )
 
     assert [called(runs) for runs in (1, 2, 5)] == ["ppo", "ppo, run 2", "ppo, run 2"]
 
 
 def test_rare_metrics_are_shown_only_where_they_are_not_zero_throughout():
     def shown(metric, *means):
-        found = {k: {"metrics": {metric: {"mean": mean}}} for k, mean in enumerate(means)}
+        found = {
+            k: {"metrics": {metric: {"mean": mean}}} for k, mean in enumerate(means)
+        }
         return benchmark_page._is_shown(metric, found)
 
     assert shown("shielded", 0.0, 0.1)
@@ -526,10 +627,16 @@ def test_rare_metrics_are_shown_only_where_they_are_not_zero_throughout():
 
 def test_who_failed_or_did_not_take_part_is_told_with_the_task():
     tasks = {
-        "calm": {"pid": {"failed": 0, "failure": ""}, "mine": {"failed": 3, "failure": "no number"}},
+        "calm": {
+            "pid": {"failed": 0, "failure": ""},
+            "mine": {"failed": 3, "failure": "no number"},
+        },
         "rough": {"pid": {"failed": 0, "failure": ""}},
     }
-    contestants = {"pid": {"refused": {}}, "mine": {"refused": {"rough": "other observations"}}}
+    contestants = {
+        "pid": {"refused": {}},
+        "mine": {"refused": {"rough": "other observations"}},
+    }
     result = BenchmarkResult({"tasks": tasks, "contestants": contestants}, {})
     assert result.failures == [
         "mine did not take part in rough: other observations",
@@ -539,7 +646,10 @@ def test_who_failed_or_did_not_take_part_is_told_with_the_task():
 
 def test_the_hardest_episode_has_tracks_where_there_is_a_path(result):
     worst = {task: hardest_of(result, task) for task in TASKS}
-    for task, names in (("mariner-calm", {"histories"}), ("mariner-current", {"histories", "tracks"})):
+    for task, names in (
+        ("mariner-calm", {"histories"}),
+        ("mariner-current", {"histories", "tracks"}),
+    ):
         one = EpisodeId("pid", task, 0, worst[task])
         suited = load_suite().task(task)
         pilot = PID.from_model(suited.ship, dt=suited.task.interval(suited.ship))
@@ -551,7 +661,10 @@ def test_the_hardest_episode_has_tracks_where_there_is_a_path(result):
 
 def test_worst_hardest_and_best_by_hand(monkeypatch):
     """Two training runs of `a` and one of `b` in three episodes; a cost that is no number is the worst."""
-    costs = {"a": np.array([[1.0, 3.0, 2.0], [0.0, 9.0, np.nan]]), "b": np.array([[1.0, 1.0, 4.0]])}
+    costs = {
+        "a": np.array([[1.0, 3.0, 2.0], [0.0, 9.0, np.nan]]),
+        "b": np.array([[1.0, 1.0, 4.0]]),
+    }
     means = {
         "a": {"cost": {"value": 2.0}},
         "b": {"cost": {"value": 1.0}},

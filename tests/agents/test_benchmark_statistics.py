@@ -24,15 +24,24 @@ RANDOM = np.random.default_rng(0)
 def test_every_statistic_of_three_runs_and_seven_episodes_is_the_golden_one():
     """With draws of runs and episodes, of two tasks; the costs follow no pattern."""
     place = np.arange(21.0).reshape(3, 7)
-    one = {0: 20.0 + 5.0 * np.sin(2.0 * place) + place, 1: 31.0 + 9.0 * np.cos(3.0 * place)}
-    other = {0: 27.0 + 7.0 * np.cos(place[:2]), 1: 30.0 + 9.5 * np.sin(5.0 * place[:1]), 2: place}
+    one = {
+        0: 20.0 + 5.0 * np.sin(2.0 * place) + place,
+        1: 31.0 + 9.0 * np.cos(3.0 * place),
+    }
+    other = {
+        0: 27.0 + 7.0 * np.cos(place[:2]),
+        1: 30.0 + 9.5 * np.sin(5.0 * place[:1]),
+        2: place,
+    }
     draws = Draws(3, 7, seed=5, n_draws=301)
     references = [(40.0, 18.0), (45.0, 25.0)]
     told = {
         "mean": mean_cost(one[0], draws, 0, 3).to_dict(),
         "middle": interquartile_cost(one[1], draws, 1, 2).to_dict(),
         "middle of one run": interquartile_cost(other[1], draws, 1).to_dict(),
-        "score": aggregate_score([one[0], one[1]], references, draws, [0, 1], 1).to_dict(),
+        "score": (
+            aggregate_score([one[0], one[1]], references, draws, [0, 1], 1).to_dict()
+        ),
         "no score": aggregate_score([], [], draws, [], 1).to_dict(),
         "better": improvement(one, other, draws, (1, 2)).to_dict(),
         "worse": improvement(other, one, draws, (2, 1)).to_dict(),
@@ -42,16 +51,23 @@ def test_every_statistic_of_three_runs_and_seven_episodes_is_the_golden_one():
 
 
 def test_interquartile_mean_of_eight_scores_by_hand():
-    assert interquartile_mean([9.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, -7.0]) == (2.0 + 3.0 + 4.0 + 5.0) / 4.0
+    assert (
+        interquartile_mean([9.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, -7.0])
+        == (2.0 + 3.0 + 4.0 + 5.0) / 4.0
+    )
 
 
 @settings(max_examples=60, deadline=None)
-@given(st.lists(st.floats(-1e3, 1e3), min_size=1, max_size=12), st.integers(0, 2**32 - 1))
+@given(
+    st.lists(st.floats(-1e3, 1e3), min_size=1, max_size=12), st.integers(0, 2**32 - 1)
+)
 def test_weighted_interquartile_means_are_scipys_of_the_samples(values, seed):
     array, n = np.array(values), len(values)
     weights = np.random.default_rng(seed).multinomial(3 * n, np.full(n, 1.0 / n), 4)
     expected = [trim_mean(np.repeat(array, row), 0.25) for row in weights]
-    np.testing.assert_allclose(weighted_interquartile_mean(array, weights), expected, atol=1e-9)
+    np.testing.assert_allclose(
+        weighted_interquartile_mean(array, weights), expected, atol=1e-9
+    )
 
 
 def test_scores_are_the_way_from_wheel_over_to_the_best_known():
@@ -107,8 +123,16 @@ def test_interquartile_cost_does_not_see_one_bad_end():
     lost = costs.copy()
     lost[0, 3] = 1e5
     draws = Draws(1, 100)
-    assert interquartile_cost(costs, draws, 0).value == float(trim_mean(costs, 0.25, axis=None))
-    assert abs(interquartile_cost(lost, draws, 0).value - interquartile_cost(costs, draws, 0).value) < 0.1
+    assert interquartile_cost(costs, draws, 0).value == float(
+        trim_mean(costs, 0.25, axis=None)
+    )
+    assert (
+        abs(
+            interquartile_cost(lost, draws, 0).value
+            - interquartile_cost(costs, draws, 0).value
+        )
+        < 0.1
+    )
     assert interquartile_cost(lost, draws, 0).high < 52.0
 
 
@@ -127,13 +151,18 @@ def probability_of_improvement(one, other):
 def test_probability_of_improvement_is_paired_and_ties_count_half():
     one, other = np.array([[1.0, 2.0, 3.0, 4.0]]), np.array([[2.0, 2.0, 1.0, 9.0]])
     assert probability_of_improvement(one, other) == (1.0 + 0.5 + 0.0 + 1.0) / 4.0
-    assert probability_of_improvement(other, one) == 1.0 - probability_of_improvement(one, other)
+    assert probability_of_improvement(other, one) == 1.0 - probability_of_improvement(
+        one, other
+    )
     runs = np.array([[0.0, 0.0], [5.0, 5.0]])  # one training run wins, the other loses
     assert probability_of_improvement(runs, np.array([[1.0, 1.0]])) == 0.5
 
 
 def test_improvement_is_the_mean_over_common_tasks_with_its_interval():
-    better = {0: RANDOM.normal(10.0, 1.0, (1, 100)), 1: RANDOM.normal(10.0, 1.0, (3, 100))}
+    better = {
+        0: RANDOM.normal(10.0, 1.0, (1, 100)),
+        1: RANDOM.normal(10.0, 1.0, (3, 100)),
+    }
     worse = {1: better[1] + 0.5, 0: better[0] + 0.5, 2: np.zeros((1, 100))}
     draws = Draws(3, 100)
     found = improvement(better, worse, draws, (0, 1))
@@ -154,7 +183,11 @@ def test_performance_profile_by_hand():
 def test_runs_are_drawn_for_each_contestant_and_the_first_by_default():
     costs, draws = RANDOM.normal(50.0, 9.0, (3, 20)), Draws(1, 20, n_draws=50)
     for statistic in (mean_cost, interquartile_cost):
-        assert statistic(costs, draws, 0) == statistic(costs, draws, 0, 0) != statistic(costs, draws, 0, 1)
+        assert (
+            statistic(costs, draws, 0)
+            == statistic(costs, draws, 0, 0)
+            != statistic(costs, draws, 0, 1)
+        )
 
 
 def test_percentile_interval():

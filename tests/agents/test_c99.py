@@ -24,7 +24,7 @@ from agents import (
     TurnRate,
     WheelOver,
     load_agent,
-)  # fmt: skip
+)
 from agents.cli import app
 from agents.controllers.adaptive_lq import AdaptiveLQ
 from agents.controllers.los_autopilot import AdaptiveLineOfSight
@@ -50,7 +50,16 @@ from shipgym.ships.kernel_boxes import Kernel, kernel_box
 from shipgym.tasks.task import Task, path_following_task
 from tests.agents.policies import MARINER, random_network, random_policy
 
-FLAGS = ["-std=c99", "-O2", "-Wall", "-Wextra", "-Werror", "-pedantic", "-shared", "-fPIC"]
+FLAGS = [
+    "-std=c99",
+    "-O2",
+    "-Wall",
+    "-Wextra",
+    "-Werror",
+    "-pedantic",
+    "-shared",
+    "-fPIC",
+]
 
 
 def built(folder, name, *texts):
@@ -80,8 +89,14 @@ def sailed(folder, model, commands, given, dt):
 @pytest.mark.parametrize(("name", "steps"), [("mariner", 10_000), ("container", 300)])
 def test_a_ship_in_c_sails_as_the_library_does(name, steps, tmp_path):
     model, dt, windy = load_model(name), 1.0, name == "mariner"
-    weather = Weather(Current(0.5, 90.0), Wind(8.0, 30.0, gust=False)) if windy else None
-    given = (0.5 * np.cos(np.pi / 2), 0.5, 8.0, np.radians(30.0)) if windy else (0.0, 0.0, 0.0, 0.0)
+    weather = (
+        Weather(Current(0.5, 90.0), Wind(8.0, 30.0, gust=False)) if windy else None
+    )
+    given = (
+        (0.5 * np.cos(np.pi / 2), 0.5, 8.0, np.radians(30.0))
+        if windy
+        else (0.0, 0.0, 0.0, 0.0)
+    )
     rudder = np.radians(15.0) * np.sign(np.sin(0.01 * np.arange(steps) + 0.001))
     commands = np.column_stack([rudder, np.full(steps, model.service_shaft_speed)])
     trial = model.simulate(commands[:, : len(model.command_names)], dt, weather=weather)
@@ -97,10 +112,14 @@ def kernel_ship():
     box, random = load_model("kvlcc2-rm-svm"), np.random.default_rng(0)
     shapes = ((8, 4), (8, 3))
     kernel = Kernel(
-        np.array([0.0, 0.0, 0.0, 1.0]), np.full(4, 0.5), *(random.normal(size=one) for one in shapes)
+        np.array([0.0, 0.0, 0.0, 1.0]),
+        np.full(4, 0.5),
+        *(random.normal(size=one) for one in shapes),
     )
     structure = kernel_box(box.dynamics, kernel)
-    weights = dict(zip(structure.coefficient_names, 1e-3 * random.normal(size=9), strict=True))
+    weights = dict(
+        zip(structure.coefficient_names, 1e-3 * random.normal(size=9), strict=True)
+    )
     return replace(box, coefficients=weights, covariance=None, own_table=structure)
 
 
@@ -108,11 +127,19 @@ def kernel_ship():
 def test_every_kind_of_ship_is_the_same_in_c_as_in_plain_python(name, tmp_path):
     model = kernel_ship() if name == "kernel" else load_model(name)
     parts = {**model.vessel.parts(), **sea_functions(True)}
-    plain, numbers = Specialisation(parts, "plain", None).copy(advance), model.ship_numbers()
-    ship, coefficients = (parts[one].function(numbers, 0) for one in ("load_ship", "load_coefficients"))
+    plain, numbers = (
+        Specialisation(parts, "plain", None).copy(advance),
+        model.ship_numbers(),
+    )
+    ship, coefficients = (
+        parts[one].function(numbers, 0) for one in ("load_ship", "load_coefficients")
+    )
     rudder, shaft = np.radians(20.0), model.service_shaft_speed
     found = sailed(tmp_path, model, [rudder] * 30, (0.1, 0.2, 0.0, 0.0), 1.0)
-    motion, given = Motion(*found[0].tolist()), ShipInput(rudder, shaft, 0.1, 0.2, 0.0, 0.0)
+    motion, given = (
+        Motion(*found[0].tolist()),
+        ShipInput(rudder, shaft, 0.1, 0.2, 0.0, 0.0),
+    )
     for row in found[1:]:
         motion = plain(motion, given, 1.0, coefficients, ship, CALM)
         np.testing.assert_allclose(row, motion, rtol=1e-12, atol=1e-15)
@@ -121,15 +148,28 @@ def test_every_kind_of_ship_is_the_same_in_c_as_in_plain_python(name, tmp_path):
 def test_functions_of_the_engine_are_the_same_in_c_bit_by_bit(tmp_path):
     c = Translator({}, "it")
     names = [
-        c.function(one, float)[0] for one in (mathematics.exponential, mathematics.two_to, mathematics.wrap)
+        c.function(one, float)[0]
+        for one in (mathematics.exponential, mathematics.two_to, mathematics.wrap)
     ]
     names.append(c.function(mathematics.arctan, float)[0])
-    prelude = ship_source(MARINER, "ship").source.partition("typedef")[0].replace('"ship.h"', '"it.h"')
+    prelude = (
+        ship_source(MARINER, "ship")
+        .source.partition("typedef")[0]
+        .replace('"ship.h"', '"it.h"')
+    )
     public = [
-        f"double f{k}(double x);\ndouble f{k}(double x) {{ return {one}(x); }}" for k, one in enumerate(names)
+        f"double f{k}(double x);\ndouble f{k}(double x) {{ return {one}(x); }}"
+        for k, one in enumerate(names)
     ]
-    library = built(tmp_path, "it", "", "\n".join([prelude, *c.structures, *c.functions, *public]))
-    plain = (mathematics.exponential, mathematics.two_to, mathematics.wrap, mathematics.arctan)
+    library = built(
+        tmp_path, "it", "", "\n".join([prelude, *c.structures, *c.functions, *public])
+    )
+    plain = (
+        mathematics.exponential,
+        mathematics.two_to,
+        mathematics.wrap,
+        mathematics.arctan,
+    )
     for k, function in enumerate(plain):
         in_c = getattr(library, f"f{k}")
         in_c.restype, in_c.argtypes = ctypes.c_double, [ctypes.c_double]
@@ -187,7 +227,12 @@ def branches(x):
 
 
 def limited(x):
-    return abs(min(x, 0.5)) + max(-x, math.floor(x)) + float(int(x)) / 2 + np.arctan2(x, 1.5)
+    return (
+        abs(min(x, 0.5))
+        + max(-x, math.floor(x))
+        + float(int(x)) / 2
+        + np.arctan2(x, 1.5)
+    )
 
 
 def paired(x):
@@ -201,11 +246,19 @@ def turned(pair):
 
 
 def test_each_construct_of_python_is_the_same_in_c(tmp_path):
-    c, plain = Translator({}, "it"), (within, either, summed, swapped, powers, branches, limited, paired)
+    c, plain = (
+        Translator({}, "it"),
+        (within, either, summed, swapped, powers, branches, limited, paired),
+    )
     names = [c.function(one, float)[0] for one in plain]
-    prelude = ship_source(MARINER, "ship").source.partition("typedef")[0].replace('"ship.h"', '"it.h"')
+    prelude = (
+        ship_source(MARINER, "ship")
+        .source.partition("typedef")[0]
+        .replace('"ship.h"', '"it.h"')
+    )
     public = [
-        f"double f{k}(double x);\ndouble f{k}(double x) {{ return {one}(x); }}" for k, one in enumerate(names)
+        f"double f{k}(double x);\ndouble f{k}(double x) {{ return {one}(x); }}"
+        for k, one in enumerate(names)
     ]
     text = "\n".join([prelude, *c.structures, *c.functions, *public])
     (tmp_path / "it.h").write_text("")
@@ -217,7 +270,10 @@ def test_each_construct_of_python_is_the_same_in_c(tmp_path):
         in_c = getattr(library, f"f{k}")
         in_c.restype, in_c.argtypes = ctypes.c_double, [ctypes.c_double]
         for x in (-3.0, -1.3, -1.0, -0.4, 0.0, 0.3, 0.7, 1.0, 1.9, 2.0, 2.6):
-            assert in_c(x) == pytest.approx(function(x), rel=1e-15, abs=1e-15), (function.__name__, x)
+            assert in_c(x) == pytest.approx(function(x), rel=1e-15, abs=1e-15), (
+                function.__name__,
+                x,
+            )
 
 
 def over_wheel_over():
@@ -227,13 +283,19 @@ def over_wheel_over():
     names, scales = zip(*((one.name, one.scale) for one in shown), strict=True)
     network = random_network(len(names) + 1, 16, 1)
     return random_policy(
-        network=network, observation_names=names, observation_scales=scales, base=base, authority=0.3
+        network=network,
+        observation_names=names,
+        observation_scales=scales,
+        base=base,
+        authority=0.3,
     )
 
 
 CONTROLLERS = {
     "pid": PID.from_model(MARINER),
-    "filtered": FilteredPID.from_model(MARINER, wave_period=9.0, largest_turn_rate_deg_s=0.5),
+    "filtered": FilteredPID.from_model(
+        MARINER, wave_period=9.0, largest_turn_rate_deg_s=0.5
+    ),
     "lq": LQ.from_model(MARINER),
     "scheduled": ScheduledLQ.from_model(MARINER),
     "lqg": LQG.from_model(MARINER, wave_period=9.0),
@@ -246,16 +308,26 @@ CONTROLLERS = {
     ),
     "ppo": load_agent("mariner-calm-ppo"),
     "path_ppo": load_agent("container-roll-path-ppo"),
-    "limited": random_policy(base=LQ.from_model(MARINER), action_repeat=3, rate_limit=0.1),
+    "limited": random_policy(
+        base=LQ.from_model(MARINER), action_repeat=3, rate_limit=0.1
+    ),
     "residual": over_wheel_over(),
     "orders": random_policy(action="rudder-discrete", frame_stack=3, action_repeat=2),
 }
 LONG = ("lq", "turn_rate", "wheel_over", "wheel_over_legs")
 SIZES = {
-    "heading": 0.1, "set_point": 0.3, "yaw_rate": 0.01, "sway": 1.0, "surge": 8.0, "rudder": 0.3,
-    "cross_track": 200.0, "turn_distance": 300.0, "next_turn_distance": 500.0, "second_turn_distance": 900.0,
+    "heading": 0.1,
+    "set_point": 0.3,
+    "yaw_rate": 0.01,
+    "sway": 1.0,
+    "surge": 8.0,
+    "rudder": 0.3,
+    "cross_track": 200.0,
+    "turn_distance": 300.0,
+    "next_turn_distance": 500.0,
+    "second_turn_distance": 900.0,
     "rate_of_turn": 0.004,
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("name", CONTROLLERS)
@@ -267,13 +339,19 @@ def test_an_autopilot_in_c_orders_what_the_library_orders(name, tmp_path):
     step.restype, step.argtypes = ctypes.c_double, [ctypes.c_void_p, ctypes.c_void_p]
     getattr(library, f"{name}_init")(state)
     random = np.random.default_rng(0)
-    numbers = random.normal(0.0, [SIZES.get(one, 0.5) for one in source.inputs], (steps, len(source.inputs)))
+    numbers = random.normal(
+        0.0, [SIZES.get(one, 0.5) for one in source.inputs], (steps, len(source.inputs))
+    )
     numbers[:, 0] = 0.4 * (np.arange(steps) % 600 > 300)  # the set-point stands first
     for column in np.flatnonzero(
         np.isin([*source.inputs], ["rate_of_turn", "turn_angle", "next_turn_angle"])
     ):
         numbers[::3, column] = 0.0  # no rate ordered, no turn ahead
-    within = 1e-12 if name not in ("ppo", "path_ppo", "limited", "residual", "orders") else 1e-6
+    within = (
+        1e-12
+        if name not in ("ppo", "path_ppo", "limited", "residual", "orders")
+        else 1e-6
+    )
     for row in numbers:
         expected = bridge.step(dict(zip(source.inputs, row.tolist(), strict=True)))
         assert abs(step(state, row.ctypes.data) - expected) <= within
@@ -283,27 +361,36 @@ SHIELDED = Shielded.from_model(MARINER, random_policy())
 
 
 @pytest.mark.parametrize(
-    "agent", [CONTROLLERS["lq"], CONTROLLERS["ppo"], SHIELDED], ids=["lq", "ppo", "shield"]
+    "agent",
+    [CONTROLLERS["lq"], CONTROLLERS["ppo"], SHIELDED],
+    ids=["lq", "ppo", "shield"],
 )
 def test_an_autopilot_orders_what_the_controller_commands_in_the_environment(agent):
     env = gym.make("shipgym/CourseKeeping-v0", model="mariner")
     seen, _ = env.reset(seed=3)
     scales, bridge, state = env.unwrapped.observation_scales, Autopilot(agent), None
     for step in range(60):
-        physical = dict(zip(env.unwrapped.observation_names, seen * scales, strict=True))
+        physical = dict(
+            zip(env.unwrapped.observation_names, seen * scales, strict=True)
+        )
         error = np.arctan2(seen[0], seen[1])
         order = bridge.step({**physical, "set_point": error, "heading": 0.0})
         action, state = agent.predict(seen, state, step == 0)
-        assert order / bridge.limit == pytest.approx(action[0], abs=2e-5)  # observations are single
+        assert order / bridge.limit == pytest.approx(
+            action[0], abs=2e-5
+        )  # observations are single
         seen, *_ = env.step(action)
 
 
 @pytest.mark.parametrize(
-    ("version", "kind"), [(1, WheelOver), (0, WheelOver), (1, PreviewMPC), (1, IntegralLineOfSight)]
+    ("version", "kind"),
+    [(1, WheelOver), (0, WheelOver), (1, PreviewMPC), (1, IntegralLineOfSight)],
 )
 def test_guidance_orders_what_it_commands_along_a_path(version, kind):
     """Its inputs are those of a bridge: the direction of the path, and the course over ground."""
-    env = gym.make(f"shipgym/PathFollowing-v{version}", model="mariner", max_turn_deg=60.0)
+    env = gym.make(
+        f"shipgym/PathFollowing-v{version}", model="mariner", max_turn_deg=60.0
+    )
     task = env.unwrapped.task
     agent = kind.from_model(MARINER, task=task)
     seen, _ = env.reset(seed=3)
@@ -312,25 +399,37 @@ def test_guidance_orders_what_it_commands_along_a_path(version, kind):
     for step in range(60 if kind is PreviewMPC else 250):
         told = dict(zip(names, seen.astype(float) * scales, strict=True))
         turns = [np.array([told[name]]) for name in agent.turns_ahead]
-        course = np.arctan2(seen[0], seen[1])  # the environment's, the ship heading to the north
+        course = np.arctan2(
+            seen[0], seen[1]
+        )  # the environment's, the ship heading to the north
         ground = course - np.arctan2(told["course_error_sin"], told["course_error_cos"])
-        direction = course + np.arctan2(told["cross_track"], agent.gains["task_lookahead"])
+        direction = course + np.arctan2(
+            told["cross_track"], agent.gains["task_lookahead"]
+        )
         direction -= float(np.squeeze(agent.shift(turns)))
-        order = bridge.step({**told, "set_point": direction, "heading": 0.0, "course": ground})
+        order = bridge.step(
+            {**told, "set_point": direction, "heading": 0.0, "course": ground}
+        )
         action, state = agent.predict(seen, state, step == 0)
         assert order / bridge.limit == pytest.approx(action[0], abs=2e-5)
         seen, *_ = env.step(action)
 
 
 def test_what_is_no_closed_law_is_refused():
-    with pytest.raises(InputError, match=r"'preview-mpc' found, .*'alos', 'wheel-over' over one of these"):
+    with pytest.raises(
+        InputError,
+        match=r"'preview-mpc' found, .*'alos', 'wheel-over' over one of these",
+    ):
         autopilot_source(PreviewMPC.from_model(MARINER))
     said = (
-        "'lq-adaptive' found, which is not a closed-form law and cannot be written as C. Export 'pid', 'lq'"
+        "'lq-adaptive' found, which is not a closed-form law and cannot be written as"
+        " C. Export 'pid', 'lq'"
     )
     with pytest.raises(InputError, match=said):
         autopilot_source(AdaptiveLQ.from_model(MARINER))
-    with pytest.raises(InputError, match=r"commands rudder-shaft .*expected rudder alone"):
+    with pytest.raises(
+        InputError, match=r"commands rudder-shaft .*expected rudder alone"
+    ):
         autopilot_source(random_policy(action="rudder-shaft"))
 
 
@@ -346,7 +445,9 @@ def unwritable(x):
 
 
 def test_python_that_is_not_arithmetic_is_refused_with_its_line():
-    with pytest.raises(InputError, match=r"unwritable, line 3: '\[x, x\]' found, which cannot be"):
+    with pytest.raises(
+        InputError, match=r"unwritable, line 3: '\[x, x\]' found, which cannot be"
+    ):
         Translator({}, "it").function(unwritable, float)
 
 
@@ -372,7 +473,8 @@ def of_a_text(x):
 @pytest.mark.parametrize("function", [of_a_sequence, of_too_few, of_itself, of_a_text])
 def test_what_c_has_no_words_for_is_refused(function):
     with pytest.raises(
-        InputError, match=rf"test_c99.{function.__name__}, line [2-5]: .* cannot be written as C"
+        InputError,
+        match=rf"test_c99.{function.__name__}, line [2-5]: .* cannot be written as C",
     ):
         Translator({}, "it").function(function, float)
 
@@ -397,32 +499,95 @@ def test_things_of_one_name_are_numbered_from_the_second_on():
 
 def test_a_lambda_is_refused():
     double = lambda x: 2 * x  # noqa: E731
-    with pytest.raises(InputError, match=r"line 1: 'double = lambda x: 2 \* x' found, which cannot be"):
+    with pytest.raises(
+        InputError, match=r"line 1: 'double = lambda x: 2 \* x' found, which cannot be"
+    ):
         Translator({}, "it").function(double, float)
 
 
 def test_the_command_writes_c_and_says_what_it_cannot(tmp_path):
     CONTROLLERS["pid"].save(tmp_path / "pid.json")
     run = CliRunner().invoke
-    found = run(app, ["export", str(tmp_path / "pid.json"), "--c", str(tmp_path / "out")])
+    found = run(
+        app, ["export", str(tmp_path / "pid.json"), "--c", str(tmp_path / "out")]
+    )
     assert found.exit_code == 0, found.output
-    assert sorted(one.name for one in (tmp_path / "out").iterdir()) == ["pid.c", "pid.h"]
+    assert sorted(one.name for one in (tmp_path / "out").iterdir()) == [
+        "pid.c",
+        "pid.h",
+    ]
     for what, name in ((tmp_path / "pid.json", "helm"), ("mariner", "hull")):
-        found = run(app, ["export", str(what), "--c", str(tmp_path / name), "--name", name, "--json"])
+        found = run(
+            app,
+            [
+                "export",
+                str(what),
+                "--c",
+                str(tmp_path / name),
+                "--name",
+                name,
+                "--json",
+            ],
+        )
         written = sorted(one.name for one in (tmp_path / name).iterdir())
         assert (found.exit_code, written) == (0, [f"{name}.c", f"{name}.h"])
         assert json.loads(found.stdout) == {"written": [str(tmp_path / name)]}
     found = run(app, ["export", "mariner", "--c", str(tmp_path)])
-    assert (found.exit_code, (tmp_path / "mariner.c").exists()) == (2, False)  # a folder with other files
+    assert (found.exit_code, (tmp_path / "mariner.c").exists()) == (
+        2,
+        False,
+    )  # a folder with other files
     for said, *arguments in (
         ("nothing to write: give --c FOLDER", "mariner"),
         ("Did you mean 'mariner'", "marinr", "--c", tmp_path / "no"),
-        ("--depth found, which are for --c and --fmu", "mariner", "--onnx", tmp_path / "no", "--depth", 9),
-        ("agent: 'mariner' found", "mariner", "--c", tmp_path / "no", "--onnx", tmp_path / "no.onnx"),
-        ("its folder does not exist", "mariner", "--c", tmp_path / "no", "--fmu", tmp_path / "a" / "no.fmu"),
-        ("name that ends in .fmu", "mariner", "--c", tmp_path / "no", "--fmu", tmp_path / "no.zip"),
-        ("--fmi: 2.0 found, which is for --fmu alone", "mariner", "--c", tmp_path / "no", "--fmi", "2.0"),
-        ("--depth: 9 found, but", tmp_path / "pid.json", "--c", tmp_path / "no", "--depth", 9),
+        (
+            "--depth found, which are for --c and --fmu",
+            "mariner",
+            "--onnx",
+            tmp_path / "no",
+            "--depth",
+            9,
+        ),
+        (
+            "agent: 'mariner' found",
+            "mariner",
+            "--c",
+            tmp_path / "no",
+            "--onnx",
+            tmp_path / "no.onnx",
+        ),
+        (
+            "its folder does not exist",
+            "mariner",
+            "--c",
+            tmp_path / "no",
+            "--fmu",
+            tmp_path / "a" / "no.fmu",
+        ),
+        (
+            "name that ends in .fmu",
+            "mariner",
+            "--c",
+            tmp_path / "no",
+            "--fmu",
+            tmp_path / "no.zip",
+        ),
+        (
+            "--fmi: 2.0 found, which is for --fmu alone",
+            "mariner",
+            "--c",
+            tmp_path / "no",
+            "--fmi",
+            "2.0",
+        ),
+        (
+            "--depth: 9 found, but",
+            tmp_path / "pid.json",
+            "--c",
+            tmp_path / "no",
+            "--depth",
+            9,
+        ),
     ):
         found = run(app, ["export", *map(str, arguments)])
         assert found.exit_code == 2
@@ -435,7 +600,10 @@ def test_texts_have_angles_speeds_and_headings_in_four_digits():
     made = _environment().filters
     assert made["deg"](np.radians(-12.34567)) == -12.3457
     assert made["knots"](1852.0 / 3600.0 * 7.12345) == 7.1235
-    headings = [made["heading"](np.radians(one)) for one in (-90.0, 12.34567, 359.99997, -1e-9, 720.5)]
+    headings = [
+        made["heading"](np.radians(one))
+        for one in (-90.0, 12.34567, 359.99997, -1e-9, 720.5)
+    ]
     assert headings == [270.0, 12.3457, 0.0, 0.0, 0.5]
     assert made["float32"](0.1) == "1.000000000e-01f"
 
@@ -444,7 +612,9 @@ def test_a_long_name_is_shown_by_its_beginning():
     with pytest.raises(InputError) as refused:
         checked_name("x" * 100)
     assert f"name: '{'x' * 60}' found" in str(refused.value)
-    title = ship_source(replace(MARINER, name="m" * 300), "ship").header.partition("*/")[0]
+    title = ship_source(replace(MARINER, name="m" * 300), "ship").header.partition(
+        "*/"
+    )[0]
     assert "Ship model _" + "m" * 108 in title  # 120 characters
     assert "m" * 109 not in title
 

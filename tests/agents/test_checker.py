@@ -7,7 +7,11 @@ from agents import LQ, LQG, PID, check_controller
 from agents.controllers.checker import _check_same
 from shipgym.errors import InputError
 from shipgym.ships import load_model
-from shipgym.tasks.task import OBSERVATION_NAMES, observation_scales, path_following_task
+from shipgym.tasks.task import (
+    OBSERVATION_NAMES,
+    observation_scales,
+    path_following_task,
+)
 
 MARINER = load_model("mariner")
 
@@ -95,7 +99,9 @@ class Listed(Helmsman):
 
 
 class ByKeyword(Helmsman):
-    def predict(self, observation, *, state=None, episode_start=None, deterministic=True):
+    def predict(
+        self, observation, *, state=None, episode_start=None, deterministic=True
+    ):
         return observation[..., :1], state
 
 
@@ -130,7 +136,13 @@ def test_a_user_s_own_passes():
     ("controller", "message"),
     [
         (Moody(), "asked again with the same state it answers"),
-        (Herd(), "ship 0 alone: .* rows of a batch and episodes must be independent of each other"),
+        (
+            Herd(),
+            (
+                "ship 0 alone: .* rows of a batch and episodes must be independent of"
+                " each other"
+            ),
+        ),
         (Hanger(), "with episode_start True and the state of another episode"),
         (Vandal(), "the observation was changed"),
         (Divider(), "step 0: action .*nan.* found"),
@@ -140,7 +152,10 @@ def test_a_user_s_own_passes():
         (Curt(), "ndarray found, expected a pair: action and state"),
         (Triple(), "tuple found, expected a pair: action and state"),
         (Listed(), "list found, expected a pair: action and state"),
-        (ByKeyword(), r"too many positional arguments; expected predict\(observation, state=None"),
+        (
+            ByKeyword(),
+            r"too many positional arguments; expected predict\(observation, state=None",
+        ),
         (Unnamed(), "unexpected keyword argument 'state'; expected predict"),
         (Short(), "unexpected keyword argument 'state'; expected predict"),
         (object(), "no method 'predict' found"),
@@ -160,7 +175,9 @@ def test_a_scale_of_one_s_own_may_differ_by_a_millionth_of_it():
     for factor, fits in ((1.0 + 0.9e-6, True), (1.0 + 1.2e-6, False)):
         own = Helmsman()
         own.observation_names = OBSERVATION_NAMES
-        own.observation_scales = tuple(scales * np.where(np.arange(8) == 2, factor, 1.0))
+        own.observation_scales = tuple(
+            scales * np.where(np.arange(8) == 2, factor, 1.0)
+        )
         if fits:
             check_controller(own, MARINER, n_steps=2)
         else:
@@ -171,7 +188,9 @@ def test_a_scale_of_one_s_own_may_differ_by_a_millionth_of_it():
 def test_orders_are_the_same_to_a_hundred_thousandth_of_the_rudder_limit():
     _check_same([0.9 + 0.95e-5], [0.9], "it")
     for found in (0.9 + 1.05e-5, 0.9 - 1.05e-5):
-        with pytest.raises(InputError, match=r"it: \[0\.\d+\] found, expected \[0\.9\] as otherwise"):
+        with pytest.raises(
+            InputError, match=r"it: \[0\.\d+\] found, expected \[0\.9\] as otherwise"
+        ):
             _check_same([found], [0.9], "it")
 
 

@@ -13,7 +13,14 @@ from safetensors import safe_open
 from agents.training import checkpoints, run_folder
 from agents.training.algorithms import make_agent
 from agents.training.plan import Given, make_plan
-from agents.training.safe_file import CONTENT, SHA256, _unpacked, check_like, read_values, write_values
+from agents.training.safe_file import (
+    CONTENT,
+    SHA256,
+    _unpacked,
+    check_like,
+    read_values,
+    write_values,
+)
 from shipgym.errors import InputError
 
 SHORT = {"episode_steps": 20, "change_interval_steps": 10}
@@ -51,9 +58,12 @@ def test_what_fits_is_put_back(fresh, memory):
     assert fresh.num_timesteps == 40
     again = checkpoints.take(fresh)
     assert torch.equal(
-        again["parameters"]["policy"]["actor.mu.weight"], memory["parameters"]["policy"]["actor.mu.weight"]
+        again["parameters"]["policy"]["actor.mu.weight"],
+        memory["parameters"]["policy"]["actor.mu.weight"],
     )
-    np.testing.assert_array_equal(again["ships"][1]["states"], memory["ships"][1]["states"])
+    np.testing.assert_array_equal(
+        again["ships"][1]["states"], memory["ships"][1]["states"]
+    )
     assert again["replay"]["pos"] == memory["replay"]["pos"] == 10
 
 
@@ -73,10 +83,19 @@ def test_random_numbers_go_on_where_they_were(fresh, memory):
 def test_of_an_optimiser_only_rates_and_moments_are_put_back(fresh, memory):
     changed = copy.deepcopy(memory)
     (group,) = changed["parameters"]["actor.optimizer"]["param_groups"]
-    group |= {"lr": 0.25, "eps": "evil", "params": [7], "of another version of torch": [1]}
+    group |= {
+        "lr": 0.25,
+        "eps": "evil",
+        "params": [7],
+        "of another version of torch": [1],
+    }
     checkpoints.put_back(fresh, changed)
     (found,) = fresh.get_parameters()["actor.optimizer"]["param_groups"]
-    assert (found["lr"], found["eps"], found["params"]) == (0.25, 1e-8, [0, 1, 2, 3, 4, 5])
+    assert (found["lr"], found["eps"], found["params"]) == (
+        0.25,
+        1e-8,
+        [0, 1, 2, 3, 4, 5],
+    )
 
 
 RANDOM_ARRAY = np.zeros(3)
@@ -87,7 +106,11 @@ WEIGHT = ("parameters", "policy", "actor.mu.weight")
 @pytest.mark.parametrize(
     ("path", "value", "said"),
     [
-        (("parameters",), "/etc/passwd", "agent.parameters: '/etc/passwd' found, expected a table of 4"),
+        (
+            ("parameters",),
+            "/etc/passwd",
+            "agent.parameters: '/etc/passwd' found, expected a table of 4",
+        ),
         (
             ("parameters", "policy"),
             "/dev/zero",
@@ -96,56 +119,135 @@ WEIGHT = ("parameters", "policy", "actor.mu.weight")
         (
             WEIGHT,
             "/etc/passwd",
-            "actor.mu.weight: '/etc/passwd' found, expected Tensor of torch.float32, shape (1, 8)",
+            (
+                "actor.mu.weight: '/etc/passwd' found, expected Tensor of"
+                " torch.float32, shape (1, 8)"
+            ),
         ),
         (WEIGHT, torch.zeros(8, 1), "Tensor of torch.float32, shape (8, 1) found"),
-        (WEIGHT, torch.zeros(1, 8, dtype=torch.float64), "Tensor of torch.float64, shape (1, 8) found"),
-        (WEIGHT, np.zeros((1, 8), np.float32), "ndarray of float32, shape (1, 8) found, expected Tensor"),
-        (("parameters", "policy", "more"), torch.zeros(1), "agent.parameters.policy: a table of"),
-        (("parameters", "actor.optimizer", "state", 99), {}, "actor.optimizer.state: a table of"),
+        (
+            WEIGHT,
+            torch.zeros(1, 8, dtype=torch.float64),
+            "Tensor of torch.float64, shape (1, 8) found",
+        ),
+        (
+            WEIGHT,
+            np.zeros((1, 8), np.float32),
+            "ndarray of float32, shape (1, 8) found, expected Tensor",
+        ),
+        (
+            ("parameters", "policy", "more"),
+            torch.zeros(1),
+            "agent.parameters.policy: a table of",
+        ),
+        (
+            ("parameters", "actor.optimizer", "state", 99),
+            {},
+            "actor.optimizer.state: a table of",
+        ),
         (
             ("parameters", "actor.optimizer", "state", 0, "exp_avg"),
             torch.zeros(3),
             "state[0].exp_avg: Tensor",
         ),
-        (("parameters", "actor.optimizer", "param_groups"), [], "param_groups: list of 0 found"),
+        (
+            ("parameters", "actor.optimizer", "param_groups"),
+            [],
+            "param_groups: list of 0 found",
+        ),
         (("variables",), {}, "agent.variables: a table of 0"),
-        (("variables", "log_ent_coef"), 0.5, "log_ent_coef: float found, expected Tensor"),
+        (
+            ("variables", "log_ent_coef"),
+            0.5,
+            "log_ent_coef: float found, expected Tensor",
+        ),
         (("counters", "num_timesteps"), -1, "num_timesteps: -1 found, expected int"),
-        (("counters", "num_timesteps"), 1.5, "num_timesteps: float found, expected int"),
-        (("counters", "num_timesteps"), True, "num_timesteps: bool found, expected int"),
-        (("counters", "_last_obs"), None, "_last_obs: None found, expected ndarray of float32, shape (4, 8)"),
+        (
+            ("counters", "num_timesteps"),
+            1.5,
+            "num_timesteps: float found, expected int",
+        ),
+        (
+            ("counters", "num_timesteps"),
+            True,
+            "num_timesteps: bool found, expected int",
+        ),
+        (
+            ("counters", "_last_obs"),
+            None,
+            "_last_obs: None found, expected ndarray of float32, shape (4, 8)",
+        ),
         (("counters", "__class__"), 1, "agent.counters: a table of 7"),
-        (("episodes",), [{"r": 1.0, "l": 5}], "agent.episodes[0]: a table of 2 found, expected a table of 3"),
+        (
+            ("episodes",),
+            [{"r": 1.0, "l": 5}],
+            "agent.episodes[0]: a table of 2 found, expected a table of 3",
+        ),
         (("episodes",), "rlt", "agent.episodes: 'rlt' found, expected list of 0"),
         (("successes",), ["x"], "agent.successes[0]: 'x' found"),
         (("successes",), [float("inf")], "agent.successes[0]: inf found"),
         (("ships",), [], "agent.ships: list of 0 found, expected list of 2"),
         (("ships", 0, "var"), "x", "agent.ships[0].var: 'x' found"),
-        (("ships", 1, "states"), RANDOM_ARRAY, "agent.ships[1].states: ndarray of float64, shape (3,) found"),
+        (
+            ("ships", 1, "states"),
+            RANDOM_ARRAY,
+            "agent.ships[1].states: ndarray of float64, shape (3,) found",
+        ),
         (("replay",), None, "agent.replay: None found, expected a table of 8"),
         (
             ("replay", "actions"),
             None,
             "agent.replay.actions: None found, expected ndarray of float32, shape (0,",
         ),
-        (("replay", "actions"), np.zeros((), np.float32), "agent.replay.actions: float found"),
-        (("replay", "pos"), 11, "agent.replay: not the 11 steps that its position 11 says"),
+        (
+            ("replay", "actions"),
+            np.zeros((), np.float32),
+            "agent.replay.actions: float found",
+        ),
+        (
+            ("replay", "pos"),
+            11,
+            "agent.replay: not the 11 steps that its position 11 says",
+        ),
         (("replay", "pos"), 10**9, "agent.replay: not the"),
         (("replay", "full"), True, "agent.replay: not the 20 steps"),
-        (("replay", "actions"), np.zeros((10, 4, 2), np.float32), "agent.replay.actions: ndarray"),
-        (("replay", "actions"), np.zeros((99, 4, 1), np.float32), "agent.replay.actions: ndarray"),
-        (("random", "numpy"), ("MT19937", np.zeros(624, np.uint32), 10**6, 0, 0.0), "position 1000000 found"),
+        (
+            ("replay", "actions"),
+            np.zeros((10, 4, 2), np.float32),
+            "agent.replay.actions: ndarray",
+        ),
+        (
+            ("replay", "actions"),
+            np.zeros((99, 4, 1), np.float32),
+            "agent.replay.actions: ndarray",
+        ),
+        (
+            ("random", "numpy"),
+            ("MT19937", np.zeros(624, np.uint32), 10**6, 0, 0.0),
+            "position 1000000 found",
+        ),
         (
             ("random", "numpy"),
             ("PCG64", np.zeros(624, np.uint32), 0, 0, 0.0),
             "random.numpy[0]: 'PCG64' found",
         ),
-        (("random", "python"), (3, (1, 2), None), "agent.random.python[1]: tuple of 2 found"),
+        (
+            ("random", "python"),
+            (3, (1, 2), None),
+            "agent.random.python[1]: tuple of 2 found",
+        ),
         (("random", "python"), (3, (2**100,) * 625, None), "agent.random: "),
         (("random", "torch"), torch.zeros(5056, dtype=torch.uint8), "agent.random: "),
-        (("random", "torch"), torch.zeros(3, dtype=torch.uint8), "agent.random.torch: Tensor of torch.uint8"),
-        (("random", "actions", "bit_generator"), "os", "bit_generator: 'os' found, expected 'PCG64'"),
+        (
+            ("random", "torch"),
+            torch.zeros(3, dtype=torch.uint8),
+            "agent.random.torch: Tensor of torch.uint8",
+        ),
+        (
+            ("random", "actions", "bit_generator"),
+            "os",
+            "bit_generator: 'os' found, expected 'PCG64'",
+        ),
     ],
 )
 def test_what_does_not_fit_is_named(fresh, memory, path, value, said):
@@ -162,7 +264,10 @@ def test_what_does_not_fit_is_named(fresh, memory, path, value, said):
 def test_weights_with_which_outputs_overflow_are_refused(fresh, memory):
     changed = copy.deepcopy(memory)
     changed["parameters"]["policy"]["actor.mu.weight"][0, 0] = 1e30
-    with pytest.raises(ValueError, match=r"policy\.actor\.mu\.weight: expected numbers of magnitude 1e\+09"):
+    with pytest.raises(
+        ValueError,
+        match=r"policy\.actor\.mu\.weight: expected numbers of magnitude 1e\+09",
+    ):
         checkpoints.put_back(fresh, changed)
 
 
@@ -181,7 +286,9 @@ def test_weights_with_which_outputs_overflow_are_refused(fresh, memory):
         (("variables", "log_ent_coef"), "agent.variables.log_ent_coef"),
     ],
 )
-def test_numbers_that_are_infinite_or_nan_are_refused(fresh, memory, path, where, wrong):
+def test_numbers_that_are_infinite_or_nan_are_refused(
+    fresh, memory, path, where, wrong
+):
     changed = copy.deepcopy(memory)
     inside = changed
     for key in path:
@@ -190,7 +297,9 @@ def test_numbers_that_are_infinite_or_nan_are_refused(fresh, memory, path, where
     inside[first] = wrong
     with pytest.raises(ValueError) as error:  # noqa: PT011 - its message is compared
         checkpoints.put_back(fresh, changed)
-    assert str(error.value).endswith(f"{where}: {wrong} found at {list(first)}, expected a finite number")
+    assert str(error.value).endswith(
+        f"{where}: {wrong} found at {list(first)}, expected a finite number"
+    )
 
 
 def test_numbers_of_ships_without_bound_stay_so(fresh, memory):
@@ -202,12 +311,18 @@ def test_numbers_of_ships_without_bound_stay_so(fresh, memory):
 def test_observations_that_no_environment_shows_are_refused(fresh, memory):
     changed = copy.deepcopy(memory)
     changed["counters"]["_last_obs"][0, 0] = 3.0
-    with pytest.raises(ValueError, match=r"_last_obs: expected numbers within the bounds"):
+    with pytest.raises(
+        ValueError, match=r"_last_obs: expected numbers within the bounds"
+    ):
         checkpoints.put_back(fresh, changed)
 
 
 def test_weights_reach_to_a_thousand_millions_and_deviations_to_e_to_the_20th():
-    allowed = {"weight": torch.tensor([1e9, -1e9]), "log_std": torch.tensor([-20.0, 20.0]), "steps": 3}
+    allowed = {
+        "weight": torch.tensor([1e9, -1e9]),
+        "log_std": torch.tensor([-20.0, 20.0]),
+        "steps": 3,
+    }
     checkpoints._check_weights({"policy": allowed | {"counts": torch.tensor([2**40])}})
     for name, value, most in (
         ("weight", 1.05e9, r"1e\+09"),
@@ -215,7 +330,10 @@ def test_weights_reach_to_a_thousand_millions_and_deviations_to_e_to_the_20th():
         ("log_std", -21.0, "20"),
     ):
         wrong = {"policy": allowed, "actor": {name: torch.tensor([0.0, value])}}
-        with pytest.raises(ValueError, match=rf"^parameters\.actor\.{name}: .* of magnitude {most} at most$"):
+        with pytest.raises(
+            ValueError,
+            match=rf"^parameters\.actor\.{name}: .* of magnitude {most} at most$",
+        ):
             checkpoints._check_weights(wrong)
 
 
@@ -230,7 +348,10 @@ def test_what_is_no_memory_is_refused(fresh, memory):
     [
         ({"curve": [{"steps": 1}]}, r"run.curve\[0\]: a table of 1"),
         ({"curve": {}}, "run.curve: a table of 0 found, expected list of 0"),
-        ({"curve": [{**ROW, "mean_return": "low"}]}, r"run.curve\[0\].mean_return: 'low' found"),
+        (
+            {"curve": [{**ROW, "mean_return": "low"}]},
+            r"run.curve\[0\].mean_return: 'low' found",
+        ),
         ({"curve": [{**ROW, "cost": None}]}, r"run.curve\[0\].cost: None found"),
         ({"best_cost": "low"}, "run.best_cost: 'low' found"),
         ({"best_steps": -1}, "run.best_steps: -1 found"),
@@ -239,7 +360,12 @@ def test_what_is_no_memory_is_refused(fresh, memory):
     ],
 )
 def test_so_is_another_record(change, said):
-    record = {"best_cost": 2.0, "best_steps": 0, "curve": [ROW, {**ROW, "mean_return": -1.0}], "seconds": 3.0}
+    record = {
+        "best_cost": 2.0,
+        "best_steps": 0,
+        "curve": [ROW, {**ROW, "mean_return": -1.0}],
+        "seconds": 3.0,
+    }
     checkpoints.check_record(record)
     checkpoints.check_record({**record, "best_cost": None, "curve": []})
     with pytest.raises(ValueError, match=said):
@@ -259,7 +385,9 @@ def rewritten(path, change):
 @pytest.fixture
 def file(tmp_path):
     path = tmp_path / "values.safetensors"
-    write_values({"a": np.arange(3.0), "b": (1, 2.5, None, "x", True), 4: [torch.ones(2)]}, path)
+    write_values(
+        {"a": np.arange(3.0), "b": (1, 2.5, None, "x", True), 4: [torch.ones(2)]}, path
+    )
     return path
 
 
@@ -273,12 +401,20 @@ def test_values_come_back_and_older_files_without_a_hash_too(file):
 
 def test_values_of_every_kind_come_back_as_they_were(tmp_path):
     inner = {"x": np.arange(6.0).reshape(2, 3).T, "y": np.float32(0.5)}
-    value = {"a": inner, "b": {"x": np.arange(3)}, "c": [inner["x"][0], [inner["x"][1]]], "d": np.int64(3)}
+    value = {
+        "a": inner,
+        "b": {"x": np.arange(3)},
+        "c": [inner["x"][0], [inner["x"][1]]],
+        "d": np.int64(3),
+    }
     write_values(value, tmp_path / "values.safetensors")
     found = read_values(tmp_path / "values.safetensors", "thing")
     np.testing.assert_array_equal(found["a"]["x"], [[0.0, 3.0], [1.0, 4.0], [2.0, 5.0]])
     assert found["b"]["x"].tolist() == [0, 1, 2]  # of the same name in another table
-    assert [found["c"][0].tolist(), found["c"][1][0].tolist()] == [[0.0, 3.0], [1.0, 4.0]]
+    assert [found["c"][0].tolist(), found["c"][1][0].tolist()] == [
+        [0.0, 3.0],
+        [1.0, 4.0],
+    ]
     assert (found["a"]["y"], found["d"]) == (0.5, 3)
     write_values([np.ones(1)], tmp_path / "list.safetensors")
     assert read_values(tmp_path / "list.safetensors", "thing")[0].tolist() == [1.0]
@@ -294,14 +430,23 @@ def test_what_is_found_is_told_in_short():
     with pytest.raises(ValueError, match=r"^place: 'x{79} found, expected int$"):
         check_like("x" * 500, 0, "place")
     many = {f"{'n' * 9}{k:03}": 0 for k in range(99)}
-    with pytest.raises(ValueError, match=r"^place\.steps: nothing found, beside ") as error:
+    with pytest.raises(
+        ValueError, match=r"^place\.steps: nothing found, beside "
+    ) as error:
         check_like(many, {"steps": 0} | dict.fromkeys(list(many)[:98], 0), "place")
     assert len(str(error.value)) == len("place.steps: nothing found, beside ") + 200
 
 
 @pytest.mark.parametrize(
     ("found", "own"),
-    [(0, 7), (np.int64(2), 0), (np.float32(1.0), -2.0), (0.0, 3.0), (np.zeros(2), np.ones(2)), ((), ())],
+    [
+        (0, 7),
+        (np.int64(2), 0),
+        (np.float32(1.0), -2.0),
+        (0.0, 3.0),
+        (np.zeros(2), np.ones(2)),
+        ((), ()),
+    ],
 )
 def test_numbers_of_a_kind_are_alike(found, own):
     check_like(found, own, "place")
@@ -309,7 +454,15 @@ def test_numbers_of_a_kind_are_alike(found, own):
 
 @pytest.mark.parametrize(
     ("found", "own"),
-    [(-1, 0), (1.0, 0), (0, 1.0), (np.inf, 1.0), (np.zeros(2), np.zeros(3)), ([], ()), ("a", "b")],
+    [
+        (-1, 0),
+        (1.0, 0),
+        (0, 1.0),
+        (np.inf, 1.0),
+        (np.zeros(2), np.zeros(3)),
+        ([], ()),
+        ("a", "b"),
+    ],
 )
 def test_numbers_of_other_kinds_are_not(found, own):
     with pytest.raises(ValueError, match=r"^place: .* found, expected "):
@@ -320,11 +473,16 @@ def test_values_that_have_changed_are_refused(file):
     whole = file.read_bytes()
     file.write_bytes(whole[:-1] + bytes([whole[-1] ^ 1]))
     with pytest.raises(
-        InputError, match=r"values.safetensors: not a thing.*its SHA-256 is not that of its content"
+        InputError,
+        match=(
+            r"values.safetensors: not a thing.*its SHA-256 is not that of its content"
+        ),
     ):
         read_values(file, "thing")
     file.write_bytes(whole)
-    rewritten(file, lambda header: header["__metadata__"].update({CONTENT: '{"array": "a"}'}))
+    rewritten(
+        file, lambda header: header["__metadata__"].update({CONTENT: '{"array": "a"}'})
+    )
     with pytest.raises(InputError, match="its SHA-256 is not that of its content"):
         read_values(file, "thing")
     with safe_open(file, "numpy") as found:
@@ -334,7 +492,9 @@ def test_values_that_have_changed_are_refused(file):
 @pytest.mark.parametrize("kind", ["F8_E4M3", "F8_E5M2", "F8_E8M0", "I8", "XX"])
 def test_tensors_of_other_types_are_refused_in_one_message(file, kind):
     rewritten(file, lambda header: header["a"].update({"dtype": kind, "shape": [24]}))
-    with pytest.raises(InputError, match=rf"^[^\n]*not a thing, or one that is cut short [^\n]*{kind}"):
+    with pytest.raises(
+        InputError, match=rf"^[^\n]*not a thing, or one that is cut short [^\n]*{kind}"
+    ):
         read_values(file, "thing")
 
 
@@ -388,7 +548,9 @@ def test_values_within_values_are_read_twenty_deep():
         _unpacked(nested(21), {})
     with pytest.raises(ValueError, match="'code' found among its values, 1 deep"):
         _unpacked({"tuple": [{"code": "x"}]}, {})
-    assert _unpacked({"dict": [["a", {"tuple": [1, 2]}], ["b", {"array": "x"}]]}, {"x": 5}) == {
+    assert _unpacked(
+        {"dict": [["a", {"tuple": [1, 2]}], ["b", {"array": "x"}]]}, {"x": 5}
+    ) == {
         "a": (1, 2),
         "b": 5,
     }
@@ -411,15 +573,38 @@ def test_a_run_is_read_as_it_was_begun(run):
 @pytest.mark.parametrize(
     ("place", "value", "said"),
     [
-        (["format"], 2, r"run\.json: format 2 found, this version of shipgym reads format 1"),
-        (["versions"], None, r"run\.json: field 'versions' is missing; start a new run in another folder"),
+        (
+            ["format"],
+            2,
+            r"run\.json: format 2 found, this version of shipgym reads format 1",
+        ),
+        (
+            ["versions"],
+            None,
+            (
+                r"run\.json: field 'versions' is missing; start a new run in another"
+                r" folder"
+            ),
+        ),
         (["more"], 1, r"run\.json: unknown key 'more'"),
         (["configuration"], 3, r"run\.json: configuration: 3 found, expected a table"),
-        (["configuration", "seed"], None, r"run\.json: configuration: 'seed' is missing"),
+        (
+            ["configuration", "seed"],
+            None,
+            r"run\.json: configuration: 'seed' is missing",
+        ),
         (["configuration", "seed"], "3", r"run\.json: configuration\.seed: '3' found"),
         (["configuration", "seed"], 801, r"run\.json: seed: 801 found"),
-        (["configuration", "settings", "gamma"], None, r"run\.json: .*field 'gamma' is missing"),
-        (["configuration", "model_sha256"], "0", r"run: a run of another configuration: model_sha256 is '0'"),
+        (
+            ["configuration", "settings", "gamma"],
+            None,
+            r"run\.json: .*field 'gamma' is missing",
+        ),
+        (
+            ["configuration", "model_sha256"],
+            "0",
+            r"run: a run of another configuration: model_sha256 is '0'",
+        ),
         (["threads"], 0, r"run\.json: threads: 0 found"),
     ],
 )
@@ -442,9 +627,18 @@ def test_a_new_run_begins_in_a_new_or_an_empty_folder(run, tmp_path):
     run_folder.check_new(tmp_path / "empty")
     (tmp_path / "file").write_text("mine")
     for wrong, said in (
-        (run, "run: contains a run already; resume it with --resume, or name another folder"),
+        (
+            run,
+            (
+                "run: contains a run already; resume it with --resume, or name another"
+                " folder"
+            ),
+        ),
         (tmp_path, "exists and is not a training run; name another folder"),
-        (tmp_path / "file", "file: exists and is not a training run; name another folder"),
+        (
+            tmp_path / "file",
+            "file: exists and is not a training run; name another folder",
+        ),
         (tmp_path / "file" / "run", "file cannot be written to; choose another folder"),
     ):
         with pytest.raises(InputError, match=said):
@@ -455,4 +649,7 @@ def test_a_package_that_is_not_installed_has_no_version(monkeypatch):
     monkeypatch.setattr(run_folder, "PACKAGES", ("numpy", "no-such-package-of-shipgym"))
     found = run_folder.versions()
     assert found.pop("python").startswith("3.")
-    assert found == {"numpy": np.__version__, "no-such-package-of-shipgym": "not installed"}
+    assert found == {
+        "numpy": np.__version__,
+        "no-such-package-of-shipgym": "not installed",
+    }

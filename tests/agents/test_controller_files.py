@@ -32,8 +32,12 @@ def test_a_file_holds_the_whole_controller(kind, tmp_path):
     again = load_agent(path, MARINER)
     assert type(again) is type(controller)
     assert asdict(again) == asdict(controller)
-    observations = np.random.default_rng(0).uniform(-1.0, 1.0, (50, 8)).astype(np.float32)
-    np.testing.assert_array_equal(again.predict(observations)[0], controller.predict(observations)[0])
+    observations = (
+        np.random.default_rng(0).uniform(-1.0, 1.0, (50, 8)).astype(np.float32)
+    )
+    np.testing.assert_array_equal(
+        again.predict(observations)[0], controller.predict(observations)[0]
+    )
     assert list(tmp_path.iterdir()) == [path]
 
 
@@ -41,7 +45,12 @@ def test_a_file_is_standard_json_though_a_margin_has_no_limit(tmp_path):
     path = tmp_path / "controller.json"
     DESIGNS["no limit"].save(path)
     assert DESIGNS["no limit"].margins.gain_margin == math.inf
-    assert json.loads(path.read_text(), parse_constant=pytest.fail)["margins"]["gain_margin"] is None
+    assert (
+        json.loads(path.read_text(), parse_constant=pytest.fail)["margins"][
+            "gain_margin"
+        ]
+        is None
+    )
 
 
 def test_a_file_that_cannot_be_written_leaves_nothing_behind(tmp_path):
@@ -76,28 +85,49 @@ SCALES = list(DESIGNS["pid"].observation_scales)
     [
         ({"format": 2}, "format 2 found, this version of shipgym reads format 1"),
         ({"kind": None}, "field 'kind' is missing"),
-        ({"kind": "pdi"}, "kind: 'pdi' found, expected one of 'pid', .*Did you mean 'pid'"),
+        (
+            {"kind": "pdi"},
+            "kind: 'pdi' found, expected one of 'pid', .*Did you mean 'pid'",
+        ),
         ({"gains": None}, "field 'gains' is missing"),
         ({"gain": {}}, "unknown key 'gain'. Did you mean 'gains'"),
         ({"gains__proportional": None}, "gains: 'proportional' is missing"),
-        ({"gains__proportional": float("nan")}, "gains.proportional: nan found, expected a number"),
+        (
+            {"gains__proportional": float("nan")},
+            "gains.proportional: nan found, expected a number",
+        ),
         ({"gains__sway": 1.0}, "gains: unknown key 'sway'"),
         ({"neutral_rudder": "1"}, "neutral_rudder: '1' .* found, expected a number"),
         ({"margins__gain_margin": "inf"}, "margins.gain_margin: 'inf' .* found"),
-        ({"margins__phase": 1.0}, "margins: unknown key 'phase'. Did you mean 'phase_margin_deg'"),
+        (
+            {"margins__phase": 1.0},
+            "margins: unknown key 'phase'. Did you mean 'phase_margin_deg'",
+        ),
         ({"model__name": ""}, "model.name: '' found, expected a text"),
         ({"design__dt": [1]}, r"design.dt: \[1\] found, expected a number"),
-        ({"observation_names": "sway"}, "observation_names: 'sway' found, expected a list of names"),
+        (
+            {"observation_names": "sway"},
+            "observation_names: 'sway' found, expected a list of names",
+        ),
         (
             {"observation_names": [*NAMES[:2], NAMES[3], NAMES[2], *NAMES[4:]]},
             "observation_names: observation 2 is 'sway', expected 'yaw_rate'",
         ),
         (
             {"observation_names": NAMES[:-1]},
-            "7 observations found, expected 8; in one and not in the other: heading_error_integral",
+            (
+                "7 observations found, expected 8; in one and not in the other:"
+                " heading_error_integral"
+            ),
         ),
-        ({"observation_scales": SCALES[:5]}, "observation_scales: 5 found, expected 8 numbers"),
-        ({"observation_scales": [*SCALES[:7], -1.0]}, r"scales\[7\] \('heading_error_integral'\): -1 found"),
+        (
+            {"observation_scales": SCALES[:5]},
+            "observation_scales: 5 found, expected 8 numbers",
+        ),
+        (
+            {"observation_scales": [*SCALES[:7], -1.0]},
+            r"scales\[7\] \('heading_error_integral'\): -1 found",
+        ),
     ],
 )
 def test_a_wrong_field_is_named(changes, message, tmp_path):
@@ -110,7 +140,10 @@ def test_a_wrong_field_is_named(changes, message, tmp_path):
 @pytest.mark.parametrize(
     ("content", "message"),
     [
-        (b'{"format": 1, "kind": "pid", "gai', "broken JSON .*line 1 column 30.*cut short"),
+        (
+            b'{"format": 1, "kind": "pid", "gai',
+            "broken JSON .*line 1 column 30.*cut short",
+        ),
         (b"\x89PNG\xff\xfe", "binary content.*expected a controller file"),
         (b"[1, 2]", "expected a table"),
         (b"{}", "field 'format' is missing"),
@@ -144,18 +177,24 @@ def test_an_agent_is_found_by_its_file_its_folder_or_its_name(tmp_path, monkeypa
     assert len(known) == len(list(PRETRAINED.glob("*.json")))
     with pytest.raises(InputError) as error:
         load_agent("mariner-clam-ppo")
-    assert str(error.value) == (
-        f"agent: 'mariner-clam-ppo' found, expected a file, or one of {len(known)} pretrained agents, "
-        f"such as '{known[0]}'. Did you mean 'mariner-calm-ppo'?"
+    assert (
+        str(error.value)
+        == f"agent: 'mariner-clam-ppo' found, expected a file, or one of {len(known)}"
+        f" pretrained agents, such as '{known[0]}'. Did you mean 'mariner-calm-ppo'?"
     )
 
 
 def test_a_controller_of_another_ship_is_refused_with_the_difference(tmp_path):
     path = tmp_path / "pid.json"
     DESIGNS["pid"].save(path)
-    with pytest.raises(InputError, match=r"model 'mariner': the scale of 'yaw_rate' is 0\.0248.* 0\.0479"):
+    with pytest.raises(
+        InputError,
+        match=r"model 'mariner': the scale of 'yaw_rate' is 0\.0248.* 0\.0479",
+    ):
         load_agent(path, mariner(service_speed=4.0))
-    with pytest.raises(InputError, match=r"the scale of 'rudder' .*another ship or rudder limit"):
+    with pytest.raises(
+        InputError, match=r"the scale of 'rudder' .*another ship or rudder limit"
+    ):
         load_agent(path, replace(MARINER, steering=SteeringGear(35.0, 5.0, 1.0)))
 
 
@@ -172,7 +211,9 @@ def changed(path, tmp_path, change):
 
 def test_scales_of_observations_agree_within_a_millionth():
     check_scales(["rudder"], [1.0 - 0.95e-6], [1.0], "agent", "hers is {}")
-    with pytest.raises(InputError, match=r"agent: the scale of 'rudder' is 0\.999999, but hers is 1"):
+    with pytest.raises(
+        InputError, match=r"agent: the scale of 'rudder' is 0\.999999, but hers is 1"
+    ):
         check_scales(["rudder"], [1.0 - 1.05e-6], [1.0], "agent", "hers is {}")
     for own in (0.01, 300.0):  # of it, whatever it is
         check_scales(["it"], [own * (1.0 + 0.95e-6)], [own], "agent", "{}")
@@ -191,13 +232,21 @@ def test_what_a_kind_needs_of_its_design_is_checked_when_it_is_read(path, tmp_pa
     for name, (least, largest, default) in kind.ranges.items():
         place = "gains" if name in kind.gain_names else "design"
         for value in (None, "1", least - 1.0, largest * 2.0):
-            with pytest.raises(InputError, match=rf"{place}.{name}: .* found, expected a number >= "):
+            with pytest.raises(
+                InputError, match=rf"{place}.{name}: .* found, expected a number >= "
+            ):
                 load_agent(
                     changed(
-                        path, tmp_path, lambda content, v=value, n=name, p=place: content[p].update({n: v})
+                        path,
+                        tmp_path,
+                        lambda content, v=value, n=name, p=place: content[p].update(
+                            {n: v}
+                        ),
                     )
                 )
-        without = changed(path, tmp_path, lambda content, n=name, p=place: content[p].pop(n))
+        without = changed(
+            path, tmp_path, lambda content, n=name, p=place: content[p].pop(n)
+        )
         if default is None:
             with pytest.raises(InputError, match=f"{place}: '{name}' is missing"):
                 load_agent(without)
@@ -213,8 +262,16 @@ def test_what_a_kind_needs_of_its_design_is_checked_when_it_is_read(path, tmp_pa
             lambda arrays: arrays["kalman"][0].append(1.0),
             r"arrays.kalman\[0\]: 3 entries .* 2 numbers",
         ),
-        ("lqg", lambda arrays: arrays["kalman"][0].__setitem__(0, 1e5), "a sampled pole of size .* below 1"),
-        ("lqg", lambda arrays: arrays["transition"].append([0.0] * 3), r"shape \(states, states\)"),
+        (
+            "lqg",
+            lambda arrays: arrays["kalman"][0].__setitem__(0, 1e5),
+            "a sampled pole of size .* below 1",
+        ),
+        (
+            "lqg",
+            lambda arrays: arrays["transition"].append([0.0] * 3),
+            r"shape \(states, states\)",
+        ),
         (
             "lqg",
             lambda arrays: arrays["output"].pop(),
@@ -230,10 +287,26 @@ def test_what_a_kind_needs_of_its_design_is_checked_when_it_is_read(path, tmp_pa
             lambda arrays: arrays["transition"][3].__setitem__(3, -0.01),
             "stays: -0.01 found, .* >= 0 and",
         ),
-        ("mpc", lambda arrays: arrays["transition"][3].__setitem__(3, 1.01), "stays: 1.01 found, .* <= 1$"),
-        ("mpc", lambda arrays: arrays["effect"].__setitem__(3, 1.01), "followed: 1.01 found"),
-        ("mpc", lambda arrays: arrays["transition"][0].__setitem__(0, 9.0), "a sampled pole of size"),
-        ("lqg", lambda arrays: arrays["transition"].clear(), r"transition: .* of shape \(states, states\)"),
+        (
+            "mpc",
+            lambda arrays: arrays["transition"][3].__setitem__(3, 1.01),
+            "stays: 1.01 found, .* <= 1$",
+        ),
+        (
+            "mpc",
+            lambda arrays: arrays["effect"].__setitem__(3, 1.01),
+            "followed: 1.01 found",
+        ),
+        (
+            "mpc",
+            lambda arrays: arrays["transition"][0].__setitem__(0, 9.0),
+            "a sampled pole of size",
+        ),
+        (
+            "lqg",
+            lambda arrays: arrays["transition"].clear(),
+            r"transition: .* of shape \(states, states\)",
+        ),
         (
             "lqg",
             lambda arrays: arrays.update(
@@ -244,10 +317,26 @@ def test_what_a_kind_needs_of_its_design_is_checked_when_it_is_read(path, tmp_pa
             ),
             r"arrays.input: 4 states found, expected one of \(3, 5\)",
         ),
-        ("lq-scheduled", lambda arrays: arrays["speeds"].clear(), r"speeds: .* of shape \(speeds\)"),
-        ("turn-rate", lambda arrays: arrays["rates"].sort(reverse=True), "rates: .* in rising order"),
-        ("lq-scheduled", lambda arrays: arrays["speeds"].sort(reverse=True), "speeds: .* in rising order"),
-        ("lq-scheduled", lambda arrays: arrays["neutral"][0].pop(), "expected a list of 2 numbers"),
+        (
+            "lq-scheduled",
+            lambda arrays: arrays["speeds"].clear(),
+            r"speeds: .* of shape \(speeds\)",
+        ),
+        (
+            "turn-rate",
+            lambda arrays: arrays["rates"].sort(reverse=True),
+            "rates: .* in rising order",
+        ),
+        (
+            "lq-scheduled",
+            lambda arrays: arrays["speeds"].sort(reverse=True),
+            "speeds: .* in rising order",
+        ),
+        (
+            "lq-scheduled",
+            lambda arrays: arrays["neutral"][0].pop(),
+            "expected a list of 2 numbers",
+        ),
         (
             "lq-adaptive",
             lambda arrays: arrays["prior"][1].__setitem__(2, 0.0),
@@ -268,8 +357,14 @@ def test_matrices_that_no_design_has_are_refused(kind, change, message, tmp_path
 
 def test_guidance_leads_what_keeps_a_heading(tmp_path):
     path = next(path for path in CORPUS if path.stem == "los")
-    nested = changed(path, tmp_path, lambda content: content.update(autopilot=json.loads(path.read_text())))
-    with pytest.raises(InputError, match="autopilot: 'los' found, expected one that keeps a heading"):
+    nested = changed(
+        path,
+        tmp_path,
+        lambda content: content.update(autopilot=json.loads(path.read_text())),
+    )
+    with pytest.raises(
+        InputError, match="autopilot: 'los' found, expected one that keeps a heading"
+    ):
         load_agent(nested)
 
 
@@ -278,7 +373,13 @@ def test_a_model_is_told_by_its_structure_coefficients_particulars_and_gear():
     assert len(own) == 64
     assert model_hash(replace(MARINER, name="other", covariance=None)) == own
     others = [
-        replace(MARINER, coefficients={**MARINER.coefficients, "N_r": 1.001 * MARINER.coefficients["N_r"]}),
+        replace(
+            MARINER,
+            coefficients={
+                **MARINER.coefficients,
+                "N_r": 1.001 * MARINER.coefficients["N_r"],
+            },
+        ),
         replace(MARINER, particulars=replace(MARINER.particulars, draught=7.5)),
         replace(MARINER, steering=replace(MARINER.steering, time_constant=0.3)),
     ]
@@ -293,4 +394,7 @@ def test_gains_of_many_ships_make_as_many_rows_and_none_where_a_gain_is_none():
     }
     row = replace(DESIGNS["pid"], gains=gains).row
     assert row.tolist() == [[0.0, 0.0], [-3.0, 0.0], [0.0, 2.0], [0.0, 0.0], [0.0, 0.0]]
-    assert replace(DESIGNS["pid"], gains=dict.fromkeys(gains, 0.0)).row.tolist() == [0.0] * 5
+    assert (
+        replace(DESIGNS["pid"], gains=dict.fromkeys(gains, 0.0)).row.tolist()
+        == [0.0] * 5
+    )

@@ -15,7 +15,10 @@ MARINER = load_model("mariner")
 PILOT = PID.from_model(MARINER)
 TURNED = replace(
     MARINER,
-    coefficients={n: -value if n in ("N_d", "Y_d") else value for n, value in MARINER.coefficients.items()},
+    coefficients={
+        n: -value if n in ("N_d", "Y_d") else value
+        for n, value in MARINER.coefficients.items()
+    },
 )
 SHORT = course_keeping_task(episode_steps=150)
 
@@ -40,7 +43,11 @@ def fleet(n, seed=0):
         replace(
             MARINER,
             coefficients={
-                name: value * (1.0 + 0.05 * rng.standard_normal()) if name.startswith("N_") else value
+                name: (
+                    value * (1.0 + 0.05 * rng.standard_normal())
+                    if name.startswith("N_")
+                    else value
+                )
                 for name, value in MARINER.coefficients.items()
             },
         )
@@ -62,7 +69,12 @@ def test_an_episode_depends_on_its_ship_and_seed_alone():
 def test_seeds_give_the_results_their_shape():
     ships = fleet(3)
     grid = sail(PILOT, ships, SHORT, seeds=np.arange(12).reshape(3, 4))
-    assert grid.cost.shape == grid.terminated.shape == grid.heading_rmse_deg.shape == (3, 4)
+    assert (
+        grid.cost.shape
+        == grid.terminated.shape
+        == grid.heading_rmse_deg.shape
+        == (3, 4)
+    )
     assert grid.cost[2, 1] == sail(PILOT, ships[2], SHORT, seeds=9).cost
     assert sail(PILOT, MARINER, SHORT).cost == sail(PILOT, MARINER, SHORT, seeds=0).cost
     assert grid.seeds.tolist() == np.arange(12).reshape(3, 4).tolist()
@@ -75,7 +87,12 @@ def test_costs_add_up_and_are_those_of_the_environment():
     import gymnasium as gym
 
     episodes = sail(PILOT, MARINER, SHORT, seeds=np.arange(5))
-    parts = episodes.heading_cost + episodes.rudder_cost + episodes.rudder_rate_cost + episodes.end_cost
+    parts = (
+        episodes.heading_cost
+        + episodes.rudder_cost
+        + episodes.rudder_rate_cost
+        + episodes.end_cost
+    )
     np.testing.assert_allclose(episodes.cost, parts)
     assert np.all(episodes.duration_s == 150.0)
     assert sail(PILOT, MARINER, SHORT.changed(dt=0.5), seeds=0).duration_s == 75.0
@@ -83,7 +100,9 @@ def test_costs_add_up_and_are_those_of_the_environment():
     observation, _ = env.reset(seed=0)
     cost, errors, over = 0.0, [], False
     while not over:
-        observation, reward, terminated, truncated, info = env.step(PILOT.predict(observation)[0])
+        observation, reward, terminated, truncated, info = env.step(
+            PILOT.predict(observation)[0]
+        )
         cost -= reward
         errors.append(info["heading_error"])
         over = terminated or truncated
@@ -117,8 +136,12 @@ def test_step_responses_of_many_ships_are_those_of_each():
     assert together.t[-1] == pytest.approx(16.0 * 160.93 / 7.7175, abs=1.0)
     assert together.heading.shape == together.rudder.shape == (5, len(together.t))
     assert np.all(together.heading[:, 0] == 0.0)
-    np.testing.assert_array_equal(step_response(PILOT, ships[3], 15.0).heading[0], together.heading[3])
-    assert np.degrees(together.heading[:, -1]) == pytest.approx(np.full(5, 15.0), abs=0.5)
+    np.testing.assert_array_equal(
+        step_response(PILOT, ships[3], 15.0).heading[0], together.heading[3]
+    )
+    assert np.degrees(together.heading[:, -1]) == pytest.approx(
+        np.full(5, 15.0), abs=0.5
+    )
     assert np.ptp(together.heading, axis=0).max() > np.radians(0.1)
 
 
@@ -150,8 +173,14 @@ def test_a_lost_ship_stays_where_it_was_lost():
 @pytest.mark.parametrize(
     ("answer", "message"),
     [
-        (lambda n: np.full((n, 1), np.nan), "Helmsman.predict: action nan found at step 0 for ship 0"),
-        (lambda n: np.zeros(n), r"actions of shape \(2,\) found at step 0, expected \(2, 1\)"),
+        (
+            lambda n: np.full((n, 1), np.nan),
+            "Helmsman.predict: action nan found at step 0 for ship 0",
+        ),
+        (
+            lambda n: np.zeros(n),
+            r"actions of shape \(2,\) found at step 0, expected \(2, 1\)",
+        ),
         (lambda n: [["port"]] * n, "found at step 0, expected numbers"),
         (lambda n: None, "found at step 0, expected"),
     ],
@@ -168,9 +197,18 @@ def test_a_controller_that_gives_no_command_is_named(answer, message):
     [
         (lambda: sail(PILOT, mariner(4.0)), "model 'mariner': the scale of 'yaw_rate'"),
         (lambda: sail(PILOT, []), "models: none found"),
-        (lambda: sail(PILOT, fleet(3), seeds=[1, 2]), r"seeds: shape \(2,\) found, expected \(3,\)"),
-        (lambda: sail(PILOT, MARINER, seeds=[0.5]), r"seeds: \[0.5\] found, expected integers"),
-        (lambda: sail(PILOT, MARINER, seeds=[]), r"seeds: \[\] found, expected integers"),
+        (
+            lambda: sail(PILOT, fleet(3), seeds=[1, 2]),
+            r"seeds: shape \(2,\) found, expected \(3,\)",
+        ),
+        (
+            lambda: sail(PILOT, MARINER, seeds=[0.5]),
+            r"seeds: \[0.5\] found, expected integers",
+        ),
+        (
+            lambda: sail(PILOT, MARINER, seeds=[]),
+            r"seeds: \[\] found, expected integers",
+        ),
         (lambda: step_response(PILOT, MARINER, 120.0), "step_deg: 120 found"),
         (lambda: step_response(PILOT, MARINER, duration=0.0), "duration: 0 found"),
     ],

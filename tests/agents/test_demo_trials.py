@@ -25,7 +25,9 @@ def test_the_shipped_trials_are_those_the_script_writes(script, demo):
     rng = np.random.default_rng([script.SEED, 0])
     logged = script.log(script.sail(load_model("mariner"), script.ORDERS[0], rng), rng)
     shipped = np.loadtxt(demo.parent / script.ORDERS[0].file, delimiter=",", skiprows=1)
-    assert shipped == pytest.approx(logged, abs=0.051)  # the rudder is logged to 0.1 deg
+    assert shipped == pytest.approx(
+        logged, abs=0.051
+    )  # the rudder is logged to 0.1 deg
 
 
 def test_the_demo_is_small(demo):
@@ -37,4 +39,6 @@ def test_the_sensors_are_as_noisy_as_stated(demo):
     truth = open_loop(load_model("mariner"), trial)
     assert np.std(trial["u"] - truth["u"]) == pytest.approx(0.03, rel=0.2)
     assert np.degrees(np.std(trial["r"] - truth["r"])) == pytest.approx(0.02, rel=0.2)
-    assert np.std(np.diff(trial["psi"], 2)) == pytest.approx(np.radians(0.1) * np.sqrt(6.0), rel=0.2)
+    assert np.std(np.diff(trial["psi"], 2)) == pytest.approx(
+        np.radians(0.1) * np.sqrt(6.0), rel=0.2
+    )

@@ -7,7 +7,17 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from direct_search import FIRST_SEED, LAWS, REFUSED, Setting, is_sane, search, search_spaces, tunable, tune
+from direct_search import (
+    FIRST_SEED,
+    LAWS,
+    REFUSED,
+    Setting,
+    is_sane,
+    search,
+    search_spaces,
+    tunable,
+    tune,
+)
 
 from agents import PID
 from agents.controllers.designs import CLASSICAL, design, design_base, tuned
@@ -20,7 +30,9 @@ from shipgym.ships import load_model
 from shipgym.ships.conversions import nomoto, nomoto2_ship
 
 CALM = BenchmarkTask("calm", "course-keeping", "mariner", "", {"episode_steps": 60})
-NOISY = BenchmarkTask("noisy", "course-keeping", "mariner", "", {"episode_steps": 60, "noise": 5.0})
+NOISY = BenchmarkTask(
+    "noisy", "course-keeping", "mariner", "", {"episode_steps": 60, "noise": 5.0}
+)
 PATH = BenchmarkTask("path", "path-following", "mariner", "", {"episode_steps": 60})
 
 
@@ -42,10 +54,19 @@ def test_bounds_budget_and_alternatives_hold() -> None:
 
     def cost(settings: Mapping[str, float]) -> float:
         asked.append(settings["a"])
-        return REFUSED if settings["a"] < 0.8 else settings["a"] + (0.0 if "c" in settings else 10.0)
+        return (
+            REFUSED
+            if settings["a"] < 0.8
+            else settings["a"] + (0.0 if "c" in settings else 10.0)
+        )
 
     found = search(
-        cost, [[Setting("a", 1.0, 0.5, 2.0)], [Setting("a", 1.0, 0.5, 2.0), Setting("c", 1.0)]], 25
+        cost,
+        [
+            [Setting("a", 1.0, 0.5, 2.0)],
+            [Setting("a", 1.0, 0.5, 2.0), Setting("c", 1.0)],
+        ],
+        25,
     )
     assert "c" in found.settings
     assert found.settings["a"] == pytest.approx(0.8, abs=0.05)
@@ -63,16 +84,20 @@ def test_tuning_is_reproducible_never_worse_than_the_design_and_sane() -> None:
     controller = design("pid", NOISY, first.settings)
     assert is_sane(controller)
     seeds = FIRST_SEED + np.arange(4)
-    assert episode_costs(controller, NOISY.engine(4), seeds).mean() == pytest.approx(first.cost, rel=1e-12)
-    assert episode_costs(PID.from_model(CALM.ship), NOISY.engine(4), seeds).mean() == pytest.approx(
-        first.start_cost
+    assert episode_costs(controller, NOISY.engine(4), seeds).mean() == pytest.approx(
+        first.cost, rel=1e-12
     )
+    assert episode_costs(
+        PID.from_model(CALM.ship), NOISY.engine(4), seeds
+    ).mean() == pytest.approx(first.start_cost)
 
 
 def test_a_loop_with_little_margin_is_not_sane() -> None:
     plain = PID.from_model(CALM.ship)
     assert is_sane(plain)
-    assert not is_sane(replace(plain, margins=replace(plain.margins, phase_margin_deg=10.0)))
+    assert not is_sane(
+        replace(plain, margins=replace(plain.margins, phase_margin_deg=10.0))
+    )
     assert not is_sane(replace(plain, margins=replace(plain.margins, gain_margin=1.2)))
 
 
@@ -88,7 +113,9 @@ def test_the_search_of_every_controller_starts_at_its_own_design(kind: str) -> N
         assert designed.gains[name] == pytest.approx(gain, rel=1e-6), name
 
 
-def test_guidance_needs_a_path_and_adaptation_a_ship_with_sway(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_guidance_needs_a_path_and_adaptation_a_ship_with_sway(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     assert tunable(PATH) == CLASSICAL
     assert set(CLASSICAL) - set(tunable(CALM)) == set(LAWS)
     mariner = load_model("mariner")
@@ -111,13 +138,18 @@ def test_settings_found_are_read_from_the_file_of_the_suite(
 ) -> None:
     path = tmp_path / "tuned.json"
     monkeypatch.setattr("agents.suites.reference.suite_file", lambda suite, what: path)
-    found = {"pid": {"settings": {"damping": 1.0}, "cost": 2.0}, "lq": {"settings": {}, "cost": 3.0}}
+    found = {
+        "pid": {"settings": {"damping": 1.0}, "cost": 2.0},
+        "lq": {"settings": {}, "cost": 3.0},
+    }
     write_json({"tasks": {"calm": found}}, path)
     assert tuned("best", CALM, "any").kind == "pid"
     assert tuned("pid", CALM, "any").design["damping"] == 1.0
     with pytest.raises(InputError, match="no tuned settings of 'lqg' for task 'calm'"):
         tuned("lqg", CALM, "any")
-    with pytest.raises(InputError, match=r"no tuned settings of 'best' for task 'noisy'.*of: none"):
+    with pytest.raises(
+        InputError, match=r"no tuned settings of 'best' for task 'noisy'.*of: none"
+    ):
         tuned("best", NOISY, "any")
 
 
@@ -126,7 +158,9 @@ def test_policies_are_not_added_to_slow_controllers_unless_asked_for(
 ) -> None:
     path = tmp_path / "tuned.json"
     monkeypatch.setattr("agents.suites.reference.suite_file", lambda suite, what: path)
-    monkeypatch.setattr("agents.controllers.designs.suite_of", lambda name: "shipgym-v1")
+    monkeypatch.setattr(
+        "agents.controllers.designs.suite_of", lambda name: "shipgym-v1"
+    )
     costs = {"mpc": 1.0, "lq-adaptive": 2.0, "lq": 3.0, "pid": 4.0}
     found = {kind: {"settings": {}, "cost": cost} for kind, cost in costs.items()}
     write_json({"tasks": {"calm": found}}, path)
@@ -144,8 +178,18 @@ def test_the_suite_s_settings_make_sane_controllers_for_every_task() -> None:
     suite, found = load_suite(), load_tuned("shipgym-v1")
     assert set(found) == {task.name for task in suite.tasks}
     for task in suite.tasks:
-        best = min(found[task.name], key=lambda kind: float(found[task.name][kind]["cost"]))
-        for kind in {"base"} if best == "mpc" and find_spec("osqp") is None else {"base", "best"}:
+        best = min(
+            found[task.name], key=lambda kind: float(found[task.name][kind]["cost"])
+        )
+        for kind in (
+            {"base"}
+            if best == "mpc" and find_spec("osqp") is None
+            else {"base", "best"}
+        ):
             assert is_sane(tuned(kind, task, suite.name))
-        assert set(found[task.name]) == set(tunable(task)) - {"preview-mpc"}  # not searched: slow
-        assert all(one["cost"] <= one["start_cost"] for one in found[task.name].values())
+        assert set(found[task.name]) == set(tunable(task)) - {
+            "preview-mpc"
+        }  # not searched: slow
+        assert all(
+            one["cost"] <= one["start_cost"] for one in found[task.name].values()
+        )

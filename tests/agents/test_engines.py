@@ -99,13 +99,17 @@ def test_results_are_the_same_wherever_they_were_computed(functions, tmp_path):
     alone = run_jobs(functions.spectrum, jobs)
     assert [result["seed"] for result in alone] == [3, 1, 3, 2]
     assert alone[0]["values"] is not alone[2]["values"]
-    expected = np.linalg.svd(np.random.default_rng(1).normal(size=(60, 40)), compute_uv=False)
+    expected = np.linalg.svd(
+        np.random.default_rng(1).normal(size=(60, 40)), compute_uv=False
+    )
     np.testing.assert_allclose(alone[1]["values"], expected, rtol=1e-12)
     two = run_jobs(functions.spectrum, jobs, workers=2, keep=tmp_path / "kept")
     told = []
     engine = JobEngine(keep=tmp_path / "kept")
     engine.check()
-    resumed = engine.run(functions.spectrum, jobs, lambda *progress: told.append(progress))
+    resumed = engine.run(
+        functions.spectrum, jobs, lambda *progress: told.append(progress)
+    )
     assert same(alone, two)
     assert same(alone, resumed)
     assert told
@@ -115,11 +119,14 @@ def test_results_are_the_same_wherever_they_were_computed(functions, tmp_path):
 def test_ray_gives_the_same_results(functions, tmp_path):
     jobs = [{"seed": seed} for seed in range(3)]
     assert same(
-        run_jobs(functions.spectrum, jobs, engine="ray", workers=2), run_jobs(functions.spectrum, jobs)
+        run_jobs(functions.spectrum, jobs, engine="ray", workers=2),
+        run_jobs(functions.spectrum, jobs),
     )
 
 
-def test_a_job_has_one_thread_and_leaves_the_environment_as_it_was(functions, monkeypatch):
+def test_a_job_has_one_thread_and_leaves_the_environment_as_it_was(
+    functions, monkeypatch
+):
     monkeypatch.setenv("OMP_NUM_THREADS", "7")
     monkeypatch.delenv("MKL_NUM_THREADS", raising=False)
     ((numbers, given),) = run_jobs(functions.threads, [{}])
@@ -129,9 +136,15 @@ def test_a_job_has_one_thread_and_leaves_the_environment_as_it_was(functions, mo
     assert "MKL_NUM_THREADS" not in os.environ
 
 
-def test_progress_counts_equal_jobs_each_and_two_tries_more_are_usual(functions, tmp_path):
+def test_progress_counts_equal_jobs_each_and_two_tries_more_are_usual(
+    functions, tmp_path
+):
     told = []
-    run_jobs(functions.spectrum, [{"seed": 1}] * 3, progress=lambda *progress: told.append(progress))
+    run_jobs(
+        functions.spectrum,
+        [{"seed": 1}] * 3,
+        progress=lambda *progress: told.append(progress),
+    )
     assert told == [(0, 3), (3, 3)]
     assert len(run_jobs(functions.spectrum, [{"seed": 1}], retries=0)) == 1
     assert inspect.signature(run_jobs).parameters["retries"].default == 2
@@ -146,14 +159,22 @@ def test_killed_worker_is_replaced(functions, tmp_path):
     assert mark.read_text() == "x"
 
 
-def test_job_that_always_kills_its_worker_is_named_and_the_others_are_kept(functions, tmp_path):
+def test_job_that_always_kills_its_worker_is_named_and_the_others_are_kept(
+    functions, tmp_path
+):
     mark = tmp_path / "mark"
     mark.touch()
     jobs = [{"k": k, "mark": str(mark), "deaths": 99} for k in range(2)]
-    with pytest.raises(WorkerDiedError, match=r'job \{"k": 1, .*its worker died 2 times'):
-        run_jobs(functions.dies_at_first, jobs, workers=2, retries=1, keep=tmp_path / "kept")
+    with pytest.raises(
+        WorkerDiedError, match=r'job \{"k": 1, .*its worker died 2 times'
+    ):
+        run_jobs(
+            functions.dies_at_first, jobs, workers=2, retries=1, keep=tmp_path / "kept"
+        )
     mark.write_text("x" * 99)
-    assert run_jobs(functions.dies_at_first, jobs, workers=1, keep=tmp_path / "kept") == [0, 1]
+    assert run_jobs(
+        functions.dies_at_first, jobs, workers=1, keep=tmp_path / "kept"
+    ) == [0, 1]
 
 
 def test_what_is_kept_is_not_done_again(functions, tmp_path):
@@ -163,7 +184,12 @@ def test_what_is_kept_is_not_done_again(functions, tmp_path):
     told = []
     run_jobs(functions.logged, jobs[:3], keep=kept)
     sorted(kept.iterdir())[0].write_text('{"cut short')
-    run_jobs(functions.logged, jobs, keep=kept, progress=lambda *progress: told.append(progress))
+    run_jobs(
+        functions.logged,
+        jobs,
+        keep=kept,
+        progress=lambda *progress: told.append(progress),
+    )
     assert told == [(2, 4), (3, 4), (4, 4)]
     assert len(log.read_text().split()) == 5
     assert len(list(kept.iterdir())) == 4
@@ -185,35 +211,48 @@ def test_what_is_kept_is_of_its_function_and_version(functions, tmp_path):
     own.save(text, {"value": {"__array__": ["<f8", [3], ""]}})
     assert own.load(text) is None  # broken, and computed again
     (tmp_path / "file").write_text("")
-    with pytest.raises(InputError, match="file: is not a folder, expected one for results; choose another"):
+    with pytest.raises(
+        InputError,
+        match="file: is not a folder, expected one for results; choose another",
+    ):
         KeptResults(tmp_path / "file", functions.logged)
 
 
 def test_wrong_input_of_a_job_is_told_with_the_job(functions, tmp_path):
     jobs = [{"k": k, "log": str(tmp_path / "log"), "wrong": 2} for k in range(4)]
-    with pytest.raises(InputError, match=r'job 2 \{"k": 2, .*\}: k: 2 found, expected another'):
+    with pytest.raises(
+        InputError, match=r'job 2 \{"k": 2, .*\}: k: 2 found, expected another'
+    ):
         run_jobs(functions.logged, jobs)
-    with pytest.raises(JobError, match=r'job 1 \{"k": 0\}: ZeroDivisionError') as caught:
+    with pytest.raises(
+        JobError, match=r'job 1 \{"k": 0\}: ZeroDivisionError'
+    ) as caught:
         run_jobs(functions.divides, [{"k": 1}, {"k": 0}])
     assert "return 1 / job" in caught.value.__notes__[0]
 
 
-@pytest.mark.parametrize(("number", "returned"), [(signal.SIGINT, 130), (signal.SIGKILL, -signal.SIGKILL)])
-def test_workers_end_with_the_process_that_started_them(functions, tmp_path, number, returned):
+@pytest.mark.parametrize(
+    ("number", "returned"), [(signal.SIGINT, 130), (signal.SIGKILL, -signal.SIGKILL)]
+)
+def test_workers_end_with_the_process_that_started_them(
+    functions, tmp_path, number, returned
+):
     pids = tmp_path / "pids"
     pids.mkdir()
     script = (
-        "import signal, sys, engine_jobs\nfrom agents.engines.jobs import run_jobs\n"
-        "if __name__ == '__main__':\n"
-        "    signal.signal(signal.SIGINT, signal.default_int_handler)  # also where it is begun with & \n"
-        "    jobs = [{'k': k, 'pids': sys.argv[1]} for k in range(2)]\n"
-        "    try:\n        run_jobs(engine_jobs.sleeps, jobs, workers=2)\n"
-        "    except KeyboardInterrupt:\n        sys.exit(130)\n"
+        "import signal, sys, engine_jobs\nfrom agents.engines.jobs import run_jobs\nif"
+        " __name__ == '__main__':\n    signal.signal(signal.SIGINT,"
+        " signal.default_int_handler)  # also where it is begun with & \n    jobs ="
+        " [{'k': k, 'pids': sys.argv[1]} for k in range(2)]\n    try:\n       "
+        " run_jobs(engine_jobs.sleeps, jobs, workers=2)\n    except"
+        " KeyboardInterrupt:\n        sys.exit(130)\n"
     )
     (tmp_path / "script.py").write_text(script)
     environment = {**os.environ, "PYTHONPATH": f"{tmp_path}{os.pathsep}{Path.cwd()}"}
     with subprocess.Popen(
-        [sys.executable, tmp_path / "script.py", pids], env=environment, stderr=subprocess.PIPE
+        [sys.executable, tmp_path / "script.py", pids],
+        env=environment,
+        stderr=subprocess.PIPE,
     ) as parent:
         end = time.monotonic() + 60
         while len(list(pids.iterdir())) < 2 and time.monotonic() < end:
@@ -246,7 +285,10 @@ def test_workers_end_with_the_process_that_started_them(functions, tmp_path, num
         ({"engine": "ray", "address": "10.0.0.1:ray"}, "expected 'HOST:PORT'"),
         ({"function": lambda job: job}, "top level of a module"),
         ({"function": partial(os.path.join, "a")}, "top level of a module"),
-        ({"jobs": [{"k": object()}]}, r"jobs\[0\]: .* found, expected a dict of numbers"),
+        (
+            {"jobs": [{"k": object()}]},
+            r"jobs\[0\]: .* found, expected a dict of numbers",
+        ),
         ({"jobs": [{"k": math.nan}]}, r"jobs\[0\]"),
         ({"jobs": [3]}, r"jobs\[0\]: 3 found, expected a dict"),
     ],
@@ -262,20 +304,31 @@ def test_address_that_does_not_answer():
     with socket.socket() as silent:
         silent.bind(("127.0.0.1", 0))
         port = silent.getsockname()[1]
-        with pytest.raises(InputError, match=r"no ray cluster answers .* within 10 s \(Connection refused\)"):
+        with pytest.raises(
+            InputError,
+            match=r"no ray cluster answers .* within 10 s \(Connection refused\)",
+        ):
             check_answers(f"127.0.0.1:{port}")
         silent.listen()
-        with pytest.raises(InputError, match=r"no ray cluster answers .* \(no answer that ray"):
+        with pytest.raises(
+            InputError, match=r"no ray cluster answers .* \(no answer that ray"
+        ):
             check_answers(f"ray://127.0.0.1:{port}", ray_patience_s=0.2)
 
 
 def test_what_ray_says_last_is_told(monkeypatch):
     def fails(command, **options):
-        raise subprocess.CalledProcessError(1, command, stderr="a traceback\nConnectionError: wrong token\n")
+        raise subprocess.CalledProcessError(
+            1, command, stderr="a traceback\nConnectionError: wrong token\n"
+        )
 
     monkeypatch.setattr(ray_engine.subprocess, "run", fails)
     with pytest.raises(
-        InputError, match=r"no ray cluster answers at 'auto' within 30 s \(ConnectionError: wrong token\)"
+        InputError,
+        match=(
+            r"no ray cluster answers at 'auto' within 30 s \(ConnectionError: wrong"
+            r" token\)"
+        ),
     ):
         check_answers("auto")
 
@@ -285,21 +338,29 @@ def test_why_no_cluster_answers_is_told_in_any_case(monkeypatch):
         raise TimeoutError(f"{timeout:g} s are over")
 
     monkeypatch.setattr(ray_engine.socket, "create_connection", patiently)
-    with pytest.raises(InputError, match=r"no ray cluster answers .* within 10 s \(10 s are over\)"):
+    with pytest.raises(
+        InputError, match=r"no ray cluster answers .* within 10 s \(10 s are over\)"
+    ):
         check_answers("10.0.0.1:65535")
 
     def fails(command, **options):
         raise subprocess.CalledProcessError(3, command, stderr="")
 
     monkeypatch.setattr(ray_engine.subprocess, "run", fails)
-    with pytest.raises(InputError, match=r"no ray cluster answers .* within 7 s \(exit code 3\)"):
+    with pytest.raises(
+        InputError, match=r"no ray cluster answers .* within 7 s \(exit code 3\)"
+    ):
         check_answers("auto", 7.0)
 
 
 def test_nothing_is_left_where_no_cluster_answers(functions, tmp_path):
     with pytest.raises(InputError, match=r"no ray cluster answers|not installed"):
         run_jobs(
-            functions.spectrum, [{"n": 1}], engine="ray", address="127.0.0.1:1", keep=tmp_path / "kept" / "in"
+            functions.spectrum,
+            [{"n": 1}],
+            engine="ray",
+            address="127.0.0.1:1",
+            keep=tmp_path / "kept" / "in",
         )
     assert not (tmp_path / "kept").exists()
 
@@ -311,7 +372,9 @@ def test_web_server_is_not_taken_for_ray():
 
     with HTTPServer(("127.0.0.1", 0), Page) as server:
         threading.Thread(target=server.handle_request, daemon=True).start()
-        with pytest.raises(InputError, match=r"no ray cluster answers .* Is it the right port"):
+        with pytest.raises(
+            InputError, match=r"no ray cluster answers .* Is it the right port"
+        ):
             check_answers(f"127.0.0.1:{server.server_port}", ray_patience_s=3.0)
 
 
@@ -319,7 +382,10 @@ def test_packing_keeps_types_shapes_and_bits():
     value = {
         "a": np.arange(6, dtype=">i2").reshape(2, 3)[:, ::2],
         "b": [0.1 + 0.2, -0.0, math.nan, np.float32(0.1), np.True_, None],
-        "c": {"complex": np.array([1j, math.nan]), "empty": np.zeros((0, 3), dtype=np.float32)},
+        "c": {
+            "complex": np.array([1j, math.nan]),
+            "empty": np.zeros((0, 3), dtype=np.float32),
+        },
     }
     back = unpack(json.loads(json.dumps(pack(value), allow_nan=False)))
     assert back["a"].dtype == ">i2"
@@ -335,23 +401,33 @@ def test_packing_keeps_types_shapes_and_bits():
 
 
 def test_a_job_finds_modules_of_the_working_folder_registered(tmp_path, monkeypatch):
-    (tmp_path / "named_by_a_user.py").write_text("import builtins\nbuiltins.registered_by_a_user = 7\n")
+    (tmp_path / "named_by_a_user.py").write_text(
+        "import builtins\nbuiltins.registered_by_a_user = 7\n"
+    )
     monkeypatch.chdir(tmp_path)
     path = list(sys.path)
-    done = with_modules(lambda job: job["k"] * builtins.registered_by_a_user, ["named_by_a_user"], {"k": 6})
+    done = with_modules(
+        lambda job: job["k"] * builtins.registered_by_a_user,
+        ["named_by_a_user"],
+        {"k": 6},
+    )
     monkeypatch.delitem(sys.modules, "named_by_a_user")
     monkeypatch.delattr(builtins, "registered_by_a_user")
     assert done == 42
     assert sys.path == path
 
 
-def test_a_module_of_the_working_folder_goes_before_others_of_its_name(tmp_path, monkeypatch):
+def test_a_module_of_the_working_folder_goes_before_others_of_its_name(
+    tmp_path, monkeypatch
+):
     for name in ("other", "here"):
         (tmp_path / name).mkdir()
         (tmp_path / name / "named_twice.py").write_text(f"where = {name!r}\n")
     monkeypatch.syspath_prepend(tmp_path / "other")
     monkeypatch.chdir(tmp_path / "here")
-    found = with_modules(lambda job: sys.modules["named_twice"].where, ["named_twice"], {})
+    found = with_modules(
+        lambda job: sys.modules["named_twice"].where, ["named_twice"], {}
+    )
     monkeypatch.delitem(sys.modules, "named_twice")
     assert found == "here"
 
@@ -361,7 +437,10 @@ def test_an_engine_refuses_wrong_arguments_before_the_work():
     assert JobEngine("local", 1, None, None) == HERE
     for engine, said in (
         (JobEngine("rai"), "Did you mean 'ray'"),
-        (JobEngine(workers=0), "workers: 0 found, .* or None for as many as there are cores"),
+        (
+            JobEngine(workers=0),
+            "workers: 0 found, .* or None for as many as there are cores",
+        ),
         (JobEngine(address="10.0.0.1:6379"), "it is for engine 'ray'"),
     ):
         with pytest.raises(InputError, match=said):
@@ -378,7 +457,10 @@ def test_as_many_jobs_at_once_as_asked_or_as_there_are_cores(monkeypatch):
     monkeypatch.setattr(jobs_module, "in_processes", in_processes)
     monkeypatch.setattr(jobs_module, "cpu_count", lambda: 7)
     for workers in (5, None):
-        assert run_jobs(os.path.join, [{}, {"k": 1}], workers=workers, retries=3) == [1, 1]
+        assert run_jobs(os.path.join, [{}, {"k": 1}], workers=workers, retries=3) == [
+            1,
+            1,
+        ]
     assert run_jobs(os.path.join, [], workers=5) == []
     assert asked == [(5, 3), (7, 3)]
 
@@ -389,7 +471,11 @@ def test_workers_get_one_job_at_a_time(monkeypatch):
     class Pool:
         def __init__(self, jobs, **options):
             asked.append((jobs, options["pre_dispatch"], options["batch_size"]))
-            warnings.warn("2 tasks which were still being processed are cancelled", UserWarning, stacklevel=1)
+            warnings.warn(
+                "2 tasks which were still being processed are cancelled",
+                UserWarning,
+                stacklevel=1,
+            )
 
         def __call__(self, calls):
             return ((text, {"value": 1}) for _, (_, text), _ in calls)
@@ -397,7 +483,9 @@ def test_workers_get_one_job_at_a_time(monkeypatch):
     threads = []
     monkeypatch.setattr(local, "Parallel", Pool)
     monkeypatch.setattr(
-        local, "parallel_config", lambda backend, **named: threads.append((backend, named)) or nullcontext()
+        local,
+        "parallel_config",
+        lambda backend, **named: threads.append((backend, named)) or nullcontext(),
     )
     for workers, at_once in ((1, 2), (2, 2), (3, 3)):  # one would be this process
         doing = set()
@@ -413,14 +501,20 @@ def test_a_worker_asks_twice_a_second_whether_it_is_still_wanted(monkeypatch):
     monkeypatch.setattr(local.os, "_exit", ended.append)
     monkeypatch.setattr(local.time, "sleep", slept.append)
     monkeypatch.setattr(
-        local.threading, "Thread", lambda target, daemon: SimpleNamespace(start=target, daemon=daemon)
+        local.threading,
+        "Thread",
+        lambda target, daemon: SimpleNamespace(start=target, daemon=daemon),
     )
     local._end_with_parent.__wrapped__()
     assert (slept, ended, parents) == ([0.5, 0.5], [1], [])
 
 
-@pytest.mark.parametrize(("deaths", "retries"), [(0, 2), (2, 2), (3, 2), (1, 0), (1, 1), (2, 1)])
-def test_jobs_whose_worker_died_are_done_again_the_last_time_alone(monkeypatch, deaths, retries):
+@pytest.mark.parametrize(
+    ("deaths", "retries"), [(0, 2), (2, 2), (3, 2), (1, 0), (1, 1), (2, 1)]
+)
+def test_jobs_whose_worker_died_are_done_again_the_last_time_alone(
+    monkeypatch, deaths, retries
+):
     batches, pool = [], Mock()
 
     def until_broken(function, waiting, doing, workers):
@@ -437,14 +531,20 @@ def test_jobs_whose_worker_died_are_done_again_the_last_time_alone(monkeypatch, 
     monkeypatch.setattr(local, "get_reusable_executor", lambda: pool)
     run = local.in_processes(len, ["a", "bad", "c"], 2, retries)
     if deaths > retries:
-        named = "bad" if retries else "(a|bad|c)"  # at once it is not known whose fault it was
-        with pytest.raises(WorkerDiedError, match=rf"job {named}: its worker died {retries + 1} times"):
+        named = (
+            "bad" if retries else "(a|bad|c)"
+        )  # at once it is not known whose fault it was
+        with pytest.raises(
+            WorkerDiedError, match=rf"job {named}: its worker died {retries + 1} times"
+        ):
             list(run)
     else:
         assert sorted(text for text, _ in run) == ["a", "bad", "c"]
         together = min(deaths + 1, max(retries, 1))
         assert batches[:together] == [["a", "bad", "c"]] * together
-        assert sorted(batches[together:]) == ([["a"], ["bad"], ["c"]] if deaths == retries else [])
+        assert sorted(batches[together:]) == (
+            [["a"], ["bad"], ["c"]] if deaths == retries else []
+        )
     pool.shutdown.assert_called_once_with(wait=True, kill_workers=True)
 
 
@@ -494,18 +594,32 @@ class Ray:
 
 @pytest.mark.parametrize(
     ("workers", "resources", "most"),
-    [(2, {"CPU": 5.0}, 2), (None, {"CPU": 3.0}, 3), (None, {"CPU": 0.5}, 1), (None, {}, 1), (9, {}, 5)],
+    [
+        (2, {"CPU": 5.0}, 2),
+        (None, {"CPU": 3.0}, 3),
+        (None, {"CPU": 0.5}, 1),
+        (None, {}, 1),
+        (9, {}, 5),
+    ],
 )
-def test_ray_gets_as_many_jobs_at_once_as_asked_or_as_it_has_cores(monkeypatch, workers, resources, most):
+def test_ray_gets_as_many_jobs_at_once_as_asked_or_as_it_has_cores(
+    monkeypatch, workers, resources, most
+):
     ray = Ray(resources)
     monkeypatch.setattr(ray_engine, "_connected", lambda *where: nullcontext(ray))
     done = list(ray_engine.on_ray(len, list("abcde"), workers, None, 4))
     assert sorted(done) == [(text, {"value": 1}) for text in "abcde"]
-    assert (ray.most, ray.options, ray.cancelled) == (most, {"num_cpus": 1, "max_retries": 4}, [])
+    assert (ray.most, ray.options, ray.cancelled) == (
+        most,
+        {"num_cpus": 1, "max_retries": 4},
+        [],
+    )
 
 
 @pytest.mark.parametrize("crash", ["WorkerCrashedError", "OutOfMemoryError"])
-def test_a_job_that_kills_rays_workers_is_named_and_the_others_are_cancelled(monkeypatch, crash):
+def test_a_job_that_kills_rays_workers_is_named_and_the_others_are_cancelled(
+    monkeypatch, crash
+):
     ray = Ray(crash=crash)
     monkeypatch.setattr(ray_engine, "_connected", lambda *where: nullcontext(ray))
     with pytest.raises(WorkerDiedError, match="job bad: its worker died 5 times"):
@@ -530,9 +644,16 @@ def test_ray_is_started_here_on_one_thread_each_and_ended(own_ray, monkeypatch):
         assert (ray, ray.ended) == (own_ray, 0)
     ((options, environment),) = ray.given
     quiet = {"log_to_driver": False, "configure_logging": False}
-    assert options == {"address": "local", "num_cpus": 3, "include_dashboard": False, **quiet}
+    assert options == {
+        "address": "local",
+        "num_cpus": 3,
+        "include_dashboard": False,
+        **quiet,
+    }
     assert environment["OMP_NUM_THREADS"] == environment["MKL_NUM_THREADS"] == "1"
-    assert environment["PYTHONPATH"].split(os.pathsep) == [path for path in sys.path if path]
+    assert environment["PYTHONPATH"].split(os.pathsep) == [
+        path for path in sys.path if path
+    ]
     assert environment["RAY_USAGE_STATS_ENABLED"] == "0"  # nothing is told to others
     assert environment["RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO"] == "0"
     assert (os.environ["OMP_NUM_THREADS"], ray.ended) == ("7", 1)
@@ -560,13 +681,19 @@ def test_ray_that_runs_already_is_neither_started_nor_ended(own_ray):
 def test_ray_that_does_not_start_or_is_not_there_is_told(own_ray, monkeypatch):
     own_ray.crash = "RuntimeError"
     with (
-        pytest.raises(InputError, match="engine: 'ray' found, but it does not start here: no memory"),
+        pytest.raises(
+            InputError,
+            match="engine: 'ray' found, but it does not start here: no memory",
+        ),
         ray_engine._connected(3, None),
     ):
         pass
     monkeypatch.setitem(sys.modules, "ray", None)
     with (
-        pytest.raises(InputError, match="engine: 'ray' found, but it is not installed: pip install"),
+        pytest.raises(
+            InputError,
+            match="engine: 'ray' found, but it is not installed: pip install",
+        ),
         ray_engine._connected(3, None),
     ):
         pass

@@ -23,11 +23,18 @@ RUDDER = np.radians(20.0)
 
 def run(path, names, values, **more):
     """Outputs of an FMU with inputs that stay."""
-    given = np.array([(0.0, *values)], dtype=[("time", float), *((name, float) for name in names)])
+    given = np.array(
+        [(0.0, *values)], dtype=[("time", float), *((name, float) for name in names)]
+    )
     return fmpy.simulate_fmu(
-        str(path), input=given, stop_time=STEPS * DT, step_size=DT, output_interval=DT,
-        validate=True, **more,
-    )  # fmt: skip
+        str(path),
+        input=given,
+        stop_time=STEPS * DT,
+        step_size=DT,
+        output_interval=DT,
+        validate=True,
+        **more,
+    )
 
 
 @pytest.mark.parametrize("version", ["2.0", "3.0"])
@@ -36,8 +43,12 @@ def test_a_ship_turns_as_in_the_library(version, tmp_path):
     write_fmu(ship_source(MARINER, "ship"), path, version)
     assert validation.validate_fmu(str(path)) == []
     inputs = {
-        "rudder": RUDDER, "current_north": 0.0, "current_east": 0.5, "wind_speed": 8.0, "wind_from": 0.5
-    }  # fmt: skip
+        "rudder": RUDDER,
+        "current_north": 0.0,
+        "current_east": 0.5,
+        "wind_speed": 8.0,
+        "wind_from": 0.5,
+    }
     found = run(path, inputs, inputs.values(), start_values={"u": 7.0})
     weather = Weather(Current(0.5, 90.0), Wind(8.0, np.degrees(0.5), gust=False))
     start = MARINER.service_state.copy()
@@ -49,10 +60,20 @@ def test_a_ship_turns_as_in_the_library(version, tmp_path):
 
 
 BY_A_BRIDGE = {
-    "set_point": 0.1, "heading": 0.02, "yaw_rate": 0.001, "sway": 0.1, "surge": 7.5, "rudder": 0.05,
-    "rate_of_turn": 0.003, "cross_track": 30.0, "course": 0.05, "next_turn_distance": 200.0,
-    "next_turn_angle": 0.6, "second_turn_distance": 2000.0, "second_turn_angle": -0.4,
-}  # fmt: skip
+    "set_point": 0.1,
+    "heading": 0.02,
+    "yaw_rate": 0.001,
+    "sway": 0.1,
+    "surge": 7.5,
+    "rudder": 0.05,
+    "rate_of_turn": 0.003,
+    "cross_track": 30.0,
+    "course": 0.05,
+    "next_turn_distance": 200.0,
+    "next_turn_angle": 0.6,
+    "second_turn_distance": 2000.0,
+    "second_turn_angle": -0.4,
+}
 ALONG_ARCS = Task.of("PathFollowing-v1", dt=2 * DT)
 PILOTS = {
     "lq": LQ.from_model(MARINER, dt=2 * DT),
@@ -62,7 +83,8 @@ PILOTS = {
 
 
 @pytest.mark.parametrize(
-    ("name", "version"), [("lq", "2.0"), ("lq", "3.0"), ("turn_rate", "2.0"), ("wheel_over", "3.0")]
+    ("name", "version"),
+    [("lq", "2.0"), ("lq", "3.0"), ("turn_rate", "2.0"), ("wheel_over", "3.0")],
 )
 def test_an_autopilot_decides_once_in_each_of_its_intervals(name, version, tmp_path):
     agent, path = PILOTS[name], tmp_path / f"{name}.fmu"
@@ -77,21 +99,29 @@ def test_an_autopilot_decides_once_in_each_of_its_intervals(name, version, tmp_p
 def test_what_is_in_the_way_and_what_is_missing_is_said(tmp_path, monkeypatch):
     source = autopilot_source(LQ.from_model(MARINER), "lq")
     (tmp_path / "lq.fmu").mkdir()
-    with pytest.raises(InputError, match=r"lq\.fmu: is not a file; choose another name"):
+    with pytest.raises(
+        InputError, match=r"lq\.fmu: is not a file; choose another name"
+    ):
         write_fmu(source, tmp_path / "lq.fmu")
-    with pytest.raises(InputError, match=r"fmi: '1\.0' found, expected one of '2\.0', '3\.0'"):
+    with pytest.raises(
+        InputError, match=r"fmi: '1\.0' found, expected one of '2\.0', '3\.0'"
+    ):
         write_fmu(source, tmp_path / "other.fmu", "1.0")
     monkeypatch.setenv("CC", "no-such-compiler")
     with pytest.raises(InputError, match="no C compiler for Linux found"):
         write_fmu(source, tmp_path / "other.fmu")
     assert not (tmp_path / "other.fmu").exists()
-    with pytest.raises(InputError, match=r"lq\.zip: found, expected a name that ends in \.fmu"):
+    with pytest.raises(
+        InputError, match=r"lq\.zip: found, expected a name that ends in \.fmu"
+    ):
         write_fmu(source, tmp_path / "lq.zip")
     monkeypatch.setenv("CC", "false")  # a program that fails
     with pytest.raises(InputError, match="false: cannot compile the FMU: "):
         write_fmu(source, tmp_path / "other.fmu")
     monkeypatch.setattr(fmu, "find_spec", lambda name: None)
-    with pytest.raises(InputError, match=r"fmpy is not installed, .*pip install 'shipgym\[fmu\]'"):
+    with pytest.raises(
+        InputError, match=r"fmpy is not installed, .*pip install 'shipgym\[fmu\]'"
+    ):
         write_fmu(source, tmp_path / "other.fmu")
     assert [one.name for one in tmp_path.iterdir()] == ["lq.fmu"]
 
@@ -99,10 +129,12 @@ def test_what_is_in_the_way_and_what_is_missing_is_said(tmp_path, monkeypatch):
 @pytest.mark.parametrize(
     ("version", "machine", "folder"),
     [
-        ("2.0", "x86_64", "linux64"), ("2.0", "aarch64", "aarch64-linux"),
-        ("3.0", "x86_64", "x86_64-linux"), ("3.0", "aarch64", "aarch64-linux"),
+        ("2.0", "x86_64", "linux64"),
+        ("2.0", "aarch64", "aarch64-linux"),
+        ("3.0", "x86_64", "x86_64-linux"),
+        ("3.0", "aarch64", "aarch64-linux"),
     ],
-)  # fmt: skip
+)
 def test_a_binary_stands_where_the_standard_has_it_beside_its_sources(
     version, machine, folder, tmp_path, monkeypatch
 ):

@@ -11,7 +11,11 @@ from shipgym import InputError, load_model
 def sailed(controller, model, n=64, **options):
     """Shares of episodes with success, of those aground, and of the time within the corridor."""
     env = gymnasium.make_vec(
-        "shipgym/PathFollowing-v0", num_envs=n, model=model, autoreset_mode="Disabled", **options
+        "shipgym/PathFollowing-v0",
+        num_envs=n,
+        model=model,
+        autoreset_mode="Disabled",
+        **options,
     )
     controller.check_fits(env.observation_names, env.observation_scales)
     seen, _ = env.reset(seed=0)
@@ -19,7 +23,10 @@ def sailed(controller, model, n=64, **options):
     over, success, grounded = np.zeros((3, n), dtype=np.bool_)
     while not over.all():
         seen, _, terminated, truncated, infos = env.step(controller.predict(seen)[0])
-        steps, within = steps + (~over).sum(), within + (infos["in_corridor"] & ~over).sum()
+        steps, within = (
+            steps + (~over).sum(),
+            within + (infos["in_corridor"] & ~over).sum(),
+        )
         success |= infos["success"] & ~over
         grounded |= infos["grounded"] & ~over
         over |= terminated | truncated
@@ -47,7 +54,9 @@ def test_most_paths_in_a_rough_sea_too(name):
 
 def test_a_ship_left_to_herself_runs_aground():
     class Nothing(PID):
-        def predict(self, observation, state=None, episode_start=None, deterministic=True):
+        def predict(
+            self, observation, state=None, episode_start=None, deterministic=True
+        ):
             return np.zeros((len(observation), 1), np.float32), state
 
     model = load_model("mariner")
@@ -66,7 +75,11 @@ def test_what_is_seen_beyond_does_not_matter_but_must_begin_as_designed_for():
         pid.predict(seen[:, :7])
     names, scales = list(pid.observation_names), list(pid.observation_scales)
     pid.check_fits([*names, "cross_track"], [*scales, 1.0])
-    with pytest.raises(InputError, match="observation 0 is 'cross_track', expected 'heading_error_sin'"):
+    with pytest.raises(
+        InputError, match="observation 0 is 'cross_track', expected 'heading_error_sin'"
+    ):
         pid.check_fits(["cross_track", *names], [1.0, *scales])
-    with pytest.raises(InputError, match="in one and not in the other: heading_error_integral"):
+    with pytest.raises(
+        InputError, match="in one and not in the other: heading_error_integral"
+    ):
         pid.check_fits(names[:7], scales[:7])

@@ -14,7 +14,9 @@ from agents.deployment.autopilot import Autopilot
 from shipgym.tasks.task import Task
 from tests.agents.policies import MARINER
 
-PAGE = (Path(__file__).parents[2] / "docs" / "deployment.md").read_text(encoding="utf-8")
+PAGE = (Path(__file__).parents[2] / "docs" / "deployment.md").read_text(
+    encoding="utf-8"
+)
 SECTION = PAGE.partition("## Gains")[2].partition("\n## ")[0]
 
 
@@ -23,7 +25,13 @@ class ByHand:
 
     def __init__(self, path):
         self.file = json.loads(path.read_text())
-        scales = dict(zip(self.file["observation_names"], self.file["observation_scales"], strict=True))
+        scales = dict(
+            zip(
+                self.file["observation_names"],
+                self.file["observation_scales"],
+                strict=True,
+            )
+        )
         self.limit, self.bound = scales["rudder"], scales["heading_error_integral"]
         self.integral, self.first = 0.0, True
 
@@ -32,18 +40,26 @@ class ByHand:
         error = (set_point - heading + math.pi) % (2.0 * math.pi) - math.pi
         if not self.first and abs(error) <= math.radians(10.0):
             self.integral += error * self.file["design"]["dt"]
-        self.first, self.integral = False, max(-self.bound, min(self.bound, self.integral))
+        self.first, self.integral = (
+            False,
+            max(-self.bound, min(self.bound, self.integral)),
+        )
         if self.file["kind"] == "pid":
             order = (
-                neutral + gains["proportional"] * error + gains["integral"] * self.integral
+                neutral
+                + gains["proportional"] * error
+                + gains["integral"] * self.integral
                 - gains["derivative"] * yaw_rate
-            )  # fmt: skip
+            )
         else:
             order = (
-                neutral + gains["heading_error"] * error + gains["heading_error_integral"] * self.integral
-                + gains["yaw_rate"] * yaw_rate + gains["sway"] * (sway - self.file["neutral_sway"])
+                neutral
+                + gains["heading_error"] * error
+                + gains["heading_error_integral"] * self.integral
+                + gains["yaw_rate"] * yaw_rate
+                + gains["sway"] * (sway - self.file["neutral_sway"])
                 + gains["rudder"] * (rudder - neutral)
-            )  # fmt: skip
+            )
         return max(-self.limit, min(self.limit, order))
 
 
@@ -55,11 +71,21 @@ def test_it_commands_what_the_controller_commands(design, tmp_path):
     env = gym.make("shipgym/CourseKeeping-v0", model="mariner")
     seen, _ = env.reset(seed=5)
     for _ in range(80):
-        values = dict(zip(controller.observation_names, seen * controller.observation_scales, strict=True))
+        values = dict(
+            zip(
+                controller.observation_names,
+                seen * controller.observation_scales,
+                strict=True,
+            )
+        )
         set_point = np.arctan2(values["heading_error_sin"], values["heading_error_cos"])
-        order = by_hand.step(set_point, 0.0, values["yaw_rate"], values["sway"], values["rudder"])
+        order = by_hand.step(
+            set_point, 0.0, values["yaw_rate"], values["sway"], values["rudder"]
+        )
         action, _ = controller.predict(seen)
-        assert order / by_hand.limit == pytest.approx(action[0], abs=2e-5)  # observations are single
+        assert order / by_hand.limit == pytest.approx(
+            action[0], abs=2e-5
+        )  # observations are single
         seen, *_ = env.step(action)
 
 
@@ -87,13 +113,21 @@ def turn_rate_by_hand(file, given, memory):
     """The four steps of the page; the memory is followed rate and integral part."""
     gains, arrays, dt = file["gains"], file["arrays"], file["design"]["dt"]
     share = dt * file["design"]["frequency"] / (1.0 + dt * file["design"]["frequency"])
-    scales = dict(zip(file["observation_names"], file["observation_scales"], strict=True))
+    scales = dict(
+        zip(file["observation_names"], file["observation_scales"], strict=True)
+    )
     to_heading = wrap(given["set_point"] - given["heading"]) / gains["heading_time"]
-    wanted = given["rate_of_turn"] or max(-gains["rate"], min(gains["rate"], to_heading))
+    wanted = given["rate_of_turn"] or max(
+        -gains["rate"], min(gains["rate"], to_heading)
+    )
     followed, part = memory or (given["yaw_rate"], 0.0)
     followed += share * (wanted - followed)
     off = followed - given["yaw_rate"]
-    order = between(followed, arrays["rates"], arrays["rudders"]) + gains["proportional"] * off + part
+    order = (
+        between(followed, arrays["rates"], arrays["rudders"])
+        + gains["proportional"] * off
+        + part
+    )
     if abs(order) < scales["rudder"]:
         part += gains["integral"] * dt * off
     return max(-scales["rudder"], min(scales["rudder"], order)), (followed, part)
@@ -103,31 +137,76 @@ def test_a_rate_of_turn_is_steered_as_the_page_says():
     agent, random, memory = TurnRate.from_model(MARINER), np.random.default_rng(0), None
     file, bridge = json.loads(json.dumps(agent.to_dict())), Autopilot(agent)
     for step in range(300):
-        given = dict(zip(("set_point", "heading", "yaw_rate"), random.normal(0, 0.01, 3), strict=True))
+        given = dict(
+            zip(
+                ("set_point", "heading", "yaw_rate"),
+                random.normal(0, 0.01, 3),
+                strict=True,
+            )
+        )
         given["rate_of_turn"] = 0.003 if step % 100 > 60 else 0.0
         order, memory = turn_rate_by_hand(file, given, memory)
         assert bridge.step(given) == pytest.approx(order, abs=1e-12)
 
 
 def test_wheel_over_is_what_the_page_says():
-    agent, random = WheelOver.from_model(MARINER, task=Task.of("PathFollowing-v1")), np.random.default_rng(1)
+    agent, random = (
+        WheelOver.from_model(MARINER, task=Task.of("PathFollowing-v1")),
+        np.random.default_rng(1),
+    )
     bridge, gains, integral = Autopilot(agent), agent.gains, 0.0
     helm = json.loads(json.dumps(agent.to_dict()))["autopilot"]
-    sizes = {"surge": 1.0, "sway": 0.3, "cross_track": 80.0, "next_turn_distance": 300.0}
+    sizes = {
+        "surge": 1.0,
+        "sway": 0.3,
+        "cross_track": 80.0,
+        "next_turn_distance": 300.0,
+    }
     for step in range(300):
-        given = {name: random.normal(0.0, sizes.get(name, 0.05)) for name in bridge.inputs}
-        given |= {"surge": 7.5 + given["surge"], "second_turn_distance": 900.0, "second_turn_angle": -0.5}
-        crab = wrap(given["course"] - given["heading"] - math.atan2(given["sway"], given["surge"]))
+        given = {
+            name: random.normal(0.0, sizes.get(name, 0.05)) for name in bridge.inputs
+        }
+        given |= {
+            "surge": 7.5 + given["surge"],
+            "second_turn_distance": 900.0,
+            "second_turn_angle": -0.5,
+        }
+        crab = wrap(
+            given["course"]
+            - given["heading"]
+            - math.atan2(given["sway"], given["surge"])
+        )
         bend = 0.0
         for one in ("next", "second"):
-            angle, ahead = given[f"{one}_turn_angle"], gains["turn_reach"] - given[f"{one}_turn_distance"]
-            bend += math.copysign(max(0.0, min(abs(angle), ahead / gains["path_radius"])), angle)
-        wanted = given["set_point"] - math.atan(given["cross_track"] / gains["lookahead"]) + bend
+            angle, ahead = (
+                given[f"{one}_turn_angle"],
+                gains["turn_reach"] - given[f"{one}_turn_distance"],
+            )
+            bend += math.copysign(
+                max(0.0, min(abs(angle), ahead / gains["path_radius"])), angle
+            )
+        wanted = (
+            given["set_point"]
+            - math.atan(given["cross_track"] / gains["lookahead"])
+            + bend
+        )
         error = wrap(wanted - gains["crab_share"] * crab - given["heading"])
-        integral += error * helm["design"]["dt"] if step and abs(error) <= math.radians(10.0) else 0.0
+        integral += (
+            error * helm["design"]["dt"]
+            if step and abs(error) <= math.radians(10.0)
+            else 0.0
+        )
         of, neutral = helm["gains"], helm["neutral_rudder"]
-        order = neutral + of["heading_error"] * error + of["heading_error_integral"] * integral
-        order += of["yaw_rate"] * given["yaw_rate"] + of["sway"] * (given["sway"] - helm["neutral_sway"])
+        order = (
+            neutral
+            + of["heading_error"] * error
+            + of["heading_error_integral"] * integral
+        )
+        order += of["yaw_rate"] * given["yaw_rate"] + of["sway"] * (
+            given["sway"] - helm["neutral_sway"]
+        )
         order += of["rudder"] * (given["rudder"] - neutral)
         limit = MARINER.steering.limit
-        assert bridge.step(given) == pytest.approx(max(-limit, min(limit, order)), abs=1e-9)
+        assert bridge.step(given) == pytest.approx(
+            max(-limit, min(limit, order)), abs=1e-9
+        )

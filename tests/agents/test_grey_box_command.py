@@ -20,7 +20,9 @@ def ship_file(demo, tmp_path):
         text = demo.read_text()
         assert OWN in text
         path = tmp_path / "ship.toml"
-        path.write_text(text.replace(OWN, identify).replace('file = "', f'file = "{demo.parent}/'))
+        path.write_text(
+            text.replace(OWN, identify).replace('file = "', f'file = "{demo.parent}/')
+        )
         return path
 
     return write
@@ -32,7 +34,9 @@ def identified(ship, *options):
 
 
 def test_a_method_and_a_reference_ship_are_enough(ship_file):
-    ship = ship_file(f'method = "rm-svm"\nreference_model = "container-own.json"\n{QUICK}')
+    ship = ship_file(
+        f'method = "rm-svm"\nreference_model = "container-own.json"\n{QUICK}'
+    )
     shipgym.load_model("tanker").save(ship.parent / "container-own.json")
     answer = identified(ship)
     assert answer.exit_code == 0, answer.stderr
@@ -44,7 +48,10 @@ def test_a_method_and_a_reference_ship_are_enough(ship_file):
     zigzag = "zigzag_15_15.csv"
     name = next(name for name in ours["trials"] if name.endswith(zigzag))
     assert (ship.parent / "out" / "report.html").stat().st_size > 10_000
-    assert ours["trials"][name]["rmse"]["psi"] < 0.5 * ours["reference"]["trials"][name]["rmse"]["psi"]
+    assert (
+        ours["trials"][name]["rmse"]["psi"]
+        < 0.5 * ours["reference"]["trials"][name]["rmse"]["psi"]
+    )
 
 
 def test_a_grey_box_takes_the_most_similar_ship_if_none_is_named(ship_file):
@@ -53,7 +60,9 @@ def test_a_grey_box_takes_the_most_similar_ship_if_none_is_named(ship_file):
     ship.write_text(ship.read_text().replace("speed = 7.7175  # 15 knots", block))
     answer = identified(ship, "--json")
     assert answer.exit_code == 0, answer.stderr
-    reference = shipgym.load_model(ship.parent / "out" / "model.json").provenance["reference"]
+    reference = shipgym.load_model(ship.parent / "out" / "model.json").provenance[
+        "reference"
+    ]
     assert reference["name"] == "mariner"
     assert max(reference["similarity"], key=reference["similarity"].get) == "mariner"
 
@@ -64,7 +73,10 @@ def test_a_grey_box_takes_the_most_similar_ship_if_none_is_named(ship_file):
         (
             'structure = "abkowitz"\nmethod = "rm-svm"',
             [],
-            "found with structure 'abkowitz', expected structure 'grey-box', which has a reference ship",
+            (
+                "found with structure 'abkowitz', expected structure 'grey-box', which"
+                " has a reference ship"
+            ),
         ),
         (
             OWN,
@@ -73,15 +85,28 @@ def test_a_grey_box_takes_the_most_similar_ship_if_none_is_named(ship_file):
         ),
         (
             OWN,
-            ["--method", "rm-svm", "--reference-model", "tanker", "--structure", "abkowitz"],
+            [
+                "--method",
+                "rm-svm",
+                "--reference-model",
+                "tanker",
+                "--structure",
+                "abkowitz",
+            ],
             "expected structure 'grey-box'",
         ),
         ('method = "rm-svm"\nreference_model = "tankr"', [], "Did you mean 'tanker'"),
-        ('method = "rm-svm"\nreference_model = "auto"\nfolds = "luck"', [], "folds: 'luck' found"),
+        (
+            'method = "rm-svm"\nreference_model = "auto"\nfolds = "luck"',
+            [],
+            "folds: 'luck' found",
+        ),
         ('structure = "gray-box"', [], "Did you mean 'grey-box'"),
     ],
 )
-def test_what_does_not_fit_is_one_message_and_nothing_written(ship_file, identify, options, said):
+def test_what_does_not_fit_is_one_message_and_nothing_written(
+    ship_file, identify, options, said
+):
     ship = ship_file(identify)
     answer = identified(ship, *options)
     assert answer.exit_code == 2

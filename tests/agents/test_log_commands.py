@@ -25,7 +25,11 @@ def log(tmp_path, monkeypatch):
         r[k] = r[k - 1] + (0.08 * delta[k - 1] - r[k - 1]) / 12.0
     lines = ["time;Gyro [deg];Rudder"]
     for k, psi in enumerate(30.0 + np.cumsum(r)):
-        lines.append(f"2024-05-31 09:{30 + k // 60}:{k % 60:02d};{psi:.2f};{-delta[k]:.1f}".replace(".", ","))
+        lines.append(
+            f"2024-05-31 09:{30 + k // 60}:{k % 60:02d};{psi:.2f};{-delta[k]:.1f}".replace(
+                ".", ","
+            )
+        )
     (tmp_path / "log.csv").write_text("\n".join(lines))
     monkeypatch.chdir(tmp_path)
     return tmp_path
@@ -39,7 +43,9 @@ def command(monkeypatch, capsys, *words):
     return left.value.code or 0, shown.out + shown.err
 
 
-def test_a_ship_file_is_written_from_a_log_and_says_what_was_guessed(log, monkeypatch, capsys):
+def test_a_ship_file_is_written_from_a_log_and_says_what_was_guessed(
+    log, monkeypatch, capsys
+):
     code, said = command(monkeypatch, capsys, "new-ship", "log.csv", "--length", "150")
     assert code == 0
     assert "psi: column 'Gyro [deg]' in deg, unit from its name" in said
@@ -66,9 +72,14 @@ def test_service_speed_is_what_the_fastest_log_shows(log, monkeypatch, capsys):
     rows = (log / "log.csv").read_text().splitlines()
     for name, low, high in (("slow", 6.0, 7.0), ("fast", 8.0, 12.0)):
         speeds = np.linspace(low, high, len(rows) - 1)  # kn
-        more = [f"{row};{speed:.3f}".replace(".", ",") for row, speed in zip(rows[1:], speeds, strict=True)]
+        more = [
+            f"{row};{speed:.3f}".replace(".", ",")
+            for row, speed in zip(rows[1:], speeds, strict=True)
+        ]
         (log / f"{name}.csv").write_text("\n".join([f"{rows[0]};STW [kn]", *more]))
-    code, said = command(monkeypatch, capsys, "new-ship", "fast.csv", "slow.csv", "--length", "150")
+    code, said = command(
+        monkeypatch, capsys, "new-ship", "fast.csv", "slow.csv", "--length", "150"
+    )
     assert code == 0, said
     written = ShipFile.load(log / "ship.toml").particulars["speed"]
     assert written == pytest.approx(11.6 * 1852.0 / 3600.0, rel=5e-3)
@@ -81,35 +92,55 @@ def test_a_log_that_is_none_is_one_message(log, monkeypatch, capsys):
 
 
 def test_a_log_beside_others_that_cannot_be_read_is_told(log, monkeypatch, capsys):
-    code, said = command(monkeypatch, capsys, "new-ship", "log.csv", "lag.csv", "--length", "150")
+    code, said = command(
+        monkeypatch, capsys, "new-ship", "log.csv", "lag.csv", "--length", "150"
+    )
     assert code == 0
-    assert "warning: lag.csv: there is no such CSV file. Did you mean 'log.csv'?\n" in said
+    assert (
+        "warning: lag.csv: there is no such CSV file. Did you mean 'log.csv'?\n" in said
+    )
 
 
-def test_a_log_that_does_not_tell_the_rudders_sign_leaves_it_to_the_others(log, monkeypatch, capsys):
+def test_a_log_that_does_not_tell_the_rudders_sign_leaves_it_to_the_others(
+    log, monkeypatch, capsys
+):
     rows = (log / "log.csv").read_text().splitlines()
     straight = [rows[0], *(f"{row.rsplit(';', 1)[0]};0,0" for row in rows[1:60])]
     (log / "straight.csv").write_text("\n".join(straight))
-    code, said = command(monkeypatch, capsys, "new-ship", "straight.csv", "log.csv", "--length", "150")
+    code, said = command(
+        monkeypatch, capsys, "new-ship", "straight.csv", "log.csv", "--length", "150"
+    )
     assert (code, "a positive rudder steers to port" in said) == (0, True)
 
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "mariner" / "zigzag_10_10.csv"
-OF_EXAMPLE = {"time_s": "t", "compass_deg": "psi", "gyro_deg_s": "r", "rudder_deg": "delta"}
+OF_EXAMPLE = {
+    "time_s": "t",
+    "compass_deg": "psi",
+    "gyro_deg_s": "r",
+    "rudder_deg": "delta",
+}
 
 
 def example(folder, edit=lambda row: row):
     """The example's zigzag with names that tell no unit, its rows changed."""
     with EXAMPLE.open() as file:
-        rows = [edit({new: row[old] for old, new in OF_EXAMPLE.items()}) for row in csv.DictReader(file)]
+        rows = [
+            edit({new: row[old] for old, new in OF_EXAMPLE.items()})
+            for row in csv.DictReader(file)
+        ]
     lines = [",".join(rows[0]), *(",".join(row.values()) for row in rows)]
     (folder / "run.csv").write_text("\n".join(lines))
     return folder / "run.csv"
 
 
-def test_every_column_of_the_examples_log_is_recognised_in_its_unit(log, monkeypatch, capsys):
+def test_every_column_of_the_examples_log_is_recognised_in_its_unit(
+    log, monkeypatch, capsys
+):
     shutil.copy(EXAMPLE, log)
-    code, said = command(monkeypatch, capsys, "new-ship", EXAMPLE.name, "--length", "160.9")
+    code, said = command(
+        monkeypatch, capsys, "new-ship", EXAMPLE.name, "--length", "160.9"
+    )
     assert (code, "not used" in said) == (0, False), said
     assert "r: column 'gyro_deg_s' in deg/s, unit from its name" in said
     assert "psi: column 'compass_deg' in deg, unit from its name" in said
@@ -122,7 +153,9 @@ def test_every_column_of_the_examples_log_is_recognised_in_its_unit(log, monkeyp
 def test_columns_that_are_not_used_are_listed(log, monkeypatch, capsys):
     text = EXAMPLE.read_text().replace("compass_deg", "bearing", 1)
     (log / "run.csv").write_text(text.replace("log_ahead_kn", "log one", 1))
-    code, said = command(monkeypatch, capsys, "new-ship", "run.csv", "--length", "160.9")
+    code, said = command(
+        monkeypatch, capsys, "new-ship", "run.csv", "--length", "160.9"
+    )
     assert (code, "columns not used: 'bearing', 'log one'" in said) == (0, True), said
     assert "r: column 'gyro_deg_s'" in said
     assert "# not used: 'bearing', 'log one'\n" in (log / "ship.toml").read_text()
@@ -152,7 +185,9 @@ def test_columns_that_are_not_used_are_listed(log, monkeypatch, capsys):
 )
 def test_a_name_is_a_channels_where_its_unit_is_one_of_it(name, channel, unit):
     found = guess_columns(column_table(Path("log"), {name: np.zeros(3)}, range(3)))
-    assert [(one.channel, one.unit) for one in found] == ([(channel, unit)] if channel else [])
+    assert [(one.channel, one.unit) for one in found] == (
+        [(channel, unit)] if channel else []
+    )
 
 
 @pytest.mark.parametrize(
@@ -166,16 +201,23 @@ def test_a_name_is_a_channels_where_its_unit_is_one_of_it(name, channel, unit):
     ],
 )
 def test_times_since_1970_are_known_by_their_name_and_size(name, largest, unit):
-    (found,) = guess_columns(column_table(Path("log"), {name: np.array([largest] * 3)}, range(3)))
+    (found,) = guess_columns(
+        column_table(Path("log"), {name: np.array([largest] * 3)}, range(3))
+    )
     assert found.unit == unit
 
 
 def test_the_unit_that_a_check_names_is_tried_and_written(log, monkeypatch, capsys):
     example(log)
-    code, said = command(monkeypatch, capsys, "new-ship", "run.csv", "--length", "160.9")
+    code, said = command(
+        monkeypatch, capsys, "new-ship", "run.csv", "--length", "160.9"
+    )
     told = "unit by the check that refused deg/min (from its size, up to 0.637)"
     assert (code, f"r: column 'r' in deg/s, {told}" in said) == (0, True), said
-    assert f'r = {{ column = "r", unit = "deg/s" }}   # {told}' in (log / "ship.toml").read_text()
+    assert (
+        f'r = {{ column = "r", unit = "deg/s" }}   # {told}'
+        in (log / "ship.toml").read_text()
+    )
     (trial,) = ShipFile.load(log / "ship.toml").trials()
     assert np.abs(trial["r"]).max() == pytest.approx(np.radians(0.637))
 
@@ -190,27 +232,44 @@ def test_time_in_milliseconds_is_tried_and_a_unit_in_a_name_is_kept(log):
     example(log, lambda row: {**row, "r_deg_min": row["r"], "r": ""})
     text = (log / "run.csv").read_text().replace("t,psi,r,", "t,psi,spare,", 1)
     (log / "run.csv").write_text(text)
-    with pytest.raises(InputError, match=r'declare r = \{ column = "r_deg_min", unit = "deg/s" \}'):
+    with pytest.raises(
+        InputError, match=r'declare r = \{ column = "r_deg_min", unit = "deg/s" \}'
+    ):
         guess_trial(log / "run.csv")
 
 
 def test_blank_cells_are_filled_and_the_ship_file_says_so(log, monkeypatch, capsys):
-    example(log, lambda row: {**row, "psi": ""} if row["t"] in ("0.0", "20.0", "20.5") else row)
-    code, said = command(monkeypatch, capsys, "new-ship", "run.csv", "--length", "160.9")
-    assert (code, 'repair = "interpolate", without which a log is refused' in said) == (0, True), said
+    example(
+        log,
+        lambda row: {**row, "psi": ""} if row["t"] in ("0.0", "20.0", "20.5") else row,
+    )
+    code, said = command(
+        monkeypatch, capsys, "new-ship", "run.csv", "--length", "160.9"
+    )
+    assert (code, 'repair = "interpolate", without which a log is refused' in said) == (
+        0,
+        True,
+    ), said
     assert "2 missing values of psi were filled in" in said
     (trial,) = ShipFile.load(log / "ship.toml").trials()
     assert dict(trial.repaired) == {"psi": 2}
 
 
-def test_a_remedy_for_the_ship_file_says_that_there_is_none_yet(log, monkeypatch, capsys):
+def test_a_remedy_for_the_ship_file_says_that_there_is_none_yet(
+    log, monkeypatch, capsys
+):
     (log / "bad.csv").write_text("a;b\n1;2\n")
     code, said = command(monkeypatch, capsys, "new-ship", "bad.csv")
-    assert (code, "new-ship has written no ship file in which to do so: write one" in said) == (2, True)
+    assert (
+        code,
+        "new-ship has written no ship file in which to do so: write one" in said,
+    ) == (2, True)
 
 
 @pytest.mark.parametrize("length", ["1e9", "2001", "0.009", "inf", "nan", "-5"])
-def test_a_length_that_no_ship_has_is_refused_before_a_log_is_read(log, monkeypatch, capsys, length):
+def test_a_length_that_no_ship_has_is_refused_before_a_log_is_read(
+    log, monkeypatch, capsys, length
+):
     code, said = command(monkeypatch, capsys, "new-ship", "log.csv", "--length", length)
     assert code == 2
     assert "'--length'" in said

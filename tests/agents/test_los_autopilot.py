@@ -50,14 +50,20 @@ def test_a_steady_current_leaves_no_error(law):
 
 def test_without_integral_the_ship_is_set_off_by_the_lookahead_times_the_tangent_of_the_crab_angle():
     errors, _ = cross_track(LineOfSight.from_model(MARINER), STRAIGHT)
-    assert errors[-1] == pytest.approx(2.5 * LENGTH * np.tan(np.arcsin(CURRENT / SPEED)), rel=0.02)
-    shorter, _ = cross_track(LineOfSight.from_model(MARINER, lookahead_lengths=1.5), STRAIGHT)
+    assert errors[-1] == pytest.approx(
+        2.5 * LENGTH * np.tan(np.arcsin(CURRENT / SPEED)), rel=0.02
+    )
+    shorter, _ = cross_track(
+        LineOfSight.from_model(MARINER, lookahead_lengths=1.5), STRAIGHT
+    )
     assert shorter[-1] == pytest.approx(0.6 * errors[-1], rel=0.02)
 
 
 @pytest.mark.parametrize("pilot", [PID, LQG])
 def test_any_heading_autopilot_is_led(pilot):
-    guided = IntegralLineOfSight.from_model(MARINER, autopilot=pilot.from_model(MARINER))
+    guided = IntegralLineOfSight.from_model(
+        MARINER, autopilot=pilot.from_model(MARINER)
+    )
     errors, _ = cross_track(guided, STRAIGHT)
     assert np.abs(errors[-100:]).max() < 1e-3 * LENGTH
 
@@ -65,7 +71,8 @@ def test_any_heading_autopilot_is_led(pilot):
 def test_paths_with_turns_in_a_current_cost_less_with_the_integral():
     task = path_following_task(sea=Weather(current=Current(CURRENT)))
     integral, plain = (
-        cross_track(law.from_model(MARINER), task, 16)[1] for law in (IntegralLineOfSight, LineOfSight)
+        cross_track(law.from_model(MARINER), task, 16)[1]
+        for law in (IntegralLineOfSight, LineOfSight)
     )
     assert integral.mean() > 0.85 * plain.mean()  # rewards are negative
 
@@ -73,7 +80,8 @@ def test_paths_with_turns_in_a_current_cost_less_with_the_integral():
 def test_with_the_task_s_own_lookahead_plain_line_of_sight_is_the_autopilot_itself():
     task = path_following_task(episode_steps=300)
     ours, theirs = (
-        cross_track(pilot, task, 4)[0] for pilot in (LineOfSight.from_model(MARINER), LQ.from_model(MARINER))
+        cross_track(pilot, task, 4)[0]
+        for pilot in (LineOfSight.from_model(MARINER), LQ.from_model(MARINER))
     )
     assert ours == pytest.approx(theirs, abs=0.002 * LENGTH)
 
@@ -104,8 +112,14 @@ def test_a_learned_autopilot_is_led_but_has_no_file(tmp_path):
     guided = IntegralLineOfSight.from_model(MARINER, autopilot=Learned())
     check_controller(guided, MARINER, path_following_task(), n_steps=5)
     margins = guided.margins
-    assert (margins.gain_margin, margins.phase_margin_deg, margins.lowest_gain) == (np.inf, np.inf, 0.0)
-    with pytest.raises(InputError, match="autopilot: Learned found, expected a controller of shipgym"):
+    assert (margins.gain_margin, margins.phase_margin_deg, margins.lowest_gain) == (
+        np.inf,
+        np.inf,
+        0.0,
+    )
+    with pytest.raises(
+        InputError, match="autopilot: Learned found, expected a controller of shipgym"
+    ):
         guided.save(tmp_path / "guided.json")
 
 
@@ -113,9 +127,13 @@ def test_course_keeping_and_another_corridor_are_refused():
     guided = IntegralLineOfSight.from_model(MARINER)
     with pytest.raises(InputError, match="in one and not in the other: cross_track"):
         check_controller(guided, MARINER)
-    with pytest.raises(InputError, match=r"scale 160\.93 of 'cross_track', which is 80\.465"):
+    with pytest.raises(
+        InputError, match=r"scale 160\.93 of 'cross_track', which is 80\.465"
+    ):
         check_controller(guided, MARINER, path_following_task(corridor=0.5))
-    with pytest.raises(InputError, match=r"observation: shape \(8,\) found, expected \(9,\)"):
+    with pytest.raises(
+        InputError, match=r"observation: shape \(8,\) found, expected \(9,\)"
+    ):
         guided.predict(np.zeros(8))
 
 

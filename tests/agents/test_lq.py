@@ -30,7 +30,10 @@ LENGTH_TIME = 160.93 / 7.7175
 
 
 def changed(model=MARINER, gear=None, **factors):
-    coefficients = {name: value * factors.get(name, 1.0) for name, value in model.coefficients.items()}
+    coefficients = {
+        name: value * factors.get(name, 1.0)
+        for name, value in model.coefficients.items()
+    }
     return replace(model, coefficients=coefficients, steering=gear or model.steering)
 
 
@@ -55,13 +58,24 @@ def linear_cost(ship, gain, weight, integral_time, n=20_000):
         before = x[3]
         x = ship.A @ x - ship.B[:, 0] * (gain @ x)
         rate = (x[3] - before) / ship.dt
-        cost += x[2] ** 2 + RUDDER_WEIGHT * x[3] ** 2 + weight * rate**2 + (x[4] / integral_time) ** 2
+        cost += (
+            x[2] ** 2
+            + RUDDER_WEIGHT * x[3] ** 2
+            + weight * rate**2
+            + (x[4] / integral_time) ** 2
+        )
     return cost
 
 
-@pytest.mark.parametrize("model", [MARINER, UNSTABLE], ids=["stable, lag", "unstable, no lag"])
+@pytest.mark.parametrize(
+    "model", [MARINER, UNSTABLE], ids=["stable, lag", "unstable, no lag"]
+)
 def test_no_other_gains_are_cheaper_on_the_linear_ship(model):
-    ship, weight, integral_time = sample_ship(model, 1.0), rate_weight(model), 20.0 * LENGTH_TIME
+    ship, weight, integral_time = (
+        sample_ship(model, 1.0),
+        rate_weight(model),
+        20.0 * LENGTH_TIME,
+    )
     gain = lq_gain(ship, weight, integral_time)
     best = linear_cost(ship, gain, weight, integral_time, 4000)
     for i in range(5):
@@ -79,7 +93,13 @@ def test_sampling_is_exact_for_small_motions_of_the_environments_ship():
     for k in range(1, 31):
         x = ship.A @ x + ship.B[:, 0] * order
         integral -= trial["psi"][10 * k]
-    expected = [trial["v"][-1] - about.sway, trial["r"][-1], -trial["psi"][-1], order, integral]
+    expected = [
+        trial["v"][-1] - about.sway,
+        trial["r"][-1],
+        -trial["psi"][-1],
+        order,
+        integral,
+    ]
     np.testing.assert_allclose(x, expected, rtol=2e-3)
 
 
@@ -125,7 +145,14 @@ def test_a_course_change_ends_on_the_course_with_little_overshoot():
         changed(N_r=2.0, N_ur=2.0),
         changed(N_d=0.3, N_ud=0.3),
     ],
-    ids=["unstable", "very unstable", "slow gear", "lagging gear", "very stable", "weak rudder"],
+    ids=[
+        "unstable",
+        "very unstable",
+        "slow gear",
+        "lagging gear",
+        "very stable",
+        "weak rudder",
+    ],
 )
 def test_ships_hard_to_steer_are_kept_on_course(model):
     lq = LQ.from_model(model)
@@ -138,7 +165,9 @@ def test_ships_hard_to_steer_are_kept_on_course(model):
 
 def test_the_integral_removes_what_a_wrong_neutral_rudder_leaves():
     other = changed(N_0=-2.0, N_0u=-2.0, N_0uu=-2.0)
-    step = step_response(LQ.from_model(MARINER), other, 0.0, duration=120.0 * LENGTH_TIME)
+    step = step_response(
+        LQ.from_model(MARINER), other, 0.0, duration=120.0 * LENGTH_TIME
+    )
     assert np.degrees(np.abs(step.heading).max()) > 0.5
     assert np.degrees(np.abs(step.heading[0, -1])) < 0.02
 
@@ -163,10 +192,16 @@ def test_the_model_seven_metres_long_is_steered_as_its_ship():
         LQ.from_model(MARINER),
         LQ.from_model(replace(MARINER, particulars=small, steering=gear), dt=dt * time),
     )
-    assert model.gains["heading_error"] == pytest.approx(ship.gains["heading_error"], rel=1e-6)
+    assert model.gains["heading_error"] == pytest.approx(
+        ship.gains["heading_error"], rel=1e-6
+    )
     assert model.gains["rudder"] == pytest.approx(ship.gains["rudder"], rel=1e-6)
-    assert model.gains["yaw_rate"] == pytest.approx(ship.gains["yaw_rate"] * time, rel=1e-6)
-    assert model.margins.phase_margin_deg == pytest.approx(ship.margins.phase_margin_deg, rel=1e-3)
+    assert model.gains["yaw_rate"] == pytest.approx(
+        ship.gains["yaw_rate"] * time, rel=1e-6
+    )
+    assert model.margins.phase_margin_deg == pytest.approx(
+        ship.margins.phase_margin_deg, rel=1e-3
+    )
 
 
 def test_a_policy_evaluation_of_stable_baselines3_takes_it_as_it_is():
@@ -179,11 +214,15 @@ def test_a_policy_evaluation_of_stable_baselines3_takes_it_as_it_is():
 
 
 def test_an_impossible_design_is_refused():
-    with pytest.raises(InputError, match="integral_lengths: -1 found, expected a number > 0"):
+    with pytest.raises(
+        InputError, match="integral_lengths: -1 found, expected a number > 0"
+    ):
         LQ.from_model(MARINER, integral_lengths=-1.0)
 
 
-@pytest.mark.parametrize(("name", "value"), [("rudder_weight", 0.0), ("rate_weight_s2", 0.0), ("dt", 0.0)])
+@pytest.mark.parametrize(
+    ("name", "value"), [("rudder_weight", 0.0), ("rate_weight_s2", 0.0), ("dt", 0.0)]
+)
 def test_numbers_beyond_their_bounds_are_refused(name, value):
     with pytest.raises(InputError, match=rf"{name}: .* found, expected"):
         LQ.from_model(MARINER, **{name: value})
@@ -199,7 +238,9 @@ def test_the_integral_is_a_state_of_the_loop_only_where_it_is_fed_back():
         return len(Compensator(*memory).closed_loop(ship))
 
     assert len(Compensator.static(proportional).closed_loop(ship)) == 4
-    assert Compensator.static(integral).closed_loop(ship) == pytest.approx(ship.A + ship.B @ integral)
+    assert Compensator.static(integral).closed_loop(ship) == pytest.approx(
+        ship.A + ship.B @ integral
+    )
     assert size(proportional, proportional) == 5
     assert size(integral, proportional) == size(proportional, integral) == 6
 
@@ -210,7 +251,9 @@ def test_a_gear_without_lag_is_where_it_was_ordered_an_interval_later():
     assert (A[3].tolist(), B[3]) == ([0.0] * 5, 1.0)
     quick, order = sampled_ships(linear, 1e-4, 1.3)
     others = [0, 1, 2, 4]
-    np.testing.assert_allclose(A[np.ix_(others, others)], quick[0][np.ix_(others, others)], atol=1e-9)
+    np.testing.assert_allclose(
+        A[np.ix_(others, others)], quick[0][np.ix_(others, others)], atol=1e-9
+    )
     np.testing.assert_allclose(B, order[0], rtol=2e-3)
 
 
@@ -218,10 +261,14 @@ def test_the_riccati_equation_has_the_golden_ratio_for_ones_and_no_solution_with
     """X = X / (1 + X) + 1; a state that stays or doubles, and that no command moves, has none."""
     stays, doubles = np.array([[1.0]]), np.array([[2.0]])
     found = riccati(
-        np.array([stays, stays, doubles]), np.array([[[1.0]], [[0.0]], [[0.0]]]), np.ones((3, 1, 1))
+        np.array([stays, stays, doubles]),
+        np.array([[[1.0]], [[0.0]], [[0.0]]]),
+        np.ones((3, 1, 1)),
     )
     assert found[0, 0, 0] == pytest.approx((1.0 + np.sqrt(5.0)) / 2.0, rel=1e-12)
     assert np.isnan(found[1:]).all()
     unsteady = np.array([[[-0.02, -3.1, 0.0], [-0.001, 0.05, 0.0]]])
-    rows = lq_rows(*sampled_ships(unsteady, 2.0, 1.0), 1.0, rate_weight(UNSTABLE), 400.0)
+    rows = lq_rows(
+        *sampled_ships(unsteady, 2.0, 1.0), 1.0, rate_weight(UNSTABLE), 400.0
+    )
     assert np.isnan(rows).all()

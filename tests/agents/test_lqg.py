@@ -23,13 +23,20 @@ MARINER = load_model("mariner")
 
 def unstable():
     factors = {"N_v": 1.7, "N_uv": 1.7}
-    coefficients = {name: value * factors.get(name, 1.0) for name, value in MARINER.coefficients.items()}
+    coefficients = {
+        name: value * factors.get(name, 1.0)
+        for name, value in MARINER.coefficients.items()
+    }
     return replace(MARINER, coefficients=coefficients)
 
 
 def test_the_kalman_gain_is_that_of_python_control_and_of_the_recursion():
     transition, _ = rudder_response(MARINER, straight_running(MARINER), 1.0)
-    output, process, noise = np.eye(3)[1:], np.diag([1e-3, 1e-8, 1e-7]), np.diag([1e-7, 3e-6])
+    output, process, noise = (
+        np.eye(3)[1:],
+        np.diag([1e-3, 1e-8, 1e-7]),
+        np.diag([1e-7, 3e-6]),
+    )
     gain, deviation = kalman_gain(transition, process, output, noise)
     predictor, _, _ = control.dlqe(transition, np.eye(3), output, process, noise)
     assert transition @ gain == pytest.approx(np.asarray(predictor), rel=1e-9)
@@ -37,7 +44,10 @@ def test_the_kalman_gain_is_that_of_python_control_and_of_the_recursion():
     for _ in range(2000):
         innovation = output @ covariance @ output.T + noise
         limit = covariance @ output.T @ np.linalg.inv(innovation)
-        covariance = transition @ (covariance - limit @ output @ covariance) @ transition.T + process
+        covariance = (
+            transition @ (covariance - limit @ output @ covariance) @ transition.T
+            + process
+        )
     assert gain == pytest.approx(limit, rel=1e-6)
     assert deviation == pytest.approx(np.sqrt(np.diag(innovation)), rel=1e-6)
 
@@ -64,25 +74,37 @@ def test_the_wave_model_keeps_its_deviation_and_period():
     assert np.sqrt(covariance[0, 0]) == pytest.approx(0.02, rel=1e-6)
     pole = np.linalg.eigvals(transition)[0]
     assert 2.0 * np.pi / np.abs(np.log(pole)) == pytest.approx(9.0, rel=1e-6)
-    swing = 9.0 / np.sqrt(1.0 - 0.1**2)  # of which each has exp(-2 pi 0.1 / sqrt(0.99)) of the one before
-    assert wave_model(9.0, 0.02, swing)[0] == pytest.approx(0.5318 * np.eye(2), abs=1e-4)
+    swing = 9.0 / np.sqrt(
+        1.0 - 0.1**2
+    )  # of which each has exp(-2 pi 0.1 / sqrt(0.99)) of the one before
+    assert wave_model(9.0, 0.02, swing)[0] == pytest.approx(
+        0.5318 * np.eye(2), abs=1e-4
+    )
 
 
 def test_noise_makes_a_new_course_once_in_years():
     """Six deviations of the innovation, whose covariance is (1 - C K)^-1 R: once in 16 years of seconds."""
     lqg = LQG.from_model(MARINER, noise=3.0)
-    noise = np.diag((3.0 * np.array([SEA_TRIAL["r"].noise, SEA_TRIAL["psi"].noise])) ** 2)
-    deviation = np.sqrt(np.linalg.solve(np.eye(2) - lqg.output @ lqg.kalman, noise)[1, 1])
+    noise = np.diag(
+        (3.0 * np.array([SEA_TRIAL["r"].noise, SEA_TRIAL["psi"].noise])) ** 2
+    )
+    deviation = np.sqrt(
+        np.linalg.solve(np.eye(2) - lqg.output @ lqg.kalman, noise)[1, 1]
+    )
     chance = 2.0 * norm.sf(lqg.design["new_course_rad"] / deviation)
     assert 10.0 < 1.0 / (chance * 365.25 * 86400.0) < 20.0
-    assert LQG.from_model(MARINER).design["new_course_rad"] == pytest.approx(np.radians(1.0))  # at least
+    assert LQG.from_model(MARINER).design["new_course_rad"] == pytest.approx(
+        np.radians(1.0)
+    )  # at least
 
 
 def gain_at(controller, period):
     """Size of the order per heading in first-order motion of a period."""
     omega, dt = 2.0 * np.pi / period, controller.design["dt"]
     loop = controller.loop()
-    response = control.ss(loop.A, loop.B, loop.C, loop.D, dt)(np.exp(1j * omega * dt))[0]
+    response = control.ss(loop.A, loop.B, loop.C, loop.D, dt)(np.exp(1j * omega * dt))[
+        0
+    ]
     return np.abs(response[2] - 1j * omega * response[1])
 
 
@@ -91,8 +113,12 @@ def test_first_order_motion_is_not_answered_where_it_is_modelled():
     assert gain_at(notched, 9.0) < 0.2 * gain_at(plain, 9.0)
     assert notched.margins.gain_margin > 2.0
     task = course_keeping_task(sea="moderate", noise=1.0)
-    quiet, lively = (sail(one, MARINER, task, np.arange(16)) for one in (notched, plain))
-    assert quiet.rudder_travel_deg_min.mean() < 0.8 * lively.rudder_travel_deg_min.mean()
+    quiet, lively = (
+        sail(one, MARINER, task, np.arange(16)) for one in (notched, plain)
+    )
+    assert (
+        quiet.rudder_travel_deg_min.mean() < 0.8 * lively.rudder_travel_deg_min.mean()
+    )
 
 
 def test_noise_and_sea_move_the_rudder_less_than_with_lq_at_no_higher_cost():
@@ -103,11 +129,17 @@ def test_noise_and_sea_move_the_rudder_less_than_with_lq_at_no_higher_cost():
     ):
         one, other = (sail(pilot, MARINER, task, np.arange(16)) for pilot in (lqg, lq))
         assert one.cost.mean() < other.cost.mean()
-        assert one.rudder_travel_deg_min.mean() < saved * other.rudder_travel_deg_min.mean()
+        assert (
+            one.rudder_travel_deg_min.mean()
+            < saved * other.rudder_travel_deg_min.mean()
+        )
 
 
 def test_without_noise_it_costs_as_much_as_lq():
-    lq, lqg = (sail(kind.from_model(MARINER), MARINER, seeds=np.arange(16)) for kind in (LQ, LQG))
+    lq, lqg = (
+        sail(kind.from_model(MARINER), MARINER, seeds=np.arange(16))
+        for kind in (LQ, LQG)
+    )
     assert lqg.cost.mean() == pytest.approx(lq.cost.mean(), rel=0.02)
 
 
@@ -120,7 +152,9 @@ def test_without_noise_it_costs_as_much_as_lq():
     ids=["unstable", "memory of yaw"],
 )
 def test_a_new_course_is_taken_at_once_and_kept(model):
-    heading = np.degrees(step_response(LQG.from_model(model), model, 20.0, duration=1200.0).heading[0])
+    heading = np.degrees(
+        step_response(LQG.from_model(model), model, 20.0, duration=1200.0).heading[0]
+    )
     assert heading[-200:] == pytest.approx(20.0, abs=0.2)
     assert heading.max() < 23.0
 
@@ -137,20 +171,25 @@ def test_the_file_holds_the_filter(tmp_path):
         assert np.array_equal(action, repeated)
     text = (tmp_path / "lqg.json").read_text()
     (tmp_path / "cut.json").write_text(text.replace('"kalman"', '"calman"'))
-    with pytest.raises(InputError, match=r"arrays: unknown key 'calman'\. Did you mean 'kalman'"):
+    with pytest.raises(
+        InputError, match=r"arrays: unknown key 'calman'\. Did you mean 'kalman'"
+    ):
         load_agent(tmp_path / "cut.json")
 
 
 def test_the_state_is_that_of_as_many_ships():
     lqg = LQG.from_model(MARINER)
     _, state = lqg.predict(np.zeros((3, 8)))
-    with pytest.raises(InputError, match=r"state: shape \(3, 4\) found, expected \(2, 4\)"):
+    with pytest.raises(
+        InputError, match=r"state: shape \(3, 4\) found, expected \(2, 4\)"
+    ):
         lqg.predict(np.zeros((2, 8)), state)
 
 
 def test_impossible_designs_are_refused():
     with pytest.raises(
-        InputError, match="wave_period: 1 found, expected a number > 2; two control intervals"
+        InputError,
+        match="wave_period: 1 found, expected a number > 2; two control intervals",
     ):
         LQG.from_model(MARINER, wave_period=1.0)
     with pytest.raises(InputError, match="noise: 0 found"):
@@ -158,7 +197,8 @@ def test_impossible_designs_are_refused():
 
 
 @pytest.mark.parametrize(
-    ("name", "value"), [("wave_heading_deg", 0.0), ("disturbance_deg", 0.0), ("rudder_weight", -1.0)]
+    ("name", "value"),
+    [("wave_heading_deg", 0.0), ("disturbance_deg", 0.0), ("rudder_weight", -1.0)],
 )
 def test_numbers_beyond_their_bounds_are_refused(name, value):
     with pytest.raises(InputError, match=rf"{name}: .* found, expected"):
@@ -173,15 +213,22 @@ def test_a_heading_opposite_to_the_course_is_estimated_as_any_other():
         memory, rows = np.zeros((1, lqg.memory_size)), []
         for k in range(12):
             error = course + 0.002 * k + noise[k]
-            seen = {"heading_error_sin": np.sin([error]), "heading_error_cos": np.cos([error])}
+            seen = {
+                "heading_error_sin": np.sin([error]),
+                "heading_error_cos": np.cos([error]),
+            }
             seen |= {"yaw_rate": np.array([-0.002]), "rudder": np.array([0.01])}
             seen["heading_error_integral"] = np.zeros(1)
             _, memory = lqg.steer(seen, memory, np.array([k == 0]))
             rows.append(memory[0])
         kept.append(np.array(rows))
     others = [0, 1, 3]  # sway, yaw rate, rudder
-    np.testing.assert_allclose(kept[1][:, others], kept[0][:, others], rtol=1e-9, atol=1e-12)
+    np.testing.assert_allclose(
+        kept[1][:, others], kept[0][:, others], rtol=1e-9, atol=1e-12
+    )
     turned = kept[1][:, 2] - kept[0][:, 2]
-    np.testing.assert_allclose(np.exp(1j * turned), np.exp(1j * (np.pi - 0.012)), atol=1e-12)
+    np.testing.assert_allclose(
+        np.exp(1j * turned), np.exp(1j * (np.pi - 0.012)), atol=1e-12
+    )
     assert np.abs(kept[1][:, 2]).max() <= np.pi
     assert kept[1][0, 2] > 0.0 > kept[1][-1, 2]

@@ -9,7 +9,11 @@ import pytest
 from agents import LQ, PID, sail
 from agents.engines.jobs import JobEngine
 from agents.verification import index_uncertainty
-from agents.verification.index_uncertainty import nominal_runs, sail_draws, uncertainty_of
+from agents.verification.index_uncertainty import (
+    nominal_runs,
+    sail_draws,
+    uncertainty_of,
+)
 from agents.verification.monte_carlo import draw_jobs, monte_carlo
 from shipgym import InputError, load_model
 
@@ -32,27 +36,46 @@ def found(ship, pilots):
 
 
 def assert_same(one, other):
-    assert [draw.coefficients for draw in one.draws] == [draw.coefficients for draw in other.draws]
+    assert [draw.coefficients for draw in one.draws] == [
+        draw.coefficients for draw in other.draws
+    ]
     np.testing.assert_array_equal(one.course_unstable, other.course_unstable)
     np.testing.assert_array_equal(one.manoeuvres.unstable, other.manoeuvres.unstable)
-    np.testing.assert_array_equal(one.manoeuvres.zigzag_headings, other.manoeuvres.zigzag_headings)
+    np.testing.assert_array_equal(
+        one.manoeuvres.zigzag_headings, other.manoeuvres.zigzag_headings
+    )
     for name, criterion in one.manoeuvres.criteria.items():
-        np.testing.assert_array_equal(criterion.drawn.values, other.manoeuvres.criteria[name].drawn.values)
+        np.testing.assert_array_equal(
+            criterion.drawn.values, other.manoeuvres.criteria[name].drawn.values
+        )
     for a, b in zip(one.episodes, other.episodes, strict=True):
         for item in fields(a):
             np.testing.assert_array_equal(getattr(a, item.name), getattr(b, item.name))
 
 
-def test_two_workers_give_the_same_and_what_they_did_is_resumed(found, ship, pilots, tmp_path):
+def test_two_workers_give_the_same_and_what_they_did_is_resumed(
+    found, ship, pilots, tmp_path
+):
     told = []
     engine = JobEngine(workers=2, keep=tmp_path)
-    assert_same(monte_carlo(pilots, ship, DRAWS, SEED, where=engine, progress=told.append), found)
+    assert_same(
+        monte_carlo(pilots, ship, DRAWS, SEED, where=engine, progress=told.append),
+        found,
+    )
     assert told == sorted(told)
     assert (told[0], told[-1]) == (0, DRAWS)
     assert set(told) <= {0, 25, DRAWS}  # 25 in a job
     told.clear()
     assert_same(
-        monte_carlo(pilots, ship, DRAWS, SEED, where=JobEngine(keep=tmp_path), progress=told.append), found
+        monte_carlo(
+            pilots,
+            ship,
+            DRAWS,
+            SEED,
+            where=JobEngine(keep=tmp_path),
+            progress=told.append,
+        ),
+        found,
     )
     assert told == [DRAWS]
 
@@ -64,7 +87,9 @@ def test_jobs_change_nothing_in_what_is_sailed(found, ship, pilots):
     whole = uncertainty_of(ship, nominal_runs(ship), [sail_draws(ship, drawn)])
     for name, criterion in whole.criteria.items():
         assert criterion.to_dict() == found.manoeuvres.criteria[name].to_dict()
-    for one, other in zip(whole.circle_paths, found.manoeuvres.circle_paths, strict=True):
+    for one, other in zip(
+        whole.circle_paths, found.manoeuvres.circle_paths, strict=True
+    ):
         np.testing.assert_array_equal(one, other)
 
 
@@ -77,13 +102,17 @@ def test_wrong_arguments(ship, pilots):
         JobEngine("lokal").check()
 
 
-def test_draws_that_run_away_in_any_manoeuvre_count_once_and_have_no_paths(ship, monkeypatch):
+def test_draws_that_run_away_in_any_manoeuvre_count_once_and_have_no_paths(
+    ship, monkeypatch
+):
     """Of seven draws the second runs away in one criterion, the fifth loses the runs that are kept."""
     module = "agents.verification.index_uncertainty"
     away = np.arange(7) == 1
     criteria = {
         "overshoot": SimpleNamespace(drawn=SimpleNamespace(ran_away=away)),
-        "advance": SimpleNamespace(drawn=SimpleNamespace(ran_away=np.zeros(7, dtype=bool))),
+        "advance": SimpleNamespace(
+            drawn=SimpleNamespace(ran_away=np.zeros(7, dtype=bool))
+        ),
         "stop": SimpleNamespace(drawn=None),
     }
     monkeypatch.setattr(f"{module}.imo_manoeuvres", lambda model: {})
@@ -91,7 +120,15 @@ def test_draws_that_run_away_in_any_manoeuvre_count_once_and_have_no_paths(ship,
     parts = []
     for part in (np.arange(3), np.arange(3, 7)):
         kept = part[part != 4]
-        parts.append({"values": {}, "ran_away": {}, "lost": part == 4, "headings": kept, "paths": kept})
+        parts.append(
+            {
+                "values": {},
+                "ran_away": {},
+                "lost": part == 4,
+                "headings": kept,
+                "paths": kept,
+            }
+        )
     found = uncertainty_of(ship, ("zigzag", "circle"), parts)
     assert found.criteria.keys() == {"overshoot", "advance"}
     assert found.unstable.tolist() == [False, True, False, False, True, False, False]
@@ -104,7 +141,9 @@ def test_draws_are_shared_out_in_jobs_of_25_that_go_on_with_the_seeds(ship):
     jobs = draw_jobs([], ship, drawn, 7)
     assert [len(job["names"]) for job in jobs] == [25, 25, 1]
     assert [job["first_seed"] for job in jobs] == [7, 32, 57]
-    assert [name for job in jobs for name in job["names"]] == [draw.name for draw in drawn]
+    assert [name for job in jobs for name in job["names"]] == [
+        draw.name for draw in drawn
+    ]
     rows = [row for job in jobs for row in job["coefficients"]]
     assert rows == [list(draw.coefficients.values()) for draw in drawn]
 
@@ -112,19 +151,31 @@ def test_draws_are_shared_out_in_jobs_of_25_that_go_on_with_the_seeds(ship):
 def test_forty_circles_are_kept_for_the_report_and_all_headings(ship, monkeypatch):
     none = SimpleNamespace(drawn=SimpleNamespace(ran_away=np.zeros(45, dtype=bool)))
     monkeypatch.setattr(index_uncertainty, "imo_manoeuvres", lambda model: {})
-    monkeypatch.setattr(index_uncertainty, "imo_criteria", lambda model, found: {"advance": none})
+    monkeypatch.setattr(
+        index_uncertainty, "imo_criteria", lambda model, found: {"advance": none}
+    )
     part = {"values": {}, "ran_away": {}, "lost": np.zeros(45, dtype=bool)}
-    found = uncertainty_of(ship, ("", ""), [part | {"headings": np.arange(45), "paths": np.arange(45)}])
+    found = uncertainty_of(
+        ship, ("", ""), [part | {"headings": np.arange(45), "paths": np.arange(45)}]
+    )
     assert list(found.circle_paths) == list(range(40))
     assert len(found.zigzag_headings) == 45
 
 
-def test_runs_are_kept_for_25_and_30_lengths_and_the_circle_within_the_rudder_s_limit(ship):
+def test_runs_are_kept_for_25_and_30_lengths_and_the_circle_within_the_rudder_s_limit(
+    ship,
+):
     narrow = replace(ship, steering=replace(ship.steering, rudder_limit_deg=25.0))
     time = ship.particulars["length"] / ship.particulars["speed"]
     for model, rudder in ((ship, 35.0), (narrow, 25.0)):
         zigzag, circle = nominal_runs(model)
-        assert np.degrees(np.abs(circle["delta"]).max()) == pytest.approx(rudder, abs=1e-6)
-        assert np.degrees(np.abs(zigzag["delta"]).max()) == pytest.approx(20.0, abs=1e-6)
-        assert (zigzag.t[-1] / time, circle.t[-1] / time) == pytest.approx((25.0, 30.0), abs=0.11)
+        assert np.degrees(np.abs(circle["delta"]).max()) == pytest.approx(
+            rudder, abs=1e-6
+        )
+        assert np.degrees(np.abs(zigzag["delta"]).max()) == pytest.approx(
+            20.0, abs=1e-6
+        )
+        assert (zigzag.t[-1] / time, circle.t[-1] / time) == pytest.approx(
+            (25.0, 30.0), abs=0.11
+        )
         assert np.diff(circle.t) == pytest.approx(0.1 * time)

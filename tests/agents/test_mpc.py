@@ -34,7 +34,9 @@ def test_without_a_limit_in_reach_it_is_lq():
     assert mpc.gains == lq.gains
     assert mpc.margins == lq.margins
     random = np.random.default_rng(0)
-    error, rate, rudder = random.uniform(-1.0, 1.0, (3, 50)) * np.radians([[2.0], [0.05], [0.5]])
+    error, rate, rudder = random.uniform(-1.0, 1.0, (3, 50)) * np.radians(
+        [[2.0], [0.05], [0.5]]
+    )
     shown = seen(error, rate, rudder)
     assert mpc.predict(shown)[0] == pytest.approx(lq.predict(shown)[0], abs=1e-6)
 
@@ -50,12 +52,18 @@ def test_another_process_that_is_sent_it_plans_the_same():
 def test_it_plans_two_ship_lengths_ahead_or_two_steps_at_least():
     mpc = MPC.from_model(SLOW, dt=0.5)
     assert mpc.design == {
-        "dt": 0.5, "integral_lengths": 20.0, "rudder_weight": 0.1,
+        "dt": 0.5,
+        "integral_lengths": 20.0,
+        "rudder_weight": 0.1,
         "rate_weight_s2": pytest.approx(0.01 * (160.93 / 7.7175) ** 2),
-        "horizon_steps": round(2.0 * 160.93 / 7.7175 / 0.5), "rudder_rate_rad_s": np.radians(0.6),
-    }  # fmt: skip
+        "horizon_steps": round(2.0 * 160.93 / 7.7175 / 0.5),
+        "rudder_rate_rad_s": np.radians(0.6),
+    }
     assert MPC.from_model(MARINER, horizon_lengths=0.01).design["horizon_steps"] == 2.0
-    with pytest.raises(InputError, match=r"horizon_steps: 834 found, .* <= 640; a shorter horizon or longer"):
+    with pytest.raises(
+        InputError,
+        match=r"horizon_steps: 834 found, .* <= 640; a shorter horizon or longer",
+    ):
         MPC.from_model(MARINER, dt=0.05)
 
 
@@ -69,9 +77,15 @@ def hard_questions(model, n=20):
 def test_rudder_and_its_rate_keep_to_their_limits(model):
     mpc = MPC.from_model(model)
     error, rate, rudder = hard_questions(model)
-    order = mpc.predict(seen(error, rate, rudder, model))[0][:, 0] * model.steering.limit
+    order = (
+        mpc.predict(seen(error, rate, rudder, model))[0][:, 0] * model.steering.limit
+    )
     deviation = rudder - mpc.neutral_rudder
-    moved = mpc.transition[3, 3] * deviation + mpc.effect[3] * (order - mpc.neutral_rudder) - deviation
+    moved = (
+        mpc.transition[3, 3] * deviation
+        + mpc.effect[3] * (order - mpc.neutral_rudder)
+        - deviation
+    )
     largest = model.steering.rate * mpc.design["dt"]
     assert np.abs(moved).max() == pytest.approx(largest, rel=1e-5)
     assert np.abs(order).max() <= model.steering.limit * (1.0 + 1e-6)
@@ -80,7 +94,10 @@ def test_rudder_and_its_rate_keep_to_their_limits(model):
 def test_the_plan_is_the_cheapest_within_the_limits():
     """Against scipy's solver on the plan's own numbers, LQ's cost of a plan being a square of corrections."""
     mpc = MPC.from_model(SLOW, horizon_lengths=0.6)
-    limit, change = SLOW.steering.limit, mpc.design["rudder_rate_rad_s"] * mpc.design["dt"]
+    limit, change = (
+        SLOW.steering.limit,
+        mpc.design["rudder_rate_rad_s"] * mpc.design["dt"],
+    )
     steps, neutral = int(mpc.design["horizon_steps"]), mpc.neutral_rudder
     lowest = np.repeat((-limit - neutral, -change), steps)
     highest = np.repeat((limit - neutral, change), steps)
@@ -88,15 +105,27 @@ def test_the_plan_is_the_cheapest_within_the_limits():
     order = mpc.predict(seen(error, rate, rudder, SLOW))[0][:, 0] * SLOW.steering.limit
     row = np.array([mpc.gains[signal] for signal in SIGNALS])
     for k in range(6):
-        state = np.array([-mpc.neutral_sway, rate[k], error[k], rudder[k] - mpc.neutral_rudder, 0.0])
+        state = np.array(
+            [-mpc.neutral_sway, rate[k], error[k], rudder[k] - mpc.neutral_rudder, 0.0]
+        )
         planned = mpc.plan.by_state @ state
         within = [
-            {"type": "ineq", "fun": lambda v, p=planned: highest - p - mpc.plan.by_correction @ v},
-            {"type": "ineq", "fun": lambda v, p=planned: p + mpc.plan.by_correction @ v - lowest},
+            {
+                "type": "ineq",
+                "fun": lambda v, p=planned: highest - p - mpc.plan.by_correction @ v,
+            },
+            {
+                "type": "ineq",
+                "fun": lambda v, p=planned: p + mpc.plan.by_correction @ v - lowest,
+            },
         ]
         start = np.zeros(mpc.plan.by_correction.shape[1])
         best = minimize(
-            lambda v: 50.0 * v @ v, start, jac=lambda v: 100.0 * v, method="SLSQP", constraints=within
+            lambda v: 50.0 * v @ v,
+            start,
+            jac=lambda v: 100.0 * v,
+            method="SLSQP",
+            constraints=within,
         )
         expected = row @ state + best.x[0] + mpc.neutral_rudder
         assert order[k] == pytest.approx(expected, abs=np.radians(0.1))
@@ -115,7 +144,9 @@ def test_corrections_cost_their_squares_beside_lq(rudder_weight):
             order = row @ x + (corrections[k] if k < len(corrections) else 0.0)
             before, x = x[3], mpc.transition @ x + mpc.effect * order
             total += x[2] ** 2 + rudder_weight * x[3] ** 2 + (x[4] / integral_time) ** 2
-            total += mpc.design["rate_weight_s2"] * ((x[3] - before) / mpc.design["dt"]) ** 2
+            total += (
+                mpc.design["rate_weight_s2"] * ((x[3] - before) / mpc.design["dt"]) ** 2
+            )
         return total
 
     plain = cost([])
@@ -126,8 +157,13 @@ def test_corrections_cost_their_squares_beside_lq(rudder_weight):
 
 
 def test_a_slow_gear_costs_less_than_with_lq():
-    task, seeds = course_keeping_task(episode_steps=120, change_interval_steps=60), np.arange(6)
-    ours, theirs = (sail(kind.from_model(SLOW), SLOW, task, seeds).cost.mean() for kind in (MPC, LQ))
+    task, seeds = (
+        course_keeping_task(episode_steps=120, change_interval_steps=60),
+        np.arange(6),
+    )
+    ours, theirs = (
+        sail(kind.from_model(SLOW), SLOW, task, seeds).cost.mean() for kind in (MPC, LQ)
+    )
     assert ours < theirs
 
 
@@ -148,18 +184,23 @@ def test_a_file_of_before_the_rudder_s_weight_was_a_setting_steers_the_same(tmp_
     del content["design"]["rudder_weight"]
     path.write_text(json.dumps(content))
     shown = seen(*hard_questions(SLOW), SLOW)
-    assert np.array_equal(load_agent(path, SLOW).predict(shown)[0], mpc.predict(shown)[0])
+    assert np.array_equal(
+        load_agent(path, SLOW).predict(shown)[0], mpc.predict(shown)[0]
+    )
 
 
 def test_without_the_solver_the_extra_is_named(monkeypatch):
     monkeypatch.setitem(sys.modules, "osqp", None)
     with pytest.raises(
-        InputError, match=r"osqp is not installed, MPC needs it: pip install 'shipgym\[mpc\]'"
+        InputError,
+        match=r"osqp is not installed, MPC needs it: pip install 'shipgym\[mpc\]'",
     ):
         MPC.from_model(MARINER)
 
 
-@pytest.mark.parametrize(("name", "value"), [("horizon_lengths", 0.0), ("horizon_lengths", 20.1)])
+@pytest.mark.parametrize(
+    ("name", "value"), [("horizon_lengths", 0.0), ("horizon_lengths", 20.1)]
+)
 def test_numbers_beyond_their_bounds_are_refused(name, value):
     with pytest.raises(InputError, match=rf"{name}: .* found, expected"):
         MPC.from_model(MARINER, **{name: value})

@@ -22,16 +22,41 @@ from tests.agents.policies import random_policy
 
 CODE = 'open("RAN", "w").close()'
 TEXTS = (
-    f'x"""\n{CODE}\n"""', f"x'''\n{CODE}\n'''", f"x\n{CODE}\n", f"x\r{CODE}#", f"0.0\n    {CODE}",
-    f"0); {CODE} #", f"# x\n{CODE}", f"\\\n{CODE}", f"x\0{CODE}", f"x\u2028{CODE}", f"{{{CODE}}}",
-    f'" + {CODE} + "', f"' or {CODE}", f"[{CODE}]", f"lambda: {CODE}", f"U) or {CODE} or (U",
+    f'x"""\n{CODE}\n"""',
+    f"x'''\n{CODE}\n'''",
+    f"x\n{CODE}\n",
+    f"x\r{CODE}#",
+    f"0.0\n    {CODE}",
+    f"0); {CODE} #",
+    f"# x\n{CODE}",
+    f"\\\n{CODE}",
+    f"x\0{CODE}",
+    f"x\u2028{CODE}",
+    f"{{{CODE}}}",
+    f'" + {CODE} + "',
+    f"' or {CODE}",
+    f"[{CODE}]",
+    f"lambda: {CODE}",
+    f"U) or {CODE} or (U",
     "__import__('os').system('touch RAN')",
-    "c.__class__", "\uff55", "\u028b", "u\u0301", "\u202eu", "d\u0435lta", "motion.u", "|u|\n", " u", "u ",
-)  # fmt: skip
-#: What a source may be, said once more than in the package: a line each, fixed words, no text.
+    "c.__class__",
+    "\uff55",
+    "\u028b",
+    "u\u0301",
+    "\u202eu",
+    "d\u0435lta",
+    "motion.u",
+    "|u|\n",
+    " u",
+    "u ",
+)
+#: What a source may be, said once more than in the package: a line each, fixed words,
+#: no text.
 LINE = re.compile(
-    r"(    )?(def accelerations\(motion, c, ship\):|return udot, vdot, rdot( \+ motion\.q)?, pdot, qdot"
-    r"|\w+ = ([-+*/() ]|\b(motion|ship)\.[a-z]+|\bc\.c[0-9]+|\b[10]\.0\b|\b(abs_)?(u|v|r|p|n|phi|delta|du|dn"
+    r"(    )?(def accelerations\(motion, c, ship\):|return udot, vdot, rdot( \+"
+    r" motion\.q)?, pdot, qdot"
+    r"|\w+ = ([-+*/()"
+    r" ]|\b(motion|ship)\.[a-z]+|\bc\.c[0-9]+|\b[10]\.0\b|\b(abs_)?(u|v|r|p|n|phi|delta|du|dn"
     r"|s|U|per_U|fabs|sqrt)_?\b)+)",
     re.ASCII,
 )
@@ -44,7 +69,10 @@ SMALL = {
         "normalisation": "service",
         "quantity": "acceleration",
         "equations": {
-            "v": [{"name": "v", "powers": {"v": 1}}, {"name": "d", "powers": {"delta": 1}}],
+            "v": [
+                {"name": "v", "powers": {"v": 1}},
+                {"name": "d", "powers": {"delta": 1}},
+            ],
             "r": [
                 {"name": "r/U", "powers": {"r": 2, "U": -1}},
                 {"name": "|v|r", "powers": {"|v|": 1, "r": 1}},
@@ -71,7 +99,9 @@ def elsewhere(tmp_path, monkeypatch):
     monkeypatch.setattr(term_functions, "exec", execute, raising=False)
     yield
     assert not (tmp_path / "RAN").exists()
-    assert all(LINE.fullmatch(line[:-1]) for name in made for line in linecache.getlines(name))
+    assert all(
+        LINE.fullmatch(line[:-1]) for name in made for line in linecache.getlines(name)
+    )
 
 
 def places(value, path=()):
@@ -180,22 +210,33 @@ def test_a_thousand_injections_of_other_texts_and_numbers():
         path, is_key = draw.choice(where)
         text = "".join(draw.choices(pieces, k=draw.randint(1, 4)))
         found = source_of(
-            put(SMALL, path, is_key, text if is_key or draw.random() < 0.7 else draw.choice(numbers))
+            put(
+                SMALL,
+                path,
+                is_key,
+                text if is_key or draw.random() < 0.7 else draw.choice(numbers),
+            )
         )
         if found is not None:
             taken += 1
-            assert found == innocent or all(LINE.fullmatch(line) for line in found.splitlines())
-    assert 50 < taken < 500  # names and numbers that may be anything; the rest is refused
+            assert found == innocent or all(
+                LINE.fullmatch(line) for line in found.splitlines()
+            )
+    assert (
+        50 < taken < 500
+    )  # names and numbers that may be anything; the rest is refused
     assert innocent is not None
 
 
 @pytest.mark.parametrize(
-    "power", [10**9, 10**30, -(10**30), 10, 0, 1.5, 1e30, True, "1", None, [1], {"u": 1}]
+    "power",
+    [10**9, 10**30, -(10**30), 10, 0, 1.5, 1e30, True, "1", None, [1], {"u": 1}],
 )
 def test_powers_are_small_whole_numbers(power):
     path = ("structure", "equations", "v", 0, "powers", "v")
     with pytest.raises(
-        InputError, match=r"equations\.v: term 'v': power .* of 'v' found, expected a whole number"
+        InputError,
+        match=r"equations\.v: term 'v': power .* of 'v' found, expected a whole number",
     ):
         ShipModel.from_dict(put(SMALL, path, False, power))
     shares = load_model("mariner").to_dict() | {
@@ -203,13 +244,36 @@ def test_powers_are_small_whole_numbers(power):
             "name": "towed",
             "source": "x",
             "shares": {
-                "u": [{"coefficient": "X_udot", "name": "udot", "powers": {"udot": power}, "sign": 1.0}],
-                "v": [{"coefficient": "Y_v", "name": "v", "powers": {"v": power}, "sign": 1.0}],
-                "r": [{"coefficient": "N_v", "name": "v", "powers": {"v": power}, "sign": 1.0}],
+                "u": [
+                    {
+                        "coefficient": "X_udot",
+                        "name": "udot",
+                        "powers": {"udot": power},
+                        "sign": 1.0,
+                    }
+                ],
+                "v": [
+                    {
+                        "coefficient": "Y_v",
+                        "name": "v",
+                        "powers": {"v": power},
+                        "sign": 1.0,
+                    }
+                ],
+                "r": [
+                    {
+                        "coefficient": "N_v",
+                        "name": "v",
+                        "powers": {"v": power},
+                        "sign": 1.0,
+                    }
+                ],
             },
         }
-    }  # fmt: skip
-    with pytest.raises(InputError, match=r"share 'X_udot': .* expected an acceleration alone"):
+    }
+    with pytest.raises(
+        InputError, match=r"share 'X_udot': .* expected an acceleration alone"
+    ):
         ShipModel.from_dict(shares)
     shares["structure"]["shares"]["u"][0]["powers"]["udot"] = 1
     with pytest.raises(InputError, match="share 'Y_v': term 'v': power"):
@@ -219,11 +283,21 @@ def test_powers_are_small_whole_numbers(power):
 def test_terms_and_their_factors_are_not_without_number():
     equations = SMALL["structure"]["equations"]
     for listed, said in (
-        ([{"name": "v", "powers": {"v": 9, "r": 9, "u": 9}}], "27 factors found, expected at most 20"),
-        ([{"name": f"v{k}", "powers": {"v": 1}} for k in range(201)], "expected a list of terms, 1 to 200"),
+        (
+            [{"name": "v", "powers": {"v": 9, "r": 9, "u": 9}}],
+            "27 factors found, expected at most 20",
+        ),
+        (
+            [{"name": f"v{k}", "powers": {"v": 1}} for k in range(201)],
+            "expected a list of terms, 1 to 200",
+        ),
     ):
         with pytest.raises(InputError, match=said):
-            ShipModel.from_dict(put(SMALL, ("structure", "equations"), False, {**equations, "v": listed}))
+            ShipModel.from_dict(
+                put(
+                    SMALL, ("structure", "equations"), False, {**equations, "v": listed}
+                )
+            )
 
 
 @pytest.mark.parametrize(
@@ -250,7 +324,12 @@ def test_what_is_no_sum_of_terms_is_not_made_a_function(line):
 def evil(tmp_path):
     """A model file whose texts are code, and a Python file that says whether it was run."""
     model = load_model("mariner-tls-svm").to_dict()
-    for path in (("structure", "name"), ("structure", "source"), ("name",), ("particulars", "name")):
+    for path in (
+        ("structure", "name"),
+        ("structure", "source"),
+        ("name",),
+        ("particulars", "name"),
+    ):
         model = put(model, path, False, TEXTS[0])
     (tmp_path / "evil.json").write_text(json.dumps(model))
     (tmp_path / "evil.py").write_text(f"{CODE}\nSHIP = None\n")
@@ -266,11 +345,15 @@ def test_the_command_and_the_loops_take_no_code_of_a_model(evil):
 @pytest.mark.parametrize("option", ["reference_model", "prior", "anchor"])
 def test_a_ship_file_names_models_and_no_code(evil, option):
     ship = evil.with_name("ship.toml")
-    text = '[ship]\nlength = 160.93\nspeed = 7.7\n[identify]\n{} = "{}"\n[[trials]]\nfile = "a.csv"\n'
+    text = (
+        '[ship]\nlength = 160.93\nspeed = 7.7\n[identify]\n{} = "{}"\n[[trials]]\nfile'
+        ' = "a.csv"\n'
+    )
     evil.with_name("a.csv").write_text("t,u\n0,1\n")
     ship.write_text(text.format(option, "evil.py"))
     with pytest.raises(
-        InputError, match=rf"ship.toml: \[identify\].{option}: 'evil.py' found, which is code"
+        InputError,
+        match=rf"ship.toml: \[identify\].{option}: 'evil.py' found, which is code",
     ):
         ShipFile.load(ship)
     ship.write_text(text.format(option, "evil.json"))
@@ -300,31 +383,45 @@ def test_a_run_is_not_resumed_with_code_that_its_file_names(evil, place, value):
     folder = evil.with_name("run")
     begin_folder(folder, plan, "shipgym train")
     content = json.loads((folder / RUN).read_text())
-    (folder / RUN).write_text(json.dumps(added(content, ("configuration", *place), value)))
+    (folder / RUN).write_text(
+        json.dumps(added(content, ("configuration", *place), value))
+    )
     with pytest.raises(InputError, match=f"{RUN}: "):
         read_plan(folder)
-    (folder / RUN).write_text(json.dumps(added(content, ("configuration", "model"), str(evil))))
-    with pytest.raises(InputError, match="a run of another configuration: model_sha256"):
+    (folder / RUN).write_text(
+        json.dumps(added(content, ("configuration", "model"), str(evil)))
+    )
+    with pytest.raises(
+        InputError, match="a run of another configuration: model_sha256"
+    ):
         read_plan(folder)
 
 
 def test_a_run_goes_on_with_the_code_that_its_user_names_again(tmp_path):
     reward = tmp_path / "reward.py"
     reward.write_text(
-        "from typing import NamedTuple\n\nclass Reward(NamedTuple):\n    heading: float\n\n\n"
-        "def reward(motion, state, interval, ship, settings):\n    return Reward(-state.heading_error**2)\n"
+        "from typing import NamedTuple\n\nclass Reward(NamedTuple):\n    heading:"
+        " float\n\n\ndef reward(motion, state, interval, ship, settings):\n    return"
+        " Reward(-state.heading_error**2)\n"
     )
     given = Given("ppo", options={"reward": str(reward)}, settings={"total_steps": 1})
     plan = make_plan(given)
     begin_folder(tmp_path / "run", plan, "shipgym train")
     assert read_plan(tmp_path / "run", given).configuration() == plan.configuration()
-    with pytest.raises(InputError, match=r"options\.reward: '.*reward.py' found, which is code"):
+    with pytest.raises(
+        InputError, match=r"options\.reward: '.*reward.py' found, which is code"
+    ):
         read_plan(tmp_path / "run")
 
 
 def test_an_agent_only_records_what_it_learned_with(evil):
     path = evil.with_name("agent.json")
-    options = {"reward": "evil.py", "sensors": "evil", "task": "evil:factory", "corridor": 1.0}
+    options = {
+        "reward": "evil.py",
+        "sensors": "evil",
+        "task": "evil:factory",
+        "corridor": 1.0,
+    }
     random_policy(env_options=options, model_name=TEXTS[0]).save(path)
     content = json.loads(path.read_text())
     content["environment"]["id"] = "evil:CourseKeeping-v0"
@@ -338,7 +435,12 @@ def test_an_agent_only_records_what_it_learned_with(evil):
 
 
 @pytest.mark.parametrize(
-    "line", ['model = "evil.py"', 'options = { reward = "evil" }', 'options = { ensemble = ["evil.py"] }']
+    "line",
+    [
+        'model = "evil.py"',
+        'options = { reward = "evil" }',
+        'options = { ensemble = ["evil.py"] }',
+    ],
 )
 def test_a_suite_names_no_code(evil, line):
     text = f'name = "own"\n[tasks.one]\nenvironment = "course-keeping"\n{line}\n'
@@ -346,6 +448,8 @@ def test_a_suite_names_no_code(evil, line):
     with pytest.raises(InputError, match="found, which is code"):
         parse_suite(text, "suite.toml")
     suite = parse_suite(
-        f'name = "own"\n[tasks.one]\nenvironment = "course-keeping"\nmodel = "{evil}"\n', "suite"
+        'name = "own"\n[tasks.one]\nenvironment = "course-keeping"\nmodel ='
+        f' "{evil}"\n',
+        "suite",
     )
     assert suite.task("one").ship.structure == TEXTS[0]

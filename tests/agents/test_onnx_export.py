@@ -18,7 +18,9 @@ from tests.agents.policies import MARINER, random_network, random_policy
 LQ_MARINER = LQ.from_model(MARINER)
 POLICIES = {
     "relu": random_policy(),
-    "tanh": random_policy(network=random_network(8, 16, 1, activation="tanh", output="tanh")),
+    "tanh": random_policy(
+        network=random_network(8, 16, 1, activation="tanh", output="tanh")
+    ),
     "discrete": random_policy(action="rudder-discrete"),
     "shaft": random_policy(action="rudder-shaft"),
     "frame_stack": random_policy(frame_stack=3),
@@ -31,7 +33,9 @@ HELD = random_policy(base=LQ_MARINER, authority=0.6, action_repeat=2)
 def test_the_graph_commands_what_the_policy_does(name, tmp_path):
     policy = POLICIES[name]
     export_onnx(policy, tmp_path / "policy.onnx")
-    session = onnxruntime.InferenceSession(tmp_path / "policy.onnx", providers=["CPUExecutionProvider"])
+    session = onnxruntime.InferenceSession(
+        tmp_path / "policy.onnx", providers=["CPUExecutionProvider"]
+    )
     random = np.random.default_rng(0)
     for n in (1, 64):
         state, past = None, None
@@ -48,7 +52,9 @@ def test_the_graph_commands_what_the_policy_does(name, tmp_path):
 
 def test_between_decisions_the_part_of_the_last_one_is_added_to_the_base(tmp_path):
     export_onnx(HELD, tmp_path / "policy.onnx")
-    session = onnxruntime.InferenceSession(tmp_path / "policy.onnx", providers=["CPUExecutionProvider"])
+    session = onnxruntime.InferenceSession(
+        tmp_path / "policy.onnx", providers=["CPUExecutionProvider"]
+    )
     repeat = json.loads(session.get_modelmeta().custom_metadata_map["action_repeat"])
     random, state, part = np.random.default_rng(0), None, None
     for step in range(5):
@@ -57,20 +63,35 @@ def test_between_decisions_the_part_of_the_last_one_is_added_to_the_base(tmp_pat
         base = LQ_MARINER.predict(seen)[0]
         if step % repeat == 0:
             (part,) = session.run(["part"], {"observations": seen, "base_action": base})
-        np.testing.assert_allclose(np.clip(base + part, -1.0, 1.0), expected, rtol=0.0, atol=1e-6)
+        np.testing.assert_allclose(
+            np.clip(base + part, -1.0, 1.0), expected, rtol=0.0, atol=1e-6
+        )
 
 
 def test_the_metadata_say_what_it_observes(tmp_path):
     policy = POLICIES["residual"]
     export_onnx(policy, tmp_path / "policy.onnx")
-    session = onnxruntime.InferenceSession(tmp_path / "policy.onnx", providers=["CPUExecutionProvider"])
-    found = {key: json.loads(text) for key, text in session.get_modelmeta().custom_metadata_map.items()}
+    session = onnxruntime.InferenceSession(
+        tmp_path / "policy.onnx", providers=["CPUExecutionProvider"]
+    )
+    found = {
+        key: json.loads(text)
+        for key, text in session.get_modelmeta().custom_metadata_map.items()
+    }
     assert tuple(found["observation_names"]) == policy.observation_names
     assert tuple(found["observation_scales"]) == policy.observation_scales
     assert found["model"] == {"name": "mariner", "sha256": policy.model_sha256}
     assert found["environment"]["id"] == "shipgym/CourseKeeping-v0"
-    assert (found["frame_stack"], found["authority"], found["base"]["kind"]) == (2, 0.6, "lq")
-    assert (found["history"], found["hold"], found["action_repeat"]) == (2, 1, 1)  # older names too
+    assert (found["frame_stack"], found["authority"], found["base"]["kind"]) == (
+        2,
+        0.6,
+        "lq",
+    )
+    assert (found["history"], found["hold"], found["action_repeat"]) == (
+        2,
+        1,
+        1,
+    )  # older names too
     assert not found.keys() & {"training", "network", "format", "kind"}
 
 
@@ -89,9 +110,12 @@ def test_operators_have_the_attributes_that_all_runtimes_know():
         for one in node.attribute
     }
     assert told == {
-        ("Concat", "axis", 1), ("Gemm", "transB", 1), ("ArgMax", "axis", 1), ("ArgMax", "keepdims", 1),
+        ("Concat", "axis", 1),
+        ("Gemm", "transB", 1),
+        ("ArgMax", "axis", 1),
+        ("ArgMax", "keepdims", 1),
         ("Gather", "axis", 0),
-    }  # fmt: skip
+    }
 
 
 def test_a_graph_that_onnx_refuses_is_not_written(tmp_path, monkeypatch):
@@ -107,7 +131,8 @@ def test_a_graph_that_onnx_refuses_is_not_written(tmp_path, monkeypatch):
 def test_the_command_writes_it(tmp_path):
     POLICIES["relu"].save(tmp_path / "ppo.json")
     result = CliRunner().invoke(
-        app, ["export", str(tmp_path / "ppo.json"), "--onnx", str(tmp_path / "ppo.onnx")]
+        app,
+        ["export", str(tmp_path / "ppo.json"), "--onnx", str(tmp_path / "ppo.onnx")],
     )
     assert result.exit_code == 0, result.output
     assert (tmp_path / "ppo.onnx").stat().st_size < 10_000
@@ -122,7 +147,9 @@ def test_the_command_writes_it(tmp_path):
 def test_what_is_no_network_is_refused(tmp_path):
     shield = Shielded.from_model(MARINER, POLICIES["relu"])
     for policy, name in ((shield, "Shielded"), (LQ_MARINER, "LQ")):
-        with pytest.raises(InputError, match=f"policy: {name} found, expected a learned policy"):
+        with pytest.raises(
+            InputError, match=f"policy: {name} found, expected a learned policy"
+        ):
             export_onnx(policy, tmp_path / "policy.onnx")
 
 

@@ -46,7 +46,9 @@ def test_the_folder_appears_whole(tmp_path):
     assert everything(tmp_path) == ["a", "a/ship", "a/ship/model.json"]
 
 
-@pytest.mark.parametrize("error", [InputError("no"), KeyboardInterrupt(), RuntimeError()])
+@pytest.mark.parametrize(
+    "error", [InputError("no"), KeyboardInterrupt(), RuntimeError()]
+)
 def test_after_an_error_or_an_interruption_nothing_is_left(tmp_path, error):
     with pytest.raises(type(error)):
         write_half(tmp_path / "a" / "ship", error)
@@ -61,7 +63,9 @@ def test_after_an_error_the_earlier_result_is_still_there(tmp_path):
     assert (tmp_path / "ship" / "model.json").read_text() == "old"
 
 
-def test_an_interruption_while_a_folder_takes_its_place_leaves_the_earlier_result(tmp_path, monkeypatch):
+def test_an_interruption_while_a_folder_takes_its_place_leaves_the_earlier_result(
+    tmp_path, monkeypatch
+):
     rename, target = Path.replace, tmp_path / "ship"
 
     def replace(self, to):
@@ -131,8 +135,12 @@ def holder(tmp_path):
         process.kill()
 
 
-def test_a_second_process_is_told_who_uses_the_folder_and_takes_over_when_that_is_killed(holder, tmp_path):
-    with pytest.raises(InputError, match=rf"ship: in use by process {holder.pid} on .* since .* \(-c "):
+def test_a_second_process_is_told_who_uses_the_folder_and_takes_over_when_that_is_killed(
+    holder, tmp_path
+):
+    with pytest.raises(
+        InputError, match=rf"ship: in use by process {holder.pid} on .* since .* \(-c "
+    ):
         write_half(tmp_path / "ship", RuntimeError())
     with pytest.raises(InputError, match="in use"), in_use(tmp_path / "ship"):
         pass
@@ -145,7 +153,9 @@ def test_a_second_process_is_told_who_uses_the_folder_and_takes_over_when_that_i
     assert everything(tmp_path) == ["ship", "ship/model.json"]
 
 
-def test_doctor_tells_of_folders_in_use_and_of_what_killed_processes_left(holder, tmp_path, monkeypatch):
+def test_doctor_tells_of_folders_in_use_and_of_what_killed_processes_left(
+    holder, tmp_path, monkeypatch
+):
     monkeypatch.chdir(tmp_path)
     (found,) = left_findings()
     assert (found.what, found.state) == ("in use", "fine")
@@ -189,7 +199,9 @@ def test_of_a_folder_that_stands_alone_nothing_is_beside(tmp_path, monkeypatch):
     for _ in range(2):
         with whole_folder(tmp_path / "ship", NAMES) as draft:
             (draft / "model.json").write_text("new")
-            assert {path.parts[0] for path in map(Path, everything(tmp_path))} == {"ship"}
+            assert {path.parts[0] for path in map(Path, everything(tmp_path))} == {
+                "ship"
+            }
             assert draft.parent == tmp_path / "ship"
         assert everything(tmp_path) == ["ship", "ship/model.json"]
 
@@ -201,10 +213,19 @@ def test_a_page_is_a_file_that_can_be_written(tmp_path):
     (tmp_path / "folder.html").mkdir()
     (tmp_path / "file").write_text("")
     for name, message in (
-        ("page.txt", r"page.txt: ending '.txt' found, expected a file that ends in .html"),
+        (
+            "page.txt",
+            r"page.txt: ending '.txt' found, expected a file that ends in .html",
+        ),
         ("folder.html", r"folder.html: is a folder, expected a file to write to"),
-        ("absent/page.html", "its folder does not exist or cannot be written; choose another"),
-        ("file/page.html", "its folder does not exist or cannot be written; choose another"),
+        (
+            "absent/page.html",
+            "its folder does not exist or cannot be written; choose another",
+        ),
+        (
+            "file/page.html",
+            "its folder does not exist or cannot be written; choose another",
+        ),
     ):
         with pytest.raises(InputError, match=message):
             check_page(tmp_path / name)
@@ -220,7 +241,9 @@ def test_a_lock_without_words_is_another_process(tmp_path):
         patched.setattr(output.sys, "argv", command)
         told = output._this_process()
     assert re.fullmatch(
-        rf"process {os.getpid()} on \S+ since [-0-9]+ [0-9:+-]+ \(shipgym identify 'a b' x .*\)", told
+        rf"process {os.getpid()} on \S+ since [-0-9]+ [0-9:+-]+ \(shipgym identify 'a"
+        r" b' x .*\)",
+        told,
     )
     assert len(told.partition(" (")[2]) == 200 + len(")")
 
@@ -228,11 +251,17 @@ def test_a_lock_without_words_is_another_process(tmp_path):
 def test_what_a_link_leads_to_is_not_replaced(tmp_path):
     (tmp_path / "own").mkdir()
     (tmp_path / "linked").symlink_to(tmp_path / "own")
-    with pytest.raises(InputError, match="linked: is not a folder, expected one to write the results to"):
+    with pytest.raises(
+        InputError,
+        match="linked: is not a folder, expected one to write the results to",
+    ):
         check_folder(tmp_path / "linked", NAMES)
     (tmp_path / "file").write_text("")
     (tmp_path / "own" / "model.json").symlink_to(tmp_path / "file")
-    with pytest.raises(InputError, match=r"own: holds 'model.json', which is not a result of this command"):
+    with pytest.raises(
+        InputError,
+        match=r"own: holds 'model.json', which is not a result of this command",
+    ):
         check_folder(tmp_path / "own", NAMES)
     (tmp_path / "own" / "model.json").unlink()
     (tmp_path / "own" / "model.json").write_text("")
@@ -243,18 +272,27 @@ def test_what_cannot_be_written_is_refused(tmp_path, monkeypatch):
     check_writable(tmp_path / "a" / "b")
     monkeypatch.setattr(output.os, "access", lambda path, mode: path != tmp_path)
     for folder in ("b", "a/b"):
-        with pytest.raises(InputError, match=rf"b: {tmp_path} cannot be written to; choose another folder"):
+        with pytest.raises(
+            InputError,
+            match=rf"b: {tmp_path} cannot be written to; choose another folder",
+        ):
             check_writable(tmp_path / folder)
-    with pytest.raises(InputError, match=r"page.txt: its folder does not exist or cannot be written"):
+    with pytest.raises(
+        InputError, match=r"page.txt: its folder does not exist or cannot be written"
+    ):
         check_file(tmp_path / "page.txt")
     (tmp_path / "ship").mkdir()
     check_writable(tmp_path / "ship")  # which is written to itself, nothing beside it
 
 
-def test_a_folder_that_is_write_protected_is_refused_and_nothing_is_left(tmp_path, monkeypatch):
+def test_a_folder_that_is_write_protected_is_refused_and_nothing_is_left(
+    tmp_path, monkeypatch
+):
     (tmp_path / "ship").mkdir()
     (tmp_path / "ship" / "model.json").write_text("mine")
-    monkeypatch.setattr(output.os, "access", lambda path, mode: path != tmp_path / "ship")
+    monkeypatch.setattr(
+        output.os, "access", lambda path, mode: path != tmp_path / "ship"
+    )
     said = rf"ship: {tmp_path / 'ship'} cannot be written to; choose another folder"
     with pytest.raises(InputError, match=said):
         write_half(tmp_path / "ship", RuntimeError())
@@ -266,11 +304,16 @@ def test_where_no_file_can_be_made_nobody_else_is_blamed():
     """In /proc a file cannot be made even by root, to whom all folders seem to be open."""
     with pytest.raises(InputError, match=r"^/proc/ship: .*cannot be written"):
         write_half(Path("/proc/ship"), RuntimeError())
-    with pytest.raises(InputError, match=r"^/proc/ship: cannot be written"), in_use(Path("/proc/ship")):
+    with (
+        pytest.raises(InputError, match=r"^/proc/ship: cannot be written"),
+        in_use(Path("/proc/ship")),
+    ):
         pass
 
 
-def test_where_nothing_can_be_beside_a_folder_locks_and_drafts_are_in_it(tmp_path, monkeypatch):
+def test_where_nothing_can_be_beside_a_folder_locks_and_drafts_are_in_it(
+    tmp_path, monkeypatch
+):
     (tmp_path / "ship").mkdir()
     monkeypatch.setattr(output.os, "access", lambda path, mode: path != tmp_path)
     with in_use(tmp_path / "ship") as home:
@@ -291,9 +334,13 @@ def test_one_is_told_at_once_that_a_folder_is_in_use(tmp_path):
     began = time.monotonic()
     with lock:
         (tmp_path / ".ship.lock").write_text("process 7 on ship")
-        with pytest.raises(InputError, match="ship: in use by process 7 on ship; wait until"):
+        with pytest.raises(
+            InputError, match="ship: in use by process 7 on ship; wait until"
+        ):
             write_half(tmp_path / "ship", RuntimeError())
-        assert list(locks_and_drafts(tmp_path)) == [(f"{tmp_path / '.ship.lock'}: process 7 on ship", False)]
+        assert list(locks_and_drafts(tmp_path)) == [
+            (f"{tmp_path / '.ship.lock'}: process 7 on ship", False)
+        ]
     assert time.monotonic() - began < 0.9
 
 
@@ -304,7 +351,8 @@ def test_locks_of_others_are_not_spoken_of(tmp_path, monkeypatch):
     ((told, dead),) = locks_and_drafts(tmp_path)
     assert dead
     assert told.endswith(
-        "lock: left by process 7 on ship since then, which is dead; the next run there removes it"
+        "lock: left by process 7 on ship since then, which is dead; the next run there"
+        " removes it"
     )
 
     def refuses(*given, **more):
@@ -314,7 +362,9 @@ def test_locks_of_others_are_not_spoken_of(tmp_path, monkeypatch):
     assert list(locks_and_drafts(tmp_path)) == []
 
 
-@pytest.mark.parametrize("error", [NotImplementedError(), OSError(errno.ENOLCK, "No locks available")])
+@pytest.mark.parametrize(
+    "error", [NotImplementedError(), OSError(errno.ENOLCK, "No locks available")]
+)
 def test_a_disk_without_locks_takes_results(tmp_path, monkeypatch, error):
     def refuses(*given, **more):
         raise error
@@ -347,7 +397,10 @@ def test_a_folder_below_a_file_is_not_used(tmp_path):
     (tmp_path / "file").write_text("")
     with (
         pytest.raises(
-            InputError, match=r"ship: cannot be written \(File exists|ship: cannot .*Not a directory"
+            InputError,
+            match=(
+                r"ship: cannot be written \(File exists|ship: cannot .*Not a directory"
+            ),
         ),
         in_use(tmp_path / "file" / "ship"),
     ):
@@ -364,8 +417,12 @@ def test_what_a_killed_process_set_aside_goes_where_results_are_there_again(tmp_
     remove_drafts.cache_clear()
     with in_use(tmp_path / "ship"):
         assert everything(tmp_path) == [
-            ".other.0-1.old", ".other.0-1.old/model.json", ".ship.lock", "ship", "ship/model.json"
-        ]  # fmt: skip
+            ".other.0-1.old",
+            ".other.0-1.old/model.json",
+            ".ship.lock",
+            "ship",
+            "ship/model.json",
+        ]
     assert (tmp_path / "ship" / "model.json").read_text() == "ship"
 
 

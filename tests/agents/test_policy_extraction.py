@@ -25,7 +25,12 @@ COURSE = "shipgym/CourseKeeping-v0"
 MARINER = load_model("mariner")
 NETS = {"net_arch": [32, 32]}
 ROLLOUT = {"n_steps": 8, "policy_kwargs": {**NETS, "activation_fn": torch.nn.ReLU}}
-REPLAY = {"learning_starts": 1, "buffer_size": 100, "batch_size": 8, "policy_kwargs": NETS}
+REPLAY = {
+    "learning_starts": 1,
+    "buffer_size": 100,
+    "batch_size": 8,
+    "policy_kwargs": NETS,
+}
 AGENTS = {
     "PPO": (PPO, {**ROLLOUT, "batch_size": 32}),
     "A2C": (A2C, {"n_steps": 8, "policy_kwargs": NETS}),
@@ -63,38 +68,67 @@ def seen(agent, n=200):
 @pytest.mark.parametrize("name", AGENTS)
 def test_the_commands_are_those_of_torch(name, tmp_path):
     algorithm, settings = AGENTS[name]
-    agent = strong(algorithm("MlpPolicy", ships(), seed=0, **deepcopy(settings)).learn(32))
+    agent = strong(
+        algorithm("MlpPolicy", ships(), seed=0, **deepcopy(settings)).learn(32)
+    )
     policy = LearnedPolicy.from_sb3(agent, training={"algorithm": name.lower()})
     observations = seen(agent)
     expected, _ = agent.predict(observations, deterministic=True)
     assert expected.std() > 0.3
-    np.testing.assert_allclose(policy.predict(observations)[0], expected, rtol=0.0, atol=1e-6)
+    np.testing.assert_allclose(
+        policy.predict(observations)[0], expected, rtol=0.0, atol=1e-6
+    )
     policy.save(tmp_path / "agent.json")
     again = load_agent(tmp_path / "agent.json", MARINER)
-    np.testing.assert_allclose(again.predict(observations)[0], expected, rtol=0.0, atol=1e-6)
-    np.testing.assert_allclose(again.predict(observations[0])[0], expected[0], rtol=0.0, atol=1e-6)
+    np.testing.assert_allclose(
+        again.predict(observations)[0], expected, rtol=0.0, atol=1e-6
+    )
+    np.testing.assert_allclose(
+        again.predict(observations[0])[0], expected[0], rtol=0.0, atol=1e-6
+    )
     assert again.name == name.lower()
 
 
 def test_discrete_orders_are_those_of_torch():
-    agent = strong(PPO("MlpPolicy", ships("shipgym/CourseKeepingDiscrete-v0"), n_steps=8, batch_size=32))
+    agent = strong(
+        PPO(
+            "MlpPolicy",
+            ships("shipgym/CourseKeepingDiscrete-v0"),
+            n_steps=8,
+            batch_size=32,
+        )
+    )
     policy = LearnedPolicy.from_sb3(agent)
     expected, _ = agent.predict(seen(agent), deterministic=True)
     assert len(set(expected.tolist())) > 2
-    np.testing.assert_array_equal(order_numbers(policy.predict(seen(agent))[0]), expected)
-    assert (policy.action, policy.env_id) == ("rudder-discrete", "shipgym/CourseKeepingDiscrete-v0")
+    np.testing.assert_array_equal(
+        order_numbers(policy.predict(seen(agent))[0]), expected
+    )
+    assert (policy.action, policy.env_id) == (
+        "rudder-discrete",
+        "shipgym/CourseKeepingDiscrete-v0",
+    )
 
 
 def test_rudder_and_shaft_are_those_of_torch():
-    agent = PPO("MlpPolicy", ships("shipgym/PathFollowingShaft-v0", model="kvlcc2"), n_steps=8, batch_size=32)
+    agent = PPO(
+        "MlpPolicy",
+        ships("shipgym/PathFollowingShaft-v0", model="kvlcc2"),
+        n_steps=8,
+        batch_size=32,
+    )
     policy = LearnedPolicy.from_sb3(strong(agent))
     expected, _ = agent.predict(seen(agent), deterministic=True)
-    np.testing.assert_allclose(policy.predict(seen(agent))[0], expected, rtol=0.0, atol=1e-6)
+    np.testing.assert_allclose(
+        policy.predict(seen(agent))[0], expected, rtol=0.0, atol=1e-6
+    )
     policy.check_fits_model(load_model("kvlcc2"))
 
 
 def test_what_it_learned_in_is_recorded():
-    env = ships("shipgym/PathFollowing-v0", sea="moderate", leg_lengths=(5.0, 9.0), threads=1)
+    env = ships(
+        "shipgym/PathFollowing-v0", sea="moderate", leg_lengths=(5.0, 9.0), threads=1
+    )
     policy = LearnedPolicy.from_sb3(
         PPO("MlpPolicy", VecNormalize(env, norm_obs=False), n_steps=8, batch_size=32)
     )
@@ -111,7 +145,9 @@ def test_with_base_and_history_it_steers_as_in_training(history):
     base = LQ.from_model(MARINER)
     options = {"episode_steps": 15, "action": "rudder"}
     env = ResidualVecEnv(ships(**options), base, authority=0.5, frame_stack=history)
-    agent = strong(PPO("MlpPolicy", env, n_steps=8, batch_size=32, policy_kwargs=dict(NETS)))
+    agent = strong(
+        PPO("MlpPolicy", env, n_steps=8, batch_size=32, policy_kwargs=dict(NETS))
+    )
     policy = LearnedPolicy.from_sb3(agent)
     assert (policy.frame_stack, policy.base, policy.authority) == (history, base, 0.5)
     bare = ships(**options)
@@ -122,7 +158,9 @@ def test_with_base_and_history_it_steers_as_in_training(history):
         output, _ = agent.predict(theirs, deterministic=True)
         ours, rewards, starts, _ = bare.step(action)
         theirs, expected, _, _ = env.step(output)
-        np.testing.assert_allclose(rewards, expected, rtol=0.0, atol=1e-4, err_msg=f"step {step}")
+        np.testing.assert_allclose(
+            rewards, expected, rtol=0.0, atol=1e-4, err_msg=f"step {step}"
+        )
         np.testing.assert_allclose(ours, theirs[:, -9:-1], rtol=0.0, atol=1e-4)
 
 
@@ -153,9 +191,18 @@ REFUSED = {
         made(DQN, lambda: ships("shipgym/CourseKeepingDiscrete-v0"), buffer_size=10),
         "agent: DQN with DQNPolicy found, expected PPO",
     ),
-    "scaled": (made(PPO, lambda: VecNormalize(ships()), **QUICK), r"VecNormalize\(norm_obs=False\)"),
-    "stacked": (made(PPO, lambda: VecFrameStack(ships(), 2), **QUICK), "wrapper VecFrameStack found"),
-    "foreign": (made(PPO, lambda: "Pendulum-v1", **QUICK), "expected an environment of shipgym"),
+    "scaled": (
+        made(PPO, lambda: VecNormalize(ships()), **QUICK),
+        r"VecNormalize\(norm_obs=False\)",
+    ),
+    "stacked": (
+        made(PPO, lambda: VecFrameStack(ships(), 2), **QUICK),
+        "wrapper VecFrameStack found",
+    ),
+    "foreign": (
+        made(PPO, lambda: "Pendulum-v1", **QUICK),
+        "expected an environment of shipgym",
+    ),
 }
 
 
@@ -174,10 +221,19 @@ def test_layers_that_are_not_dense_are_refused_by_name():
     }
     weights = {f"{name}.weight": torch.ones(shape) for name, shape in layers.items()}
     weights |= {f"{name}.bias": torch.zeros(shape[0]) for name, shape in layers.items()}
-    network = actor_network({**weights, "value_net.weight": torch.ones(1, 2)}, None, "mine")
-    assert (network.sizes, network.activation, network.output) == ((3, 2, 2, 1), "tanh", "linear")
+    network = actor_network(
+        {**weights, "value_net.weight": torch.ones(1, 2)}, None, "mine"
+    )
+    assert (network.sizes, network.activation, network.output) == (
+        (3, 2, 2, 1),
+        "tanh",
+        "linear",
+    )
     bare = {name: value for name, value in weights.items() if name != "action_net.bias"}
-    with pytest.raises(InputError, match=r"agent: weights 'action_net.bias' missing or not known, expected"):
+    with pytest.raises(
+        InputError,
+        match=r"agent: weights 'action_net.bias' missing or not known, expected",
+    ):
         actor_network(bare, None, "mine")
     with pytest.raises(InputError, match=r"weights 'norm.weight' missing or not known"):
         actor_network({**weights, "norm.weight": torch.ones(2)}, None, "mine")
@@ -186,13 +242,20 @@ def test_layers_that_are_not_dense_are_refused_by_name():
 def test_an_agent_that_commands_otherwise_than_its_layers_is_refused(monkeypatch):
     agent = PPO("MlpPolicy", ships(), **QUICK)
     predict = agent.predict
-    monkeypatch.setattr(agent, "predict", lambda x, **more: (predict(x, **more)[0] + 0.9e-4, None))
+    monkeypatch.setattr(
+        agent, "predict", lambda x, **more: (predict(x, **more)[0] + 0.9e-4, None)
+    )
     LearnedPolicy.from_sb3(agent)
-    monkeypatch.setattr(agent, "predict", lambda x, **more: (predict(x, **more)[0] - 1.05e-4, None))
+    monkeypatch.setattr(
+        agent, "predict", lambda x, **more: (predict(x, **more)[0] - 1.05e-4, None)
+    )
     with pytest.raises(InputError, match="gives other commands than its layers do"):
         LearnedPolicy.from_sb3(agent)
     agent.observation_space = Box(-1.0, 1.0, (9,))
-    with pytest.raises(InputError, match=r"shape \(9,\) found, expected \(8,\), as its network has inputs"):
+    with pytest.raises(
+        InputError,
+        match=r"shape \(9,\) found, expected \(8,\), as its network has inputs",
+    ):
         LearnedPolicy.from_sb3(agent)
 
 
@@ -204,19 +267,30 @@ def test_what_adds_to_a_controller_is_known_by_what_it_has():
         "action_repeat": 3,
         "rate_limit": 1,
     }
-    found = _residual([SimpleNamespace(), SimpleNamespace(**added), object.__new__(type("Ships", (), {}))])
+    found = _residual(
+        [
+            SimpleNamespace(),
+            SimpleNamespace(**added),
+            object.__new__(type("Ships", (), {})),
+        ]
+    )
     assert found == added
     assert [type(found[name]) for name in list(added)[1:]] == [float, int, int, float]
     assert _residual([SimpleNamespace(**added | {"base": None})])["base"] is None
     assert _residual([SimpleNamespace(base=None, authority=1.0)]) == {}
     with pytest.raises(
-        InputError, match="base: Doubled found, expected a controller of shipgym, which a file"
+        InputError,
+        match="base: Doubled found, expected a controller of shipgym, which a file",
     ):
         _residual([SimpleNamespace(**added | {"base": object.__new__(Doubled)})])
 
 
 def test_an_environment_that_is_not_registered_is_that_of_its_task():
-    shown = {"observation_names": ["cross_track"], "observation_scales": [2], "model": MARINER}
+    shown = {
+        "observation_names": ["cross_track"],
+        "observation_scales": [2],
+        "model": MARINER,
+    }
     bare = SimpleNamespace(**shown, task=SimpleNamespace(action="rudder"), spec=None)
     found = _environment(bare)
     assert (found["env_id"], found["env_options"]) == ("shipgym/PathFollowing-v0", {})
@@ -225,14 +299,19 @@ def test_an_environment_that_is_not_registered_is_that_of_its_task():
         "rudder",
         "mariner",
     )
-    bare.spec = SimpleNamespace(id="my/Ships-v0", kwargs={"threads": 2, "model": "tanker", "noise": (1.0,)})
+    bare.spec = SimpleNamespace(
+        id="my/Ships-v0", kwargs={"threads": 2, "model": "tanker", "noise": (1.0,)}
+    )
     assert _environment(bare)["env_options"] == {"noise": [1.0]}
     assert _environment(bare)["env_id"] == "my/Ships-v0"
 
 
 def test_an_agent_without_an_environment_is_refused():
     agent = SimpleNamespace(get_env=lambda: None)
-    with pytest.raises(InputError, match="env: none found and the agent has none, expected the environment"):
+    with pytest.raises(
+        InputError,
+        match="env: none found and the agent has none, expected the environment",
+    ):
         LearnedPolicy.from_sb3(agent)
 
 
@@ -242,6 +321,8 @@ def test_single_environments_are_known_too():
     agent = PPO("MlpPolicy", gymnasium.make(COURSE, model="mariner", dt=2.0), **QUICK)
     policy = LearnedPolicy.from_sb3(agent)
     assert policy.env_options == {"dt": 2.0}
-    wrapped = RescaleObservation(gymnasium.make(COURSE, model="mariner"), np.float32(-9), np.float32(9))
+    wrapped = RescaleObservation(
+        gymnasium.make(COURSE, model="mariner"), np.float32(-9), np.float32(9)
+    )
     with pytest.raises(InputError, match="wrapper RescaleObservation found"):
         LearnedPolicy.from_sb3(PPO("MlpPolicy", wrapped, **QUICK))

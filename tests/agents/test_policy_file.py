@@ -21,12 +21,20 @@ IDENTIFIED = load_model("mariner-tls-svm")
 POLICIES = {
     "plain": random_policy(),
     "frame_stack": random_policy(frame_stack=3),
-    "residual": random_policy(base=PID.from_model(MARINER), authority=0.4, action_repeat=2),
-    "limited": random_policy(base=PID.from_model(MARINER), action_repeat=2, rate_limit=0.1),
+    "residual": random_policy(
+        base=PID.from_model(MARINER), authority=0.4, action_repeat=2
+    ),
+    "limited": random_policy(
+        base=PID.from_model(MARINER), action_repeat=2, rate_limit=0.1
+    ),
     "discrete": random_policy(action="rudder-discrete"),
-    "shielded": Shielded.from_model(IDENTIFIED, random_policy(IDENTIFIED), limits=Limits(runaway_deg=12.0)),
+    "shielded": Shielded.from_model(
+        IDENTIFIED, random_policy(IDENTIFIED), limits=Limits(runaway_deg=12.0)
+    ),
     "shielded pid": Shielded.from_model(MARINER, PID.from_model(MARINER)),
-    "twice": Shielded.from_model(MARINER, Shielded.from_model(MARINER, random_policy())),
+    "twice": Shielded.from_model(
+        MARINER, Shielded.from_model(MARINER, random_policy())
+    ),
 }
 
 
@@ -49,18 +57,32 @@ def test_a_file_holds_the_whole_policy(name, tmp_path):
     assert type(again) is type(policy)
     np.testing.assert_array_equal(steered(again), steered(policy))
     again.save(tmp_path / "again.json")
-    assert json.loads((tmp_path / "again.json").read_text()) == json.loads(path.read_text())
+    assert json.loads((tmp_path / "again.json").read_text()) == json.loads(
+        path.read_text()
+    )
     weights = {path.with_suffix(".safetensors")} if name != "shielded pid" else set()
     assert set(tmp_path.glob("agent*")) == {path, *weights}
 
 
 def test_what_was_recorded_comes_back(tmp_path):
     sea = Weather(current=Current(speed=1.0))
-    training = {"algorithm": "ppo", "seeds": (0, 1), "curve": np.array([1.0, np.nan]), "steps": np.int64(5)}
-    policy = random_policy(training=training, env_options={"sea": sea, "leg_lengths": (5.0, 10.0)})
+    training = {
+        "algorithm": "ppo",
+        "seeds": (0, 1),
+        "curve": np.array([1.0, np.nan]),
+        "steps": np.int64(5),
+    }
+    policy = random_policy(
+        training=training, env_options={"sea": sea, "leg_lengths": (5.0, 10.0)}
+    )
     policy.save(tmp_path / "ppo.json")
     again = load_agent(tmp_path / "ppo.json")
-    assert again.training == {"algorithm": "ppo", "seeds": [0, 1], "curve": [1.0, None], "steps": 5}
+    assert again.training == {
+        "algorithm": "ppo",
+        "seeds": [0, 1],
+        "curve": [1.0, None],
+        "steps": 5,
+    }
     assert again.name == "ppo"
     assert again.env_options["leg_lengths"] == [5.0, 10.0]
     assert Weather.from_dict(again.env_options["sea"]) == sea
@@ -71,7 +93,9 @@ def test_files_may_be_renamed_together_and_stay_small(tmp_path):
     random_policy().save(tmp_path / "a.json")
     for end in ("json", "safetensors"):
         (tmp_path / f"a.{end}").rename(tmp_path / f"b.{end}")
-    np.testing.assert_array_equal(steered(load_agent(tmp_path / "b.json")), steered(random_policy()))
+    np.testing.assert_array_equal(
+        steered(load_agent(tmp_path / "b.json")), steered(random_policy())
+    )
 
 
 def test_no_torch_is_needed(tmp_path):
@@ -83,7 +107,9 @@ def test_no_torch_is_needed(tmp_path):
         "agent.predict(np.zeros(8, np.float32))\n"
         "assert not {'torch', 'stable_baselines3', 'onnx'} & set(sys.modules)"
     )
-    subprocess.run([sys.executable, "-c", code, str(tmp_path / "agent.json")], check=True)
+    subprocess.run(
+        [sys.executable, "-c", code, str(tmp_path / "agent.json")], check=True
+    )
 
 
 def test_a_policy_that_cannot_be_written_leaves_nothing_behind(tmp_path):
@@ -91,10 +117,14 @@ def test_a_policy_that_cannot_be_written_leaves_nothing_behind(tmp_path):
         random_policy().save(tmp_path / "nowhere" / "a.json")
     with pytest.raises(InputError, match=r"a policy's file ends in \.json"):
         random_policy().save(tmp_path / "a.safetensors")
-    with pytest.raises(InputError, match=r"training and env_options: .*not JSON serializable"):
+    with pytest.raises(
+        InputError, match=r"training and env_options: .*not JSON serializable"
+    ):
         random_policy(training={"made": object()}).save(tmp_path / "a.json")
     stranger = type("Helmsman", (), {"predict": lambda self, *args: None})()
-    with pytest.raises(InputError, match="policy: Helmsman found, expected a learned policy"):
+    with pytest.raises(
+        InputError, match="policy: Helmsman found, expected a learned policy"
+    ):
         Shielded.from_model(MARINER, stranger).save(tmp_path / "a.json")
     assert list(tmp_path.iterdir()) == []
 
@@ -123,14 +153,26 @@ NAMES = list(POLICIES["plain"].observation_names)
         ("network", None, "field 'network' is missing"),
         ("weight", {}, "unknown key 'weight'. Did you mean 'weights'"),
         ("weights", {"sha": "1"}, "weights: unknown key 'sha'"),
-        ("weights__sha256", "00", r"safetensors: SHA-256 .* found in \d+ bytes, expected 00.*cut short"),
+        (
+            "weights__sha256",
+            "00",
+            r"safetensors: SHA-256 .* found in \d+ bytes, expected 00.*cut short",
+        ),
         (
             "weights__sha256",
             "5" * 64,
             r"SHA-256 [0-9a-f]{12}\.\.\. found in \d+ bytes, expected 5{12}\.\.\., ",
         ),
-        ("network__sizes", [8], r"network.sizes: \[8\] found, expected a list of two numbers or more"),
-        ("network__sizes", [8, 0, 1], r"network.sizes\[1\]: 0 found, expected a whole number of at least 1"),
+        (
+            "network__sizes",
+            [8],
+            r"network.sizes: \[8\] found, expected a list of two numbers or more",
+        ),
+        (
+            "network__sizes",
+            [8, 0, 1],
+            r"network.sizes\[1\]: 0 found, expected a whole number of at least 1",
+        ),
         ("network__activation", "sigmoid", "network.activation: 'sigmoid' found"),
         (
             "network__sizes",
@@ -141,12 +183,32 @@ NAMES = list(POLICIES["plain"].observation_names)
         ("network__sizes", [8, 16, 16], "network: 16 outputs found, expected 1"),
         ("network__sizes", [8, "16", 1], r"network.sizes\[1\]: '16' found"),
         ("network__sizes", 8, "network.sizes: 8 found, expected a list"),
-        ("observation_names", "sway", "observation_names: 'sway' found, expected a list of names"),
-        ("observation_names", [*NAMES[:2], NAMES[3], NAMES[2], *NAMES[4:]], "observation 2 is 'sway'"),
-        ("observation_names", NAMES[:7], "7 observations found, expected 8; .* heading_error_integral"),
+        (
+            "observation_names",
+            "sway",
+            "observation_names: 'sway' found, expected a list of names",
+        ),
+        (
+            "observation_names",
+            [*NAMES[:2], NAMES[3], NAMES[2], *NAMES[4:]],
+            "observation 2 is 'sway'",
+        ),
+        (
+            "observation_names",
+            NAMES[:7],
+            "7 observations found, expected 8; .* heading_error_integral",
+        ),
         ("observation_names", [*NAMES, "sway"], "a name twice"),
-        ("observation_scales", [1.0], "observation_scales: 1 found, expected 8 numbers"),
-        ("observation_scales", [-1.0] * 8, r"observation_scales\[0\] \('heading_error_sin'\): -1 found"),
+        (
+            "observation_scales",
+            [1.0],
+            "observation_scales: 1 found, expected 8 numbers",
+        ),
+        (
+            "observation_scales",
+            [-1.0] * 8,
+            r"observation_scales\[0\] \('heading_error_sin'\): -1 found",
+        ),
         ("action", "helm", "action: 'helm' found"),
         ("frame_stack", 1.5, "frame_stack: 1.5 found"),
         ("frame_stack", 2, "network: 8 inputs found, expected 16: 2 x 8 observations"),
@@ -173,8 +235,16 @@ def test_a_wrong_field_is_named(field, value, message, tmp_path):
         ("dt", 0.0, "dt: 0 found"),
         ("fallback", POLICIES, "fallback: .*expected a table"),
         ("fallback__gains__yaw_rate", None, "fallback: gains: 'yaw_rate' is missing"),
-        ("envelope__low", [1.0], r"envelope.low: 1 entries found, expected a list of 4"),
-        ("limits__back_deg", 20.0, "limits.back_deg: 20 found, expected a number > 0 and < 12; less than"),
+        (
+            "envelope__low",
+            [1.0],
+            r"envelope.low: 1 entries found, expected a list of 4",
+        ),
+        (
+            "limits__back_deg",
+            20.0,
+            "limits.back_deg: 20 found, expected a number > 0 and < 12; less than",
+        ),
         ("limits__calm", 1.0, "limits: unknown key 'calm'"),
         ("policy__network__sizes", [8, 9], "policy: network: .*shape"),
         ("policy", {}, "policy: field 'format' is missing"),
@@ -195,9 +265,15 @@ def test_a_shield_of_an_older_file_knows_of_no_planned_turns(tmp_path):
     edited(path, "limits__turn_lengths", None)
     edited(path, "dt", 0.05)
     found = load_agent(path)
-    assert (found.limits.turn_lengths, found.limits.runaway_deg, found.dt) == (0.0, 12.0, 0.05)
+    assert (found.limits.turn_lengths, found.limits.runaway_deg, found.dt) == (
+        0.0,
+        12.0,
+        0.05,
+    )
     edited(path, "limits__calm_lengths", None)
-    with pytest.raises(InputError, match=r"limits\.calm_lengths: None found, expected a number"):
+    with pytest.raises(
+        InputError, match=r"limits\.calm_lengths: None found, expected a number"
+    ):
         load_agent(path)
 
 
@@ -215,9 +291,18 @@ def spoil(tensors):
 
 
 CHANGES = {
-    "not finite": (spoil, r"layers\[1\].weight: nan found at \[2, 3\], expected finite"),
-    "missing": (lambda tensors: tensors.pop("layers.1.bias"), "weights 'layers.1.bias' are missing"),
-    "more": (lambda tensors: tensors.update(x=np.zeros(1)), "unknown 'x' found with the weights"),
+    "not finite": (
+        spoil,
+        r"layers\[1\].weight: nan found at \[2, 3\], expected finite",
+    ),
+    "missing": (
+        lambda tensors: tensors.pop("layers.1.bias"),
+        "weights 'layers.1.bias' are missing",
+    ),
+    "more": (
+        lambda tensors: tensors.update(x=np.zeros(1)),
+        "unknown 'x' found with the weights",
+    ),
     "double": (
         lambda tensors: tensors.update({"layers.0.bias": np.zeros(16)}),
         r"'layers.0.bias': float64 of shape \(16,\) found, expected float32",
@@ -261,7 +346,8 @@ def test_a_policy_of_another_ship_is_refused_with_the_difference(tmp_path):
     for name in ("plain", "residual", "shielded pid"):
         POLICIES[name].save(tmp_path / "agent.json")
         with pytest.raises(
-            InputError, match=r"model 'mariner': the scale of 'yaw_rate' is 0\.0248.* 0\.0479"
+            InputError,
+            match=r"model 'mariner': the scale of 'yaw_rate' is 0\.0248.* 0\.0479",
         ):
             load_agent(tmp_path / "agent.json", mariner(service_speed=4.0))
 
@@ -281,4 +367,6 @@ def test_older_files_are_read_and_a_run_s_folder_names_its_agent(tmp_path):
         assert content.pop("rate_limit") == 2.0
         content |= {} if repeats is None else {"hold": repeats}
         (tmp_path / "agent.json").write_text(json.dumps(content))
-        np.testing.assert_array_equal(steered(load_agent(tmp_path)), steered(POLICIES[name]))
+        np.testing.assert_array_equal(
+            steered(load_agent(tmp_path)), steered(POLICIES[name])
+        )

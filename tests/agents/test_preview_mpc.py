@@ -21,7 +21,11 @@ LENGTH = MARINER.particulars["length"]
 @pytest.mark.parametrize("side", [1.0, -1.0])
 def test_a_ship_on_the_arc_is_on_the_path_and_beyond_it_on_the_next_leg(side):
     turn, radius, begin = side * np.radians(60.0), 300.0, 100.0
-    ahead = Ahead([np.array([begin]), np.array([turn]), np.array([900.0]), np.array([-turn])], radius, 0.0)
+    ahead = Ahead(
+        [np.array([begin]), np.array([turn]), np.array([900.0]), np.array([-turn])],
+        radius,
+        0.0,
+    )
     swept = np.radians(np.array([10.0, 45.0]))
     for angle in swept:
         x, y = begin + radius * np.sin(angle), side * radius * (1.0 - np.cos(angle))
@@ -35,7 +39,9 @@ def test_a_ship_on_the_arc_is_on_the_path_and_beyond_it_on_the_next_leg(side):
     x = end[0] + further * np.cos(turn) - 7.0 * np.sin(turn)
     y = end[1] + further * np.sin(turn) + 7.0 * np.cos(turn)
     place = ahead.fix(np.array([x]), np.array([y]))
-    assert (place.way[0], place.cross[0]) == pytest.approx((begin + radius * abs(turn) + further, 7.0))
+    assert (place.way[0], place.cross[0]) == pytest.approx(
+        (begin + radius * abs(turn) + further, 7.0)
+    )
     assert place.turns[0][0] == FAR
 
 
@@ -43,11 +49,20 @@ def test_a_corner_is_passed_within_the_acceptance_radius_and_way_counts_abeam_of
     ahead = Ahead([np.array([500.0]), np.array([np.pi / 2.0])], 0.0, 200.0)
     before, after = (ahead.fix(np.array([x]), np.array([10.0])) for x in (299.0, 301.0))
     assert (before.cross[0], before.turns[1][0]) == pytest.approx((10.0, np.pi / 2.0))
-    assert (after.cross[0], after.way[0], after.turns[1][0]) == pytest.approx((199.0, 510.0, 0.0))
+    assert (after.cross[0], after.way[0], after.turns[1][0]) == pytest.approx(
+        (199.0, 510.0, 0.0)
+    )
 
 
 def mirrored(observation):
-    names = {"heading_error_sin", "yaw_rate", "sway", "rudder", "last_command", "heading_error_integral"}
+    names = {
+        "heading_error_sin",
+        "yaw_rate",
+        "sway",
+        "rudder",
+        "last_command",
+        "heading_error_integral",
+    }
     names |= {"cross_track", "course_error_sin", "turn_angle"}
     sign = [-1.0 if name in names else 1.0 for name in PreviewMPC.observes]
     return observation * np.array(sign)
@@ -64,7 +79,9 @@ def test_to_port_it_does_what_it_does_to_starboard():
 
 
 def test_in_a_current_its_search_is_worth_something_though_it_is_told_of_none():
-    task = path_following_task(sea=Weather(current=Current(1.5)), max_turn_deg=90.0, episode_steps=600)
+    task = path_following_task(
+        sea=Weather(current=Current(1.5)), max_turn_deg=90.0, episode_steps=600
+    )
     engine, seeds = Engine(MARINER, 8, task), np.arange(8)
     searched = PreviewMPC.from_model(MARINER, task=task, horizon_lengths=8.0)
     plain, better = (
@@ -105,6 +122,14 @@ def test_it_looks_one_step_of_two_intervals_ahead_at_least():
 
 def test_far_inside_of_an_arc_the_way_stays_finite_and_forward():
     """A ship beyond the middle of the circle, from where every direction would be the arc's."""
-    ahead = Ahead([np.array([100.0]), np.array([1.0]), np.array([9e3]), np.array([0.5])], 300.0, 0.0)
-    ways = [ahead.fix(np.array([x]), np.array([320.0])).way[0] for x in (90.0, 102.0, 110.0)]
-    assert ways == pytest.approx([90.0, 100.0 + 300.0 * np.arctan(2 / 30), 100.0 + 300.0 * np.arctan(1 / 3)])
+    ahead = Ahead(
+        [np.array([100.0]), np.array([1.0]), np.array([9e3]), np.array([0.5])],
+        300.0,
+        0.0,
+    )
+    ways = [
+        ahead.fix(np.array([x]), np.array([320.0])).way[0] for x in (90.0, 102.0, 110.0)
+    ]
+    assert ways == pytest.approx(
+        [90.0, 100.0 + 300.0 * np.arctan(2 / 30), 100.0 + 300.0 * np.arctan(1 / 3)]
+    )

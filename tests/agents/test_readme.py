@@ -14,18 +14,28 @@ ROOT = Path(__file__).parents[2]
 
 
 def test_the_lines_of_the_readme_work_outside_a_checkout(tmp_path):
-    (code,) = re.findall(r"```python\n(.*?)```", (ROOT / "README.md").read_text(encoding="utf-8"), re.DOTALL)
+    (code,) = re.findall(
+        r"```python\n(.*?)```",
+        (ROOT / "README.md").read_text(encoding="utf-8"),
+        re.DOTALL,
+    )
     answer = subprocess.run(
-        [sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=False,
+        [sys.executable, "-c", code],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=False,
         env=os.environ | {"PYTHONPATH": str(ROOT), "COLUMNS": "100"},
-    )  # fmt: skip
+    )
     assert answer.returncode == 0, answer.stderr
     assert "standard error" in answer.stdout
     assert "N_r " in answer.stdout
 
 
 def test_the_files_that_the_readme_names_are_there():
-    for link in re.findall(r"\]\(([^)#:]+)\)", (ROOT / "README.md").read_text(encoding="utf-8")):
+    for link in re.findall(
+        r"\]\(([^)#:]+)\)", (ROOT / "README.md").read_text(encoding="utf-8")
+    ):
         assert (ROOT / link).is_file(), link
 
 
@@ -33,9 +43,16 @@ def test_the_packaged_example_is_part_of_the_demo_and_small():
     folder = example_ship().parent
     trials = sorted(folder.glob("*.csv"))
     assert sum(path.stat().st_size for path in folder.iterdir()) < 300_000
-    assert [trial.use for trial in ShipFile.load(example_ship()).trials()] == ["fit", "fit", "validate"]
+    assert [trial.use for trial in ShipFile.load(example_ship()).trials()] == [
+        "fit",
+        "fit",
+        "validate",
+    ]
     for path in trials:
-        assert path.read_bytes() == (ROOT / "examples" / "mariner" / path.name).read_bytes()
+        assert (
+            path.read_bytes()
+            == (ROOT / "examples" / "mariner" / path.name).read_bytes()
+        )
 
 
 def test_an_example_that_is_not_there_is_refused():

@@ -16,7 +16,12 @@ from agents.identifying import identification_settings, identify_ship
 from agents.verification import chain as links
 from agents.verification import refusal
 from agents.verification.page import verification_view
-from agents.verification.refusal import lost_control, rudder_effect, simpler_structures, why_refused
+from agents.verification.refusal import (
+    lost_control,
+    rudder_effect,
+    simpler_structures,
+    why_refused,
+)
 from agents.verification.result import verification_metrics
 from identification.design.experiment import advise
 from shipgym import InputError, ShipFile, Trial, UnstableModelError, load_model
@@ -42,17 +47,26 @@ def test_nothing_is_refused_that_steers_as_in_the_trials(fit):
 
 
 def test_steering_to_the_other_side_than_in_the_trials_is_refused(fit):
-    turned = {name: -value if name in ("N_d", "Y_d") else value for name, value in fit.coefficients.items()}
+    turned = {
+        name: -value if name in ("N_d", "Y_d") else value
+        for name, value in fit.coefficients.items()
+    }
     said = why_refused(Changed(fit, replace(fit.model, coefficients=turned)))
-    assert said.startswith("at low frequency the model's rudder turns the ship to the other side")
+    assert said.startswith(
+        "at low frequency the model's rudder turns the ship to the other side"
+    )
     assert " to both sides" in said.partition("; run a ")[2]
 
 
 def test_a_damping_that_drives_the_motion_is_refused(fit):
     wrong = replace(
-        fit.model, coefficients=fit.coefficients | {"N_r": 0.004}, covariance=1e-4 * fit.model.covariance
+        fit.model,
+        coefficients=fit.coefficients | {"N_r": 0.004},
+        covariance=1e-4 * fit.model.covariance,
     )
-    assert "yaw damping (N_r) has the sign of a force that drives" in why_refused(Changed(fit, wrong))
+    assert "yaw damping (N_r) has the sign of a force that drives" in why_refused(
+        Changed(fit, wrong)
+    )
 
 
 def test_an_autopilot_may_lose_one_in_twenty_of_the_models_drawn():
@@ -64,26 +78,50 @@ def test_designs_that_lose_control_are_not_written(chain, tmp_path, monkeypatch)
     result = chain[1]
     monkeypatch.setattr(refusal, "MOST_LOST", -1.0)
     found, why = links._decided(result.verification, result.identification)
-    assert set(found.refused) == {"pid", "lq", "lq-scheduled", "turn-rate", "wheel-over"}
+    assert set(found.refused) == {
+        "pid",
+        "lq",
+        "lq-scheduled",
+        "turn-rate",
+        "wheel-over",
+    }
     refused = replace(result, verification=found, refusal=why)
     (tmp_path / "report").mkdir()
     links._write(refused, tmp_path / "report")
     names = sorted(path.name for path in (tmp_path / "report").iterdir())
     assert names == ["metrics.json", "model.json", "report.html"]
-    assert json.loads((tmp_path / "report" / "metrics.json").read_text())["refusal"] == why
-    assert "No autopilot is given: " in (tmp_path / "report" / "report.html").read_text()
+    assert (
+        json.loads((tmp_path / "report" / "metrics.json").read_text())["refusal"] == why
+    )
+    assert (
+        "No autopilot is given: " in (tmp_path / "report" / "report.html").read_text()
+    )
 
 
 def stood(structure, coefficients, stable=True, ran_away=0):
-    return {"structure": structure, "coefficients": coefficients, "stable": stable, "ran_away": ran_away}
+    return {
+        "structure": structure,
+        "coefficients": coefficients,
+        "stable": stable,
+        "ran_away": ran_away,
+    }
 
 
 def test_the_next_best_structures_with_fewer_coefficients_are_named():
-    chosen, larger, smaller = stood("mmg4dof", 55), stood("cubic-full", 60), stood("abkowitz", 40)
-    lost, unstable = stood("cubic", 30, ran_away=1), stood("linear-steering", 9, stable=False)
+    chosen, larger, smaller = (
+        stood("mmg4dof", 55),
+        stood("cubic-full", 60),
+        stood("abkowitz", 40),
+    )
+    lost, unstable = (
+        stood("cubic", 30, ran_away=1),
+        stood("linear-steering", 9, stable=False),
+    )
     ranking = [chosen, larger, lost, unstable, smaller, stood("nomoto", 2)]
     assert simpler_structures(ranking, "mmg4dof") == ["abkowitz", "nomoto"]
-    assert simpler_structures([*ranking, stood("mmg4dof", 40)], "mmg4dof") == ["nomoto"]  # by another method
+    assert simpler_structures([*ranking, stood("mmg4dof", 40)], "mmg4dof") == [
+        "nomoto"
+    ]  # by another method
     assert simpler_structures(ranking, "nomoto") == []
 
 
@@ -92,17 +130,23 @@ def test_a_refusal_of_a_structure_that_was_chosen_names_another(chain, monkeypat
     monkeypatch.setattr(refusal, "MOST_LOST", -1.0)
     own = fit.model.provenance["structure"]
     ranking = {"ranking": [stood(own, 40), stood("nomoto", 2)]}
-    _, why = links._decided(result.verification, replace(fit, metrics=fit.metrics | {"selection": ranking}))
+    _, why = links._decided(
+        result.verification, replace(fit, metrics=fit.metrics | {"selection": ranking})
+    )
     assert why.endswith(" to both sides, or try --structure nomoto")
 
 
 def test_a_refused_model_gives_a_report_that_says_why(demo, tmp_path, monkeypatch):
-    monkeypatch.setattr(links, "why_refused", lambda fit: "its steering is wrong; run a turn")
+    monkeypatch.setattr(
+        links, "why_refused", lambda fit: "its steering is wrong; run a turn"
+    )
     done = CliRunner().invoke(
         app, ["autopilot", str(demo), "--out", str(tmp_path / "report"), "--draws", "2"]
     )
     assert done.exit_code == 1
-    assert "no autopilot is given: its steering is wrong; run a turn; see" in " ".join(done.stderr.split())
+    assert "no autopilot is given: its steering is wrong; run a turn; see" in " ".join(
+        done.stderr.split()
+    )
     names = sorted(path.name for path in (tmp_path / "report").iterdir())
     assert names == ["metrics.json", "report.html"]
     page = (tmp_path / "report" / "report.html").read_text()
@@ -116,7 +160,10 @@ def test_gains_have_one_sign_in_report_and_metrics(chain):
     told = verification_metrics(found)["controllers"]
     names = list(verification_view(found)["linear"])
     assert dict(shown["yaw rate"])["derivative"] == told["pid"]["gains"]["derivative"]
-    assert shown["yaw rate"][names.index("LQ")] == ("yaw_rate", told["lq"]["gains"]["yaw_rate"])
+    assert shown["yaw rate"][names.index("LQ")] == (
+        "yaw_rate",
+        told["lq"]["gains"]["yaw_rate"],
+    )
 
 
 def test_one_manoeuvre_that_fails_does_not_lose_the_others(monkeypatch):
@@ -127,13 +174,17 @@ def test_one_manoeuvre_that_fails_does_not_lose_the_others(monkeypatch):
 
     families = families_of(ship)
     sailed = {name: families[name] for name in ("zigzags", "circles")}
-    spirals = {name: replace(one, sail=fails) for name, one in families["spirals"].items()}
-    monkeypatch.setattr(module, "families_of", lambda *_: {**sailed, "spirals": spirals})
+    spirals = {
+        name: replace(one, sail=fails) for name, one in families["spirals"].items()
+    }
+    monkeypatch.setattr(
+        module, "families_of", lambda *_: {**sailed, "spirals": spirals}
+    )
     found = standard_trials(ship)
     assert found.refused == {"direct spiral": "runs away"}
-    assert found.indices["zigzag 20/20, starboard first"]["overshoot_1_deg"].value == pytest.approx(
-        7.8, abs=0.1
-    )
+    assert found.indices["zigzag 20/20, starboard first"][
+        "overshoot_1_deg"
+    ].value == pytest.approx(7.8, abs=0.1)
     monkeypatch.setattr(module, "families_of", lambda *_: {"spirals": spirals})
     with pytest.raises(UnstableModelError):
         standard_trials(ship)
@@ -144,11 +195,16 @@ def test_the_reason_why_a_model_is_unstable_stands_in_the_metrics_too(unstable_s
     result = identify_ship(ship, identification_settings(ship, {}))
     assert not result.stable
     assert result.metrics["instability"].startswith("runs away: ")
-    assert "deg" in result.metrics["instability"] or "trial" in result.metrics["instability"]
+    assert (
+        "deg" in result.metrics["instability"]
+        or "trial" in result.metrics["instability"]
+    )
 
 
 def test_an_unstable_design_names_the_options_to_change():
-    with pytest.raises(InputError, match=r"shorter control interval dt, and a lower frequency \(PID\)"):
+    with pytest.raises(
+        InputError, match=r"shorter control interval dt, and a lower frequency \(PID\)"
+    ):
         PID.from_model(load_model("mariner"), frequency=0.01, damping=20.0, dt=30.0)
 
 
@@ -167,20 +223,33 @@ def test_advice_is_not_about_a_coefficient_near_zero(fit):
     assert found.coefficient != "N_0u"
 
 
-@pytest.mark.parametrize(("t", "refused"), [(-3.05, True), (-2.95, False), (3.05, False)])
-def test_trials_tell_to_which_side_the_rudder_turns_from_three_standard_errors_on(t, refused, monkeypatch):
-    steered = np.array([[-1.0, -0.3], [-1.5, -2.0]]), np.array([[-0.1], [0.5]])  # to starboard
+@pytest.mark.parametrize(
+    ("t", "refused"), [(-3.05, True), (-2.95, False), (3.05, False)]
+)
+def test_trials_tell_to_which_side_the_rudder_turns_from_three_standard_errors_on(
+    t, refused, monkeypatch
+):
+    steered = (
+        np.array([[-1.0, -0.3], [-1.5, -2.0]]),
+        np.array([[-0.1], [0.5]]),
+    )  # to starboard
     assert bool(refusal_of([steered] * 61, t, monkeypatch)) == refused
 
 
 @pytest.mark.parametrize(("row", "name"), [(0, "sway damping"), (1, "yaw damping")])
-def test_a_damping_that_drives_the_motion_in_60_of_61_models_is_refused(row, name, monkeypatch):
+def test_a_damping_that_drives_the_motion_in_60_of_61_models_is_refused(
+    row, name, monkeypatch
+):
     sound = np.array([[-1.0, -0.3], [-1.5, -2.0]])
     driven = sound.copy()
     driven[row, row] = 0.1
     rudder = np.array([[-0.1], [0.5]])
     for count, refused in ((60, True), (59, False)):
-        found = refusal_of([(driven, rudder)] * count + [(sound, rudder)] * (61 - count), 0.0, monkeypatch)
+        found = refusal_of(
+            [(driven, rudder)] * count + [(sound, rudder)] * (61 - count),
+            0.0,
+            monkeypatch,
+        )
         assert (name in (found or "")) == refused
 
 
@@ -222,7 +291,9 @@ def test_where_nothing_can_be_advised_a_zigzag_to_both_sides_helps(monkeypatch):
     monkeypatch.setattr(refusal, "advise", nothing)
     assert refusal.helpful_trial(fit) == "a 20/20 zigzag to both sides"
     advice = SimpleNamespace(chosen=["turning circle 35", "zigzag 10/10"])
-    monkeypatch.setattr(refusal, "advise", lambda *_, criterion: advice if criterion == "D" else None)
+    monkeypatch.setattr(
+        refusal, "advise", lambda *_, criterion: advice if criterion == "D" else None
+    )
     assert refusal.helpful_trial(fit) == "a turning circle 35 to both sides"
 
 
@@ -236,6 +307,12 @@ def test_a_model_without_a_straight_course_is_left_to_the_designs(monkeypatch):
 
 
 def test_two_simpler_structures_are_named_at_most():
-    ranking = [stood("a", 9), stood("b", 7), stood("c", 6), stood("b", 5), stood("d", 4)]
+    ranking = [
+        stood("a", 9),
+        stood("b", 7),
+        stood("c", 6),
+        stood("b", 5),
+        stood("d", 4),
+    ]
     assert simpler_structures(ranking, "a") == ["b", "c"]
     assert simpler_structures(ranking, "unknown") == []

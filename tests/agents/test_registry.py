@@ -73,7 +73,9 @@ def test_what_a_controller_of_ones_own_remembers_is_a_record_with_names():
     plain, _ = lq.predict(seen)
     assert state.shape == (2, sluggish.memory_size) == (2, 1)
     np.testing.assert_allclose([first, second], [0.5 * plain, 0.75 * plain], rtol=1e-6)
-    with pytest.raises(InputError, match=r"state: shape \(2, 3\) found, expected \(2, 1\)"):
+    with pytest.raises(
+        InputError, match=r"state: shape \(2, 3\) found, expected \(2, 1\)"
+    ):
         sluggish.predict(seen, np.zeros((2, 3)))
 
 
@@ -91,18 +93,32 @@ def test_a_controller_of_ones_own_is_one_file(mine, tmp_path, monkeypatch):
     task = load_suite("shipgym-v1").task("mariner-calm")
     assert isinstance(design_base("my-pd", task), my_controllers.PD)
     results = [
-        benchmark("my-pd,lq,file=pd.json", tasks=["mariner-calm"], episodes=2, workers=workers)
+        benchmark(
+            "my-pd,lq,file=pd.json", tasks=["mariner-calm"], episodes=2, workers=workers
+        )
         for workers in (1, 2)
     ]
     for result in results:
         costs = result.figures("my-pd", "mariner-calm")
-        np.testing.assert_array_equal(costs, results[0].figures("my-pd", "mariner-calm"))
+        np.testing.assert_array_equal(
+            costs, results[0].figures("my-pd", "mariner-calm")
+        )
         assert (costs > result.figures("lq", "mariner-calm")).all()
 
 
 def test_the_command_line_finds_a_class_by_its_module(mine, tmp_path):
-    asked = ["benchmark", "--controllers", "my_controllers:PD", "--tasks", "mariner-calm", "--episodes", "2"]
-    done = CliRunner().invoke(app, [*asked, "--workers", "2", "--no-page", "--out", str(tmp_path / "out")])
+    asked = [
+        "benchmark",
+        "--controllers",
+        "my_controllers:PD",
+        "--tasks",
+        "mariner-calm",
+        "--episodes",
+        "2",
+    ]
+    done = CliRunner().invoke(
+        app, [*asked, "--workers", "2", "--no-page", "--out", str(tmp_path / "out")]
+    )
     assert done.exit_code == 0, done.output
     assert "PD" in done.output
     assert registry.controller_kinds()[-1] == "my-pd"
@@ -140,7 +156,9 @@ def test_a_kind_is_a_name_and_no_other_controller_s(monkeypatch):
         return type("Mine", (LQ,), {"kind": kind, "__module__": "mine"})
 
     for kind in ("", "my lq", "my,lq", "my/lq"):
-        with pytest.raises(InputError, match=f"Mine.kind is '{kind}', expected a name such as 'my-lq'"):
+        with pytest.raises(
+            InputError, match=f"Mine.kind is '{kind}', expected a name such as 'my-lq'"
+        ):
             register_controller(of_kind(kind))
     first = of_kind("my-lq")
     assert register_controller(first) is register_controller(first) is first
@@ -148,7 +166,10 @@ def test_a_kind_is_a_name_and_no_other_controller_s(monkeypatch):
     assert registry.registered_modules() == ("mine",)
     other = of_kind("my-lq")
     other.__qualname__ = "Other"
-    with pytest.raises(InputError, match="kind 'my-lq' is that of mine:Mine already, expected another one"):
+    with pytest.raises(
+        InputError,
+        match="kind 'my-lq' is that of mine:Mine already, expected another one",
+    ):
         register_controller(other)
     assert registry.controller_class("my-lq") is first
 
@@ -161,5 +182,7 @@ def test_a_base_is_a_classical_controller_of_a_file_or_none(tmp_path):
     assert base.gains == made.gains
     assert design_base("none", task) is None
     random_policy(task.ship).save(tmp_path / "learned.json")
-    with pytest.raises(InputError, match=r"learned\.json holds a learned policy, expected a classical"):
+    with pytest.raises(
+        InputError, match=r"learned\.json holds a learned policy, expected a classical"
+    ):
         design_base(str(tmp_path / "learned.json"), task)

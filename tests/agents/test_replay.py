@@ -20,28 +20,54 @@ def episode(**changes):
     t = DT * np.arange(STEPS + 1)
     rudder = np.radians(10.0) * np.sin(t / 20.0)
     states = {
-        "x": 5.0 * t, "y": np.full_like(t, 20.0), "psi": 0.002 * t, "u": np.full_like(t, 5.0),
-        "v": np.zeros_like(t), "r": np.full_like(t, 0.002), "delta": rudder,
+        "x": 5.0 * t,
+        "y": np.full_like(t, 20.0),
+        "psi": 0.002 * t,
+        "u": np.full_like(t, 5.0),
+        "v": np.zeros_like(t),
+        "r": np.full_like(t, 0.002),
+        "delta": rudder,
         "set_point": np.full_like(t, 0.1),
         "wind_speed": np.full_like(t, 8.0),
-        "wind_from": np.full_like(t, np.pi / 2), "current_north": np.zeros_like(t),
-        "current_east": np.full_like(t, -0.5), "under_keel_clearance": np.full_like(t, 3.0),
-    }  # fmt: skip
+        "wind_from": np.full_like(t, np.pi / 2),
+        "current_north": np.zeros_like(t),
+        "current_east": np.full_like(t, -0.5),
+        "under_keel_clearance": np.full_like(t, 3.0),
+    }
     known = {
-        "environment": "shipgym/PathFollowing-v0", "model": "mariner", "dt": DT, "length": 100.0,
+        "environment": "shipgym/PathFollowing-v0",
+        "model": "mariner",
+        "dt": DT,
+        "length": 100.0,
         "beam": 20.0,
-        "rudder_limit": np.radians(35.0), "states": states, "actions": np.zeros((STEPS, 1)),
-        "rewards": np.full(STEPS, -0.5), "commands": {"delta": rudder[1:]},
-        "reward_parts": {"reward_cross_track": np.full(STEPS, -0.4), "reward_rudder": np.full(STEPS, -0.1)},
-        "info": {"cross_track": np.full_like(t, 20.0), "extrapolating": np.zeros_like(t)},
-        "waypoints": [[0.0, 0.0], [1000.0, 0.0]], "corridor": 50.0, "seed": 2**80, "truncated": True,
-    }  # fmt: skip
+        "rudder_limit": np.radians(35.0),
+        "states": states,
+        "actions": np.zeros((STEPS, 1)),
+        "rewards": np.full(STEPS, -0.5),
+        "commands": {"delta": rudder[1:]},
+        "reward_parts": {
+            "reward_cross_track": np.full(STEPS, -0.4),
+            "reward_rudder": np.full(STEPS, -0.1),
+        },
+        "info": {
+            "cross_track": np.full_like(t, 20.0),
+            "extrapolating": np.zeros_like(t),
+        },
+        "waypoints": [[0.0, 0.0], [1000.0, 0.0]],
+        "corridor": 50.0,
+        "seed": 2**80,
+        "truncated": True,
+    }
     return Episode(**(known | changes))
 
 
 def data_of(page):
     """What the page holds for its script."""
-    return json.loads(re.search(r'<script type="application/json"[^>]*>(.*?)</script>', page, re.DOTALL)[1])
+    return json.loads(
+        re.search(
+            r'<script type="application/json"[^>]*>(.*?)</script>', page, re.DOTALL
+        )[1]
+    )
 
 
 def test_series_are_in_the_units_that_are_read():
@@ -62,7 +88,9 @@ def test_shaft_speed_is_that_of_the_ship_else_what_is_ordered():
     known = episode()
     ordered = replace(known, commands={**known.commands, "n": n[1:]})
     assert "shaft_speed" not in series(known)
-    assert series(ordered)["shaft_speed"] == pytest.approx(60.0 * np.append(n[1:], n[-1]))
+    assert series(ordered)["shaft_speed"] == pytest.approx(
+        60.0 * np.append(n[1:], n[-1])
+    )
     turned = replace(ordered, states={**known.states, "n": 2.0 * n})
     assert series(turned)["shaft_speed"] == pytest.approx(120.0 * n)
 
@@ -76,18 +104,32 @@ def test_numbers_keep_seven_digits():
 def test_angles_are_read_to_a_tenth_of_a_degree_and_speeds_to_a_centimetre_per_second():
     known = episode()
     states = {**known.states, "phi": known.states["psi"], "n": known.states["u"]}
-    shown = quantities(data_of(replay_page({"first": replace(known, states=states)}))["runs"])
+    shown = quantities(
+        data_of(replay_page({"first": replace(known, states=states)}))["runs"]
+    )
     assert [(one["label"], one["unit"], one["decimals"]) for one in shown] == [
-        ("heading", "deg", 1), ("cross-track error", "m", 1), ("heading error", "deg", 1),
-        ("rudder", "deg", 1), ("speed through water", "m/s", 2), ("yaw rate", "deg/s", 2), ("heel", "deg", 1),
-        ("shaft speed", "1/min", 1), ("reward so far", "", 2),
-    ]  # fmt: skip
-    assert series(replace(known, states=states))["heel"][-1] == pytest.approx(np.degrees(0.002 * STEPS * DT))
+        ("heading", "deg", 1),
+        ("cross-track error", "m", 1),
+        ("heading error", "deg", 1),
+        ("rudder", "deg", 1),
+        ("speed through water", "m/s", 2),
+        ("yaw rate", "deg/s", 2),
+        ("heel", "deg", 1),
+        ("shaft speed", "1/min", 1),
+        ("reward so far", "", 2),
+    ]
+    assert series(replace(known, states=states))["heel"][-1] == pytest.approx(
+        np.degrees(0.002 * STEPS * DT)
+    )
 
 
 def test_headings_start_within_a_turn_and_speeds_are_of_any_direction():
     known = episode().states
-    for first, shown in ((-0.1, 360.0 - np.degrees(0.1)), (7.0, np.degrees(7.0 - 2.0 * np.pi)), (0.0, 0.0)):
+    for first, shown in (
+        (-0.1, 360.0 - np.degrees(0.1)),
+        (7.0, np.degrees(7.0 - 2.0 * np.pi)),
+        (0.0, 0.0),
+    ):
         heading = series(episode(states={**known, "psi": known["psi"] + first}))["psi"]
         assert heading[0] == pytest.approx(shown)
         assert heading[-1] - heading[0] == pytest.approx(np.degrees(0.002 * STEPS * DT))
@@ -102,15 +144,28 @@ def test_headings_start_within_a_turn_and_speeds_are_of_any_direction():
 def test_wind_and_current_are_told_from_0_to_360_degrees():
     known = episode().states
     none, half = np.zeros(STEPS + 1), np.full(STEPS + 1, 0.5)
-    for (north, east), towards in zip(((half, none), (none, half), (-half, none)), (0, 90, 180), strict=True):
-        states = {**known, "wind_from": -half * np.pi, "current_north": north, "current_east": east}
+    for (north, east), towards in zip(
+        ((half, none), (none, half), (-half, none)), (0, 90, 180), strict=True
+    ):
+        states = {
+            **known,
+            "wind_from": -half * np.pi,
+            "current_north": north,
+            "current_east": east,
+        }
         shown = series(episode(states=states))
         assert shown["current_towards"] == pytest.approx(towards)
         assert shown["current_speed"] == pytest.approx(0.5)
         assert shown["wind_from"] == pytest.approx(270.0)
-    shown = series(episode(states={**known, "current_north": none, "current_east": none}))
+    shown = series(
+        episode(states={**known, "current_north": none, "current_east": none})
+    )
     assert "current_speed" not in shown
-    states = {name: values for name, values in known.items() if name not in ("wind_from", "current_east")}
+    states = {
+        name: values
+        for name, values in known.items()
+        if name not in ("wind_from", "current_east")
+    }
     assert not {"wind_speed", "current_speed"} & series(episode(states=states)).keys()
 
 
@@ -118,7 +173,9 @@ def test_the_error_is_the_short_way_round():
     known = episode().states
     heading = np.linspace(3.0, 3.5, STEPS + 1)  # through south
     wrapped = np.where(heading > np.pi, heading - 2.0 * np.pi, heading)
-    shown = series(episode(states={**known, "psi": wrapped, "set_point": np.full(STEPS + 1, -3.0)}))
+    shown = series(
+        episode(states={**known, "psi": wrapped, "set_point": np.full(STEPS + 1, -3.0)})
+    )
     assert shown["psi"] == pytest.approx(np.degrees(heading))
     assert np.abs(shown["heading_error"]).max() < 30.0
 
@@ -139,15 +196,24 @@ def test_how_an_episode_ended_is_told(flags, words):
 
 def test_a_page_holds_all_of_an_episode_that_is_shown():
     (run,) = data_of(replay_page({"first": episode()}))["runs"]
-    assert run["seed"] == str(2**80)  # a number of that size would lose its end in a browser
+    assert run["seed"] == str(
+        2**80
+    )  # a number of that size would lose its end in a browser
     assert run["waypoints"] == [[0.0, 0.0], [1000.0, 0.0]]
     assert list(run["parts"]) == ["reward_cross_track", "reward_rudder"]
     assert run["other"].keys() >= {"under_keel_clearance", "u", "v", "extrapolating"}
     assert "cross_track" not in run["other"]
     assert run["total"] == -0.5 * STEPS
     assert run["beam"] == 20.0
-    assert (run["rudderLimit"], run["corridor"], run["dt"]) == (pytest.approx(35.0), 50.0, DT)
-    assert (run["rewards"][:2], run["parts"]["reward_rudder"][:2]) == ([0.0, -0.5], [0.0, -0.1])
+    assert (run["rudderLimit"], run["corridor"], run["dt"]) == (
+        pytest.approx(35.0),
+        50.0,
+        DT,
+    )
+    assert (run["rewards"][:2], run["parts"]["reward_rudder"][:2]) == (
+        [0.0, -0.5],
+        [0.0, -0.1],
+    )
 
 
 def test_a_ship_of_unknown_beam_is_drawn_as_slender_as_ships_are():
@@ -156,18 +222,25 @@ def test_a_ship_of_unknown_beam_is_drawn_as_slender_as_ships_are():
 
 
 def test_what_no_run_has_is_not_shown():
-    shown = {each["label"] for each in data_of(replay_page({"first": episode()}))["quantities"]}
+    shown = {
+        each["label"]
+        for each in data_of(replay_page({"first": episode()}))["quantities"]
+    }
     assert "cross-track error" in shown
     assert not shown & {"heel", "shaft speed"}
 
 
 def test_the_wind_of_a_calm_day_is_not_shown():
-    calm = {name: values for name, values in episode().states.items() if "wind" not in name}
+    calm = {
+        name: values for name, values in episode().states.items() if "wind" not in name
+    }
     calm |= {"wind_speed": np.zeros(STEPS + 1), "wind_from": np.zeros(STEPS + 1)}
     assert "wind_speed" not in series(episode(states=calm))
 
 
-@pytest.mark.parametrize("name", ["</script><script>alert(1)//", "<!--<script>", "$data ${t}"])
+@pytest.mark.parametrize(
+    "name", ["</script><script>alert(1)//", "<!--<script>", "$data ${t}"]
+)
 def test_no_name_breaks_the_page(name):
     page = replay_page({name: episode(model=name, environment=name)})
     assert page.count("</script>") == 3
@@ -187,7 +260,9 @@ def test_the_page_loads_nothing():
     page = replay_page({"first": episode()})
     assert "default-src 'none'" in page
     assert re.findall(r'(?:src|href)="([^"]*)"', page) == ["data:,"]
-    assert "http" not in page.replace("http://www.w3.org/2000/svg", "").replace("http-equiv", "")
+    assert "http" not in page.replace("http://www.w3.org/2000/svg", "").replace(
+        "http-equiv", ""
+    )
 
 
 def shipgym(*arguments):
@@ -220,7 +295,10 @@ def test_the_command_writes_the_page(recorded):
         ("x,y\n1,2\n", "broken JSON"),
         ("[1, 2]", "expected a table"),
         ('{"name": "mariner", "format": 1}', "kind: None found, expected 'episode'"),
-        ('{"kind": "episode", "format": 9}', "format 9 found, this version of shipgym reads format 1"),
+        (
+            '{"kind": "episode", "format": 9}',
+            "format 9 found, this version of shipgym reads format 1",
+        ),
     ],
 )
 def test_a_wrong_file_exits_with_2_one_message_and_no_page(recorded, text, said):

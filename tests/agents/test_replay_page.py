@@ -29,12 +29,20 @@ def page(tmp_path_factory):
     half = STEPS // 2
     states = {name: values[: half + 1] for name, values in first.states.items()}
     second = episode(
-        model="</script><b>container", length=50.0, states={**states, "y": states["y"] + 200.0},
-        commands={}, reward_parts={}, info={}, rewards=first.rewards[:half], actions=first.actions[:half],
-    )  # fmt: skip
+        model="</script><b>container",
+        length=50.0,
+        states={**states, "y": states["y"] + 200.0},
+        commands={},
+        reward_parts={},
+        info={},
+        rewards=first.rewards[:half],
+        actions=first.actions[:half],
+    )
     first.save(folder / "first.json")
     second.save(folder / "second.json")
-    write_replay([folder / "first.json", folder / "second.json"], folder / "replay.html")
+    write_replay(
+        [folder / "first.json", folder / "second.json"], folder / "replay.html"
+    )
     return (folder / "replay.html").as_uri()
 
 
@@ -53,23 +61,34 @@ def opened(browser, page):
 def ship(browser, run=0):
     """Where the ship of a run stands on the chart, east, south and heading, as the drawing has it."""
     script = f"chart.ships[{run}].ship.getAttribute('transform')"
-    return [float(number) for number in re.findall(r"-?[\d.]+(?:e-?\d+)?", browser.run(script))]
+    return [
+        float(number)
+        for number in re.findall(r"-?[\d.]+(?:e-?\d+)?", browser.run(script))
+    ]
 
 
 def slide(browser, time):
-    script = f"slider.value = {time}; slider.dispatchEvent(new Event('input', {{ bubbles: true }}))"
+    script = (
+        f"slider.value = {time}; slider.dispatchEvent(new Event('input', {{ bubbles:"
+        " true }))"
+    )
     browser.run(f"(() => {{ {script} }})()")
 
 
 def readout(browser, name):
-    found = f"[...document.querySelectorAll('.readouts div')].find((d) => d.textContent.startsWith('{name}'))"
+    found = (
+        "[...document.querySelectorAll('.readouts div')].find((d) =>"
+        f" d.textContent.startsWith('{name}'))"
+    )
     return browser.run(f"{found}.querySelector('dd').textContent")
 
 
 def test_the_slider_moves_the_ship(opened):
     assert ship(opened) == pytest.approx([20.0, 0.0, 0.0])
     slide(opened, 102.5)  # between two samples
-    assert ship(opened) == pytest.approx([20.0, -5.0 * 102.5, np.degrees(0.002 * 102.5)])
+    assert ship(opened) == pytest.approx(
+        [20.0, -5.0 * 102.5, np.degrees(0.002 * 102.5)]
+    )
     assert opened.run("find('clock').textContent") == "103 s of 200 s"
 
 
@@ -88,7 +107,8 @@ def test_the_ship_is_drawn_to_the_scale_of_the_chart(opened):
 def test_the_trailing_edge_of_the_rudder_goes_to_its_side(opened, time):
     slide(opened, time)
     edge = opened.run(
-        "((each) => new DOMPoint(0, 70).matrixTransform("  # 20 m behind the stern, amidships
+        # 20 m behind the stern, amidships
+        "((each) => new DOMPoint(0, 70).matrixTransform("
         "each.ship.getScreenCTM().inverse().multiply(each.blade.getScreenCTM())).x)(chart.ships[0])"
     )
     rudder = np.radians(10.0) * np.sin(time / 20.0)
@@ -97,7 +117,9 @@ def test_the_trailing_edge_of_the_rudder_goes_to_its_side(opened, time):
 
 def test_a_run_that_is_over_stays_where_it_ended(opened):
     slide(opened, END)
-    assert ship(opened, 1) == pytest.approx([220.0, -5.0 * END / 2, np.degrees(0.002 * END / 2)])
+    assert ship(opened, 1) == pytest.approx(
+        [220.0, -5.0 * END / 2, np.degrees(0.002 * END / 2)]
+    )
 
 
 def test_keys_step_play_and_go_to_the_ends(opened):
@@ -120,7 +142,10 @@ def test_keys_step_play_and_go_to_the_ends(opened):
 
 
 def test_play_ends_at_the_end(opened):
-    opened.run("(() => { find('speed').value = 500; find('speed').dispatchEvent(new Event('change')) })()")
+    opened.run(
+        "(() => { find('speed').value = 500; find('speed').dispatchEvent(new"
+        " Event('change')) })()"
+    )
     opened.click("#play")
     opened.wait(f"time === {END}")
     assert opened.run("find('play').textContent").strip() == "Play"
@@ -130,10 +155,14 @@ def test_readouts_show_the_state(opened):
     slide(opened, 100.0)
     assert readout(opened, "speed") == "5.00 m/s"
     assert readout(opened, "heading") == f"{np.degrees(0.2):.1f} deg"
-    assert readout(opened, "heading error") == f"\N{MINUS SIGN}{np.degrees(0.1):.1f} deg"
+    assert (
+        readout(opened, "heading error") == f"\N{MINUS SIGN}{np.degrees(0.1):.1f} deg"
+    )
     assert readout(opened, "cross-track") == "20.0 m"
     assert readout(opened, "rudder") == f"\N{MINUS SIGN}{abs(10 * np.sin(5.0)):.1f} deg"
-    cells = opened.run("[...document.querySelectorAll('#rewards td')].map((cell) => cell.textContent)")
+    cells = opened.run(
+        "[...document.querySelectorAll('#rewards td')].map((cell) => cell.textContent)"
+    )
     minus = "\N{MINUS SIGN}"
     assert cells[:3] == ["cross track", f"{minus}0.400", f"{minus}8.00"]
     assert cells[-3:] == ["sum", f"{minus}0.500", f"{minus}10.00"]
@@ -151,7 +180,11 @@ def test_the_legend_shows_hides_and_chooses_runs(opened):
     opened.click("#run-1")
     assert opened.run("chart.ships[1].group.style.display") == "none"
     opened.click("#legend li:nth-child(2) button")
-    assert opened.run("[chosen, shown[1], chart.ships[1].group.style.display]") == [1, True, ""]
+    assert opened.run("[chosen, shown[1], chart.ships[1].group.style.display]") == [
+        1,
+        True,
+        "",
+    ]
 
 
 def test_a_click_on_a_history_goes_to_that_time(opened):
@@ -180,8 +213,9 @@ def test_nothing_sticks_out_or_is_cut_off(opened, width, height):
     opened.wait(f"innerWidth === {width}")
     assert opened.run("document.documentElement.scrollWidth") <= width
     cut = (
-        "[...document.querySelectorAll('.readouts dt, .readouts dd, .controls output, h1')]"
-        ".filter((e) => e.scrollWidth > e.clientWidth + 1).map((e) => e.textContent)"
+        "[...document.querySelectorAll('.readouts dt, .readouts dd, .controls output,"
+        " h1')].filter((e) => e.scrollWidth > e.clientWidth + 1).map((e) =>"
+        " e.textContent)"
     )
     assert opened.run(cut) == []
     assert opened.run("chart.svg.clientHeight") > 0.4 * height
@@ -190,15 +224,23 @@ def test_nothing_sticks_out_or_is_cut_off(opened, width, height):
 
 @pytest.mark.parametrize(("width", "height"), [(1000, 700), (390, 844)])
 @pytest.mark.parametrize("east", [0.0, 1000.0, 4000.0])
-def test_the_whole_path_is_seen_beside_the_compass(browser, tmp_path, width, height, east):
+def test_the_whole_path_is_seen_beside_the_compass(
+    browser, tmp_path, width, height, east
+):
     path = tmp_path / "replay.html"
-    path.write_text(replay_page({"run": episode(waypoints=[[0.0, 0.0], [1000.0, east]])}))
+    path.write_text(
+        replay_page({"run": episode(waypoints=[[0.0, 0.0], [1000.0, east]])})
+    )
     browser.resize(width, height, mobile=width < 500)
     browser.open(path.as_uri())
     browser.wait(f"innerWidth === {width}")
     dots, whole, rose = (
         browser.run(f"{place}.getBoundingClientRect().toJSON()")
-        for place in ("document.querySelector('.waypoint')", "chart.svg", "find('rose')")
+        for place in (
+            "document.querySelector('.waypoint')",
+            "chart.svg",
+            "find('rose')",
+        )
     )
     assert whole["left"] < dots["left"] <= dots["right"] < whole["right"]
     assert whole["top"] < dots["top"] < dots["bottom"] < whole["bottom"]
@@ -208,6 +250,10 @@ def test_the_whole_path_is_seen_beside_the_compass(browser, tmp_path, width, hei
 def test_everything_that_can_be_operated_has_a_name(opened):
     tree = opened.ask("Accessibility.getFullAXTree")["nodes"]
     roles = {"button", "checkbox", "slider", "combobox"}
-    operated = [node for node in tree if node.get("role", {}).get("value") in roles and not node["ignored"]]
+    operated = [
+        node
+        for node in tree
+        if node.get("role", {}).get("value") in roles and not node["ignored"]
+    ]
     assert len(operated) >= 10
     assert all(node["name"]["value"].strip() for node in operated)

@@ -34,13 +34,21 @@ class Page(HTMLParser):
 
     def __init__(self, text):
         super().__init__()
-        self.loaded, self.sections, self.links, self.text, self.depth = [], [], [], [], []
+        self.loaded, self.sections, self.links, self.text, self.depth = (
+            [],
+            [],
+            [],
+            [],
+            [],
+        )
         self.scripts = 0
         self.feed(text)
 
     def handle_starttag(self, tag, attributes):
         attributes = dict(attributes)
-        self.loaded += [attributes[key] for key in ("src", "srcset", "data") if attributes.get(key)]
+        self.loaded += [
+            attributes[key] for key in ("src", "srcset", "data") if attributes.get(key)
+        ]
         if tag == "link":
             self.loaded.append(attributes.get("href"))
         if tag == "a":
@@ -81,8 +89,12 @@ def test_plotly_stands_in_the_page_once(source):
 
 
 def test_the_bundle_of_plotly_is_the_published_one():
-    bundle = files("shipgym.pages").joinpath("plotly/plotly-cartesian.min.js").read_bytes()
-    published = "79542150855a52c567260e3137095dbe2b744e6d702a5cabe67da246942fba7a"  # npm, 4.1.1
+    bundle = (
+        files("shipgym.pages").joinpath("plotly/plotly-cartesian.min.js").read_bytes()
+    )
+    published = (  # npm, 4.1.1
+        "79542150855a52c567260e3137095dbe2b744e6d702a5cabe67da246942fba7a"
+    )
     assert hashlib.sha256(bundle).hexdigest() == published
 
 
@@ -128,17 +140,30 @@ def test_the_chain_prints_its_golden_tables(chain, capsys):
     assert same_text("autopilot", shown.out + shown.err)
 
 
-def test_limits_that_are_not_kept_and_designs_that_are_refused_are_warned_of(chain, capsys):
+def test_limits_that_are_not_kept_and_designs_that_are_refused_are_warned_of(
+    chain, capsys
+):
     """Of what a standard's topics ask for, the one that failed."""
-    about = {"standard": "ISO 11674", "topic": "Course change", "unit": "deg", "limit": 2.5}
+    about = {
+        "standard": "ISO 11674",
+        "topic": "Course change",
+        "unit": "deg",
+        "limit": 2.5,
+    }
     rows = [
-        SimpleNamespace(passed=passed, value=value, **about) for passed, value in ((True, 2.1), (False, 3.2))
+        SimpleNamespace(passed=passed, value=value, **about)
+        for passed, value in ((True, 2.1), (False, 3.2))
     ]
     found = chain[1].verification.manoeuvres
     result = SimpleNamespace(
-        metrics=chain[1].metrics, stable=True, refusal=None, identification=chain[1].identification,
-        verification=SimpleNamespace(manoeuvres=found, standards=rows, refused={"lqg": "no such sensor"}),
-    )  # fmt: skip
+        metrics=chain[1].metrics,
+        stable=True,
+        refusal=None,
+        identification=chain[1].identification,
+        verification=SimpleNamespace(
+            manoeuvres=found, standards=rows, refused={"lqg": "no such sensor"}
+        ),
+    )
     _print_result(result, Path("report.html"), DRAWS)
     first, *_, last = capsys.readouterr().err.splitlines()
     assert first == "warning: ISO 11674, course change: 3.2 deg, limit 2.5"
@@ -162,7 +187,10 @@ def test_a_browser_without_network_draws_every_figure_also_for_paper(chain):
         browser.run("window.print = () => { window.printed = true; }")
         browser.click(".print")
         browser.wait("window.printed")
-        widths = "[...document.querySelectorAll('.js-plotly-plot')].map((plot) => plot._fullLayout.width)"
+        widths = (
+            "[...document.querySelectorAll('.js-plotly-plot')].map((plot) =>"
+            " plot._fullLayout.width)"
+        )
         browser.run("window.dispatchEvent(new Event('beforeprint'))")
         assert browser.run(widths) == 8 * [690]  # as wide as the paper
         browser.run("window.dispatchEvent(new Event('afterprint'))")
@@ -199,21 +227,32 @@ def test_a_variable_that_is_missing_is_an_error():
 def test_hostile_names_of_ship_trials_and_autopilots_stay_text(chain, tmp_path):
     """Escaped in the page's text, and unable to end the scripts that draw the figures."""
     result = chain[1]
-    ship = replace(result.ship, particulars=replace(result.ship.particulars, name=HOSTILE))
+    ship = replace(
+        result.ship, particulars=replace(result.ship.particulars, name=HOSTILE)
+    )
     trials = tuple(
         Trial(one.t, one.channels, name=f"{HOSTILE}{k}", kind=one.kind, use=one.use)
         for k, one in enumerate(result.trials)
     )
     names = {old.name: new.name for old, new in zip(result.trials, trials, strict=True)}
     fit = result.identification
-    metrics = {"trials": {names[name]: found for name, found in fit.metrics["trials"].items()}}
-    predictions = {names[name]: prediction for name, prediction in fit.predictions.items()}
+    metrics = {
+        "trials": {names[name]: found for name, found in fit.metrics["trials"].items()}
+    }
+    predictions = {
+        names[name]: prediction for name, prediction in fit.predictions.items()
+    }
     first, *others = result.verification.pilots
     found = replace(result.verification, pilots=(replace(first, key=HOSTILE), *others))
     hostile = replace(
-        result, ship=ship, trials=trials, verification=found,
-        identification=replace(fit, metrics=metrics, predictions=predictions, trials=trials),
-    )  # fmt: skip
+        result,
+        ship=ship,
+        trials=trials,
+        verification=found,
+        identification=replace(
+            fit, metrics=metrics, predictions=predictions, trials=trials
+        ),
+    )
     write_report(hostile, tmp_path / "report.html")
     source = (tmp_path / "report.html").read_text()
     assert Page(source).scripts == 10  # plotly.js, eight figures, printing
@@ -224,13 +263,21 @@ def test_hostile_names_of_ship_trials_and_autopilots_stay_text(chain, tmp_path):
 
 def test_hostile_names_of_models_and_manoeuvres_stay_text(tmp_path):
     name = f"zigzag {HOSTILE}"
-    zigzags = {name: standard_manoeuvres(load_model("mariner"))["zigzag 20/20, port first"]}
+    zigzags = {
+        name: standard_manoeuvres(load_model("mariner"))["zigzag 20/20, port first"]
+    }
     index = IndexInterval(1.0, np.empty(0), np.empty(0, dtype=bool))
-    found = StandardTrials({"zigzags": zigzags}, {}, {name: {"period_s": index}}, {}, {name: HOSTILE}, 0)
-    write_page(replace(load_model("mariner"), name=HOSTILE), found, tmp_path / "trials.html")
+    found = StandardTrials(
+        {"zigzags": zigzags}, {}, {name: {"period_s": index}}, {}, {name: HOSTILE}, 0
+    )
+    write_page(
+        replace(load_model("mariner"), name=HOSTILE), found, tmp_path / "trials.html"
+    )
     source = (tmp_path / "trials.html").read_text()
     assert Page(source).scripts == 2
-    assert " ".join(Page(source).text).count(HOSTILE) == 5  # window, title, head, and why it was refused
+    assert (
+        " ".join(Page(source).text).count(HOSTILE) == 5
+    )  # window, title, head, and why it was refused
 
 
 @pytest.mark.parametrize(
@@ -258,7 +305,10 @@ def test_a_page_that_cannot_be_drawn_is_refused_before_any_work(tmp_path, monkey
 
 def test_a_figure_cannot_end_the_script_it_stands_in():
     drawn = graph_objects().Figure(layout={"title": {"text": HOSTILE}, "height": 300})
-    assert shown('{{ parts.figure("plot", drawn, "") }}', drawn=drawn).count("</script>") == 1
+    assert (
+        shown('{{ parts.figure("plot", drawn, "") }}', drawn=drawn).count("</script>")
+        == 1
+    )
 
 
 @pytest.mark.parametrize(
@@ -282,7 +332,8 @@ def test_a_minus_is_a_minus():
 
 
 @pytest.mark.parametrize(
-    ("share", "shown"), [(0.0, "0 %"), (0.004, "< 1 %"), (0.5, "50 %"), (0.995, "> 99 %"), (1.0, "100 %")]
+    ("share", "shown"),
+    [(0.0, "0 %"), (0.004, "< 1 %"), (0.5, "50 %"), (0.995, "> 99 %"), (1.0, "100 %")],
 )
 def test_a_probability_is_certain_only_if_it_is(share, shown):
     assert percent(share) == shown

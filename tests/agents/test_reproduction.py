@@ -30,14 +30,18 @@ def test_an_installed_package_says_where_the_tables_are_made(monkeypatch, tmp_pa
 
 def test_rows_for_programs_and_the_page_for_readers(tmp_path):
     path = tmp_path / "reproduction.md"
-    answer = CliRunner().invoke(reproduce.app, ["cao2015", "--json", "--markdown", str(path)])
+    answer = CliRunner().invoke(
+        reproduce.app, ["cao2015", "--json", "--markdown", str(path)]
+    )
     assert answer.exit_code == 0
     rows = json.loads(answer.stdout)["cao2015"]
     assert len(rows) == 116
     assert rows[0]["case"] == "Table 2"
     assert rows[0]["agrees"]
     text = path.read_text()
-    assert "Aims met: 52 of 52" in text  # 104 rows, of which the best of the integral and Euler tables is one
+    assert (
+        "Aims met: 52 of 52" in text
+    )  # 104 rows, of which the best of the integral and Euler tables is one
     assert text.count("| Table 3 |") == 16
 
 
@@ -56,15 +60,27 @@ def row(printed, ours, best=None, met=None, quantity="K"):
 
 @pytest.mark.parametrize(
     ("printed", "ours", "agrees"),
-    [(156.0, 148.3, True), (156.0, 210.9, False), (0.0, 0.4, True), (0.0, 0.6, False),
-     (-0.0382, -0.0383, True), (4.035e-06, 5.984e-06, False), (None, 1.0, None), (1.0, None, None)],
-)  # fmt: skip
+    [
+        (156.0, 148.3, True),
+        (156.0, 210.9, False),
+        (0.0, 0.4, True),
+        (0.0, 0.6, False),
+        (-0.0382, -0.0383, True),
+        (4.035e-06, 5.984e-06, False),
+        (None, 1.0, None),
+        (1.0, None, None),
+    ],
+)
 def test_ours_agrees_with_print_within_a_tenth_or_its_rounding(printed, ours, agrees):
     assert row(printed, ours).agrees is agrees
 
 
 def test_an_aim_counts_once_however_many_rows_show_its_number():
-    shown = [row(None, 1.0, 0.25, True), row(None, 2.0, 0.25, True, "T"), row(None, 1.0, 0.5, False)]
+    shown = [
+        row(None, 1.0, 0.25, True),
+        row(None, 2.0, 0.25, True, "T"),
+        row(None, 1.0, 0.5, False),
+    ]
     assert aims(shown) == (1, 2)
     assert aims([row(None, 1.0, 18.0, True), row(None, 1.0, 18.0, True, "T")]) == (
         2,
@@ -74,16 +90,24 @@ def test_an_aim_counts_once_however_many_rows_show_its_number():
 
 
 def test_a_conclusion_is_what_its_rows_show():
-    conclusion = Conclusion("K is small", ("Table 1: K",), lambda found: found.as_paper < 1.0)
+    conclusion = Conclusion(
+        "K is small", ("Table 1: K",), lambda found: found.as_paper < 1.0
+    )
     assert conclusion.verdict([row(None, 0.5)]) == "confirmed"
     assert conclusion.verdict([row(None, 2.0)]) == "contradicted"
-    assert conclusion.verdict([row(1.0, None)]) == conclusion.verdict([]) == "not testable"
+    assert (
+        conclusion.verdict([row(1.0, None)]) == conclusion.verdict([]) == "not testable"
+    )
     assert Conclusion("K is nice").verdict([row(None, 0.5)]) == "not testable"
 
 
 @pytest.mark.parametrize("name", [*PAPERS, "comparators"])
 def test_the_page_has_the_rows_of_every_conclusion(name):
-    text = (Path(__file__).parents[2] / "docs" / "reproduction.md").read_text().replace("\\|", "|")
+    text = (
+        (Path(__file__).parents[2] / "docs" / "reproduction.md")
+        .read_text()
+        .replace("\\|", "|")
+    )
     section = text.partition(f"\n## {name}\n")[2].partition("\n## ")[0]
     conclusions = get_paper(name).conclusions
     assert len(conclusions) >= 3
@@ -91,7 +115,9 @@ def test_the_page_has_the_rows_of_every_conclusion(name):
         assert f"| {conclusion.statement} |" in section
         for shown in conclusion.shown_by:
             cuts = (
-                f"| {shown[:k]} | {shown[k + 2 :]} |" for k in range(len(shown)) if shown[k : k + 2] == ": "
+                f"| {shown[:k]} | {shown[k + 2 :]} |"
+                for k in range(len(shown))
+                if shown[k : k + 2] == ": "
             )
             assert any(cut in section for cut in cuts), shown
 
@@ -102,9 +128,13 @@ def test_all_are_the_papers_and_the_requirements():
 
 
 def test_the_page_tells_of_each_requirement_why_it_holds_and_what_shows_it():
-    text = page({"requirements": [Row("R7", "gap", None, None, 0.0, "below 1e-9", True)]})
+    text = page(
+        {"requirements": [Row("R7", "gap", None, None, 0.0, "below 1e-9", True)]}
+    )
     table = [line for line in text.splitlines() if line.startswith("| R")]
-    assert [line.split()[1] for line in table] == [one.name for one in REQUIREMENTS] + ["R7"]
+    assert [line.split()[1] for line in table] == [one.name for one in REQUIREMENTS] + [
+        "R7"
+    ]
     unescaped = [line.replace("\\|", "") for line in table]
     assert [line.count("|") for line in unescaped[:8]] == [6] * 8
     for line, one in zip(table, REQUIREMENTS, strict=False):
@@ -113,10 +143,13 @@ def test_the_page_tells_of_each_requirement_why_it_holds_and_what_shows_it():
 
 def test_a_note_stands_once_below_the_table_and_is_pointed_at():
     rows = [
-        Row("Table 1", q, 1.0, 1.0, 1.0, note=note) for q, note in zip("abc", ("x|y", "", "x|y"), strict=True)
+        Row("Table 1", q, 1.0, 1.0, 1.0, note=note)
+        for q, note in zip("abc", ("x|y", "", "x|y"), strict=True)
     ]
     lines = page({PAPERS[0]: rows}).splitlines()
-    cells = [line.split("|")[-2].strip() for line in lines if line.startswith("| Table 1")]
+    cells = [
+        line.split("|")[-2].strip() for line in lines if line.startswith("| Table 1")
+    ]
     assert cells == ["1", "", "1"]
     assert lines.count("1. x|y") == 1
 
@@ -129,7 +162,10 @@ def test_every_figure_is_drawn_and_lies_beside_the_page():
 
 
 def test_the_page_begins_with_what_became_of_each_paper():
-    shown = [Row("Table 1", "K", 1.0, 1.05, 0.3, "", True), Row("Table 2", "K", 1.0, 2.0, 0.3, "", True)]
+    shown = [
+        Row("Table 1", "K", 1.0, 1.05, 0.3, "", True),
+        Row("Table 2", "K", 1.0, 2.0, 0.3, "", True),
+    ]
     lines = page({PAPERS[0]: shown}).splitlines()
     untestable = len(get_paper(PAPERS[0]).conclusions)
     assert f"| [cao2015](#cao2015) | 0 | 0 | {untestable} | 1 of 2 | 1 of 1 |" in lines

@@ -18,7 +18,10 @@ MARINER = load_model("mariner")
 BASES = {
     "lq": (COURSE, LQ.from_model(MARINER)),
     "lqg": (COURSE, LQG.from_model(MARINER)),
-    "ilos-lqg": (PATH, IntegralLineOfSight.from_model(MARINER, autopilot=LQG.from_model(MARINER))),
+    "ilos-lqg": (
+        PATH,
+        IntegralLineOfSight.from_model(MARINER, autopilot=LQG.from_model(MARINER)),
+    ),
 }
 SHIPS, STEPS, HISTORY, AUTHORITY = 3, 11, 3, 0.4
 
@@ -51,8 +54,14 @@ def by_hand(env, base, seed, outputs):
 @pytest.mark.parametrize("name", BASES)
 def test_shows_and_does_what_is_worked_out_by_hand(name):
     env, base = BASES[name]
-    outputs = np.random.default_rng(1).uniform(-1.0, 1.0, (STEPS, SHIPS, 1)).astype(np.float32)
-    residual = ResidualVecEnv(ships(env), base, authority=AUTHORITY, frame_stack=HISTORY)
+    outputs = (
+        np.random.default_rng(1)
+        .uniform(-1.0, 1.0, (STEPS, SHIPS, 1))
+        .astype(np.float32)
+    )
+    residual = ResidualVecEnv(
+        ships(env), base, authority=AUTHORITY, frame_stack=HISTORY
+    )
     seen, shown, rewards, last = residual.reset(), [], [], [{} for _ in range(SHIPS)]
     for step in range(STEPS):
         shown.append(seen)
@@ -63,7 +72,9 @@ def test_shows_and_does_what_is_worked_out_by_hand(name):
     for row in range(SHIPS):
         expected, ends, earned = by_hand(env, base, 7 + row, outputs[:, row])
         np.testing.assert_allclose(np.array(shown)[:, row], expected, atol=1e-6)
-        np.testing.assert_allclose(np.array(rewards)[:, row], earned, rtol=1e-5, atol=1e-7)
+        np.testing.assert_allclose(
+            np.array(rewards)[:, row], earned, rtol=1e-5, atol=1e-7
+        )
         assert list(last[row]) == list(ends) == [4, 9]
         for step, end in ends.items():
             np.testing.assert_allclose(last[row][step], end, atol=1e-6)
@@ -94,7 +105,10 @@ def test_only_history():
 @pytest.mark.parametrize("name", BASES)
 def test_a_held_output_is_that_many_steps_with_it_and_none_after_an_episode_s_end(name):
     env, base = BASES[name]
-    long, short = ResidualVecEnv(ships(env), base, action_repeat=3), ResidualVecEnv(ships(env), base)
+    long, short = (
+        ResidualVecEnv(ships(env), base, action_repeat=3),
+        ResidualVecEnv(ships(env), base),
+    )
     np.testing.assert_array_equal(long.reset(), short.reset())
     random, endings = np.random.default_rng(2), 0
     for _ in range(STEPS):
@@ -102,15 +116,21 @@ def test_a_held_output_is_that_many_steps_with_it_and_none_after_an_episode_s_en
         seen, rewards, dones, infos = long.step(outputs)
         earned, over, ends = np.zeros(SHIPS), np.zeros(SHIPS, bool), [None] * SHIPS
         for _ in range(3):
-            expected, more, ended, told = short.step(np.where(over[:, None], 0.0, outputs))
+            expected, more, ended, told = short.step(
+                np.where(over[:, None], 0.0, outputs)
+            )
             earned += np.where(over, 0.0, more)
-            ends = [told[k] if ended[k] and not over[k] else ends[k] for k in range(SHIPS)]
+            ends = [
+                told[k] if ended[k] and not over[k] else ends[k] for k in range(SHIPS)
+            ]
             over |= ended
         np.testing.assert_array_equal(seen, expected)
         np.testing.assert_array_equal(dones, over)
         np.testing.assert_allclose(rewards, earned, rtol=1e-6)
         for k in np.flatnonzero(over):
-            np.testing.assert_array_equal(infos[k]["terminal_observation"], ends[k]["terminal_observation"])
+            np.testing.assert_array_equal(
+                infos[k]["terminal_observation"], ends[k]["terminal_observation"]
+            )
         endings += over.sum()
     assert endings == SHIPS * (3 * STEPS // 5)
 
@@ -166,7 +186,11 @@ def test_without_a_base_outputs_are_limited_in_rate_from_nothing_on():
     limited.reset()
     for output in (1.0, 1.0, 5.0):
         limited.step(np.full((2, 1), output))
-    assert inner.commanded == [[[0.25], [0.25]], [[0.5], [0.5]], [[0.75], [0.25]]]  # row 1 began anew
+    assert inner.commanded == [
+        [[0.25], [0.25]],
+        [[0.5], [0.5]],
+        [[0.75], [0.25]],
+    ]  # row 1 began anew
     kept = limited.memory()
     limited.reset()
     limited.step(np.full((2, 1), -1.0))
@@ -196,12 +220,17 @@ def test_the_base_and_what_is_added_are_no_more_than_the_whole_range():
     residual.step(np.array([[1.0], [-1.0]]))
     residual.step(np.array([[0.1], [-9.0]]))
     assert inner.commanded == [[[1.0], [0.4]], [[0.95], [0.4]]]
-    assert (residual.observation_space.low.tolist(), residual.observation_space.high.tolist()) == (
+    assert (
+        residual.observation_space.low.tolist(),
+        residual.observation_space.high.tolist(),
+    ) == (
         [-100.0, -1.0],
         [100.0, 1.0],
     )
     residual.reset()
-    assert base.asked[0] == base.asked[-1] == (None, [True, True])  # episodes begin with no state
+    assert (
+        base.asked[0] == base.asked[-1] == (None, [True, True])
+    )  # episodes begin with no state
     assert base.asked[1:-1] == [(1, [False, False]), (2, [False, False])]
 
 
@@ -210,18 +239,26 @@ def test_an_episode_that_ends_shows_its_last_observations_and_then_those_of_the_
     residual = ResidualVecEnv(inner, base, frame_stack=3)
     proposed = np.float32(0.9)
     assert residual.reset().tolist() == [[0.0, 0.0, 0.0, proposed]] * 2
-    assert residual.step(np.zeros((2, 1)))[0].tolist() == [[0.0, 0.0, 1.0, proposed]] * 2
+    assert (
+        residual.step(np.zeros((2, 1)))[0].tolist() == [[0.0, 0.0, 1.0, proposed]] * 2
+    )
     seen, _, dones, infos = residual.step(np.zeros((2, 1)))
     assert seen.tolist() == [[0.0, 1.0, 2.0, proposed], [-1.0, -1.0, -1.0, proposed]]
     assert infos[1]["terminal_observation"].tolist() == [0.0, 1.0, 2.0, proposed]
     assert dones.tolist() == [False, True]
     seen, *_ = residual.step(np.zeros((2, 1)))
     assert seen.tolist() == [[1.0, 2.0, 3.0, proposed], [-1.0, -1.0, 3.0, proposed]]
-    assert base.asked[2:4] == [(2, [False, False]), (2, [False, True])]  # asked of the end, then of the next
+    assert base.asked[2:4] == [
+        (2, [False, False]),
+        (2, [False, True]),
+    ]  # asked of the end, then of the next
 
 
 def test_rewards_of_a_decision_are_summed_up_to_the_end_of_the_episode():
-    for base, after in ((None, 1.0), (Steady(), 0.9)):  # after an end the base alone, or the output
+    for base, after in (
+        (None, 1.0),
+        (Steady(), 0.9),
+    ):  # after an end the base alone, or the output
         inner = Counting(end=2)
         held = ResidualVecEnv(inner, base, action_repeat=3)
         held.reset()
@@ -239,7 +276,8 @@ def test_a_base_needs_commands_within_the_whole_range(bound, fits):
         inner = Counting()
         inner.action_space = Box(low, high, (1,))
         with pytest.raises(
-            InputError, match=r"^venv: actions in Box.* found, expected a Box within \[-1, 1\]"
+            InputError,
+            match=r"^venv: actions in Box.* found, expected a Box within \[-1, 1\]",
         ):
             ResidualVecEnv(inner, Steady())
 
@@ -248,7 +286,8 @@ def test_observations_are_a_flat_row_of_numbers():
     inner = Counting()
     inner.observation_space = Box(-1.0, 1.0, (2, 2))
     with pytest.raises(
-        InputError, match=r"venv: observations in Box.* found, expected a flat Box of numbers"
+        InputError,
+        match=r"venv: observations in Box.* found, expected a flat Box of numbers",
     ):
         ResidualVecEnv(inner)
 
@@ -268,12 +307,16 @@ def test_an_output_beyond_its_limits_counts_as_the_limit():
 
 
 @pytest.mark.parametrize("rate_limit", [2.0, 0.01])
-def test_what_was_learned_beside_a_base_is_flown_from_its_file_as_in_training(rate_limit, tmp_path):
+def test_what_was_learned_beside_a_base_is_flown_from_its_file_as_in_training(
+    rate_limit, tmp_path
+):
     torch.set_num_threads(1)
     asked = {"authority": 0.2, "frame_stack": 2, "rate_limit": rate_limit}
     env = ResidualVecEnv(ships(COURSE, 8), BASES["lqg"][1], **asked)
     scaled = VecNormalize(env, norm_obs=False, gamma=0.9)
-    agent = PPO("MlpPolicy", scaled, n_steps=16, batch_size=64, n_epochs=1, seed=0, device="cpu")
+    agent = PPO(
+        "MlpPolicy", scaled, n_steps=16, batch_size=64, n_epochs=1, seed=0, device="cpu"
+    )
     before = agent.predict(scaled.reset(), deterministic=True)[0]
     agent.learn(128)
     LearnedPolicy.from_sb3(agent, scaled).save(tmp_path / "agent.json")
@@ -284,7 +327,9 @@ def test_what_was_learned_beside_a_base_is_flown_from_its_file_as_in_training(ra
     for _ in range(STEPS):
         action, state = policy.predict(seen, state, starts)
         seen, rewards, starts, _ = bare.step(action)
-        shown, expected, ends, _ = twin.step(agent.predict(shown, deterministic=True)[0])
+        shown, expected, ends, _ = twin.step(
+            agent.predict(shown, deterministic=True)[0]
+        )
         np.testing.assert_allclose(rewards, expected, rtol=1e-4, atol=1e-7)
         np.testing.assert_array_equal(starts, ends)
 
@@ -292,15 +337,26 @@ def test_what_was_learned_beside_a_base_is_flown_from_its_file_as_in_training(ra
 @pytest.mark.parametrize(
     ("made", "message"),
     [
-        (lambda: ResidualVecEnv(ships(COURSE), authority=0.5), "authority: 0.5 found without a base"),
-        (lambda: ResidualVecEnv(ships(COURSE), BASES["lq"][1], authority=3.0), "authority: 3"),
+        (
+            lambda: ResidualVecEnv(ships(COURSE), authority=0.5),
+            "authority: 0.5 found without a base",
+        ),
+        (
+            lambda: ResidualVecEnv(ships(COURSE), BASES["lq"][1], authority=3.0),
+            "authority: 3",
+        ),
         (lambda: ResidualVecEnv(ships(COURSE), frame_stack=0), "frame_stack: 0"),
         (lambda: ResidualVecEnv(ships(COURSE), action_repeat=0), "action_repeat: 0"),
         (lambda: ResidualVecEnv(ships(COURSE), "lq"), "base: str found"),
         (lambda: ResidualVecEnv(ships(COURSE), BASES["ilos-lqg"][1]), "cross_track"),
-        (lambda: ResidualVecEnv(ships(COURSE), LQ.from_model(load_model("kvlcc2"))), "base: the scale of"),
         (
-            lambda: ResidualVecEnv(ShipVecEnv(COURSE, 2, action="rudder-discrete"), BASES["lq"][1]),
+            lambda: ResidualVecEnv(ships(COURSE), LQ.from_model(load_model("kvlcc2"))),
+            "base: the scale of",
+        ),
+        (
+            lambda: ResidualVecEnv(
+                ShipVecEnv(COURSE, 2, action="rudder-discrete"), BASES["lq"][1]
+            ),
             "actions in Discrete",
         ),
     ],

@@ -32,7 +32,9 @@ def test_on_a_leg_distance_is_to_starboard_and_the_turns_ahead_are_told():
     assert found["next_turn_angle"] == pytest.approx(np.pi / 2)
     assert found["second_turn_angle"] == pytest.approx(np.pi / 2)
     arc = RADIUS * np.pi / 2
-    assert found["second_turn_distance"] == pytest.approx(1700.0 + arc + 1400.0, abs=2.0)
+    assert found["second_turn_distance"] == pytest.approx(
+        1700.0 + arc + 1400.0, abs=2.0
+    )
     assert given(path, 1000.0, -20.0)["cross_track"] == pytest.approx(-20.0, abs=0.1)
     assert not path.ended
 
@@ -44,7 +46,9 @@ def test_on_an_arc_the_direction_turns_and_behind_it_the_next_leg_follows(side):
     north, east = 2700.0 + RADIUS * math.sin(angle), RADIUS * (1.0 - math.cos(angle))
     found = given(path, north, side * east)
     assert found["set_point"] == pytest.approx(side * angle, abs=1e-3)
-    assert found["next_turn_angle"] == pytest.approx(side * math.radians(60.0), abs=1e-3)
+    assert found["next_turn_angle"] == pytest.approx(
+        side * math.radians(60.0), abs=1e-3
+    )
     assert found["cross_track"] == pytest.approx(0.0, abs=0.5)
     found = given(path, 2990.0, side * 1000.0)
     assert found["set_point"] == pytest.approx(side * np.pi / 2)
@@ -58,7 +62,8 @@ def test_on_an_arc_the_direction_turns_and_behind_it_the_next_leg_follows(side):
 def test_a_route_reaches_as_far_as_a_plane_and_turns_fit_between_waypoints():
     route((0, 0), (99e3, 0))
     with pytest.raises(
-        InputError, match="waypoints: 101 km from the first found, expected at most 100 km; divide"
+        InputError,
+        match="waypoints: 101 km from the first found, expected at most 100 km; divide",
     ):
         route((0, 0), (0, 101e3))
     with pytest.raises(InputError, match="turn"):

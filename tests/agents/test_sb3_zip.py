@@ -35,7 +35,11 @@ from shipgym.errors import InputError
 from tests.agents.test_policy_extraction import QUICK, Doubled, one_thread, seen, strong
 
 TASK = load_suite().task("mariner-calm")
-QUICK_OFF_POLICY = {"learning_starts": 4, "buffer_size": 50, "policy_kwargs": {"net_arch": [16]}}
+QUICK_OFF_POLICY = {
+    "learning_starts": 4,
+    "buffer_size": 50,
+    "policy_kwargs": {"net_arch": [16]},
+}
 assert one_thread  # a fixture for all tests
 
 
@@ -44,7 +48,9 @@ def ships(env_id=TASK.env_id, **options):
 
 
 def saved(folder, kind=PPO, env=None, steps=16, **settings):
-    agent = kind("MlpPolicy", ships() if env is None else env, seed=0, **{**QUICK, **settings})
+    agent = kind(
+        "MlpPolicy", ships() if env is None else env, seed=0, **{**QUICK, **settings}
+    )
     strong(agent.learn(steps)).save(folder / "model.zip")
     return agent, folder / "model.zip"
 
@@ -52,7 +58,13 @@ def saved(folder, kind=PPO, env=None, steps=16, **settings):
 @pytest.mark.parametrize(
     ("kind", "settings"),
     [
-        (PPO, {**QUICK, "policy_kwargs": {"net_arch": [16, 16], "activation_fn": torch.nn.ReLU}}),
+        (
+            PPO,
+            {
+                **QUICK,
+                "policy_kwargs": {"net_arch": [16, 16], "activation_fn": torch.nn.ReLU},
+            },
+        ),
         (SAC, QUICK_OFF_POLICY),
         (TD3, QUICK_OFF_POLICY),
     ],
@@ -64,19 +76,23 @@ def test_the_commands_are_those_of_torch(kind, settings, tmp_path):
     expected, _ = agent.predict(seen(agent), deterministic=True)
     policy = read_sb3(tmp_path / "model.zip").policy(TASK.task, TASK.ship)
     assert expected.std() > 0.1
-    np.testing.assert_allclose(policy.predict(seen(agent))[0], expected, rtol=0.0, atol=1e-6)
+    np.testing.assert_allclose(
+        policy.predict(seen(agent))[0], expected, rtol=0.0, atol=1e-6
+    )
 
 
 def test_a_zip_takes_part_and_is_verified(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     saved(tmp_path)
-    result = benchmark("lq,model.zip", tasks=[TASK.name], out="results", episodes=2, workers=1)
+    result = benchmark(
+        "lq,model.zip", tasks=[TASK.name], out="results", episodes=2, workers=1
+    )
     assert result.figures("model", TASK.name).shape == (1, 2)
     assert [check.passed for check in verify("results")] == [True, True]
     saved(tmp_path, learning_rate=0.01)
-    assert {check.contestant: check.note for check in verify("results")}["model"] == (
-        "'model.zip' is not the file that took part"
-    )
+    assert {check.contestant: check.note for check in verify("results")}[
+        "model"
+    ] == "'model.zip' is not the file that took part"
 
 
 REFUSED = {
@@ -85,13 +101,19 @@ REFUSED = {
         lambda: {"policy_kwargs": {"features_extractor_class": Doubled}},
         "policy_kwargs 'features_extractor_class' found",
     ),
-    "activation": (lambda: {"policy_kwargs": {"activation_fn": torch.nn.ELU}}, "network is ELU"),
+    "activation": (
+        lambda: {"policy_kwargs": {"activation_fn": torch.nn.ELU}},
+        "network is ELU",
+    ),
     "sde": (lambda: {"use_sde": True}, "use_sde"),
     "stacked": (
         lambda: {"env": VecFrameStack(ships(), 2)},
         "16 observations within .* expected the task's 8",
     ),
-    "other task": (lambda: {"env": ships("shipgym/PathFollowing-v1")}, "15 observations within"),
+    "other task": (
+        lambda: {"env": ships("shipgym/PathFollowing-v1")},
+        "15 observations within",
+    ),
     "other action": (
         lambda: {"env": ships("shipgym/CourseKeepingDiscrete-v0")},
         "9 outputs found, expected 1",
@@ -109,13 +131,18 @@ def test_what_would_steer_otherwise_than_it_learned_is_refused(name, tmp_path):
 
 
 def test_another_algorithm_and_a_policy_of_ones_own_are_refused(tmp_path):
-    DQN("MlpPolicy", ships("shipgym/CourseKeepingDiscrete-v0"), buffer_size=10).save(tmp_path / "model.zip")
-    with pytest.raises(InputError, match=r"policy of 'stable_baselines3.dqn.policies' found"):
+    DQN("MlpPolicy", ships("shipgym/CourseKeepingDiscrete-v0"), buffer_size=10).save(
+        tmp_path / "model.zip"
+    )
+    with pytest.raises(
+        InputError, match=r"policy of 'stable_baselines3.dqn.policies' found"
+    ):
         read_sb3(tmp_path / "model.zip")
 
 
 @pytest.mark.parametrize(
-    "space", [{}, {"low": "[-1. -1.]", "high": "[a b]"}, {"low": "[-1.]", "high": "[1. 1.]"}]
+    "space",
+    [{}, {"low": "[-1. -1.]", "high": "[a b]"}, {"low": "[-1.]", "high": "[1. 1.]"}],
 )
 def test_a_space_of_observations_that_is_no_flat_box_is_refused(space, tmp_path):
     _, path = saved(tmp_path)
@@ -189,9 +216,14 @@ def zipped(compression=zipfile.ZIP_STORED, **members):
 def test_members_are_as_they_are_and_together_no_larger_than_the_zip():
     noise = np.random.default_rng(0).bytes(1000)
     assert _opened(zipped(a=noise, b=noise)).read("b") == noise
-    claimed = zipped(a=noise).replace(struct.pack("<II", 1000, 1000), struct.pack("<II", 1000, 5000))
+    claimed = zipped(a=noise).replace(
+        struct.pack("<II", 1000, 1000), struct.pack("<II", 1000, 5000)
+    )
     for content in (zipped(zipfile.ZIP_DEFLATED, a=noise), claimed):
-        with pytest.raises(ValueError, match="compressed members found, expected them as `save` writes them"):
+        with pytest.raises(
+            ValueError,
+            match="compressed members found, expected them as `save` writes them",
+        ):
             _opened(content)
 
 
@@ -206,10 +238,18 @@ def test_weights_are_of_single_precision_and_fill_the_file():
     full = saved_tensors({"a": torch.arange(50_000.0)})
     assert len(full) < 5 * 50_000
     assert _weights(full)["a"][-1] == 49_999.0
-    thin = len(saved_tensors({"a": torch.zeros(1).expand(1000)})) // 2  # a number, shown so often
+    thin = (
+        len(saved_tensors({"a": torch.zeros(1).expand(1000)})) // 2
+    )  # a number, shown so often
     double = torch.zeros(3, dtype=torch.float64)
-    for wrong in ({"a": torch.zeros(1).expand(thin)}, {"a": double}, {3: torch.zeros(3)}):
-        with pytest.raises(ValueError, match=r"weights .*: expected numbers of type float32"):
+    for wrong in (
+        {"a": torch.zeros(1).expand(thin)},
+        {"a": double},
+        {3: torch.zeros(3)},
+    ):
+        with pytest.raises(
+            ValueError, match=r"weights .*: expected numbers of type float32"
+        ):
             _weights(saved_tensors(wrong))
     with pytest.raises(TypeError, match="Sparse"):
         _weights(saved_tensors({"a": torch.eye(3).to_sparse()}))
@@ -234,13 +274,25 @@ def test_what_stands_between_the_layers_is_told_by_its_name(kwargs, found):
 @pytest.mark.parametrize(
     ("about", "message"),
     [
-        ({"policy_kwargs": {"use_sde": True}}, r"state-dependent exploration \(use_sde\) found"),
+        (
+            {"policy_kwargs": {"use_sde": True}},
+            r"state-dependent exploration \(use_sde\) found",
+        ),
         ({"use_sde": True}, r"state-dependent exploration \(use_sde\) found"),
-        ({"policy_kwargs": {"extra": 1, "also": 2}}, "policy_kwargs 'also', 'extra' found, expected 'MlpPol"),
+        (
+            {"policy_kwargs": {"extra": 1, "also": 2}},
+            "policy_kwargs 'also', 'extra' found, expected 'MlpPol",
+        ),
         ({"policy_kwargs": 3}, "data: policy_kwargs: 3 found, expected a table"),
         ({"policy_class": None}, "data: policy_class: None found, expected a table"),
-        ({"policy_class": {}}, "policy of None found, expected 'MlpPolicy' of stable-baselines3"),
-        ({"policy_class": {"__module__": "my.stable_baselines3.sac.policies"}}, "policy of 'my.stable_base"),
+        (
+            {"policy_class": {}},
+            "policy of None found, expected 'MlpPolicy' of stable-baselines3",
+        ),
+        (
+            {"policy_class": {"__module__": "my.stable_baselines3.sac.policies"}},
+            "policy of 'my.stable_base",
+        ),
     ],
 )
 def test_other_policies_are_refused_by_what_their_zip_says(about, message):
@@ -254,17 +306,26 @@ def test_bounds_of_observations_are_read_from_their_texts():
 
 
 @pytest.mark.parametrize(
-    ("length", "known"), [(1.0, True), (1.00009, True), (0.9999, True), (1.000115, False), (0.99988, False)]
+    ("length", "known"),
+    [(1.0, True), (1.00009, True), (0.9999, True), (1.000115, False), (0.99988, False)],
 )
 def test_sine_and_cosine_of_an_angle_are_of_length_1(length, known):
     angle = np.array([0.3, 2.0, -1.0])
     seen = np.zeros((3, 4), np.float32)
-    seen[:, 0], seen[:, 1], seen[:, 2] = length * np.sin(angle), length * np.cos(angle), 5.0
-    about = {"_last_obs": {":serialized:": base64.b64encode(pickle.dumps(seen)).decode()}}
+    seen[:, 0], seen[:, 1], seen[:, 2] = (
+        length * np.sin(angle),
+        length * np.cos(angle),
+        5.0,
+    )
+    about = {
+        "_last_obs": {":serialized:": base64.b64encode(pickle.dumps(seen)).decode()}
+    }
     if known:
         assert _check_not_scaled(about, 4) is None
         about = {"_last_obs": {}}
-    with pytest.raises(InputError, match="last observations found that are scaled, or not of shipgym"):
+    with pytest.raises(
+        InputError, match="last observations found that are scaled, or not of shipgym"
+    ):
         _check_not_scaled(about, 4)
 
 
@@ -282,28 +343,39 @@ def test_a_task_with_other_bounds_is_another_task():
     assert policy.observation_scales == tuple(one.scale for one in shown)
     wider = Sb3Agent(agent.path, agent.network, bounds * 1.001)
     with pytest.raises(
-        InputError, match=r"^model\.zip: 8 observations within .* found, expected the task's 8"
+        InputError,
+        match=r"^model\.zip: 8 observations within .* found, expected the task's 8",
     ):
         wider.policy(TASK.task, TASK.ship)
 
 
 def test_without_torch_the_extra_is_named(tmp_path, monkeypatch):
-    (tmp_path / "model.zip").write_bytes(zipped(data="{}", **{"policy.pth": saved_tensors({})}))
+    (tmp_path / "model.zip").write_bytes(
+        zipped(data="{}", **{"policy.pth": saved_tensors({})})
+    )
     with pytest.raises(InputError, match=r"model\.zip: data: policy_class: None found"):
         read_sb3(tmp_path / "model.zip")
     monkeypatch.setitem(sys.modules, "torch", None)
     with pytest.raises(
-        InputError, match=r"model\.zip: needs torch, not installed: pip install 'shipgym\[rl\]'"
+        InputError,
+        match=r"model\.zip: needs torch, not installed: pip install 'shipgym\[rl\]'",
     ):
         read_sb3(tmp_path / "model.zip")
 
 
 def test_what_is_wrong_with_a_zip_is_told_in_a_line(tmp_path):
     (tmp_path / "model.zip").write_bytes(zipped(data="{}"))
-    with pytest.raises(InputError, match=r"\(.KeyError: .*policy\.pth.*\); save the agent again$") as error:
+    with pytest.raises(
+        InputError, match=r"\(.KeyError: .*policy\.pth.*\); save the agent again$"
+    ) as error:
         read_sb3(tmp_path / "model.zip")
     assert "\n" not in str(error.value)
     double = {"w" * 400: torch.zeros(3, dtype=torch.float64)}
-    (tmp_path / "model.zip").write_bytes(zipped(data="{}", **{"policy.pth": saved_tensors(double)}))
-    with pytest.raises(InputError, match=r"""\("ValueError: weights 'w{179}"\); save the agent again$"""):
+    (tmp_path / "model.zip").write_bytes(
+        zipped(data="{}", **{"policy.pth": saved_tensors(double)})
+    )
+    with pytest.raises(
+        InputError,
+        match=r"""\("ValueError: weights 'w{179}"\); save the agent again$""",
+    ):
         read_sb3(tmp_path / "model.zip")

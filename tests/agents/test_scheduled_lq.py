@@ -48,11 +48,17 @@ def linear_cost(ship, row, n=4000):
     for _ in range(n):
         before = x[3]
         x = ship.A @ x + ship.B[:, 0] * (row @ x)
-        cost += x[2] ** 2 + 0.1 * x[3] ** 2 + rate_weight(MARINER) * ((x[3] - before) / ship.dt) ** 2
+        cost += (
+            x[2] ** 2
+            + 0.1 * x[3] ** 2
+            + rate_weight(MARINER) * ((x[3] - before) / ship.dt) ** 2
+        )
     return cost
 
 
-def test_a_ship_that_has_lost_speed_is_steered_cheaper_than_by_the_gains_of_service_speed(of_mariner):
+def test_a_ship_that_has_lost_speed_is_steered_cheaper_than_by_the_gains_of_service_speed(
+    of_mariner,
+):
     lq = LQ.from_model(MARINER)
     ship = sample_ship(MARINER, 1.0, speed=0.6 * MARINER.particulars["speed"])
     fixed = np.array([lq.gains[signal] for signal in SIGNALS])
@@ -86,7 +92,8 @@ def test_it_is_a_controller_and_a_file(of_mariner, tmp_path):
 
 def test_speeds_that_do_not_rise_are_refused():
     with pytest.raises(
-        InputError, match=r"speeds: \[7\.0, 5\.0\] found, expected at least two in rising order"
+        InputError,
+        match=r"speeds: \[7\.0, 5\.0\] found, expected at least two in rising order",
     ):
         ScheduledLQ.from_model(MARINER, speeds=[7.0, 5.0])
 
@@ -95,4 +102,7 @@ def test_an_unbounded_gain_margin_is_a_million(monkeypatch):
     margins = SimpleNamespace(gain_margin=np.inf, phase_margin_deg=61.0)
     monkeypatch.setattr(scheduled_lq.Compensator, "margins", lambda *_: margins)
     design = ScheduledLQ.from_model(MARINER, speeds=[6.0, 8.0]).design
-    assert (design["least_gain_margin"], design["least_phase_margin_deg"]) == (1e6, 61.0)
+    assert (design["least_gain_margin"], design["least_phase_margin_deg"]) == (
+        1e6,
+        61.0,
+    )

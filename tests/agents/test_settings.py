@@ -39,47 +39,99 @@ from tests.golden.texts import flat, same_text
 FREE = {"base": "none", "authority": 1.0}
 #: The least and the largest value that is allowed, and the nearest that is not.
 BOUNDS = [
-    ("ppo", "total_steps", 1, 0), ("sac", "ships", 1, 0), ("ppo", "learning_rate", 1.0, 1.1),
-    ("ppo", "learning_rate", 1e-9, 0.0), ("ppo", "gamma", 0.0, -0.01), ("ppo", "gamma", 1.0, 1.01),
-    ("ppo", "frame_stack", 1, 0), ("ppo", "action_repeat", 1, 0), ("ppo", "reward_scale", 1e-9, 0.0),
-    ("ppo", "n_epochs", 1, 0), ("ppo", "gae_lambda", 0.0, -0.01), ("ppo", "gae_lambda", 1.0, 1.01),
-    ("ppo", "clip_range", 1e-9, 0.0), ("ppo", "ent_coef", 0.0, -0.1), ("ppo", "vf_coef", 1e-9, 0.0),
-    ("ppo", "log_std_init", -10.0, -10.1), ("ppo", "log_std_init", 3.0, 3.1),
-    ("ppo", "log_std_end", -10.0, -10.1), ("ppo", "log_std_end", 3.0, 3.1), ("ppo", "batch_size", 2, 1),
-    ("ppo", "net_arch", [1], [0]), ("ppo", "evaluate_every", 1, 0), ("ppo", "max_grad_norm", 1e-9, 0.0),
-    ("sac", "learning_starts", 0, -1), ("sac", "train_freq", 1, 0), ("sac", "gradient_steps", 1, 0),
-    ("sac", "tau", 1.0, 1.1), ("sac", "tau", 1e-9, 0.0), ("sac", "critic_arch", [1], [0]),
-    ("sac", "target_entropy", 1.0, 1.1), ("sac", "ent_coef", 0.0, -0.1), ("td3", "policy_delay", 1, 0),
-    ("td3", "action_noise", 1e-9, 0.0), ("td3", "target_policy_noise", 0.0, -0.1),
-    ("td3", "target_noise_clip", 0.0, -0.1), ("tqc", "n_critics", 1, 0), ("tqc", "n_quantiles", 3, 2),
-    ("tqc", "top_quantiles_to_drop", 0, -1), ("tqc", "top_quantiles_to_drop", 24, 25),
-]  # fmt: skip
+    ("ppo", "total_steps", 1, 0),
+    ("sac", "ships", 1, 0),
+    ("ppo", "learning_rate", 1.0, 1.1),
+    ("ppo", "learning_rate", 1e-9, 0.0),
+    ("ppo", "gamma", 0.0, -0.01),
+    ("ppo", "gamma", 1.0, 1.01),
+    ("ppo", "frame_stack", 1, 0),
+    ("ppo", "action_repeat", 1, 0),
+    ("ppo", "reward_scale", 1e-9, 0.0),
+    ("ppo", "n_epochs", 1, 0),
+    ("ppo", "gae_lambda", 0.0, -0.01),
+    ("ppo", "gae_lambda", 1.0, 1.01),
+    ("ppo", "clip_range", 1e-9, 0.0),
+    ("ppo", "ent_coef", 0.0, -0.1),
+    ("ppo", "vf_coef", 1e-9, 0.0),
+    ("ppo", "log_std_init", -10.0, -10.1),
+    ("ppo", "log_std_init", 3.0, 3.1),
+    ("ppo", "log_std_end", -10.0, -10.1),
+    ("ppo", "log_std_end", 3.0, 3.1),
+    ("ppo", "batch_size", 2, 1),
+    ("ppo", "net_arch", [1], [0]),
+    ("ppo", "evaluate_every", 1, 0),
+    ("ppo", "max_grad_norm", 1e-9, 0.0),
+    ("sac", "learning_starts", 0, -1),
+    ("sac", "train_freq", 1, 0),
+    ("sac", "gradient_steps", 1, 0),
+    ("sac", "tau", 1.0, 1.1),
+    ("sac", "tau", 1e-9, 0.0),
+    ("sac", "critic_arch", [1], [0]),
+    ("sac", "target_entropy", 1.0, 1.1),
+    ("sac", "ent_coef", 0.0, -0.1),
+    ("td3", "policy_delay", 1, 0),
+    ("td3", "action_noise", 1e-9, 0.0),
+    ("td3", "target_policy_noise", 0.0, -0.1),
+    ("td3", "target_noise_clip", 0.0, -0.1),
+    ("tqc", "n_critics", 1, 0),
+    ("tqc", "n_quantiles", 3, 2),
+    ("tqc", "top_quantiles_to_drop", 0, -1),
+    ("tqc", "top_quantiles_to_drop", 24, 25),
+]
 
 
 @pytest.mark.parametrize(("algorithm", "name", "allowed", "beyond"), BOUNDS)
-def test_settings_reach_to_their_bounds_and_no_further(algorithm, name, allowed, beyond):
+def test_settings_reach_to_their_bounds_and_no_further(
+    algorithm, name, allowed, beyond
+):
     usual = load_settings(algorithm)
     kept = changed(usual, {name: allowed})
-    assert getattr(kept, name) == (tuple(allowed) if isinstance(allowed, list) else allowed)
-    with pytest.raises(InputError, match=rf"{name}: .* found, expected|top_quantiles_to_drop: 2 found"):
+    assert getattr(kept, name) == (
+        tuple(allowed) if isinstance(allowed, list) else allowed
+    )
+    with pytest.raises(
+        InputError, match=rf"{name}: .* found, expected|top_quantiles_to_drop: 2 found"
+    ):
         changed(usual, {name: beyond})
 
 
 @pytest.mark.parametrize(
     ("given", "message"),
     [
-        ({"net_arch": "64"}, r"net_arch: '64' found, expected widths of layers, such as \[64, 64\]"),
+        (
+            {"net_arch": "64"},
+            r"net_arch: '64' found, expected widths of layers, such as \[64, 64\]",
+        ),
         ({"net_arch": 64}, "expected widths of layers"),
-        ({"ent_coef": "auto_x"}, "found, expected a number, 'auto' or such as 'auto_0.1'"),
-        ({"ent_coef": "auto_-1"}, "found, expected a number, 'auto' or such as 'auto_0.1'"),
+        (
+            {"ent_coef": "auto_x"},
+            "found, expected a number, 'auto' or such as 'auto_0.1'",
+        ),
+        (
+            {"ent_coef": "auto_-1"},
+            "found, expected a number, 'auto' or such as 'auto_0.1'",
+        ),
         ({"ent_coef": "otto"}, "ent_coef: 'otto'"),
-        ({"target_entropy": "auto_1"}, "target_entropy: 'auto_1' .* found, expected a number .*; or 'auto'$"),
-        ({"target_entropy": "auto1"}, "target_entropy: 'auto1' .* found, expected a number .*; or 'auto'$"),
-        ({"ent_coef": "auto_0"}, "found, expected a number, 'auto' or such as 'auto_0.1'"),
+        (
+            {"target_entropy": "auto_1"},
+            "target_entropy: 'auto_1' .* found, expected a number .*; or 'auto'$",
+        ),
+        (
+            {"target_entropy": "auto1"},
+            "target_entropy: 'auto1' .* found, expected a number .*; or 'auto'$",
+        ),
+        (
+            {"ent_coef": "auto_0"},
+            "found, expected a number, 'auto' or such as 'auto_0.1'",
+        ),
         ({"ent_coef": True}, "ent_coef: True found"),
         ({"schedule": "liner"}, "Did you mean 'linear'"),
         ({"activation": "elu"}, "activation: 'elu' found, expected one of"),
-        ({"ships": 10, "buffer_size": 9}, "buffer_size: 9 found, expected one for each of 10 ships"),
+        (
+            {"ships": 10, "buffer_size": 9},
+            "buffer_size: 9 found, expected one for each of 10 ships",
+        ),
         ({"authority": 2.1, "base": "lq"}, "authority: 2.1 found"),
         ({"authority": 0.0, "base": "lq"}, "authority: 0 found"),
         ({"total_steps": 1.5}, "total_steps: 1.5"),
@@ -94,7 +146,10 @@ def test_settings_that_cannot_be_meant_are_refused(given, message):
 def test_the_store_of_past_steps_has_room_for_a_step_of_every_ship(algorithm):
     settings = load_settings(algorithm, given=FREE)
     assert changed(settings, {"ships": 10, "buffer_size": 10}).buffer_size == 10
-    with pytest.raises(InputError, match="buffer_size: 9 found, expected one for each of 10 ships at least"):
+    with pytest.raises(
+        InputError,
+        match="buffer_size: 9 found, expected one for each of 10 ships at least",
+    ):
         changed(settings, {"ships": 10, "buffer_size": 9})
 
 
@@ -104,7 +159,9 @@ def test_a_base_is_a_kind_of_controller_or_a_file_of_one():
     for wrong in ("designs/mine.toml", "lqq", ""):
         with pytest.raises(InputError, match=f"base: '{wrong}' found"):
             changed(settings, {"base": wrong})
-    with pytest.raises(InputError, match=r"authority: 0\.5 found without a base, expected 1, or a base"):
+    with pytest.raises(
+        InputError, match=r"authority: 0\.5 found without a base, expected 1, or a base"
+    ):
         changed(settings, {"base": "none", "authority": 0.5})
     assert changed(settings, {"base": "none", "authority": 1.0}).authority == 1.0
 
@@ -122,10 +179,17 @@ def test_settings_of_what_is_not_known_are_refused(asked, message):
 
 
 def test_every_setting_has_a_meaning_in_the_section_of_its_class_and_nothing_else_stands_there():
-    kinds = {kind for one in ALGORITHMS.values() for kind in one.__mro__ if issubclass(kind, Settings)}
+    kinds = {
+        kind
+        for one in ALGORITHMS.values()
+        for kind in one.__mro__
+        if issubclass(kind, Settings)
+    }
     assert {kind.section for kind in kinds} == set(KNOWN)
     for kind in kinds:
-        inherited = {one.name for base in kind.__bases__ if base in kinds for one in fields(base)}
+        inherited = {
+            one.name for base in kind.__bases__ if base in kinds for one in fields(base)
+        }
         own = {one.name for one in fields(kind)} - inherited
         assert own == set(KNOWN[kind.section]), kind.section
         for name, about in KNOWN[kind.section].items():
@@ -134,11 +198,16 @@ def test_every_setting_has_a_meaning_in_the_section_of_its_class_and_nothing_els
 
 def test_words_stand_for_numbers_where_they_may():
     assert (
-        changed(load_settings("sac"), {"ent_coef": "auto_0.1", "target_entropy": "auto"}).ent_coef
+        changed(
+            load_settings("sac"), {"ent_coef": "auto_0.1", "target_entropy": "auto"}
+        ).ent_coef
         == "auto_0.1"
     )
     assert changed(load_settings("sac"), {"ent_coef": "auto"}).ent_coef == "auto"
-    assert changed(load_settings("ppo"), {"reward_scale": "running"}).reward_scale == "running"
+    assert (
+        changed(load_settings("ppo"), {"reward_scale": "running"}).reward_scale
+        == "running"
+    )
     kept = changed(load_settings("ppo"), {"log_std_end": "learned", "gamma": 1})
     assert (kept.log_std_end, kept.gamma, type(kept.gamma)) == ("learned", 1.0, float)
 
@@ -146,7 +215,11 @@ def test_words_stand_for_numbers_where_they_may():
 def test_a_value_comes_from_the_nearest_table():
     """Residual tables for the rudder alone, the task's before the suite's, what is given before all."""
     scratch, residual = load_settings("ppo", given=FREE), load_settings("ppo")
-    assert (scratch.total_steps, scratch.n_steps, scratch.reward_scale) == (1_000_000, 64, 100.0)
+    assert (scratch.total_steps, scratch.n_steps, scratch.reward_scale) == (
+        1_000_000,
+        64,
+        100.0,
+    )
     assert (residual.base, residual.n_steps, residual.clip_range) == ("lq", 256, 0.2)
     assert load_settings("ppo", "path-following").base == "ilos"
     assert load_settings("ppo", action="rudder-shaft") == scratch
@@ -158,7 +231,9 @@ def test_a_value_comes_from_the_nearest_table():
         assert type(make_settings(algorithm, table)) is kind
         assert make_settings(algorithm, table).to_dict() == table
         del table["gamma"]
-        with pytest.raises(InputError, match=f"settings of {algorithm}: field 'gamma' is missing"):
+        with pytest.raises(
+            InputError, match=f"settings of {algorithm}: field 'gamma' is missing"
+        ):
             make_settings(algorithm, table)
 
 
@@ -171,17 +246,31 @@ def test_tuned_settings_are_the_golden_ones(algorithm):
         for task in load_suite(suite).tasks:
             found = load_settings(algorithm, task.environment, task.name).to_dict()
             as_usual = usual[task.environment]
-            own[task.name] = {name: value for name, value in found.items() if value != as_usual[name]}
-    told = {"from nothing": load_settings(algorithm, given=FREE).to_dict(), **usual, **own}
+            own[task.name] = {
+                name: value for name, value in found.items() if value != as_usual[name]
+            }
+    told = {
+        "from nothing": load_settings(algorithm, given=FREE).to_dict(),
+        **usual,
+        **own,
+    }
     assert same_text(f"settings/{algorithm}", "\n".join(flat(told, "")))
 
 
 def test_settings_of_the_command_line_and_of_files(tmp_path):
     texts = "gamma=0.9", "net_arch = [8, 8]", "base=lq", 'schedule="linear"', "note=a=b"
     found = named_values(texts, "--set", "gamma=0.98")
-    assert found == {"gamma": 0.9, "net_arch": [8, 8], "base": "lq", "schedule": "linear", "note": "a=b"}
+    assert found == {
+        "gamma": 0.9,
+        "net_arch": [8, 8],
+        "base": "lq",
+        "schedule": "linear",
+        "note": "a=b",
+    }
     for wrong in ("gamma", "=0.9"):
-        with pytest.raises(InputError, match=r"expected name=value, such as --set gamma=0\.98"):
+        with pytest.raises(
+            InputError, match=r"expected name=value, such as --set gamma=0\.98"
+        ):
             named_values([wrong], "--set", "gamma=0.98")
     assert present_names({"history": 2, "hold": 3, "gamma": 1}) == {
         "frame_stack": 2,
@@ -202,12 +291,23 @@ def test_settings_of_the_command_line_and_of_files(tmp_path):
 def test_the_first_difference_of_two_configurations_is_told():
     one = {"a": 1, "b": {"c": 2, "d": [3]}}
     assert first_difference(one, one) is None
-    assert first_difference(one | {"b": {"c": 2, "d": [4]}}, one) == "b.d is [3] there, [4] here"
+    assert (
+        first_difference(one | {"b": {"c": 2, "d": [4]}}, one)
+        == "b.d is [3] there, [4] here"
+    )
     assert first_difference(one | {"e": 5}, one) == "e is None there, 5 here"
     assert first_difference({"b": one["b"]}, one) == "a is 1 there, None here"
-    assert first_difference({"a": 1, "b": 3}, one) == "b is {'c': 2, 'd': [3]} there, 3 here"
-    assert first_difference({"a": {"c": 1}, "b": one["b"]}, one) == "a is 1 there, {'c': 1} here"
-    with pytest.raises(InputError, match=r"run: a run of another configuration: b.c is 2 there, 0 here"):
+    assert (
+        first_difference({"a": 1, "b": 3}, one)
+        == "b is {'c': 2, 'd': [3]} there, 3 here"
+    )
+    assert (
+        first_difference({"a": {"c": 1}, "b": one["b"]}, one)
+        == "a is 1 there, {'c': 1} here"
+    )
+    with pytest.raises(
+        InputError, match=r"run: a run of another configuration: b.c is 2 there, 0 here"
+    ):
         check_same(one | {"b": {"c": 0, "d": [3]}}, one, "run")
     check_same(one, one, "run")
     with pytest.raises(InputError, match="run: unknown key 'e'"):
@@ -237,15 +337,33 @@ def test_what_is_not_given_is_as_it_was():
     """A run that is resumed: seed, threads, model and options of the stored one where none are given."""
     first = make_plan(
         Given(
-            "ppo", model="kvlcc2", options={"episode_steps": 50}, settings={"gamma": 0.8}, seed=3, threads=2
+            "ppo",
+            model="kvlcc2",
+            options={"episode_steps": 50},
+            settings={"gamma": 0.8},
+            seed=3,
+            threads=2,
         )
     )
-    assert (first.seed, first.randomise, first.threads, first.training_seed) == (3, False, 2, 3000)
+    assert (first.seed, first.randomise, first.threads, first.training_seed) == (
+        3,
+        False,
+        2,
+        3000,
+    )
     assert Plan.from_configuration(first.configuration(), 2) == first
     again = make_plan(Given("ppo"), first)
     assert again == first
-    other = make_plan(Given("ppo", model="mariner", seed=0, randomise=True, settings={"n_epochs": 1}), first)
-    assert (other.task.model, other.seed, other.randomise, other.threads) == ("mariner", 0, True, 2)
+    other = make_plan(
+        Given("ppo", model="mariner", seed=0, randomise=True, settings={"n_epochs": 1}),
+        first,
+    )
+    assert (other.task.model, other.seed, other.randomise, other.threads) == (
+        "mariner",
+        0,
+        True,
+        2,
+    )
     assert other.task.options == first.task.options
     assert (other.settings.gamma, other.settings.n_epochs) == (0.8, 1)
     assert type(make_plan(Given("sac", settings=FREE), first).settings) is SACSettings
@@ -256,74 +374,151 @@ def test_what_is_not_given_is_as_it_was():
 
 def test_all_agents_were_chosen_on_the_same_hundred_episodes():
     seeds = [EVALUATION_SEED, EVALUATION_SEED + N_EVALUATIONS - 1]
-    paths = [path for task in load_suite().tasks for path in pretrained(task.name, "ppo")]
-    assert [json.loads(path.read_text())["training"]["evaluation_seeds"] for path in paths] == [seeds] * 12
-    assert min(min(task.seeds) for task in load_suite().tasks) >= EVALUATION_SEED + N_EVALUATIONS
+    paths = [
+        path for task in load_suite().tasks for path in pretrained(task.name, "ppo")
+    ]
+    assert [
+        json.loads(path.read_text())["training"]["evaluation_seeds"] for path in paths
+    ] == [seeds] * 12
+    assert (
+        min(min(task.seeds) for task in load_suite().tasks)
+        >= EVALUATION_SEED + N_EVALUATIONS
+    )
     assert make_plan(Given("ppo", seed=799)).training_seed + 1000 <= EVALUATION_SEED
 
 
-def test_the_file_of_settings_goes_before_the_tuned_ones_and_the_command_before_the_file(tmp_path):
+def test_the_file_of_settings_goes_before_the_tuned_ones_and_the_command_before_the_file(
+    tmp_path,
+):
     (tmp_path / "mine.toml").write_text("gamma = 0.7\nclip_range = 0.3\n")
     settings = make_plan(
-        Given("ppo", settings_file=tmp_path / "mine.toml", settings={"gamma": 0.6, "n_epochs": 2})
+        Given(
+            "ppo",
+            settings_file=tmp_path / "mine.toml",
+            settings={"gamma": 0.6, "n_epochs": 2},
+        )
     ).settings
     assert (settings.gamma, settings.clip_range, settings.n_epochs) == (0.6, 0.3, 2)
     assert settings.n_steps == load_settings("ppo").n_steps
 
 
-def test_domain_randomisation_draws_ships_seas_and_speeds_and_leaves_what_was_asked(tmp_path):
-    plan = make_plan(Given("ppo", model="mariner-tls-svm", sea="moderate", randomise=True))
+def test_domain_randomisation_draws_ships_seas_and_speeds_and_leaves_what_was_asked(
+    tmp_path,
+):
+    plan = make_plan(
+        Given("ppo", model="mariner-tls-svm", sea="moderate", randomise=True)
+    )
     assert plan.task.options == {"sea": "moderate"}
     options = training_options(plan)
-    assert [sea.name for sea in options["sea"]] == ["moderate", "calm", "slight", "rough"]  # each once
+    assert [sea.name for sea in options["sea"]] == [
+        "moderate",
+        "calm",
+        "slight",
+        "rough",
+    ]  # each once
     assert options["model_uncertainty"] == "covariance"
     asked = {"speed_range": (0.5, 0.6)}
-    own = training_options(make_plan(Given("ppo", model="mariner-tls-svm", options=asked, randomise=True)))
+    own = training_options(
+        make_plan(Given("ppo", model="mariner-tls-svm", options=asked, randomise=True))
+    )
     assert {name: own[name] for name in asked} == asked
     alone = {"model_uncertainty": "covariance"}
-    drawn = training_options(make_plan(Given("ppo", model="mariner-tls-svm", settings=alone)))
+    drawn = training_options(
+        make_plan(Given("ppo", model="mariner-tls-svm", settings=alone))
+    )
     assert drawn == alone  # neither seas nor speeds
-    assert training_options(make_plan(Given("ppo", model="mariner", settings=alone))) == {}
-    nomoto1_ship(0.1, 20.0, {"length": 160.0, "speed": 7.0}).save(tmp_path / "ship.json")
-    unknown = training_options(make_plan(Given("ppo", model=str(tmp_path / "ship.json"), randomise=True)))
+    assert (
+        training_options(make_plan(Given("ppo", model="mariner", settings=alone))) == {}
+    )
+    nomoto1_ship(0.1, 20.0, {"length": 160.0, "speed": 7.0}).save(
+        tmp_path / "ship.json"
+    )
+    unknown = training_options(
+        make_plan(Given("ppo", model=str(tmp_path / "ship.json"), randomise=True))
+    )
     assert [sea.name for sea in unknown["sea"]] == ["calm"]  # no beam, no weather
 
 
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ({"seed": 800}, "seed: 800 found, expected a whole number of at least 0 and at most 799"),
+        (
+            {"seed": 800},
+            "seed: 800 found, expected a whole number of at least 0 and at most 799",
+        ),
         ({"seed": -1}, "seed: -1 found"),
         ({"threads": 0}, "threads: 0 found"),
-        ({"settings": {"ships": 1001, "batch_size": 1001}}, "ships: 1001 found, .* at most 1000"),
+        (
+            {"settings": {"ships": 1001, "batch_size": 1001}},
+            "ships: 1001 found, .* at most 1000",
+        ),
         ({"settings": {"ships": 0}}, "ships: 0 found"),
-        ({"settings": {"action_repeat": 601}}, "action_repeat: 601 found, .* at most 600, no longer than an"),
-        ({"options": {"action": "rudder-shaft"}}, "action: 'rudder-shaft' found, but 'mariner' has no shaft"),
-        ({"task": "mariner-calm", "options": {"noise": 1.0}}, "--task: found together with --option, which"),
-        ({"task": "mariner-calm", "model": "kvlcc2"}, "--task: found together with --model, which"),
-        ({"options": {"action": "rudder-shaft"}, "model": "kvlcc2", "settings": {"base": "lq"}},
-         "base: 'lq' found with action 'rudder-shaft', expected 'none', or action 'rudder'"),
+        (
+            {"settings": {"action_repeat": 601}},
+            "action_repeat: 601 found, .* at most 600, no longer than an",
+        ),
+        (
+            {"options": {"action": "rudder-shaft"}},
+            "action: 'rudder-shaft' found, but 'mariner' has no shaft",
+        ),
+        (
+            {"task": "mariner-calm", "options": {"noise": 1.0}},
+            "--task: found together with --option, which",
+        ),
+        (
+            {"task": "mariner-calm", "model": "kvlcc2"},
+            "--task: found together with --model, which",
+        ),
+        (
+            {
+                "options": {"action": "rudder-shaft"},
+                "model": "kvlcc2",
+                "settings": {"base": "lq"},
+            },
+            (
+                "base: 'lq' found with action 'rudder-shaft', expected 'none', or"
+                " action 'rudder'"
+            ),
+        ),
     ],
-)  # fmt: skip
+)
 def test_plans_that_cannot_be_are_refused(arguments, message):
     with pytest.raises(InputError, match=message):
         make_plan(Given("ppo", **arguments))
     assert make_plan(Given("ppo", seed=799, threads=1)).training_seed == 799_000
-    assert make_plan(Given("ppo", settings={"action_repeat": 600})).settings.action_repeat == 600
-    assert make_plan(Given("sac", settings={"ships": 1, "action_repeat": 1})).settings.ships == 1
+    assert (
+        make_plan(Given("ppo", settings={"action_repeat": 600})).settings.action_repeat
+        == 600
+    )
+    assert (
+        make_plan(
+            Given("sac", settings={"ships": 1, "action_repeat": 1})
+        ).settings.ships
+        == 1
+    )
 
 
 def test_an_unknown_algorithm_is_told_before_an_unknown_task():
     with pytest.raises(InputError, match="algorithm: 'pqo' found"):
         make_plan(Given("pqo", task="mariner-clam"))
     with pytest.raises(InputError, match="which sac does not learn; take ppo"):
-        make_plan(Given("sac", environment="shipgym/CourseKeepingDiscrete-v0", settings=FREE))
-    discrete = make_plan(Given("ppo", environment="shipgym/CourseKeepingDiscrete-v0", settings=FREE))
+        make_plan(
+            Given("sac", environment="shipgym/CourseKeepingDiscrete-v0", settings=FREE)
+        )
+    discrete = make_plan(
+        Given("ppo", environment="shipgym/CourseKeepingDiscrete-v0", settings=FREE)
+    )
     assert discrete.task.options == {"action": "rudder-discrete"}
 
 
 def test_a_plan_has_the_settings_of_its_algorithm():
     plan = make_plan(Given("ppo"))
-    with pytest.raises(InputError, match="settings: PPOSettings found, expected SACSettings for sac"):
+    with pytest.raises(
+        InputError, match="settings: PPOSettings found, expected SACSettings for sac"
+    ):
         Plan("sac", plan.task, plan.settings)
-    assert (plan.seed, plan.randomise, plan.threads) == (0, False, 1)  # where none are given
+    assert (plan.seed, plan.randomise, plan.threads) == (
+        0,
+        False,
+        1,
+    )  # where none are given

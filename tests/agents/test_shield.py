@@ -25,7 +25,10 @@ class Always:
         self.command = command
 
     def predict(self, observation, state=None, episode_start=None, deterministic=True):
-        return np.full((*np.shape(observation)[:-1], 1), self.command, np.float32), state
+        return (
+            np.full((*np.shape(observation)[:-1], 1), self.command, np.float32),
+            state,
+        )
 
 
 class Once(Always):
@@ -67,9 +70,13 @@ def test_a_policy_hard_over_is_caught_and_the_ship_keeps_her_course(name, side):
 
 
 @pytest.mark.parametrize("course_change_deg", [30.0, 90.0])
-@pytest.mark.parametrize("model", [MARINER, IDENTIFIED, load_model("kvlcc2")], ids=lambda model: model.name)
+@pytest.mark.parametrize(
+    "model", [MARINER, IDENTIFIED, load_model("kvlcc2")], ids=lambda model: model.name
+)
 def test_a_good_controller_is_never_interrupted_in_calm_water(model, course_change_deg):
-    task = course_keeping_task(course_change_deg=course_change_deg, max_heading_error_deg=180.0)
+    task = course_keeping_task(
+        course_change_deg=course_change_deg, max_heading_error_deg=180.0
+    )
     for good in (LQ.from_model(model), PID.from_model(model)):
         shield = Shielded.from_model(model, good)
         _, _, states = sailed(shield, model, task, steps=300)
@@ -78,7 +85,9 @@ def test_a_good_controller_is_never_interrupted_in_calm_water(model, course_chan
 
 def test_noisy_instruments_in_a_sea_do_not_call_it():
     task = course_keeping_task(sea="moderate", noise=1.0)
-    _, _, states = sailed(Shielded.from_model(IDENTIFIED, LQ.from_model(IDENTIFIED)), IDENTIFIED, task)
+    _, _, states = sailed(
+        Shielded.from_model(IDENTIFIED, LQ.from_model(IDENTIFIED)), IDENTIFIED, task
+    )
     assert interventions(states[-1]).count.sum() == 0
 
 
@@ -121,7 +130,9 @@ def test_leaving_the_envelope_calls_it_before_the_heading_does():
 
 
 def test_a_command_that_is_no_number_calls_it_at_once():
-    errors, lost, states = sailed(Shielded.from_model(MARINER, Always(np.nan)), steps=100)
+    errors, lost, states = sailed(
+        Shielded.from_model(MARINER, Always(np.nan)), steps=100
+    )
     assert not lost.any()
     assert np.abs(errors).max() < 2.0
     np.testing.assert_array_equal(interventions(states[-1]).intervals, 100)
@@ -133,7 +144,10 @@ def test_a_new_course_is_no_running_away():
     shield = Shielded.from_model(MARINER, Always(0.5))
     state = None
     for error in (0.0, -170.0, 170.0, -60.0):
-        shown = np.array([np.sin(np.radians(error)), np.cos(np.radians(error)), 0, 0, 1, 0, 0, 0], np.float32)
+        shown = np.array(
+            [np.sin(np.radians(error)), np.cos(np.radians(error)), 0, 0, 1, 0, 0, 0],
+            np.float32,
+        )
         action, state = shield.predict(shown, state)
         np.testing.assert_array_equal(action, [0.5])
     assert interventions(state).count == 0
@@ -145,7 +159,9 @@ def test_an_early_turn_that_is_planned_is_no_running_away_and_a_turn_the_wrong_w
     found = {}
     for lengths in (0.0, 8.0):
         limits = Limits(turn_lengths=lengths)
-        *_, states = sailed(Shielded.from_model(MARINER, early, limits=limits), task=task, steps=900)
+        *_, states = sailed(
+            Shielded.from_model(MARINER, early, limits=limits), task=task, steps=900
+        )
         found[lengths] = interventions(states[-1]).count.sum()
     assert found[0.0] > 0
     assert found[8.0] == 0
@@ -162,25 +178,37 @@ def test_an_early_turn_that_is_planned_is_no_running_away_and_a_turn_the_wrong_w
 
 
 @pytest.mark.parametrize("turn_deg", [60.0, -60.0, 0.0])
-def test_before_a_turn_headings_up_to_the_course_beyond_it_are_on_course(turn_deg, monkeypatch):
+def test_before_a_turn_headings_up_to_the_course_beyond_it_are_on_course(
+    turn_deg, monkeypatch
+):
     """Within 5 degrees of them a ship that turns away is not counted as running away."""
     errors = np.arange(-90.0, 91.0, 4.0)
     low, high = min(-turn_deg, 0.0) - 5.0, max(-turn_deg, 0.0) + 5.0
     shown = np.zeros((len(errors), 8), np.float32)
-    shown[:, 0], shown[:, 1], shown[:, 4] = np.sin(np.radians(errors)), np.cos(np.radians(errors)), 1.0
+    shown[:, 0], shown[:, 1], shown[:, 4] = (
+        np.sin(np.radians(errors)),
+        np.cos(np.radians(errors)),
+        1.0,
+    )
     shown[:, 2] = -np.sign(errors + 0.5 * turn_deg)  # away from the middle of the turn
     shield = Shielded(Always(0.2), GOOD, dt=1.0)
-    monkeypatch.setattr(Shielded, "_planned_turn", lambda self, seen: np.radians(turn_deg))
+    monkeypatch.setattr(
+        Shielded, "_planned_turn", lambda self, seen: np.radians(turn_deg)
+    )
     _, state = shield.predict(shown)
     turned = records(state.watch, WATCH)["turned"]
     np.testing.assert_array_equal(turned > 0.0, (errors < low) | (errors > high))
     yaw_rate = GOOD.observation_scales[2]
-    assert turned.max() == pytest.approx(0.5 * 1.0 * yaw_rate)  # from no rate of turn to that, in a second
+    assert turned.max() == pytest.approx(
+        0.5 * 1.0 * yaw_rate
+    )  # from no rate of turn to that, in a second
 
 
 def test_a_shaft_command_that_is_no_number_is_none():
     class Broken(Always):
-        def predict(self, observation, state=None, episode_start=None, deterministic=True):
+        def predict(
+            self, observation, state=None, episode_start=None, deterministic=True
+        ):
             return np.array([[0.3, np.nan], [0.3, 0.7]]), state
 
     shown = np.tile(np.eye(8)[1], (2, 1)).astype(np.float32)
@@ -195,7 +223,9 @@ def test_counts_begin_anew_with_an_episode():
     shown = np.zeros((N, 8), np.float32)
     shown[:, 1] = 1.0
     begins = np.arange(N) < 4
-    _, state = Shielded.from_model(MARINER, Always(-1.0)).predict(shown, states[-1], begins)
+    _, state = Shielded.from_model(MARINER, Always(-1.0)).predict(
+        shown, states[-1], begins
+    )
     assert (interventions(state).count[:4] == 0).all()
     assert interventions(state).count[4:].all()
 
@@ -203,13 +233,17 @@ def test_counts_begin_anew_with_an_episode():
 @pytest.mark.parametrize("seed", range(3))
 def test_random_policies_never_lose_the_ship_under_it(seed):
     shield = Shielded.from_model(IDENTIFIED, random_policy(IDENTIFIED, seed=seed))
-    errors, lost, _ = sailed(shield, IDENTIFIED, course_keeping_task(course_change_deg=30.0), steps=300)
+    errors, lost, _ = sailed(
+        shield, IDENTIFIED, course_keeping_task(course_change_deg=30.0), steps=300
+    )
     assert not lost.any()
     assert np.abs(errors).max() < 80.0
 
 
 def test_it_keeps_the_promises_of_a_controller():
-    check_controller(Shielded.from_model(MARINER, random_policy(frame_stack=2)), n_steps=30)
+    check_controller(
+        Shielded.from_model(MARINER, random_policy(frame_stack=2)), n_steps=30
+    )
     shield = Shielded.from_model(MARINER, LQ.from_model(MARINER))
     check_controller(shield, MARINER, path_following_task(), n_steps=5)
     assert shield.name == "lq-shielded"
@@ -234,7 +268,10 @@ def test_the_shaft_stays_with_the_policy():
     ("limits", "message"),
     [
         ({"envelope_out": 0.5}, "limits.envelope_out: 0.5 found"),
-        ({"envelope_back": 1.5}, "limits.envelope_back: 1.5 found.*< 1.5; less than to take over"),
+        (
+            {"envelope_back": 1.5},
+            "limits.envelope_back: 1.5 found.*< 1.5; less than to take over",
+        ),
         ({"back_deg": 10.0}, "limits.back_deg: 10 found"),
         ({"runaway_deg": 200.0}, "limits.runaway_deg: 200 found"),
         ({"calm_lengths": -1.0}, "limits.calm_lengths: -1 found"),
@@ -251,7 +288,9 @@ def test_another_ship_is_refused():
         Shielded.from_model(kvlcc2, random_policy())
     with pytest.raises(InputError, match="model 'kvlcc2': the scale of 'yaw_rate'"):
         Shielded.from_model(MARINER, random_policy()).check_fits_model(kvlcc2)
-    with pytest.raises(InputError, match="fallback: Always found, expected a controller"):
+    with pytest.raises(
+        InputError, match="fallback: Always found, expected a controller"
+    ):
         Shielded.from_model(MARINER, random_policy(), fallback=Always(0.0))
 
 
@@ -266,7 +305,10 @@ class ForHer(Always):
 
 
 def test_policy_and_fallback_are_asked_whether_they_fit_the_ship():
-    assert Shielded.from_model(MARINER, ForHer("mariner")).observation_names == GOOD.observation_names
+    assert (
+        Shielded.from_model(MARINER, ForHer("mariner")).observation_names
+        == GOOD.observation_names
+    )
     with pytest.raises(InputError, match=r"^not for mariner$"):
         Shielded.from_model(MARINER, ForHer("kvlcc2"))
     other = LQ.from_model(load_model("kvlcc2"))
@@ -275,7 +317,9 @@ def test_policy_and_fallback_are_asked_whether_they_fit_the_ship():
     names, scales = list(GOOD.observation_names), list(GOOD.observation_scales)
     for shield in (Shielded(Always(0.0), GOOD, 1.0), Shielded(GOOD, GOOD, 1.0)):
         shield.check_fits(names, scales)
-        with pytest.raises(InputError, match="place: the scale of 'heading_error_sin' is 2, but"):
+        with pytest.raises(
+            InputError, match="place: the scale of 'heading_error_sin' is 2, but"
+        ):
             shield.check_fits(names, [2.0 * scale for scale in scales], "place")
 
 
@@ -290,16 +334,26 @@ def test_times_are_in_ship_lengths_and_one_interval_at_least():
 
 
 def test_a_limit_of_no_time_calls_it_at_the_first_interval_beyond():
-    shield = Shielded.from_model(IDENTIFIED, Always(0.0), limits=Limits(runaway_deg=180.0, out_lengths=0.0))
+    shield = Shielded.from_model(
+        IDENTIFIED, Always(0.0), limits=Limits(runaway_deg=180.0, out_lengths=0.0)
+    )
     u, v, r, delta = IDENTIFIED.envelope.centre
-    shown = np.array([0.0, 1.0, r, v, 2.0 * u, delta, delta, 0.0]) / shield.observation_scales
+    shown = (
+        np.array([0.0, 1.0, r, v, 2.0 * u, delta, delta, 0.0])
+        / shield.observation_scales
+    )
     _, state = shield.predict(shown.astype(np.float32))
     assert interventions(state).steering
 
 
 def test_a_shield_waits_a_quarter_and_a_whole_ship_length():
     assert Limits() == Limits(1.5, 1.1, 0.25, 10.0, 5.0, 1.0, 8.0)
-    wrong = {"envelope_out": 0.9, "envelope_back": 1.5, "runaway_deg": 181.0, "back_deg": 10.0}
+    wrong = {
+        "envelope_out": 0.9,
+        "envelope_back": 1.5,
+        "runaway_deg": 181.0,
+        "back_deg": 10.0,
+    }
     for name, value in wrong.items():
         with pytest.raises(InputError, match=rf"limits\.{name}: {value:g} found"):
             Limits(**{name: value})

@@ -8,7 +8,14 @@ import pytest
 from agents import LQ, PID, WheelOver
 from agents.deployment.steering import Limits
 from agents.verification import standards as module
-from agents.verification.standards import REQUIREMENTS, Row, heading_control, kept, standards, track_control
+from agents.verification.standards import (
+    REQUIREMENTS,
+    Row,
+    heading_control,
+    kept,
+    standards,
+    track_control,
+)
 from agents.verification.tracks import keep_track, track_task
 from shipgym.errors import InputError
 from tests.agents.policies import MARINER
@@ -16,11 +23,15 @@ from tests.agents.policies import MARINER
 
 @pytest.fixture(scope="module")
 def track():
-    return keep_track(WheelOver.from_model(MARINER, task=track_task(MARINER)), [MARINER, MARINER])
+    return keep_track(
+        WheelOver.from_model(MARINER, task=track_task(MARINER)), [MARINER, MARINER]
+    )
 
 
 def test_the_mariner_under_lq_and_wheel_over_meets_every_row(track):
-    rows = {row.name: row for row in standards(MARINER, LQ.from_model(MARINER), [track])}
+    rows = {
+        row.name: row for row in standards(MARINER, LQ.from_model(MARINER), [track])
+    }
     assert set(rows) == set(REQUIREMENTS)
     assert [name for name, row in rows.items() if not row.passed] == []
     assert 55.0 <= rows["early_indication"].value <= 62.0
@@ -30,20 +41,32 @@ def test_the_mariner_under_lq_and_wheel_over_meets_every_row(track):
 
 def test_an_autopilot_that_is_too_weak_and_a_late_turn_fail_their_rows(track):
     weak = PID.from_model(MARINER)
-    weak = replace(weak, gains={**weak.gains, "derivative": 0.1 * weak.gains["derivative"]})
-    assert heading_control(MARINER, weak)["overshoot"] > REQUIREMENTS["overshoot"]["limit"]
-    late = replace(track.controller, gains={**track.controller.gains, "turn_reach": 1.0})
+    weak = replace(
+        weak, gains={**weak.gains, "derivative": 0.1 * weak.gains["derivative"]}
+    )
+    assert (
+        heading_control(MARINER, weak)["overshoot"] > REQUIREMENTS["overshoot"]["limit"]
+    )
+    late = replace(
+        track.controller, gains={**track.controller.gains, "turn_reach": 1.0}
+    )
     found = track_control(MARINER, keep_track(late, [MARINER, MARINER]))
     assert found["cross_track"] > REQUIREMENTS["cross_track"]["limit"]
 
 
 def test_what_was_not_simulated_is_neither_passed_nor_failed():
-    rows = [Row("it", "", "", 1.0, "deg", least, value) for least in (False, True) for value in (None, 2.0)]
+    rows = [
+        Row("it", "", "", 1.0, "deg", least, value)
+        for least in (False, True)
+        for value in (None, 2.0)
+    ]
     assert [row.passed for row in rows] == [None, False, None, True]
 
 
 def test_a_heading_that_falls_silent_is_handed_over_and_the_rest_is_steered():
-    found = kept(MARINER, PID.from_model(MARINER), lost=["heading"], limits=Limits(silence_s=5.0))
+    found = kept(
+        MARINER, PID.from_model(MARINER), lost=["heading"], limits=Limits(silence_s=5.0)
+    )
     assert found.alarm == "no heading for 5 s"
     assert 65.0 <= found.alarm_at <= 67.0
     assert np.abs(found.error).max() < 1.0
@@ -53,7 +76,9 @@ def test_a_course_is_kept_for_forty_ship_lengths_of_which_the_first_ten_do_not_c
     found = kept(MARINER, PID.from_model(MARINER))
     assert (found.alarm, found.alarm_at) == ("", np.inf)
     assert found.t[-1] == pytest.approx(40.0 * MARINER.travel_time, abs=1.0)
-    assert module._settled(found.t)[0] == pytest.approx(10.0 * MARINER.travel_time, abs=1.0)
+    assert module._settled(found.t)[0] == pytest.approx(
+        10.0 * MARINER.travel_time, abs=1.0
+    )
 
 
 def test_what_no_simulation_shows_of_a_ship_has_no_value(monkeypatch):
@@ -69,7 +94,9 @@ def test_what_no_simulation_shows_of_a_ship_has_no_value(monkeypatch):
 
 
 def test_what_is_largest_without_a_warning_is_that_of_the_quiet_intervals():
-    run = module.Run(*[np.zeros(4)] * 5, [], [[], ["off track"], ["off heading"], []], "", np.inf)
+    run = module.Run(
+        *[np.zeros(4)] * 5, [], [[], ["off track"], ["off heading"], []], "", np.inf
+    )
     size = np.array([1.0, 9.0, 7.0, 3.0])
     assert module._unwarned(run, size, "off track") == 7.0
     assert module._unwarned(run, size, "off heading") == 9.0
@@ -83,14 +110,21 @@ def made_up(errors, warnings=None, **more):
     given, order = more.pop("given", [{}] * n), np.full(n, more.pop("order", 5.0))
     zeros, rest = np.zeros(n), {"alarm": "", "alarm_at": np.inf} | more
     told = warnings or [[]] * n
-    return module.Run(np.arange(float(n)), np.array(errors), zeros, zeros, order, given, told, **rest)
+    return module.Run(
+        np.arange(float(n)), np.array(errors), zeros, zeros, order, given, told, **rest
+    )
 
 
 @pytest.mark.parametrize(
-    ("last", "overshoot", "rudder"), [(0.95, 0.0, 7.0), (-0.95, 0.95, 7.0), (1.05, 0.0, np.inf)]
+    ("last", "overshoot", "rudder"),
+    [(0.95, 0.0, 7.0), (-0.95, 0.95, 7.0), (1.05, 0.0, np.inf)],
 )
-def test_a_turn_counts_where_it_ends_within_a_degree_of_the_course(last, overshoot, rudder, monkeypatch):
-    turn = made_up([30.0, 12.0, 11.0, last], [["off heading"], ["off heading"], [], []], order=-7.0)
+def test_a_turn_counts_where_it_ends_within_a_degree_of_the_course(
+    last, overshoot, rudder, monkeypatch
+):
+    turn = made_up(
+        [30.0, 12.0, 11.0, last], [["off heading"], ["off heading"], [], []], order=-7.0
+    )
     straight = made_up([9.0, 0.3, -0.4, 0.2])  # the first quarter does not count
     asked = []
 
@@ -101,18 +135,31 @@ def test_a_turn_counts_where_it_ends_within_a_degree_of_the_course(last, oversho
 
     monkeypatch.setattr(module, "kept", run_of)
     found = heading_control(MARINER, None)
-    assert found == pytest.approx({
-        "heading_calm": 0.4, "overshoot": overshoot, "rudder_limit": rudder, "off_heading": 11.0 - 10.0,
-        "heading_lost": 3.5,
-    })  # fmt: skip
+    assert found == pytest.approx(
+        {
+            "heading_calm": 0.4,
+            "overshoot": overshoot,
+            "rudder_limit": rudder,
+            "off_heading": 11.0 - 10.0,
+            "heading_lost": 3.5,
+        }
+    )
     narrow = {"limits": Limits(order_deg=10.0)}
-    assert asked == [(30.0, {}), (30.0, narrow), (0.0, {}), (0.0, {"lost": ["heading"]})]
+    assert asked == [
+        (30.0, {}),
+        (30.0, narrow),
+        (0.0, {}),
+        (0.0, {"lost": ["heading"]}),
+    ]
 
 
 @pytest.mark.parametrize(
-    ("warned", "lead"), [([], 1.0), ([3, 4, 5], 2.0), ([1, 2, 3], 4.0), ([0, 1, 2, 3], 0.0)]
+    ("warned", "lead"),
+    [([], 1.0), ([3, 4, 5], 2.0), ([1, 2, 3], 4.0), ([0, 1, 2, 3], 0.0)],
 )
-def test_a_turn_is_announced_from_the_last_quiet_interval_on(warned, lead, track, monkeypatch):
+def test_a_turn_is_announced_from_the_last_quiet_interval_on(
+    warned, lead, track, monkeypatch
+):
     """Begun where the reach is passed, in the fifth interval; one that was never quiet tells no lead.
 
     The route ends four intervals after the last, of 10 m each.
@@ -120,9 +167,18 @@ def test_a_turn_is_announced_from_the_last_quiet_interval_on(warned, lead, track
     reach = track.controller.gains["turn_reach"]
     to_go = reach + 10.0 * np.array([4.0, 3.0, 2.0, 1.0, 0.0, -1.0])
     given = [{"next_turn_distance": one, "next_turn_angle": 0.5} for one in to_go]
-    given += [{"next_turn_distance": one, "next_turn_angle": 0.0} for one in (60.0, 50.0, 40.0)]
+    given += [
+        {"next_turn_distance": one, "next_turn_angle": 0.0}
+        for one in (60.0, 50.0, 40.0)
+    ]
     told = [["course change ahead"] if k in warned else [] for k in range(9)]
-    along = made_up([0.0] * 9, told, given=given, alarm="the end of the route is reached", alarm_at=13.0)
+    along = made_up(
+        [0.0] * 9,
+        told,
+        given=given,
+        alarm="the end of the route is reached",
+        alarm_at=13.0,
+    )
     off = [{"cross_track": one} for one in (150.0, -53.0, 9.0)]
     aside = made_up([0.0] * 3, [["off track"], [], []], given=off)
     lost = made_up([0.0] * 3, alarm="no latitude", alarm_at=63.0)

@@ -22,13 +22,20 @@ def best_cost(controller, model, task):
     """Least mean cost over the same gains: drawn about the best of those before, all sailed side by side."""
     random = np.random.default_rng(0)
     seeds, engine = np.tile(SEEDS, TRIED), Engine(model, TRIED * len(SEEDS), task)
-    mean, covariance = np.zeros(len(controller.gains)), 0.4**2 * np.eye(len(controller.gains))
+    mean, covariance = (
+        np.zeros(len(controller.gains)),
+        0.4**2 * np.eye(len(controller.gains)),
+    )
     least = np.inf
     for _ in range(ROUNDS):
         factors = np.exp(random.multivariate_normal(mean, covariance, TRIED))
         pilots = [
             replace(
-                controller, gains={k: v * f for (k, v), f in zip(controller.gains.items(), row, strict=True)}
+                controller,
+                gains={
+                    k: v * f
+                    for (k, v), f in zip(controller.gains.items(), row, strict=True)
+                },
             )
             for row in factors
         ]

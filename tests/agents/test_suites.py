@@ -41,7 +41,11 @@ def test_a_suite_is_read_task_by_task():
     assert suite.name == "mine-v1"
     assert [task.name for task in suite.tasks] == ["calm", "drift", "rough"]
     calm, drift, rough = suite.tasks
-    assert (calm.env_id, calm.model, calm.why) == ("shipgym/CourseKeeping-v0", "mariner", "the easiest")
+    assert (calm.env_id, calm.model, calm.why) == (
+        "shipgym/CourseKeeping-v0",
+        "mariner",
+        "the easiest",
+    )
     assert (drift.env_id, drift.ship.name) == ("shipgym/PathFollowing-v0", "kvlcc2")
     assert calm.options == {"noise": 1.0}
     assert calm.task.weather.calm
@@ -67,7 +71,11 @@ def test_a_suite_is_read_task_by_task():
         ('model = "kvlcc2"', 'model = "kvlcc3"', r"tasks\.drift: .*kvlcc3"),
         ('model = "kvlcc2"', "", r"tasks\.drift\.model: None found"),
         ("options = { noise = 1.0 }", "options = 3", r"tasks\.calm\.options: 3 found"),
-        ("options = { noise = 1.0 }", "options = { nois = 1.0 }", r"tasks\.calm: .*Did you mean 'noise'"),
+        (
+            "options = { noise = 1.0 }",
+            "options = { nois = 1.0 }",
+            r"tasks\.calm: .*Did you mean 'noise'",
+        ),
         ("speed = 0.5", "sped = 0.5", r"tasks\.drift\.sea.*sped"),
         ('sea = "rough"', 'sea = "rogh"', r"tasks\.rough: .*Did you mean 'rough'"),
         ("options = { noise = 1.0 }", 'ship = ""', r"tasks\.calm\.ship: '' found"),
@@ -76,7 +84,11 @@ def test_a_suite_is_read_task_by_task():
             'options = { reward = "mine:cost" }',
             "calm.options.reward: .* is code",
         ),
-        ('model = "kvlcc2"', 'model = "kvlcc2.py"', r"tasks\.drift\.model: 'kvlcc2.py' found, which is code"),
+        (
+            'model = "kvlcc2"',
+            'model = "kvlcc2.py"',
+            r"tasks\.drift\.model: 'kvlcc2.py' found, which is code",
+        ),
     ],
 )
 def test_a_wrong_field_is_named(old, new, message):
@@ -94,7 +106,9 @@ def test_shipped_suites_are_known_by_name():
     for call in (load_suite, suite_hash):
         with pytest.raises(InputError, match="suite: 'shipgym-v3' found"):
             call("shipgym-v3")
-    with pytest.raises(InputError, match=r"suite 'shipgym-v1': task: .*Did you mean 'mariner-calm'"):
+    with pytest.raises(
+        InputError, match=r"suite 'shipgym-v1': task: .*Did you mean 'mariner-calm'"
+    ):
         load_suite().task("mariner-clam")
 
 
@@ -121,30 +135,51 @@ def test_every_model_has_the_ship_behind_it_named_in_its_file():
 
 def test_what_contestants_are_handed_does_not_name_the_ship():
     handed = V2.task("two-zigzags-far").handed_out
-    assert (handed.behind, dict(handed.far), handed.sailed[0].name) == ("", {}, "container-two-zigzags")
+    assert (handed.behind, dict(handed.far), handed.sailed[0].name) == (
+        "",
+        {},
+        "container-two-zigzags",
+    )
 
 
 def test_a_ship_of_other_particulars_than_the_model_is_refused():
-    text = (FOLDER / "shipgym-v2.toml").read_text().replace('ship = "kvlcc2"', 'ship = "tanker"')
-    with pytest.raises(InputError, match=r"tasks.strong-current: .*expected a ship of the same particulars"):
+    text = (
+        (FOLDER / "shipgym-v2.toml")
+        .read_text()
+        .replace('ship = "kvlcc2"', 'ship = "tanker"')
+    )
+    with pytest.raises(
+        InputError,
+        match=r"tasks.strong-current: .*expected a ship of the same particulars",
+    ):
         parse_suite(text, "suite")
 
 
 def test_a_ship_that_is_never_far_from_the_design_has_two_sets_of_episodes():
-    text = TEXT.replace('model = "mariner"\nsea', 'model = "mariner-tls-svm"\nship = "mariner"\nsea')
+    text = TEXT.replace(
+        'model = "mariner"\nsea', 'model = "mariner-tls-svm"\nship = "mariner"\nsea'
+    )
     *alone, first, second = parse_suite(text, "mine").tasks
-    assert [(task.on, task.behind, dict(task.far)) for task in alone] == [("ship", "", {})] * 2
+    assert [(task.on, task.behind, dict(task.far)) for task in alone] == [
+        ("ship", "", {})
+    ] * 2
     assert [(one.name, one.on, one.behind) for one in (first, second)] == [
-        ("rough", "ship", "mariner"), ("rough-on-model", "model", "")
-    ]  # fmt: skip
+        ("rough", "ship", "mariner"),
+        ("rough-on-model", "model", ""),
+    ]
     assert inspect.signature(BenchmarkTask.engine).parameters["threads"].default == 1
 
 
 @pytest.fixture
 def kept(tmp_path, monkeypatch):
     """Writes a file that is kept with a suite."""
-    monkeypatch.setattr("agents.suites.reference.suite_file", lambda suite, what: tmp_path / f"{what}.json")
-    return lambda what, content: (tmp_path / f"{what}.json").write_text(json.dumps(content))
+    monkeypatch.setattr(
+        "agents.suites.reference.suite_file",
+        lambda suite, what: tmp_path / f"{what}.json",
+    )
+    return lambda what, content: (tmp_path / f"{what}.json").write_text(
+        json.dumps(content)
+    )
 
 
 def test_a_suite_without_best_known_costs_has_no_references(kept):
@@ -163,13 +198,25 @@ def test_references_are_the_cost_of_wheel_over_and_the_mean_of_the_best(kept):
     [
         ({"zero": "30"}, r"best.json.*calm.zero: '30' "),
         ({"costs": ["1"] * 100}, r"best.json.*calm.costs\[0\]: '1' "),
-        ({"costs": [1.0] * 99}, "best.json: calm: expected costs of 100 episodes, and by what"),
-        ({"by": ["lq"] * 99}, "best.json: calm: expected costs of 100 episodes, and by what"),
-        ({"costs": [1.0] * 101, "by": ["lq"] * 101}, "best.json: calm: expected costs of 100 episodes"),
+        (
+            {"costs": [1.0] * 99},
+            "best.json: calm: expected costs of 100 episodes, and by what",
+        ),
+        (
+            {"by": ["lq"] * 99},
+            "best.json: calm: expected costs of 100 episodes, and by what",
+        ),
+        (
+            {"costs": [1.0] * 101, "by": ["lq"] * 101},
+            "best.json: calm: expected costs of 100 episodes",
+        ),
     ],
 )
 def test_best_known_costs_with_a_wrong_field_are_refused(kept, changes, said):
-    kept("best", {"calm": {"zero": 30.0, "costs": [1.0] * 100, "by": ["lq"] * 100} | changes})
+    kept(
+        "best",
+        {"calm": {"zero": 30.0, "costs": [1.0] * 100, "by": ["lq"] * 100} | changes},
+    )
     with pytest.raises(InputError, match=said):
         best_known("mine")
 

@@ -20,7 +20,13 @@ from agents.cli import app
 from agents.controllers.designs import design_base
 from agents.rollouts.rollout import episode_costs
 from agents.training import run_folder, training
-from agents.training.algorithms import algorithm_class, make_agent, make_ships, sb3_arguments, set_deviation
+from agents.training.algorithms import (
+    algorithm_class,
+    make_agent,
+    make_ships,
+    sb3_arguments,
+    set_deviation,
+)
 from agents.training.plan import EVALUATION_SEED, Given, make_plan, training_options
 from agents.training.run_folder import begin_folder, other_versions
 from agents.training.safe_file import read_values, write_values
@@ -39,14 +45,23 @@ OFF_POLICY = {
     "total_steps": 144,
 }
 TINY = {
-    "ppo": {"base": "none", "ships": 8, "n_steps": 32, "batch_size": 64, "n_epochs": 2, "total_steps": 768},
+    "ppo": {
+        "base": "none",
+        "ships": 8,
+        "n_steps": 32,
+        "batch_size": 64,
+        "n_epochs": 2,
+        "total_steps": 768,
+    },
     "sac": OFF_POLICY,
     "td3": OFF_POLICY,
     "tqc": OFF_POLICY,
 }
 SHORT = {"episode_steps": 20, "change_interval_steps": 10}
 OPTIONS = [f"--option={name}={value}" for name, value in SHORT.items()]
-SETTINGS = [f"--set={name}={value}" for name, value in {**TINY["ppo"], "net_arch": [8]}.items()]
+SETTINGS = [
+    f"--set={name}={value}" for name, value in {**TINY["ppo"], "net_arch": [8]}.items()
+]
 COMMAND = ["train", "ppo", *OPTIONS, *SETTINGS]
 
 
@@ -62,7 +77,10 @@ def tiny(algorithm="ppo", **settings):
 
 
 def learned(folder):
-    return {name: (folder / name).read_bytes() for name in ("agent.safetensors", "last.safetensors")}
+    return {
+        name: (folder / name).read_bytes()
+        for name in ("agent.safetensors", "last.safetensors")
+    }
 
 
 def costs(result):
@@ -84,18 +102,33 @@ def stopping_at(steps):
 @pytest.mark.parametrize(
     ("algorithm", "settings"),
     [
-        ("ppo", {"frame_stack": 2, "base": "lqg", "authority": 0.5, "action_repeat": 3, "rate_limit": 0.1}),
+        (
+            "ppo",
+            {
+                "frame_stack": 2,
+                "base": "lqg",
+                "authority": 0.5,
+                "action_repeat": 3,
+                "rate_limit": 0.1,
+            },
+        ),
         ("sac", {"reward_scale": 10.0}),
         ("td3", {"buffer_size": 80}),
         ("tqc", {"base": "lq", "ent_coef": 0.1}),
     ],
 )
-def test_a_killed_run_ends_as_one_that_was_not(algorithm, settings, tmp_path, monkeypatch):
+def test_a_killed_run_ends_as_one_that_was_not(
+    algorithm, settings, tmp_path, monkeypatch
+):
     plan = tiny(algorithm, **settings)
     whole = train(plan, tmp_path / "whole")
     monkeypatch.setattr(training, "CHECKPOINT_SECONDS", 0.0)
     with pytest.raises(StopError):
-        train(plan, tmp_path / "killed", tell=stopping_at(2 * plan.settings.total_steps // 3))
+        train(
+            plan,
+            tmp_path / "killed",
+            tell=stopping_at(2 * plan.settings.total_steps // 3),
+        )
     resumed = train(plan, tmp_path / "killed", resume=True)
     assert 0 < resumed.resumed_from < plan.settings.total_steps
     assert learned(tmp_path / "whole") == learned(tmp_path / "killed")
@@ -107,7 +140,9 @@ def test_the_same_seed_learns_the_same_and_another_does_not(tmp_path):
     for name, own in (("a", plan), ("b", plan), ("c", replace(plan, seed=1))):
         train(own, tmp_path / name)
     assert learned(tmp_path / "a") == learned(tmp_path / "b")
-    assert (tmp_path / "a" / "agent.json").read_text() == (tmp_path / "b" / "agent.json").read_text()
+    assert (tmp_path / "a" / "agent.json").read_text() == (
+        tmp_path / "b" / "agent.json"
+    ).read_text()
     assert learned(tmp_path / "a") != learned(tmp_path / "c")
 
 
@@ -115,7 +150,9 @@ def test_the_file_is_the_policy_of_the_lowest_cost_held_out(tmp_path):
     plan = tiny(base="lq", authority=0.3)
     result = train(plan, tmp_path / "run")
     seeds = EVALUATION_SEED + np.arange(10)
-    costs = episode_costs(load_agent(tmp_path / "run" / "agent.json"), plan.task.engine(10), seeds)
+    costs = episode_costs(
+        load_agent(tmp_path / "run" / "agent.json"), plan.task.engine(10), seeds
+    )
     assert costs.mean() == result.best_cost == min(row["cost"] for row in result.curve)
     assert result.policy.training["steps"] == result.best_steps
     assert result.policy.training["cost"] == result.best_cost
@@ -126,9 +163,15 @@ def test_the_file_is_the_policy_of_the_lowest_cost_held_out(tmp_path):
     assert seconds[-1] - 0.001 <= result.seconds < 60.0
     kept = read_values(tmp_path / "run" / "checkpoint.safetensors", "checkpoint")
     deviation = kept["agent"]["parameters"]["policy"]["log_std"].item()
-    assert deviation == pytest.approx(-2.5 - 2.0 / 3.0, abs=0.05)  # of -2.5 to -3.5, then learned from
+    assert deviation == pytest.approx(
+        -2.5 - 2.0 / 3.0, abs=0.05
+    )  # of -2.5 to -3.5, then learned from
     record = load_agent(tmp_path / "run" / "agent.json").training
-    learned_from = ("cost", "curve", "versions")  # which differ from computer to computer
+    learned_from = (
+        "cost",
+        "curve",
+        "versions",
+    )  # which differ from computer to computer
     told = {name: value for name, value in record.items() if name not in learned_from}
     assert same_text("record of a training", "\n".join(flat(told, "")))
     progress = json.loads((tmp_path / "run" / "progress.json").read_text())
@@ -137,7 +180,9 @@ def test_the_file_is_the_policy_of_the_lowest_cost_held_out(tmp_path):
     assert [row["steps"] for row in progress["curve"]] == [0, 256, 512, 768]
     returns = [row["mean_return"] for row in progress["curve"]]
     assert returns[0] is None
-    assert all(0.1 * result.lq_cost < -one < 30.0 * result.lq_cost for one in returns[1:])
+    assert all(
+        0.1 * result.lq_cost < -one < 30.0 * result.lq_cost for one in returns[1:]
+    )
 
 
 def test_the_residual_of_nothing_costs_what_its_base_does():
@@ -161,17 +206,33 @@ def test_time_that_is_up_is_made_up_for(tmp_path):
 def test_randomised_ships_sail_all_seas_at_many_speeds():
     plan = make_plan(Given("ppo", task="mariner-current", randomise=True))
     options = training_options(plan)
-    assert [sea.name for sea in options["sea"]] == ["weather", "calm", "slight", "moderate", "rough"]
+    assert [sea.name for sea in options["sea"]] == [
+        "weather",
+        "calm",
+        "slight",
+        "moderate",
+        "rough",
+    ]
     assert {sea.current for sea in options["sea"]} == {plan.task.task.weather.current}
     assert options["speed_range"] == (0.8, 1.1)
     assert "model_uncertainty" not in options  # a reference ship has no covariance
-    assert plan.task.task.seas == make_plan(Given("ppo", task="mariner-current")).task.task.seas
+    assert (
+        plan.task.task.seas
+        == make_plan(Given("ppo", task="mariner-current")).task.task.seas
+    )
 
 
 def test_agents_of_the_second_suite_learn_over_drawn_models_and_never_see_the_ship():
     plan = make_plan(Given("ppo", task="roll-limit"))
-    assert (plan.task.behind, plan.task.far, plan.task.sailed) == ("", {}, plan.task.parts)
-    assert training_options(plan) == {**plan.task.options, "model_uncertainty": "covariance"}
+    assert (plan.task.behind, plan.task.far, plan.task.sailed) == (
+        "",
+        {},
+        plan.task.parts,
+    )
+    assert training_options(plan) == {
+        **plan.task.options,
+        "model_uncertainty": "covariance",
+    }
     assert design_base(plan.settings.base, plan.task).kind == "wheel-over"
     before = make_plan(Given("ppo", task="mariner-current"))
     assert training_options(before) == before.task.options
@@ -189,7 +250,9 @@ def test_what_the_algorithms_are_given_is_as_golden():
     for name in ALGORITHMS:
         found = sb3_arguments(load_settings(name, given={"schedule": "linear"}), (2,))
         found["learning_rate"] = found["learning_rate"](2.0 / 3.0)
-        found["policy_kwargs"]["activation_fn"] = found["policy_kwargs"]["activation_fn"].__name__
+        found["policy_kwargs"]["activation_fn"] = found["policy_kwargs"][
+            "activation_fn"
+        ].__name__
         told[name] = found
     assert same_text("arguments of the algorithms", "\n".join(flat(told, "")))
 
@@ -201,7 +264,10 @@ def test_noise_of_exploration_is_of_one_command_where_none_is_said():
 def test_an_algorithm_that_is_not_installed_is_reported_with_its_extra(monkeypatch):
     monkeypatch.setitem(sys.modules, "sb3_contrib", None)
     assert algorithm_class("sac").__name__ == "SAC"
-    with pytest.raises(InputError, match=r"sb3_contrib is not installed, tqc needs it: pip install 'shipgym"):
+    with pytest.raises(
+        InputError,
+        match=r"sb3_contrib is not installed, tqc needs it: pip install 'shipgym",
+    ):
         algorithm_class("tqc")
 
 
@@ -215,12 +281,21 @@ def test_ships_are_seen_through_a_wrapper_only_where_they_have_to_be():
     names = []
     for settings in ({}, {"frame_stack": 2}, {"action_repeat": 2}, {"rate_limit": 0.5}):
         names.append(type(make_ships(tiny(**settings), None).venv).__name__)
-    assert names == ["StaggeredShips", "ResidualVecEnv", "ResidualVecEnv", "ResidualVecEnv"]
+    assert names == [
+        "StaggeredShips",
+        "ResidualVecEnv",
+        "ResidualVecEnv",
+        "ResidualVecEnv",
+    ]
 
 
 def test_agents_have_the_settings():
     agent = make_agent(tiny("tqc", gamma=0.9, tau=0.1, activation="tanh"), None)
-    assert (agent.gamma, agent.tau, agent.policy_kwargs["net_arch"]) == (0.9, 0.1, {"pi": [8], "qf": [12]})
+    assert (agent.gamma, agent.tau, agent.policy_kwargs["net_arch"]) == (
+        0.9,
+        0.1,
+        {"pi": [8], "qf": [12]},
+    )
     assert agent.policy_kwargs["activation_fn"].__name__ == "Tanh"
     assert agent.top_quantiles_to_drop_per_net == 2
     assert agent.lr_schedule(0.5) == pytest.approx(0.5 * agent.lr_schedule(1.0))
@@ -254,12 +329,16 @@ def test_exploration_falls_to_what_is_asked():
 
 
 def test_rewards_are_divided_by_their_scale():
-    plain, scaled = (make_ships(tiny(reward_scale=scale), None) for scale in (1.0, 50.0))
+    plain, scaled = (
+        make_ships(tiny(reward_scale=scale), None) for scale in (1.0, 50.0)
+    )
     for ships in (plain, scaled):
         ships.seed(0)
         ships.reset()
         ships.step_async(np.ones((8, 1), np.float32))
-    np.testing.assert_allclose(scaled.step_wait()[1], plain.step_wait()[1] / 50.0, rtol=1e-6)
+    np.testing.assert_allclose(
+        scaled.step_wait()[1], plain.step_wait()[1] / 50.0, rtol=1e-6
+    )
 
 
 def test_a_diverged_training_says_so(monkeypatch):
@@ -269,16 +348,22 @@ def test_a_diverged_training_says_so(monkeypatch):
         return agent
 
     monkeypatch.setattr(training, "make_agent", broken)
-    with pytest.raises(InputError, match=r"diverged after 0 steps.*lower learning_rate"):
+    with pytest.raises(
+        InputError, match=r"diverged after 0 steps.*lower learning_rate"
+    ):
         train(tiny())
 
 
-@pytest.mark.parametrize(("said", "kind"), [("expected invalid values", InputError), ("mine", ValueError)])
+@pytest.mark.parametrize(
+    ("said", "kind"), [("expected invalid values", InputError), ("mine", ValueError)]
+)
 def test_only_torch_s_refusal_to_draw_is_a_training_that_diverged(said, kind):
     def tell(now):
         raise ValueError(said)
 
-    with pytest.raises(kind, match="diverged after 0 steps" if kind is InputError else "^mine$"):
+    with pytest.raises(
+        kind, match="diverged after 0 steps" if kind is InputError else "^mine$"
+    ):
         train(tiny(), tell=tell)
 
 
@@ -313,15 +398,27 @@ def at_boundary(steps, *evaluated, kept_at=0.0, **more):
     """What is done at a boundary after evaluations at these steps, on a clock that stands at 1000 s."""
     done = []
     own = {
-        "plan": SimpleNamespace(settings=SimpleNamespace(evaluate_every=100, total_steps=500)),
-        "agent": SimpleNamespace(num_timesteps=steps), "held_out": SimpleNamespace(lq_cost=7.0),
-        "found": {"best_cost": 5.0, "curve": [{"steps": one, "cost": 9.0} for one in evaluated]},
-        "evaluate": lambda: done.append("evaluated"), "keep": lambda: done.append("kept"),
-        "tell": lambda now: done.append(now), "started": 900.0, "seconds": 130.0, "max_seconds": None,
+        "plan": SimpleNamespace(
+            settings=SimpleNamespace(evaluate_every=100, total_steps=500)
+        ),
+        "agent": SimpleNamespace(num_timesteps=steps),
+        "held_out": SimpleNamespace(lq_cost=7.0),
+        "found": {
+            "best_cost": 5.0,
+            "curve": [{"steps": one, "cost": 9.0} for one in evaluated],
+        },
+        "evaluate": lambda: done.append("evaluated"),
+        "keep": lambda: done.append("kept"),
+        "tell": lambda now: done.append(now),
+        "started": 900.0,
+        "seconds": 130.0,
+        "max_seconds": None,
         "kept_at": 1000.0 - kept_at,
-    }  # fmt: skip
+    }
     run = SimpleNamespace(**own | more)
-    run._evaluated = lambda name, otherwise: training._Training._evaluated(run, name, otherwise)
+    run._evaluated = lambda name, otherwise: training._Training._evaluated(
+        run, name, otherwise
+    )
     try:
         training._Training._on_rollout_start(run)
     except training._TimeIsUpError:
@@ -338,13 +435,28 @@ def at_1000_s(monkeypatch):
 @pytest.mark.usefixtures("at_1000_s")
 @pytest.mark.parametrize(
     ("steps", "evaluated", "due"),
-    [(0, [], True), (99, [0], False), (100, [0], True), (199, [0, 120], False), (200, [0, 199], True)],
+    [
+        (0, [], True),
+        (99, [0], False),
+        (100, [0], True),
+        (199, [0, 120], False),
+        (200, [0, 199], True),
+    ],
 )
 def test_an_evaluation_is_due_in_each_stretch_of_steps(steps, evaluated, due):
     *first, now = at_boundary(steps, *evaluated)
     assert first == ["evaluated"] * due
-    assert (now.steps, now.total, now.seconds, now.evaluated) == (steps, 500, 130.0, due)
-    assert (now.cost, now.best_cost, now.lq_cost) == (9.0 if evaluated else None, 5.0, 7.0)
+    assert (now.steps, now.total, now.seconds, now.evaluated) == (
+        steps,
+        500,
+        130.0,
+        due,
+    )
+    assert (now.cost, now.best_cost, now.lq_cost) == (
+        9.0 if evaluated else None,
+        5.0,
+        7.0,
+    )
 
 
 @pytest.mark.usefixtures("at_1000_s")
@@ -357,20 +469,27 @@ def test_a_run_is_kept_every_45_s_and_when_its_time_is_up():
     run = SimpleNamespace(folder=None, seconds_before=7.0, started=900.0)
     training._Training.keep(run)
     assert run.kept_at == 1000.0
-    assert training._Training.seconds.fget(run) == 107.0  # with those before it was resumed
+    assert (
+        training._Training.seconds.fget(run) == 107.0
+    )  # with those before it was resumed
 
 
 def test_a_run_is_kept_at_its_first_boundary_and_resumed_from_it(tmp_path):
     plan, run = tiny(), tmp_path / "run"
     begin_folder(run, plan, "")
-    assert train(plan, run, resume=True, max_seconds=0.0).resumed_from == 0  # killed before the first one
+    assert (
+        train(plan, run, resume=True, max_seconds=0.0).resumed_from == 0
+    )  # killed before the first one
     again = train(plan, run, resume=True, tell=lambda now: None, max_seconds=0.0)
     assert (again.resumed_from, again.steps, again.finished) == (0, 0, False)
     (run / "checkpoint.safetensors").unlink()
     with pytest.raises(StopError):
         train(plan, run, resume=True, tell=stopping_at(1))
     assert (
-        read_values(run / "checkpoint.safetensors", "checkpoint")["agent"]["counters"]["num_timesteps"] == 0
+        read_values(run / "checkpoint.safetensors", "checkpoint")["agent"]["counters"][
+            "num_timesteps"
+        ]
+        == 0
     )
 
 
@@ -380,24 +499,32 @@ def test_a_checkpoint_with_another_record_is_refused_with_the_place(tmp_path):
     values = read_values(kept, "checkpoint")
     write_values({**values, "run": {**values["run"], "best_steps": "x"}}, kept)
     with pytest.raises(
-        InputError, match=r"does not fit this run \(run\.best_steps: 'x' found, expected int\);"
+        InputError,
+        match=r"does not fit this run \(run\.best_steps: 'x' found, expected int\);",
     ):
         train(plan, tmp_path / "run", resume=True)
     write_values({"run": values["run"]}, kept)
-    with pytest.raises(InputError, match=r"does not fit this run \('agent'\); start a new run"):
+    with pytest.raises(
+        InputError, match=r"does not fit this run \('agent'\); start a new run"
+    ):
         train(plan, tmp_path / "run", resume=True)
 
 
 def test_the_time_of_a_run_is_counted_from_its_beginning():
     before, over = time.monotonic(), []
-    train(tiny(total_steps=1), tell=lambda now: over.append(now.seconds - (time.monotonic() - before)))
+    train(
+        tiny(total_steps=1),
+        tell=lambda now: over.append(now.seconds - (time.monotonic() - before)),
+    )
     assert len(over) == 1
     assert -5.0 < over[0] <= 0.0
 
 
 def test_folders_are_checked_before_anything_is_learned(tmp_path):
     plan, run = tiny(), tmp_path / "run"
-    with pytest.raises(InputError, match="resume: found without a folder, expected the one of the run"):
+    with pytest.raises(
+        InputError, match="resume: found without a folder, expected the one of the run"
+    ):
         train(plan, resume=True)
     with pytest.raises(InputError, match="no run of training is there"):
         train(plan, run, resume=True)
@@ -422,10 +549,18 @@ def test_torch_has_the_threads_of_the_plan_and_afterwards_its_own():
     assert (during, torch.get_num_threads()) == ([before + 1], before)
 
 
-@pytest.mark.parametrize(("cost", "reached"), [(10.0, True), (10.0099, True), (10.0101, False)])
+@pytest.mark.parametrize(
+    ("cost", "reached"), [(10.0, True), (10.0099, True), (10.0101, False)]
+)
 def test_lq_is_reached_by_what_costs_a_thousandth_more_at_most(cost, reached):
-    curve = ({"steps": 0, "cost": 11.0}, {"steps": 5, "cost": cost}, {"steps": 9, "cost": 9.0})
-    result = training.TrainingResult(None, None, curve, 9.0, 9, 9, 10.0, 1.0, True, None)
+    curve = (
+        {"steps": 0, "cost": 11.0},
+        {"steps": 5, "cost": cost},
+        {"steps": 9, "cost": 9.0},
+    )
+    result = training.TrainingResult(
+        None, None, curve, 9.0, 9, 9, 10.0, 1.0, True, None
+    )
     assert result.lq_reached["steps"] == (5 if reached else 9)
     assert replace(result, lq_cost=None).lq_reached is None
 
@@ -446,10 +581,16 @@ def test_the_command_trains_and_resumes(tmp_path):
     assert written["configuration"] == told["configuration"]
     assert written["format"] == 1  # which later versions read
     assert written["command"].split()[0] == "shipgym"
-    assert {path.suffix for path in run.iterdir() if path.is_file()} == {".json", ".safetensors"}
+    assert {path.suffix for path in run.iterdir() if path.is_file()} == {
+        ".json",
+        ".safetensors",
+    }
     before = learned(run)
     settings = written["configuration"]["settings"]
-    settings |= {"hold": settings.pop("action_repeat"), "history": settings.pop("frame_stack")}
+    settings |= {
+        "hold": settings.pop("action_repeat"),
+        "history": settings.pop("frame_stack"),
+    }
     assert other_versions(run) == []
     written["versions"]["numpy"] = "0.1"
     (run / "run.json").write_text(json.dumps(written))  # as older versions wrote it
@@ -462,7 +603,11 @@ def test_the_command_trains_and_resumes(tmp_path):
 @pytest.mark.parametrize(
     ("algorithm", "steps", "said"),
     [
-        ("ppo", 100, "total_steps: 100 is rounded up to 256: rollouts of 8 ships have 256 steps"),
+        (
+            "ppo",
+            100,
+            "total_steps: 100 is rounded up to 256: rollouts of 8 ships have 256 steps",
+        ),
         ("ppo", 512, ""),
         ("sac", 1001, "1,001 is rounded up to 1,008: rollouts of 8 ships have 8 steps"),
     ],
@@ -474,8 +619,18 @@ def test_steps_that_are_no_whole_rollouts_are_told_before_the_training(
         raise InputError("begins")
 
     monkeypatch.setattr(training, "train", stand_in)
-    sizes = ["--set", "ships=8"] + ["--set", "n_steps=32", "--set", "batch_size=64"] * (algorithm == "ppo")
-    words = ["train", algorithm, "--total-steps", steps, *sizes, "--out", tmp_path / "run"]
+    sizes = ["--set", "ships=8"] + ["--set", "n_steps=32", "--set", "batch_size=64"] * (
+        algorithm == "ppo"
+    )
+    words = [
+        "train",
+        algorithm,
+        "--total-steps",
+        steps,
+        *sizes,
+        "--out",
+        tmp_path / "run",
+    ]
     code, printed = shipgym(*words)
     assert (code, printed.count("\n")) == (2, 2 if said else 1)
     assert f"{said}\n" * bool(said) + "error: begins\n" in printed
@@ -483,7 +638,12 @@ def test_steps_that_are_no_whole_rollouts_are_told_before_the_training(
 
 def test_a_training_learns_whole_rollouts():
     for plan in (tiny("ppo"), tiny("sac")):
-        found = train(replace(plan, settings=replace(plan.settings, total_steps=plan.settings.rollout + 1)))
+        found = train(
+            replace(
+                plan,
+                settings=replace(plan.settings, total_steps=plan.settings.rollout + 1),
+            )
+        )
         assert found.steps == 2 * plan.settings.rollout
 
 
@@ -498,20 +658,44 @@ def test_a_training_learns_whole_rollouts():
             ["train", "ppo", "--threads", "1025"],
             "threads: 1025 found, expected a whole number of at least 1 an",
         ),
-        (["train", "ppo", "--set", "gamma=nan"], "--set gamma: nan found, expected a number of magnitude"),
-        (["train", "ppo", "--set", "gamma=2"], "gamma: 2 found, expected a number >= 0 and <= 1"),
-        (["train", "ppo", "--set", "batch_size=1000"], "a divisor above 1 of ships x n_steps, 32768"),
+        (
+            ["train", "ppo", "--set", "gamma=nan"],
+            "--set gamma: nan found, expected a number of magnitude",
+        ),
+        (
+            ["train", "ppo", "--set", "gamma=2"],
+            "gamma: 2 found, expected a number >= 0 and <= 1",
+        ),
+        (
+            ["train", "ppo", "--set", "batch_size=1000"],
+            "a divisor above 1 of ships x n_steps, 32768",
+        ),
         (["train", "ppo", "--set", "base=lqq"], "Did you mean 'lq'?"),
         (["train", "ppo", "--set", "base=los"], "'course-keeping' has no path"),
-        (["train", "ppo", "--set", "base=none", "--set", "authority=0.5"], "without a base"),
-        (["train", "ppo", "--set", "base=tuned"], "base: 'tuned' found without a task of the suite"),
+        (
+            ["train", "ppo", "--set", "base=none", "--set", "authority=0.5"],
+            "without a base",
+        ),
+        (
+            ["train", "ppo", "--set", "base=tuned"],
+            "base: 'tuned' found without a task of the suite",
+        ),
         (
             ["train", "ppo", "--set", "action_repeat=1000"],
-            "action_repeat: 1000 found, expected a whole number of at least 1 and at most 600, no longer",
+            (
+                "action_repeat: 1000 found, expected a whole number of at least 1 and"
+                " at most 600, no longer"
+            ),
         ),
         (["train", "ppo", "--option", "nois=1"], "Did you mean 'noise'?"),
-        (["train", "ppo", "--task", "mariner-calm", "--sea", "rough"], "--task: found together with --sea"),
-        (["train", "sac", "--env", "shipgym/CourseKeepingDiscrete-v0"], "which sac does not learn"),
+        (
+            ["train", "ppo", "--task", "mariner-calm", "--sea", "rough"],
+            "--task: found together with --sea",
+        ),
+        (
+            ["train", "sac", "--env", "shipgym/CourseKeepingDiscrete-v0"],
+            "which sac does not learn",
+        ),
         (["train", "ppo", "--settings", "none.toml"], "there is no such settings file"),
         (["train", "ppo", "--resume"], "no run of training is there"),
     ],
@@ -538,7 +722,9 @@ def test_a_folder_in_use_is_not_written_over(tmp_path):
         assert expected in printed
     code, printed = shipgym("train", "sac", "--resume", "--out", run)
     assert (code, "algorithm is 'ppo' there, 'sac' here" in printed) == (2, True)
-    assert before == {path: path.read_bytes() for path in run.rglob("*") if path.is_file()}
+    assert before == {
+        path: path.read_bytes() for path in run.rglob("*") if path.is_file()
+    }
 
 
 def test_a_checkpoint_cut_short_or_of_another_network_is_refused(tmp_path):
@@ -549,22 +735,30 @@ def test_a_checkpoint_cut_short_or_of_another_network_is_refused(tmp_path):
     with pytest.raises(InputError, match="cut short"):
         train(plan, run, resume=True)
     train(tiny(total_steps=1, net_arch=[4]), tmp_path / "other")
-    (tmp_path / "other" / "checkpoint.safetensors").replace(run / "checkpoint.safetensors")
-    with pytest.raises(InputError, match=r"^[^\n]*does not fit this run [^\n]*start a new run$"):
+    (tmp_path / "other" / "checkpoint.safetensors").replace(
+        run / "checkpoint.safetensors"
+    )
+    with pytest.raises(
+        InputError, match=r"^[^\n]*does not fit this run [^\n]*start a new run$"
+    ):
         train(plan, run, resume=True)
 
 
 def test_a_process_that_is_killed_is_resumed(tmp_path):
     run = tmp_path / "run"
     words = [*COMMAND, "--total-steps", "1000000", "--out", str(run)]
-    process = subprocess.Popen([sys.executable, "-m", "agents.cli", *words], env={**os.environ})
+    process = subprocess.Popen(
+        [sys.executable, "-m", "agents.cli", *words], env={**os.environ}
+    )
     deadline = time.monotonic() + 60.0
     while not (run / "checkpoint.safetensors").exists() and time.monotonic() < deadline:
         assert process.poll() is None
         time.sleep(0.05)
     os.kill(process.pid, signal.SIGKILL)
     process.wait()
-    code, printed = shipgym("train", "ppo", "--resume", "--max-seconds", "0", "--out", run)
+    code, printed = shipgym(
+        "train", "ppo", "--resume", "--max-seconds", "0", "--out", run
+    )
     assert code == 0
     assert "resumed at step" in printed
     assert "continue with --resume" in printed.replace("\n", " ")

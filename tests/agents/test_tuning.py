@@ -78,30 +78,49 @@ def trainings(tmp_path, monkeypatch):
 
 
 def plan(**settings):
-    return make_plan(Given("ppo", settings={"base": "none", "total_steps": 10} | settings))
+    return make_plan(
+        Given("ppo", settings={"base": "none", "total_steps": 10} | settings)
+    )
 
 
 def test_better_settings_are_found_and_written_for_training(trainings, tmp_path):
     folder, told = tmp_path / "study", []
-    found = tune(plan(), folder, 10, training=trainings.bowl, progress=lambda *now: told.append(now))
+    found = tune(
+        plan(),
+        folder,
+        10,
+        training=trainings.bowl,
+        progress=lambda *now: told.append(now),
+    )
     assert [trial.number for trial in found.trials] == list(range(10))
-    assert [now[:2] for now in told] == [(k, 10) for k in (0, 1, 2, 3, 4, 4, 5, 6, 7, 8, 8, 9, 10)]
-    lowest = [
-        min((one.cost for one in found.trials[:n] if one.cost is not None), default=None) for n in (0, 4, 8)
+    assert [now[:2] for now in told] == [
+        (k, 10) for k in (0, 1, 2, 3, 4, 4, 5, 6, 7, 8, 8, 9, 10)
     ]
-    assert [now[2] for now in told] == [lowest[0]] * 5 + [lowest[1]] * 5 + [lowest[2]] * 3  # by batches
+    lowest = [
+        min(
+            (one.cost for one in found.trials[:n] if one.cost is not None), default=None
+        )
+        for n in (0, 4, 8)
+    ]
+    assert [now[2] for now in told] == [lowest[0]] * 5 + [lowest[1]] * 5 + [
+        lowest[2]
+    ] * 3  # by batches
     assert found.best.cost < found.trials[0].cost
-    assert found.best.cost == min(trial.cost for trial in found.trials if trial.cost is not None)
+    assert found.best.cost == min(
+        trial.cost for trial in found.trials if trial.cost is not None
+    )
     settings = make_plan(Given("ppo", settings_file=folder / "best.toml")).settings
     assert settings.to_dict() == dict(found.best.settings)
     head, _, written = (folder / "best.toml").read_text().partition("\n")
-    assert head == (
-        f"# Trial {found.best.number} of 10: mean cost held out {found.best.cost:.6g}, seed 0, ppo on "
-        "course-keeping with mariner."
+    assert (
+        head == f"# Trial {found.best.number} of 10: mean cost held out"
+        f" {found.best.cost:.6g}, seed 0, ppo on course-keeping with mariner."
     )
     assert "evaluate_every" not in written
     assert found.trials[0].settings == plan().settings.to_dict()
-    study = optuna.load_study(study_name="shipgym", storage=f"sqlite:///{folder / 'study.db'}")
+    study = optuna.load_study(
+        study_name="shipgym", storage=f"sqlite:///{folder / 'study.db'}"
+    )
     assert len(study.trials) == 10
     assert study.best_value == found.best.cost
     stopped = [trial for trial in found.trials if trial.ended == "stopped early"]
@@ -125,12 +144,25 @@ def test_interrupted_study_goes_on_as_if_nothing_had_happened(trainings, tmp_pat
 
 def test_two_workers_find_the_same(trainings, tmp_path):
     one = tune(plan(), tmp_path / "one", 5, training=trainings.bowl)
-    assert tune(plan(), tmp_path / "two", 5, training=trainings.bowl, where=JobEngine(workers=2)) == one
+    assert (
+        tune(
+            plan(),
+            tmp_path / "two",
+            5,
+            training=trainings.bowl,
+            where=JobEngine(workers=2),
+        )
+        == one
+    )
 
 
 def test_settings_that_are_given_are_not_varied(trainings, tmp_path):
     found = tune(
-        plan(gamma=0.9), tmp_path / "study", 5, fixed=("gamma", "batch_size"), training=trainings.bowl
+        plan(gamma=0.9),
+        tmp_path / "study",
+        5,
+        fixed=("gamma", "batch_size"),
+        training=trainings.bowl,
     )
     assert {trial.settings["gamma"] for trial in found.trials} == {0.9}
     assert not any("minibatches" in trial.parameters for trial in found.trials)
@@ -141,13 +173,17 @@ def test_what_is_varied_is_as_golden(algorithm):
     """The ranges, and the settings of their middle."""
     space = search_space(algorithm)
     middle = {
-        name: one.choices[len(one.choices) // 2]
-        if isinstance(one, optuna.distributions.CategoricalDistribution)
-        else type(one.low)((one.low + one.high) / 2)
+        name: (
+            one.choices[len(one.choices) // 2]
+            if isinstance(one, optuna.distributions.CategoricalDistribution)
+            else type(one.low)((one.low + one.high) / 2)
+        )
         for name, one in space.items()
     }
     found = with_parameters(load_settings(algorithm), middle).to_dict()
-    told = [f"{name}: {one}" for name, one in space.items()] + list(flat(found, "settings"))
+    told = [f"{name}: {one}" for name, one in space.items()] + list(
+        flat(found, "settings")
+    )
     assert same_text(f"varied/{algorithm}", "\n".join(told))
 
 
@@ -156,7 +192,9 @@ def test_trials_are_told_the_best_first(tmp_path, capsys):
     trials = (
         Trial(0, {}, {}, 9.87654, ((100, 10.0),), "finished"),
         Trial(1, varied, {}, None, (), "stopped early"),
-        Trial(2, varied | {"activation": "tanh"}, {}, 5.4321, ((100, 5.4321),), "finished"),
+        Trial(
+            2, varied | {"activation": "tanh"}, {}, 5.4321, ((100, 5.4321),), "finished"
+        ),
         Trial(3, varied, {}, None, (), "diverged"),
     )
     _print_tuning(Tuning(trials, trials[2]), tmp_path)
@@ -183,28 +221,39 @@ def test_whatever_is_proposed_are_valid_settings(algorithm):
 
 def test_a_trial_must_keep_up_with_the_median_of_finished_ones():
     curves = [((100, 9.0 - k), (200, 8.0 - k), (300, 8.5 - k)) for k in range(4)]
-    trials = [Trial(k, {}, {}, 8.0 - k, curve, "finished") for k, curve in enumerate(curves)]
+    trials = [
+        Trial(k, {}, {}, 8.0 - k, curve, "finished") for k, curve in enumerate(curves)
+    ]
     trials.append(Trial(4, {}, {}, None, ((100, 1.0),), "stopped early"))
     assert limits(trials[:3], 400) == []
     found = limits(trials, 400)
     assert found == [(100, 7.5), (200, 6.5), (300, 6.5)]
-    assert limits(trials, 800) == [(200, 6.5), (300, 6.5)]  # in the first quarter nobody is stopped
+    assert limits(trials, 800) == [
+        (200, 6.5),
+        (300, 6.5),
+    ]  # in the first quarter nobody is stopped
     assert lowest(found, 50) == float("inf")
     assert lowest(found, 250) == 6.5
 
 
 def test_folder_of_something_else_is_refused(trainings, tmp_path):
     tune(plan(), tmp_path / "study", 1, training=trainings.bowl)
-    with pytest.raises(InputError, match=r"configuration\.settings\.gamma is 0\.99 there, 0\.9 here"):
+    with pytest.raises(
+        InputError, match=r"configuration\.settings\.gamma is 0\.99 there, 0\.9 here"
+    ):
         tune(plan(gamma=0.9), tmp_path / "study", 1, training=trainings.bowl)
     with pytest.raises(InputError, match="exists and is not a tuning study"):
         tune(plan(), tmp_path, 1, training=trainings.bowl)
     (tmp_path / "study" / "study.db").write_text("no database " * 100)
     with pytest.raises(InputError, match="not a study of Optuna"):
         tune(plan(), tmp_path / "study", 1, training=trainings.bowl)
-    with pytest.raises(InputError, match=r"every trial diverged, the first: not finite, gamma 0\.99$"):
+    with pytest.raises(
+        InputError, match=r"every trial diverged, the first: not finite, gamma 0\.99$"
+    ):
         tune(plan(), tmp_path / "other", 5, training=trainings.diverges)
-    with pytest.raises(InputError, match="trials: 0 found, expected a whole number of at least 1"):
+    with pytest.raises(
+        InputError, match="trials: 0 found, expected a whole number of at least 1"
+    ):
         tune(plan(), tmp_path / "none", 0, training=trainings.bowl)
 
 
@@ -212,22 +261,32 @@ def test_an_empty_folder_becomes_a_study_and_a_file_does_not(trainings, tmp_path
     (tmp_path / "empty").mkdir()
     assert tune(plan(), tmp_path / "empty", 1, training=trainings.bowl).best.number == 0
     (tmp_path / "file").write_text("mine")
-    with pytest.raises(InputError, match="file: exists and is not a tuning study; name another folder"):
+    with pytest.raises(
+        InputError, match="file: exists and is not a tuning study; name another folder"
+    ):
         tune(plan(), tmp_path / "file", 1, training=trainings.bowl)
     assert (tmp_path / "file").read_text() == "mine"
 
 
-def test_a_study_with_another_table_of_trials_is_no_study_of_optuna(trainings, tmp_path):
+def test_a_study_with_another_table_of_trials_is_no_study_of_optuna(
+    trainings, tmp_path
+):
     tune(plan(), tmp_path / "study", 1, training=trainings.bowl)
     with sqlite3.connect(tmp_path / "study" / "study.db") as database:
         database.execute("ALTER TABLE trials RENAME COLUMN number TO place")
     database.close()
-    with pytest.raises(InputError, match=r"study\.db: not a study of Optuna .*written again from .*trials$"):
+    with pytest.raises(
+        InputError,
+        match=r"study\.db: not a study of Optuna .*written again from .*trials$",
+    ):
         tune(plan(), tmp_path / "study", 1, training=trainings.bowl)
 
 
 def test_what_a_training_returns_has_to_be_a_result(trainings, tmp_path):
-    with pytest.raises(InputError, match=r"trial 0\.cost: 'low' found, expected a whole number or a number"):
+    with pytest.raises(
+        InputError,
+        match=r"trial 0\.cost: 'low' found, expected a whole number or a number",
+    ):
         tune(plan(), tmp_path / "study", 1, training=trainings.broken)
 
 
@@ -239,10 +298,19 @@ def test_what_was_found_decides_what_is_proposed_next():
     ]
     turned = [replace(trial, cost=10.0 - trial.cost) for trial in first]
     rates = [
-        [parameters["learning_rate"] for parameters, _ in _proposed(asked, found, 2, ())]
-        for asked, found in ((plan(), first), (plan(), turned), (replace(plan(), seed=1), first))
+        [
+            parameters["learning_rate"]
+            for parameters, _ in _proposed(asked, found, 2, ())
+        ]
+        for asked, found in (
+            (plan(), first),
+            (plan(), turned),
+            (replace(plan(), seed=1), first),
+        )
     ]
-    assert rates[0] == [parameters["learning_rate"] for parameters, _ in _proposed(plan(), first, 2, ())]
+    assert rates[0] == [
+        parameters["learning_rate"] for parameters, _ in _proposed(plan(), first, 2, ())
+    ]
     assert rates[0] != rates[1]
     assert rates[0] != rates[2]
 
@@ -250,19 +318,32 @@ def test_what_was_found_decides_what_is_proposed_next():
 def test_one_that_was_stopped_early_is_the_best_only_where_none_has_finished(tmp_path):
     settings = plan().settings.to_dict()
     diverged = Trial(0, {}, settings, None, (), "diverged")
-    stopped = [Trial(k, {}, settings, None, ((5, 9.0 - k), (7, 12.0)), "stopped early") for k in (1, 2)]
+    stopped = [
+        Trial(k, {}, settings, None, ((5, 9.0 - k), (7, 12.0)), "stopped early")
+        for k in (1, 2)
+    ]
     finished = Trial(3, {}, settings, 20.0, ((10, 20.0),), "finished")
     assert _best([diverged, *stopped]) is stopped[1]
     assert _best([diverged, *stopped, finished]) is finished
-    on_task = make_plan(Given("ppo", task="mariner-calm", seed=4, settings={"base": "none"}))
+    on_task = make_plan(
+        Given("ppo", task="mariner-calm", seed=4, settings={"base": "none"})
+    )
     _write_best(tmp_path, on_task, [diverged, *stopped])
     lines = (tmp_path / "best.toml").read_text().splitlines()
-    assert lines[0] == "# Trial 2 of 3: no trial has finished, seed 4, ppo on mariner-calm with mariner."
+    assert (
+        lines[0]
+        == "# Trial 2 of 3: no trial has finished, seed 4, ppo on mariner-calm with"
+        " mariner."
+    )
 
 
-@pytest.mark.parametrize(("total_steps", "every"), [(1, 1), (9, 1), (19, 1), (20, 2), (1000, 100)])
+@pytest.mark.parametrize(
+    ("total_steps", "every"), [(1, 1), (9, 1), (19, 1), (20, 2), (1000, 100)]
+)
 def test_a_trial_is_evaluated_ten_times_on_the_way(total_steps, every):
-    assert evaluated_evenly(plan(total_steps=total_steps)).settings.evaluate_every == every
+    assert (
+        evaluated_evenly(plan(total_steps=total_steps)).settings.evaluate_every == every
+    )
 
 
 def told_by(monkeypatch, *told, rows=()):
@@ -278,30 +359,63 @@ def told_by(monkeypatch, *told, rows=()):
         return SimpleNamespace(curve=rows)
 
     monkeypatch.setattr(training, "train", stand_in)
-    return train_trial({"configuration": plan().configuration(), "limits": [(100, 6.0)]}), plans
+    return (
+        train_trial({"configuration": plan().configuration(), "limits": [(100, 6.0)]}),
+        plans,
+    )
 
 
-def test_a_trial_is_compared_at_its_evaluations_and_may_cost_as_much_as_the_limit(monkeypatch):
-    rows = [{"steps": 0, "cost": 1.0}, {"steps": 1, "cost": 8.0}, {"steps": 2, "cost": 9.0}]
-    equal, (asked,) = told_by(monkeypatch, (0, 1.0, True), (50, 9.0, True), (100, 6.0, True), rows=rows)
+def test_a_trial_is_compared_at_its_evaluations_and_may_cost_as_much_as_the_limit(
+    monkeypatch,
+):
+    rows = [
+        {"steps": 0, "cost": 1.0},
+        {"steps": 1, "cost": 8.0},
+        {"steps": 2, "cost": 9.0},
+    ]
+    equal, (asked,) = told_by(
+        monkeypatch, (0, 1.0, True), (50, 9.0, True), (100, 6.0, True), rows=rows
+    )
     assert equal == {"cost": 8.0, "curve": [(1, 8.0), (2, 9.0)], "ended": "finished"}
     assert asked.threads == 1  # trials are trained side by side
-    once, _ = told_by(monkeypatch, (1, 5.0, True), (100, 7.0, True), (200, 8.0, False), rows=rows)
+    once, _ = told_by(
+        monkeypatch, (1, 5.0, True), (100, 7.0, True), (200, 8.0, False), rows=rows
+    )
     assert once == equal  # better at any time
     stopped, _ = told_by(
-        monkeypatch, (0, 1.0, True), (50, 9.0, True), (60, 2.0, False), (100, 6.01, True), (200, 3.0, True)
+        monkeypatch,
+        (0, 1.0, True),
+        (50, 9.0, True),
+        (60, 2.0, False),
+        (100, 6.01, True),
+        (200, 3.0, True),
     )
-    assert stopped == {"cost": None, "curve": [(50, 9.0), (100, 6.01)], "ended": "stopped early"}
+    assert stopped == {
+        "cost": None,
+        "curve": [(50, 9.0), (100, 6.01)],
+        "ended": "stopped early",
+    }
 
 
 def test_a_trial_that_diverges_says_why(monkeypatch):
     found, _ = told_by(monkeypatch, (10, 7.0, True), (20, "not finite", True))
-    assert found == {"cost": None, "curve": [(10, 7.0)], "ended": "diverged", "why": "training diverged"}
+    assert found == {
+        "cost": None,
+        "curve": [(10, 7.0)],
+        "ended": "diverged",
+        "why": "training diverged",
+    }
 
 
 def test_trials_are_trainings_that_stop_when_they_fall_behind():
     pytest.importorskip("stable_baselines3")
-    small = {"total_steps": 256, "ships": 8, "n_steps": 16, "batch_size": 64, "n_epochs": 1}
+    small = {
+        "total_steps": 256,
+        "ships": 8,
+        "n_steps": 16,
+        "batch_size": 64,
+        "n_epochs": 1,
+    }
     short = make_plan(Given("ppo", options={"episode_steps": 20}, settings=small))
     job = {"configuration": evaluated_evenly(short).configuration(), "limits": []}
     finished = train_trial(job)
@@ -325,13 +439,17 @@ def test_trials_are_trainings_that_stop_when_they_fall_behind():
     ],
 )
 def test_wrong_arguments_of_the_command(arguments, message, tmp_path):
-    answer = CliRunner().invoke(app, ["tune", *arguments, "--out", str(tmp_path / "study")])
+    answer = CliRunner().invoke(
+        app, ["tune", *arguments, "--out", str(tmp_path / "study")]
+    )
     assert answer.exit_code == 2
     assert message in answer.stderr.replace("\n", " ")
     assert not (tmp_path / "study").exists()
 
 
-def test_the_command_asks_for_what_it_was_told_and_shows_trials_best_first(tmp_path, monkeypatch):
+def test_the_command_asks_for_what_it_was_told_and_shows_trials_best_first(
+    tmp_path, monkeypatch
+):
     asked, drawn = [], {"learning_rate": 0.000312345, "batch_size": 64}
     trials = (
         Trial(0, {}, {}, 5.0, (), "finished"),
@@ -340,25 +458,68 @@ def test_the_command_asks_for_what_it_was_told_and_shows_trials_best_first(tmp_p
     )
 
     def stand_in(plan, out, trials_asked, fixed, where, progress):
-        asked.append((plan.settings.gamma, plan.settings.evaluate_every, plan.configuration()["seed"]))
+        asked.append(
+            (
+                plan.settings.gamma,
+                plan.settings.evaluate_every,
+                plan.configuration()["seed"],
+            )
+        )
         asked.append((out, trials_asked, fixed, where.workers, progress))
-        assert plan.threads == 1  # of each of the trials that are done beside one another
+        assert (
+            plan.threads == 1
+        )  # of each of the trials that are done beside one another
         return Tuning(trials, trials[2])
 
-    assert inspect.signature(tune).parameters["trials"].default == 20  # as the command has it
+    assert (
+        inspect.signature(tune).parameters["trials"].default == 20
+    )  # as the command has it
     monkeypatch.setattr(tuning, "tune", stand_in)
-    words = ["tune", "ppo", "--total-steps", "100000", "--set", "gamma=0.9", "--out", str(tmp_path)]
+    words = [
+        "tune",
+        "ppo",
+        "--total-steps",
+        "100000",
+        "--set",
+        "gamma=0.9",
+        "--out",
+        str(tmp_path),
+    ]
     told = json.loads(CliRunner().invoke(app, [*words, "--json"]).stdout)
-    assert asked == [(0.9, 10_000, 0), (tmp_path, 20, ("gamma",), 1, None)]  # ten evaluations on the way
+    assert asked == [
+        (0.9, 10_000, 0),
+        (tmp_path, 20, ("gamma",), 1, None),
+    ]  # ten evaluations on the way
     assert [trial["cost"] for trial in told["trials"]] == [5.0, None, 4.25]
     assert (told["best"], told["settings"]) == (2, str(tmp_path / "best.toml"))
-    words += ["--set", "evaluate_every=50", "--trials", "3", "--seed", "7", "--workers", "2"]
+    words += [
+        "--set",
+        "evaluate_every=50",
+        "--trials",
+        "3",
+        "--seed",
+        "7",
+        "--workers",
+        "2",
+    ]
     lines = CliRunner().invoke(app, words).stdout.splitlines()
-    assert asked[2:] == [(0.9, 50, 7), (tmp_path, 3, ("gamma", "evaluate_every"), 2, None)]
+    assert asked[2:] == [
+        (0.9, 50, 7),
+        (tmp_path, 3, ("gamma", "evaluate_every"), 2, None),
+    ]
     assert [line.split() for line in lines if line.strip()[:1].isdigit()] == [
         ["2", "4.250", "finished", "learning_rate", "0.000312,", "batch_size", "64"],
         ["0", "5.000", "finished", "nothing:", "as", "it", "was"],
-        ["1", "-", "stopped", "early", "learning_rate", "0.000312,", "batch_size", "64"],
+        [
+            "1",
+            "-",
+            "stopped",
+            "early",
+            "learning_rate",
+            "0.000312,",
+            "batch_size",
+            "64",
+        ],
     ]
     assert f"written: {tmp_path / 'best.toml'}" in lines
 
@@ -372,10 +533,24 @@ def test_missing_optuna_is_reported_with_its_extra(tmp_path, monkeypatch):
 
 
 def test_what_a_base_does_before_anything_is_learned_does_not_count():
-    settings = {"base": "lq", "ships": 2, "n_steps": 8, "batch_size": 16, "total_steps": 32, "net_arch": [4]}
-    plan = make_plan(Given("ppo", settings=settings | {"evaluate_every": 16, "learning_rate": 1.0}))
+    settings = {
+        "base": "lq",
+        "ships": 2,
+        "n_steps": 8,
+        "batch_size": 16,
+        "total_steps": 32,
+        "net_arch": [4],
+    }
+    plan = make_plan(
+        Given("ppo", settings=settings | {"evaluate_every": 16, "learning_rate": 1.0})
+    )
     told = train_trial({"configuration": plan.configuration(), "limits": []})
     assert [steps for steps, _ in told["curve"]] == [16, 32]
     assert told["cost"] == min(cost for _, cost in told["curve"]) > 30.0  # LQ: 26
-    stopped = train_trial({"configuration": plan.configuration(), "limits": [(16, 30.0)]})
-    assert (stopped["ended"], [steps for steps, _ in stopped["curve"]]) == ("stopped early", [16])
+    stopped = train_trial(
+        {"configuration": plan.configuration(), "limits": [(16, 30.0)]}
+    )
+    assert (stopped["ended"], [steps for steps, _ in stopped["curve"]]) == (
+        "stopped early",
+        [16],
+    )

@@ -21,8 +21,13 @@ def turned(agent, model, rate, seconds):
     dt, state, memory = agent.design["dt"], model.service_state.copy(), np.zeros((1, 2))
     rates, orders = [], []
     for step in range(int(seconds / dt)):
-        seen = {name: np.zeros(1) for name in agent.observation_names} | {"heading_error_cos": np.ones(1)}
-        seen |= {"yaw_rate": state[None, model.state_names.index("r")], "rate_of_turn": np.array([rate])}
+        seen = {name: np.zeros(1) for name in agent.observation_names} | {
+            "heading_error_cos": np.ones(1)
+        }
+        seen |= {
+            "yaw_rate": state[None, model.state_names.index("r")],
+            "rate_of_turn": np.array([rate]),
+        }
         order, memory = agent.steer(seen, memory, np.array([step == 0]))
         limited = np.clip(order, -model.steering.limit, model.steering.limit)
         commands = np.tile(model.service_command, (2, 1))
@@ -38,7 +43,9 @@ def turned(agent, model, rate, seconds):
 def test_the_table_is_that_of_steady_turning_circles_also_of_an_unstable_ship(model):
     rates, rudders = steady_turns(model, straight_running(model).rudder)
     steady = turning_circle(model, 10.0, 3000.0, 1.0)["r"][-1]
-    assert np.interp(steady, rates, rudders) == pytest.approx(np.radians(10.0), rel=0.04)
+    assert np.interp(steady, rates, rudders) == pytest.approx(
+        np.radians(10.0), rel=0.04
+    )
 
 
 @pytest.mark.parametrize("side", [1.0, -1.0])
@@ -67,10 +74,14 @@ def test_a_rate_is_hardly_overshot_and_a_heading_damped_by_seven_tenths(model):
     agent = TurnRate.from_model(model)
     gains, design = agent.gains, agent.design
     time, effect = design["nomoto_T"], design["nomoto_K"] / design["nomoto_T"]
-    rate = np.array([1.0, 1.0 / time + gains["proportional"] * effect, gains["integral"] * effect])
+    rate = np.array(
+        [1.0, 1.0 / time + gains["proportional"] * effect, gains["integral"] * effect]
+    )
     pair = np.roots(rate)[0]
     assert np.abs(pair) == pytest.approx(design["frequency"])
-    assert np.exp(np.pi * pair.real / np.abs(pair.imag)) == pytest.approx(0.0015, abs=0.001)
+    assert np.exp(np.pi * pair.real / np.abs(pair.imag)) == pytest.approx(
+        0.0015, abs=0.001
+    )
     heading = np.roots(np.append(rate, rate[2] / gains["heading_time"]))
     slowest = heading[np.argmin(np.abs(heading))]
     assert -slowest.real / np.abs(slowest) == pytest.approx(0.74, abs=0.03)
@@ -78,15 +89,24 @@ def test_a_rate_is_hardly_overshot_and_a_heading_damped_by_seven_tenths(model):
 
 @pytest.mark.parametrize(
     "model",
-    [replace(MARINER, steering=replace(MARINER.steering, rudder_limit_deg=35.0)), TANKER],
+    [
+        replace(MARINER, steering=replace(MARINER.steering, rudder_limit_deg=35.0)),
+        TANKER,
+    ],
     ids=["mariner", "tanker"],
 )
-def test_courses_are_changed_at_the_largest_tabulated_rate_of_three_tenths_of_the_rudder(model):
+def test_courses_are_changed_at_the_largest_tabulated_rate_of_three_tenths_of_the_rudder(
+    model,
+):
     agent, most = TurnRate.from_model(model), 0.3 * model.steering.limit
     time = model.particulars["length"] / model.particulars["speed"]
     rates = agent.gains["rate"] + np.array([0.0, 0.02 / time])
-    rudders = [np.interp(side * rates, agent.rates, agent.rudders) for side in (1.0, -1.0)]
-    used, further = np.abs(np.array(rudders) - straight_running(model).rudder).max(axis=0)
+    rudders = [
+        np.interp(side * rates, agent.rates, agent.rudders) for side in (1.0, -1.0)
+    ]
+    used, further = np.abs(np.array(rudders) - straight_running(model).rudder).max(
+        axis=0
+    )
     assert used <= most < further
 
 
@@ -94,7 +114,9 @@ def test_a_long_ship_and_a_slow_gear_are_asked_for_less():
     time = MARINER.particulars["length"] / MARINER.particulars["speed"]
     assert TurnRate.from_model(MARINER).design["frequency"] * time == pytest.approx(2.0)
     slow = replace(MARINER, steering=replace(MARINER.steering, time_constant=10.0))
-    assert TurnRate.from_model(slow, dt=2.0).design["frequency"] * (10.0 + 1.0) == pytest.approx(0.3)
+    assert TurnRate.from_model(slow, dt=2.0).design["frequency"] * (
+        10.0 + 1.0
+    ) == pytest.approx(0.3)
 
 
 def test_it_is_a_controller_with_margins_and_a_file(tmp_path):
@@ -109,7 +131,9 @@ def test_it_is_a_controller_with_margins_and_a_file(tmp_path):
         TurnRate.from_model(MARINER, rate_deg_min=1000.0)
 
 
-def test_a_ship_that_three_tenths_of_the_rudder_do_not_turn_changes_courses_at_the_least_rate(monkeypatch):
+def test_a_ship_that_three_tenths_of_the_rudder_do_not_turn_changes_courses_at_the_least_rate(
+    monkeypatch,
+):
     """A fiftieth of speed over length."""
     table = np.array([-0.01, 0.0, 0.01]), np.radians([-15.0, 0.0, 15.0])
     monkeypatch.setattr(turn_rate, "steady_turns", lambda *_: table)

@@ -15,7 +15,9 @@ ROOT = Path(__file__).parents[2]
 SAMPLE = random.Random(0).sample(list(wrong_commands.lines()), 60)
 
 
-def test_wrong_commands_are_refused_with_one_message_and_nothing_written(tmp_path, monkeypatch):
+def test_wrong_commands_are_refused_with_one_message_and_nothing_written(
+    tmp_path, monkeypatch
+):
     monkeypatch.chdir(tmp_path)
     assert wrong_commands.faults(SAMPLE) == {}
 
@@ -29,10 +31,17 @@ def test_an_output_that_cannot_be_written_is_told(words):
     with Path("/dev/full").open("w") as full:
         answer = subprocess.run(
             [sys.executable, "-m", "agents.cli", *words],
-            cwd=ROOT, stdout=full, stderr=subprocess.PIPE, text=True, check=False,
-        )  # fmt: skip
+            cwd=ROOT,
+            stdout=full,
+            stderr=subprocess.PIPE,
+            text=True,
+            check=False,
+        )
     assert answer.returncode == 1
-    assert answer.stderr == "error: the output cannot be written (No space left on device)\n"
+    assert (
+        answer.stderr
+        == "error: the output cannot be written (No space left on device)\n"
+    )
 
 
 def test_names_from_files_do_not_steer_the_terminal(capsys):

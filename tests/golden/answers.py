@@ -19,8 +19,17 @@ from tests.golden.store import Floats, numbers_in
 
 REFUSED = (shipgym.InputError, shipgym.ManoeuvreError, shipgym.UnstableModelError)
 SHIPPED_FAMILIES = ("zigzags", "circles", "spirals", "pull-outs", "stops")
-SHIPPED_KINDS = ("zigzag", "turning-circle", "spiral", "pull-out", "straight", "captive", "random")
-MOST = 20  # numbers of an array that are kept whole; of longer ones samples and two means are
+SHIPPED_KINDS = (
+    "zigzag",
+    "turning-circle",
+    "spiral",
+    "pull-out",
+    "straight",
+    "captive",
+    "random",
+)
+# numbers of an array that are kept whole; of longer ones samples and two means are
+MOST = 20
 
 
 def plain(value: Any) -> Any:
@@ -33,10 +42,13 @@ def plain(value: Any) -> Any:
         return [value.real, value.imag]
     if isinstance(value, Trial):
         facts = {
-            name: getattr(value, name) for name in ("name", "kind", "use", "length", "over_ground", "notes")
+            name: getattr(value, name)
+            for name in ("name", "kind", "use", "length", "over_ground", "notes")
         }
         facts |= {"derived": sorted(value.derived), "repaired": dict(value.repaired)}
-        return plain({**{name: value[name] for name in ("t", *value.channels)}, **facts})
+        return plain(
+            {**{name: value[name] for name in ("t", *value.channels)}, **facts}
+        )
     if isinstance(value, np.ndarray | np.generic):
         return thinned(np.asarray(value))
     if is_dataclass(value) and not isinstance(value, type):
@@ -57,13 +69,20 @@ def thinned(values: np.ndarray[Any, Any]) -> list[Any]:
     if values.dtype.kind not in "fiubc":
         return [str(one) for one in values.reshape(-1)[:: max(values.size // MOST, 1)]]
     flat = values.astype(np.complex128).reshape(-1)
-    flat = np.concatenate([flat.real, flat.imag]) if np.iscomplexobj(values) else flat.real
+    flat = (
+        np.concatenate([flat.real, flat.imag]) if np.iscomplexobj(values) else flat.real
+    )
     if flat.size <= MOST:
         return list(map(float, flat))
     known = flat[np.isfinite(flat)]
     means = [known.mean(), np.sqrt(np.mean(known**2))] if known.size else []
     samples = flat[np.linspace(0, flat.size - 1, MOST // 2).round().astype(int)]
-    return [float(flat.size), float(known.size), *map(float, means), *map(float, samples)]
+    return [
+        float(flat.size),
+        float(known.size),
+        *map(float, means),
+        *map(float, samples),
+    ]
 
 
 def asked(question: Callable[[], Any]) -> Any:
@@ -95,13 +114,21 @@ def words(answers: Any, place: str = "") -> list[str]:
         pairs = answers.items()
     elif isinstance(answers, list):
         pairs = enumerate(answers)
-    return [line for key, one in pairs for line in words(one, f"{place}.{key}" if place else str(key))]
+    return [
+        line
+        for key, one in pairs
+        for line in words(one, f"{place}.{key}" if place else str(key))
+    ]
 
 
 @contextmanager
 def as_shipped() -> Iterator[None]:
     """An empty folder, and nothing registered but what is shipped, whatever was registered before."""
-    tables = (STRUCTURES, PRINTED), (EQUATIONS, SHIPPED_EQUATIONS), (FAMILIES, SHIPPED_FAMILIES)
+    tables = (
+        (STRUCTURES, PRINTED),
+        (EQUATIONS, SHIPPED_EQUATIONS),
+        (FAMILIES, SHIPPED_FAMILIES),
+    )
     before, kinds = [dict(table) for table, _ in tables], KINDS[:]
     for table, shipped in tables:
         for name in table.keys() - set(shipped):

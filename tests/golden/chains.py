@@ -24,23 +24,44 @@ OF_THE_RUN = ("time", "duration", "version", "path", "software")
 
 CONTESTANTS = ("pid", "lq", "ppo")
 TASKS = (
-    "mariner-calm", "kvlcc2-large-turns", "mariner-rough", "kvlcc2-noise", "container-path",
-    "tanker-shallow-path", "mariner-current", "kvlcc2-current", "mariner-sharp-turns", "kvlcc2-sharp-turns",
-    "container-roll-path", "container-rough-path",
-)  # fmt: skip
+    "mariner-calm",
+    "kvlcc2-large-turns",
+    "mariner-rough",
+    "kvlcc2-noise",
+    "container-path",
+    "tanker-shallow-path",
+    "mariner-current",
+    "kvlcc2-current",
+    "mariner-sharp-turns",
+    "kvlcc2-sharp-turns",
+    "container-roll-path",
+    "container-rough-path",
+)
 EPISODES = 3
 KEYS = ("contestant", "task", "run", "seed")
 
 METHODS: Mapping[str, Mapping[str, Any]] = {
     "default": {},
     "ls": {"method": "ls"},
-    "abc-lssvr": {"method": "abc-lssvr", "optimiser": {"name": "abc", "rounds": 10}, "seed": 1},
-    "rm-svm": {"structure": "grey-box", "method": "rm-svm", "reference_model": "tanker"},
+    "abc-lssvr": {
+        "method": "abc-lssvr",
+        "optimiser": {"name": "abc", "rounds": 10},
+        "seed": 1,
+    },
+    "rm-svm": {
+        "structure": "grey-box",
+        "method": "rm-svm",
+        "reference_model": "tanker",
+    },
     "output-error": {"method": "output-error"},
     "tmils": {"method": "tmils"},
     "prior": {"prior": "container"},
     "nomoto euler": {"method": "ls", "samples": "euler", "structure": "nomoto"},
-    "cv-lssvr rts bootstrap": {"method": "cv-lssvr", "preprocessing": "rts", "uncertainty": "bootstrap"},
+    "cv-lssvr rts bootstrap": {
+        "method": "cv-lssvr",
+        "preprocessing": "rts",
+        "uncertainty": "bootstrap",
+    },
 }
 #: The refinement stops when a step is small, so that its last digits depend on the way.
 TOLERANCES = {"": 1e-7, "output-error: ": 1e-5}
@@ -50,9 +71,20 @@ def record_demo(_: str) -> dict[str, Floats]:
     """The numbers in the metrics of `make demo`."""
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder) / "report"
-        words = ["autopilot", str(SHIP_FILE), "--agent", "mariner-calm-ppo", "--out", str(out)]
+        words = [
+            "autopilot",
+            str(SHIP_FILE),
+            "--agent",
+            "mariner-calm-ppo",
+            "--out",
+            str(out),
+        ]
         subprocess.run(
-            [sys.executable, "-m", "agents.cli", *words], cwd=ROOT, check=True, capture_output=True, text=True
+            [sys.executable, "-m", "agents.cli", *words],
+            cwd=ROOT,
+            check=True,
+            capture_output=True,
+            text=True,
         )
         metrics = json.loads((out / "metrics.json").read_text(encoding="utf-8"))
     return numbers_in(metrics, left_out=OF_THE_RUN)
@@ -72,9 +104,15 @@ def record_pretrained(task: str) -> dict[str, Floats]:
 def record_identification(method: str) -> dict[str, Floats]:
     """Coefficients of the example's ship, each with its standard error, and the errors of predictions."""
     ship = shipgym.ShipFile.load(SHIP_FILE)
-    result = identify(ship.trials(), particulars=ship.particulars, steering=ship.steering, **METHODS[method])
+    result = identify(
+        ship.trials(),
+        particulars=ship.particulars,
+        steering=ship.steering,
+        **METHODS[method],
+    )
     errors = result.standard_errors
     found = {
-        f"coefficient {name}": np.array([value, errors[name]]) for name, value in result.coefficients.items()
+        f"coefficient {name}": np.array([value, errors[name]])
+        for name, value in result.coefficients.items()
     }
     return found | numbers_in(result.metrics, "metrics")

@@ -1,8 +1,9 @@
 """Golden section `controllers`: designs of every kind, and their commands over fixed series of observations.
 
-Each kind is designed twice: as it is for one ship, and with settings that are not the defaults for another.
-The series of observations is no voyage: smooth, of all sizes from small motions to those beyond the limits,
-with jumps of the course, and different for each ship. Guidance is also shown paths of both versions.
+Each kind is designed twice: as it is for one ship, and with settings that are not the
+defaults for another. The series of observations is no voyage: smooth, of all sizes from
+small motions to those beyond the limits, with jumps of the course, and different for
+each ship. Guidance is also shown paths of both versions.
 """
 
 from __future__ import annotations
@@ -44,10 +45,22 @@ TOLERANCES = {"": 1e-6, "mpc": 1e-4, "second order: mpc": 1e-4}
 AGAIN = 20  # step at which an episode begins anew for one of the ships
 #: Size of what is observed beside the heading error, over its scale, by name.
 SIZES = {
-    "yaw_rate": 0.3, "sway": 0.15, "rudder": 0.6, "last_command": 0.5, "heading_error_integral": 0.7,
-    "cross_track": 1.3, "turn_angle": 0.7, "next_turn_angle": 0.6, "second_turn_angle": 0.4,
-}  # fmt: skip
-LINEAR = {"dt": 0.8, "integral_lengths": 13.0, "rudder_weight": 0.23, "rate_weight_s2": 17.0}
+    "yaw_rate": 0.3,
+    "sway": 0.15,
+    "rudder": 0.6,
+    "last_command": 0.5,
+    "heading_error_integral": 0.7,
+    "cross_track": 1.3,
+    "turn_angle": 0.7,
+    "next_turn_angle": 0.6,
+    "second_turn_angle": 0.4,
+}
+LINEAR = {
+    "dt": 0.8,
+    "integral_lengths": 13.0,
+    "rudder_weight": 0.23,
+    "rate_weight_s2": 17.0,
+}
 PATHS: dict[str, Callable[[], Task]] = {
     "v0": lambda: path_following_task(noise=0.7, lookahead=2.3, corridor=0.8),
     "v1": lambda: Task.of("PathFollowing-v1", rudder_travel_weight=0.03),
@@ -55,29 +68,64 @@ PATHS: dict[str, Callable[[], Task]] = {
 SETTINGS: dict[str, dict[str, Any]] = {
     "pid": {"dt": 1.3, "frequency": 0.043, "damping": 0.77, "integral_lengths": 13.0},
     "pid-filtered": {
-        "dt": 0.9, "damping": 1.1, "integral_lengths": 17.0, "reference_share": 1.7, "tracking_lengths": 3.1,
-        "largest_turn_rate_deg_s": 0.37, "wave_period": 8.3,
+        "dt": 0.9,
+        "damping": 1.1,
+        "integral_lengths": 17.0,
+        "reference_share": 1.7,
+        "tracking_lengths": 3.1,
+        "largest_turn_rate_deg_s": 0.37,
+        "wave_period": 8.3,
     },
     "lq": LINEAR,
     "lq-scheduled": {**LINEAR, "speeds": [4.1, 6.3, 7.0, 8.9]},
-    "lqg": {**LINEAR, "noise": 1.7, "disturbance_deg": 1.3, "wave_period": 9.1, "wave_heading_deg": 0.7},
+    "lqg": {
+        **LINEAR,
+        "noise": 1.7,
+        "disturbance_deg": 1.3,
+        "wave_period": 9.1,
+        "wave_heading_deg": 0.7,
+    },
     "turn-rate": {"dt": 1.7, "frequency": 0.031, "rate_deg_min": 23.0},
     "mpc": {**LINEAR, "horizon_lengths": 1.3},
-    "lq-adaptive": {**LINEAR, "forgetting_lengths": 11.0, "redesign_lengths": 0.7, "noise": 2.0},
+    "lq-adaptive": {
+        **LINEAR,
+        "forgetting_lengths": 11.0,
+        "redesign_lengths": 0.7,
+        "noise": 2.0,
+    },
     "los": {"lookahead_lengths": 1.7, "integral_lengths": 11.0},
     "ilos": {"lookahead_lengths": 2.7},
     "alos": {"integral_lengths": 9.0},
     "wheel-over": {
-        "lookahead_lengths": 1.7, "turn_lookahead_lengths": 2.9, "radius_lengths": 3.1, "reach_lengths": 1.3,
+        "lookahead_lengths": 1.7,
+        "turn_lookahead_lengths": 2.9,
+        "radius_lengths": 3.1,
+        "reach_lengths": 1.3,
         "crab_share": 0.7,
     },
     "preview-mpc": {
-        "horizon_lengths": 2.3, "deviation_deg": 4.0, "radius_lengths": 2.7, "reach_lengths": 1.1,
+        "horizon_lengths": 2.3,
+        "deviation_deg": 4.0,
+        "radius_lengths": 2.7,
+        "reach_lengths": 1.1,
     },
-}  # fmt: skip
+}
 GUIDES = ("los", "ilos", "alos", "wheel-over", "preview-mpc")
-SHIP_OF = {"lqg": "mariner-tls-svm", "lq-scheduled": "mariner", "preview-mpc": "mariner"}
-OTHERS = ("steering", "kvlcc2", "container", "second order", "functions", "learning", "search", "tuned")
+SHIP_OF = {
+    "lqg": "mariner-tls-svm",
+    "lq-scheduled": "mariner",
+    "preview-mpc": "mariner",
+}
+OTHERS = (
+    "steering",
+    "kvlcc2",
+    "container",
+    "second order",
+    "functions",
+    "learning",
+    "search",
+    "tuned",
+)
 
 
 def cases() -> list[str]:
@@ -93,7 +141,9 @@ def record(case: str) -> dict[str, Floats]:
     if kind in GUIDES:
         return of_guide(kind, SETTINGS[kind] if settings else {})
     model = load_model(SHIP_OF.get(kind, "mariner") if settings else "mariner")
-    return of_controller(controller_class(kind).from_model(model, **(SETTINGS[kind] if settings else {})))
+    return of_controller(
+        controller_class(kind).from_model(model, **(SETTINGS[kind] if settings else {}))
+    )
 
 
 def of_guide(kind: str, settings: dict[str, Any]) -> dict[str, Floats]:
@@ -106,7 +156,9 @@ def of_guide(kind: str, settings: dict[str, Any]) -> dict[str, Floats]:
         elif kind == "preview-mpc":
             more = {"horizon_lengths": 1.5, **more}
         made = controller_class(kind).from_model(model, **more)
-        found |= {f"{name} {one}": values for one, values in of_controller(made).items()}
+        found |= {
+            f"{name} {one}": values for one, values in of_controller(made).items()
+        }
     return found
 
 
@@ -114,12 +166,18 @@ def of_controller(made: Any) -> dict[str, Floats]:
     """What its file says, what it commands to ships side by side and to one, and what it remembers."""
     again = read_controller(made.to_dict(), "file")
     found = numbers_in(again.to_dict(), left_out=("ship",))
-    found |= {"loop": np.concatenate([vector(one) for one in vars(made.loop()).values()])}
+    found |= {
+        "loop": np.concatenate([vector(one) for one in vars(made.loop()).values()])
+    }
     # a search among plans has to tell them apart
-    shown = series(made.observation_names, largest=0.13 if made.kind == "preview-mpc" else 0.9)
+    shown = series(
+        made.observation_names, largest=0.13 if made.kind == "preview-mpc" else 0.9
+    )
     state, alone, actions, own = None, None, [], []
     for step, seen in enumerate(shown):
-        begins = np.arange(SHIPS) == 1 if step == AGAIN else np.zeros(SHIPS, dtype=np.bool_)
+        begins = (
+            np.arange(SHIPS) == 1 if step == AGAIN else np.zeros(SHIPS, dtype=np.bool_)
+        )
         action, state = again.predict(seen, state, begins)
         actions.append(action[:, 0])
         if step < 5:
@@ -127,7 +185,9 @@ def of_controller(made: Any) -> dict[str, Floats]:
             own.append(action)
     orders, _ = orders_of(made, shown[:12])
     found |= {"commands": vector(actions), "alone": vector(own), "orders": orders}
-    return found | {f"memory {k}": vector(one) for k, one in enumerate(flattened(state))}
+    return found | {
+        f"memory {k}": vector(one) for k, one in enumerate(flattened(state))
+    }
 
 
 def orders_of(made: Any, shown: Floats) -> tuple[Floats, Any]:
@@ -136,7 +196,9 @@ def orders_of(made: Any, shown: Floats) -> tuple[Floats, Any]:
         return vector(0.0), None
     memory, orders = np.zeros((SHIPS, made.memory_size)), []
     for step, rows in enumerate(shown):
-        seen = dict(zip(made.observation_names, (rows * made.observation_scales).T, strict=True))
+        seen = dict(
+            zip(made.observation_names, (rows * made.observation_scales).T, strict=True)
+        )
         if made.kind == "turn-rate" and step % 3 == 0:
             seen["rate_of_turn"] = np.array([0.0, 0.004, -0.007])
         order, memory = made.steer(seen, memory, np.full(SHIPS, step == 0))
@@ -159,7 +221,9 @@ def series(names: tuple[str, ...], steps: int = STEPS, largest: float = 0.9) -> 
     at, ship = np.arange(steps)[:, None], np.arange(SHIPS)
     size = np.array([0.01, min(0.25, 0.4 * largest), largest])  # of motions, by ship
     error = (
-        1.6 * size * np.sin(0.13 * at + ship) + np.where(at > 30, 0.7 * size, 0.0) - 0.4 * (at > 40) * size
+        1.6 * size * np.sin(0.13 * at + ship)
+        + np.where(at > 30, 0.7 * size, 0.0)
+        - 0.4 * (at > 40) * size
     )
     rows = []
     for k, name in enumerate(names):
@@ -170,17 +234,29 @@ def series(names: tuple[str, ...], steps: int = STEPS, largest: float = 0.9) -> 
         elif name == "surge":
             rows.append(0.9 + 0.2 * np.sin(0.1 * at + 2.0 * ship))
         elif name.endswith("distance"):
-            rows.append(0.45 - 0.4 * np.sin(0.12 * at + ship) + (0.5 if name.startswith("second") else 0.0))
+            rows.append(
+                0.45
+                - 0.4 * np.sin(0.12 * at + ship)
+                + (0.5 if name.startswith("second") else 0.0)
+            )
         else:
-            rows.append(SIZES[name] * np.minimum(size * 1.5, 1.0) * np.sin((0.17 + 0.02 * k) * at + k + ship))
+            rows.append(
+                SIZES[name]
+                * np.minimum(size * 1.5, 1.0)
+                * np.sin((0.17 + 0.02 * k) * at + k + ship)
+            )
     return np.stack(rows, axis=-1)
 
 
 def rates(made: Any, models: list[ShipModel]) -> dict[str, Floats]:
     """Margins of a controller on ships."""
     found = margin_uncertainty(made, models)
-    return {"nominal": vector(astuple(found.nominal)), "stable": vector(found.stable), **found.by_name,
-            **{f"quantiles {name}": values for name, values in found.quantiles().items()}}  # fmt: skip
+    return {
+        "nominal": vector(astuple(found.nominal)),
+        "stable": vector(found.stable),
+        **found.by_name,
+        **{f"quantiles {name}": values for name, values in found.quantiles().items()},
+    }
 
 
 def record_steering() -> dict[str, Floats]:
@@ -188,11 +264,19 @@ def record_steering() -> dict[str, Floats]:
     found: dict[str, Floats] = {}
     model = load_model("mariner-tls-svm")
     ships = [
-        replace(model, coefficients={**model.coefficients, "N_d": share * model.coefficients["N_d"]})
+        replace(
+            model,
+            coefficients={
+                **model.coefficients,
+                "N_d": share * model.coefficients["N_d"],
+            },
+        )
         for share in (0.7, 1.0, 1.45, -1.0)
     ]
     for made in (PID.from_model(model), LQ.from_model(model, **LINEAR)):
-        found |= {f"{made.kind} {name}": values for name, values in rates(made, ships).items()}
+        found |= {
+            f"{made.kind} {name}": values for name, values in rates(made, ships).items()
+        }
     return found
 
 
@@ -201,7 +285,9 @@ def under(model: ShipModel, *kinds: str) -> dict[str, Floats]:
     return {
         f"{kind} {name}": values
         for kind in kinds
-        for name, values in of_controller(controller_class(kind).from_model(model)).items()
+        for name, values in of_controller(
+            controller_class(kind).from_model(model)
+        ).items()
     }
 
 
@@ -225,18 +311,28 @@ def record_second_order() -> dict[str, Floats]:
 def record_functions() -> dict[str, Floats]:
     """Functions that designs are made of, at numbers that no design has."""
     model, dt = load_model("mariner"), 1.3
-    A, B = linear_loop.sampled_ships(np.array([[[-0.02, -3.1, 0.9], [-0.001, -0.05, 0.003]]] * 2), 0.0, dt)
+    A, B = linear_loop.sampled_ships(
+        np.array([[[-0.02, -3.1, 0.9], [-0.001, -0.05, 0.003]]] * 2), 0.0, dt
+    )
     rows = lq.lq_rows(A[:1].copy(), B[:1], dt, 11.0, 340.0, 0.13)
     ship = linear_loop.sample_ship(model, dt, first_order=True)
     slow = linear_loop.sample_ship(model, dt, speed=5.1)
     motion, drive = lqg.wave_model(9.3, 0.013, dt)
-    gain, deviations = lqg.kalman_gain(0.9 * motion, 2.0 * drive, np.eye(2)[:1], np.array([[1e-4]]))
-    reach = on_course(np.zeros((2, 9)), np.array([0.3, -2.0]), np.array([1.7, -0.9]), 7.0)
+    gain, deviations = lqg.kalman_gain(
+        0.9 * motion, 2.0 * drive, np.eye(2)[:1], np.array([[1e-4]])
+    )
+    reach = on_course(
+        np.zeros((2, 9)), np.array([0.3, -2.0]), np.array([1.7, -0.9]), 7.0
+    )
     return {
         "sampled": np.concatenate([vector(A[0]), vector(B[0])]),
         "rows": vector(rows),
-        "first order": np.concatenate([vector(ship.A), vector(ship.B), vector(astuple(ship.about))]),
-        "slow": np.concatenate([vector(slow.A), vector(slow.B), vector(astuple(slow.about))]),
+        "first order": np.concatenate(
+            [vector(ship.A), vector(ship.B), vector(astuple(ship.about))]
+        ),
+        "slow": np.concatenate(
+            [vector(slow.A), vector(slow.B), vector(astuple(slow.about))]
+        ),
         "wave motion": vector(motion),
         "wave drive": vector(drive),
         "kalman": vector(gain),
@@ -263,7 +359,10 @@ def record_functions() -> dict[str, Floats]:
         ),
         "own turn": vector(wheel_over.own_turn(model, 0.5)),
         "own lead": vector(
-            [wheel_over.own_lead(model, one) for one in (None, LQ.from_model(model, **LINEAR))]
+            [
+                wheel_over.own_lead(model, one)
+                for one in (None, LQ.from_model(model, **LINEAR))
+            ]
         ),
         "prior": vector(adaptive_lq.prime_steering(load_model("kvlcc2"))),
         "units": vector(adaptive_lq.units(161.0, 7.7)),
@@ -277,7 +376,10 @@ def record_learning() -> dict[str, Floats]:
     from shipgym.envs.engine import Engine
 
     model = load_model("mariner")
-    changed = {name: value * (1.0 if name[0] == "X" else 1.25) for name, value in model.coefficients.items()}
+    changed = {
+        name: value * (1.0 if name[0] == "X" else 1.25)
+        for name, value in model.coefficients.items()
+    }
     found = {}
     for name, noise, settings in (
         ("clean", 0.0, {}),
@@ -295,9 +397,15 @@ def record_learning() -> dict[str, Floats]:
             f"{name} actions": vector(actions[::10]),
             f"{name} coefficients": vector(made.coefficients(state)),
             f"{name} gains": vector(adaptive_lq.records(state, made.record)["gains"]),
-            f"{name} restless": vector(adaptive_lq.records(state, made.record)["restless"]),
-            f"{name} neutral": vector(adaptive_lq.records(state, made.record)["neutral"]),
-            f"{name} covariance": vector(adaptive_lq.records(state, made.record)["covariance"]),
+            f"{name} restless": vector(
+                adaptive_lq.records(state, made.record)["restless"]
+            ),
+            f"{name} neutral": vector(
+                adaptive_lq.records(state, made.record)["neutral"]
+            ),
+            f"{name} covariance": vector(
+                adaptive_lq.records(state, made.record)["covariance"]
+            ),
         }
     return found
 
@@ -307,18 +415,28 @@ def record_search() -> dict[str, Floats]:
     found: dict[str, Floats] = {}
     model = load_model("mariner")
     paths = {
-        **PATHS, "arcs": lambda: Task.of("PathFollowing-v1", turn_radius=2.3), "shallow": lambda: Task.of(
-            "PathFollowing-v1", sea=Weather(current=Current(1.1, towards_deg=50.0)), rudder_weight=0.3
+        **PATHS,
+        "arcs": lambda: Task.of("PathFollowing-v1", turn_radius=2.3),
+        "shallow": lambda: Task.of(
+            "PathFollowing-v1",
+            sea=Weather(current=Current(1.1, towards_deg=50.0)),
+            rudder_weight=0.3,
         ),
-    }  # fmt: skip
+    }
     for name, path in paths.items():
-        made = controller_class("preview-mpc").from_model(model, task=path(), horizon_lengths=2.7)
+        made = controller_class("preview-mpc").from_model(
+            model, task=path(), horizon_lengths=2.7
+        )
         rows = series(made.observation_names, 3, 0.13)[2] * made.observation_scales
         seen = dict(zip(made.observation_names, rows.T, strict=True))
-        seen["heading_error"] = np.arctan2(seen["heading_error_sin"], seen["heading_error_cos"])
+        seen["heading_error"] = np.arctan2(
+            seen["heading_error_sin"], seen["heading_error_cos"]
+        )
         stream = made._stream(seen, np.array([[0.3, -0.2], [0.0, 0.0], [-0.5, 0.9]]))
         plans = (
-            0.1 * preview_mpc.DRAWS[:1, :4].repeat(SHIPS, axis=0) * np.array([1.0, -0.7, 2.0])[:, None, None]
+            0.1
+            * preview_mpc.DRAWS[:1, :4].repeat(SHIPS, axis=0)
+            * np.array([1.0, -0.7, 2.0])[:, None, None]
         )
         costs = made._costs(seen, stream.T, plans)
         best = made._planned(seen, stream.T, np.full((SHIPS, preview_mpc.KNOTS), 0.03))
@@ -337,7 +455,9 @@ def record_search() -> dict[str, Floats]:
         ]
         ahead = preview_mpc.Ahead(turns, radius, 70.0)
         for x in (0.0, 90.0, 260.0, 380.0, 700.0, 1200.0):
-            place = ahead.fix(np.array([x, 0.8 * x, x]), np.array([0.3 * x, -0.4 * x - 10.0, 20.0]))
+            place = ahead.fix(
+                np.array([x, 0.8 * x, x]), np.array([0.3 * x, -0.4 * x - 10.0, 20.0])
+            )
             found[f"ahead {radius:g} {x:g}"] = np.concatenate(
                 [place.way, place.cross, place.course, *place.turns]
             )
@@ -355,15 +475,20 @@ def record_tuned() -> dict[str, Floats]:
     task, path = tuned_task(), load_suite("shipgym-v1").task("container-path")
     made = {
         "design": design("lq", task, {"integral_lengths": 13.0}),
-        "guide": design("los", path, {"lookahead_lengths": 1.7, "lq_rudder_weight": 0.3}),
-        "tuned": tuned("pid", task, "shipgym-v1"), "best": tuned("best", task, "shipgym-v1"),
-        "base": design_base("tuned", task), "path base": design_base("tuned", path),
+        "guide": design(
+            "los", path, {"lookahead_lengths": 1.7, "lq_rudder_weight": 0.3}
+        ),
+        "tuned": tuned("pid", task, "shipgym-v1"),
+        "best": tuned("best", task, "shipgym-v1"),
+        "base": design_base("tuned", task),
+        "path base": design_base("tuned", path),
         "named": design_base("pid", task),
-    }  # fmt: skip
+    }
     found = {}
     for name, one in made.items():
         content = one.to_dict() if one is not None else {}
         found |= {
-            f"{name} {part}": values for part, values in numbers_in(content, left_out=("ship",)).items()
+            f"{name} {part}": values
+            for part, values in numbers_in(content, left_out=("ship",)).items()
         }
     return found

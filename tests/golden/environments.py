@@ -1,12 +1,13 @@
 """Golden section `environments`: what every environment shows over 2,000 steps, in all its options.
 
-Rows are steered by a helmsman of fixed rules: a rudder that swings smoothly, and a feedback of heading error
-and yaw rate, rounded to 1/64. Observations are single precision: without that rounding a difference of 1e-15
-could turn a last digit of an observation, hence of an action, into a difference of 1e-7.
+Rows are steered by a helmsman of fixed rules: a rudder that swings smoothly, and a
+feedback of heading error and yaw rate, rounded to 1/64. Observations are single
+precision: without that rounding a difference of 1e-15 could turn a last digit of an
+observation, hence of an action, into a difference of 1e-7.
 
-What a difference grows to before the ship forgets it depends on the ship. When results are recorded, each
-case is sailed a second time with a ship longer by 1e-13 of her length; only the steps before that shows by
-1e-9 are kept and compared.
+What a difference grows to before the ship forgets it depends on the ship. When results
+are recorded, each case is sailed a second time with a ship longer by 1e-13 of her
+length; only the steps before that shows by 1e-9 are kept and compared.
 """
 
 from __future__ import annotations
@@ -25,7 +26,11 @@ from tests.golden.store import Floats, vector
 STEPS, ROWS, SEED = 2000, 3, 20
 EVERY = 200  # steps between samples, which are of one row after the other
 STRETCH, FORGIVEN = 1e-13, 1e-9
-TOLERANCES = {"": 1e-9, "seen ": 3e-7, "final seen ": 3e-7}  # single observations are single precision
+TOLERANCES = {
+    "": 1e-9,
+    "seen ": 3e-7,
+    "final seen ": 3e-7,
+}  # single observations are single precision
 
 
 @dataclass(frozen=True)
@@ -53,12 +58,18 @@ class Case:
         """The environment, with ships that are longer by a part `stretch` of their length."""
         options = dict(self.options)
         if stretch:
-            name = options.get("model", gymnasium.spec(self.id).kwargs.get("model", "mariner-tls-svm"))
+            name = options.get(
+                "model", gymnasium.spec(self.id).kwargs.get("model", "mariner-tls-svm")
+            )
             options["model"] = longer(name, stretch)
-            options["ensemble"] = [longer(one, stretch) for one in options.get("ensemble", ())]
+            options["ensemble"] = [
+                longer(one, stretch) for one in options.get("ensemble", ())
+            ]
         if self.single:
             return gymnasium.make(self.id, **options)
-        return gymnasium.make_vec(self.id, **{"num_envs": ROWS, "autoreset_mode": "SameStep"} | options)
+        return gymnasium.make_vec(
+            self.id, **{"num_envs": ROWS, "autoreset_mode": "SameStep"} | options
+        )
 
     @property
     def id(self) -> str:
@@ -81,26 +92,39 @@ CHANGING_SEA = shipgym.Weather(
     waves=shipgym.Waves(3.0, 9.0, from_deg=45.0),
 )
 GUSTS = shipgym.Weather(
-    current=shipgym.Current(0.5), wind=shipgym.Wind(14.0, spectrum="norsok", coefficients="isherwood")
+    current=shipgym.Current(0.5),
+    wind=shipgym.Wind(14.0, spectrum="norsok", coefficients="isherwood"),
 )
 CORNERS = [[0.0, 0.0], [1600.0, 0.0], [2800.0, 900.0], [4000.0, 400.0]]
 
 
 def cases() -> dict[str, Case]:
     """All cases by name."""
-    found = {task + variant: Case(task + variant) for task in (COURSE, PATH) for variant in VARIANTS}
+    found = {
+        task + variant: Case(task + variant)
+        for task in (COURSE, PATH)
+        for variant in VARIANTS
+    }
     for model in shipgym.list_models():
-        for task in (COURSE, PATH) if model != "mariner-tls-svm" else ():  # the default of both
+        for task in (
+            (COURSE, PATH) if model != "mariner-tls-svm" else ()
+        ):  # the default of both
             found[f"{task} {model}"] = Case(task, {"model": model})
     for task in (COURSE, PATH):
         for model in ("mariner-tls-svm", "container", "kvlcc2"):
             roll = {"roll": True} if model == "container" else {}
             seas = {
                 "moderate noise": {"sea": "moderate", "noise": 1.0},
-                "rough filtered": {"sea": "rough", "noise": 1.0, "measurement": "filtered"},
+                "rough filtered": {
+                    "sea": "rough",
+                    "noise": 1.0,
+                    "measurement": "filtered",
+                },
             }
             for name, sea in seas.items():
-                found[f"{task} {model} {name}"] = Case(task, {"model": model, **sea, **roll})
+                found[f"{task} {model} {name}"] = Case(
+                    task, {"model": model, **sea, **roll}
+                )
         more: dict[str, dict[str, Any]] = {
             "shallow": {"model": "tanker", "water_depth": 27.7},
             "long dt": {"dt": 3.0},
@@ -111,22 +135,39 @@ def cases() -> dict[str, Case]:
             "loading rough": {"loading_range": (0.9, 1.2), "sea": "rough"},
             "next step": {"autoreset_mode": "NextStep", "episode_steps": 450},
         }
-        found |= {f"{task} {name}": Case(task, options) for name, options in more.items()}
+        found |= {
+            f"{task} {name}": Case(task, options) for name, options in more.items()
+        }
         found[f"{task} single"] = Case(task, {"sea": "moderate"}, single=True)
         found[f"{task} envelope"] = Case(
             task, {"envelope_weight": 0.5, "max_envelope_distance": 1.5}, swing=0.9
         )
-    found[f"{COURSE} course changes"] = Case(COURSE, {"course_changes_deg": [20.0, -35.0, 10.0]})
-    found[f"{COURSE} lost control"] = Case(COURSE, {"max_heading_error_deg": 12.0, "episode_steps": 300})
-    found[f"{COURSE} posterior grey box"] = Case(
-        COURSE, {"model": "kvlcc2-rm-svm", "model_uncertainty": "posterior", "sea": "rough"}
+    found[f"{COURSE} course changes"] = Case(
+        COURSE, {"course_changes_deg": [20.0, -35.0, 10.0]}
     )
-    found[f"{COURSE} Roll astern"] = Case(f"{COURSE}Roll", {"action": "rudder-shaft", "sea": "rough"})
-    found[f"{PATH} waypoints"] = Case(PATH, {"waypoints": CORNERS, "lookahead": 2.0, "corridor": 0.7})
+    found[f"{COURSE} lost control"] = Case(
+        COURSE, {"max_heading_error_deg": 12.0, "episode_steps": 300}
+    )
+    found[f"{COURSE} posterior grey box"] = Case(
+        COURSE,
+        {"model": "kvlcc2-rm-svm", "model_uncertainty": "posterior", "sea": "rough"},
+    )
+    found[f"{COURSE} Roll astern"] = Case(
+        f"{COURSE}Roll", {"action": "rudder-shaft", "sea": "rough"}
+    )
+    found[f"{PATH} waypoints"] = Case(
+        PATH, {"waypoints": CORNERS, "lookahead": 2.0, "corridor": 0.7}
+    )
     found[f"{PATH} aground"] = Case(PATH, {"ground": 1.1, "corridor": 0.5}, swing=0.6)
     found[f"{PATH} sharp turns"] = Case(
         PATH,
-        {"n_legs": 8, "leg_lengths": (5.0, 8.0), "max_turn_deg": 110.0, "acceptance": 2.0, "ground": 8.0},
+        {
+            "n_legs": 8,
+            "leg_lengths": (5.0, 8.0),
+            "max_turn_deg": 110.0,
+            "acceptance": 2.0,
+            "ground": 8.0,
+        },
     )
     return found
 
@@ -136,7 +177,9 @@ def record(name: str, steps: int | None = None) -> dict[str, Floats]:
     return recorded_case(cases()[name], STEPS, EVERY, steps)
 
 
-def recorded_case(case: Case, longest: int, every: int, steps: int | None = None) -> dict[str, Floats]:
+def recorded_case(
+    case: Case, longest: int, every: int, steps: int | None = None
+) -> dict[str, Floats]:
     """The values of a case over some steps, by default over as many of the longest as can be compared."""
     if steps is None:
         history = sailed(case, longest)
@@ -169,7 +212,9 @@ def sailed(case: Case, steps: int, stretch: float = 0.0) -> dict[str, Floats]:
     return history
 
 
-def helmsman(seen: NDArray[np.float32], names: list[str], step: int, swing: float, env: Any) -> Any:
+def helmsman(
+    seen: NDArray[np.float32], names: list[str], step: int, swing: float, env: Any
+) -> Any:
     """Commands of all rows."""
     rows = np.arange(len(seen))
     sine, cosine, rate = (
@@ -189,21 +234,35 @@ def helmsman(seen: NDArray[np.float32], names: list[str], step: int, swing: floa
 def told(shown: Any, names: list[str], env: Any) -> dict[str, Any]:
     """What a step showed: observations, reward, flags, infos, those of episodes that ended, and the state."""
     seen, reward, terminated, truncated, infos = shown
-    found = {f"seen {name}": column for name, column in zip(names, np.atleast_2d(seen).T, strict=True)}
+    found = {
+        f"seen {name}": column
+        for name, column in zip(names, np.atleast_2d(seen).T, strict=True)
+    }
     found |= {"reward": reward, "terminated": terminated, "truncated": truncated}
     found |= {f"state {name}": value for name, value in env.physical_state().items()}
     for name, values in infos.items():
         if name == "final_info":
-            found |= {f"final {key}": last for key, last in values.items() if not key.startswith("_")}
+            found |= {
+                f"final {key}": last
+                for key, last in values.items()
+                if not key.startswith("_")
+            }
         elif name == "final_obs":
-            ended = np.stack([np.zeros(len(names)) if last is None else last for last in values])
-            found |= {f"final seen {key}": column for key, column in zip(names, ended.T, strict=True)}
+            ended = np.stack(
+                [np.zeros(len(names)) if last is None else last for last in values]
+            )
+            found |= {
+                f"final seen {key}": column
+                for key, column in zip(names, ended.T, strict=True)
+            }
         elif not name.startswith("_"):
             found[f"info {name}"] = values
     return found
 
 
-def comparable_steps(history: Mapping[str, Floats], perturbed: Mapping[str, Floats]) -> int:
+def comparable_steps(
+    history: Mapping[str, Floats], perturbed: Mapping[str, Floats]
+) -> int:
     """Steps until a difference has grown too large in anything that is double precision."""
     steps = len(next(iter(history.values())))
     for name, values in history.items():
@@ -231,7 +290,10 @@ def summary(history: Mapping[str, Floats], every: int) -> dict[str, Floats]:
         elif "final " in name:
             found[name] = vector(sums)
         elif name.startswith("seen "):
-            found |= {name: samples, f"observation {name.removeprefix('seen ')}": vector(sums)}
+            found |= {
+                name: samples,
+                f"observation {name.removeprefix('seen ')}": vector(sums),
+            }
         else:
             found[name] = np.concatenate([*sums, samples])
     return found

@@ -33,7 +33,9 @@ from shipgym.trials.trial import Trial
 from tests.golden.answers import Questions, refused
 
 Answers = dict[str, Any]
-stopping = import_module("shipgym.manoeuvres.stopping")  # its name is that of a function in the package
+stopping = import_module(
+    "shipgym.manoeuvres.stopping"
+)  # its name is that of a function in the package
 AROUND = (0.8, 0.9, 0.97, 1.03, 1.1, 1.2)  # a limit
 
 
@@ -45,24 +47,42 @@ def model(name: str) -> ShipModel:
 
 def measured(trial: Trial, keep: slice = slice(None), **changed: Any) -> Trial:
     """A simulated trial as if measured: without orders, some channels changed or, by None, left out."""
-    channels = dict(trial.channels) | {"delta_command": None, "n_command": None} | changed
-    kept = {name: np.asarray(values)[keep] for name, values in channels.items() if values is not None}
-    return Trial(trial.t[keep], kept, name="measured", kind=trial.kind, length=trial.length)
+    channels = (
+        dict(trial.channels) | {"delta_command": None, "n_command": None} | changed
+    )
+    kept = {
+        name: np.asarray(values)[keep]
+        for name, values in channels.items()
+        if values is not None
+    }
+    return Trial(
+        trial.t[keep], kept, name="measured", kind=trial.kind, length=trial.length
+    )
 
 
 def excited() -> Answers:
     """Rudder and shaft sequences by seed, with usual and other settings."""
     ship, other = model("mariner"), model("container")
-    steps = partial(excitation._steps, np.arange(0.0, 90.0, 0.7), (-0.2, 0.5), (3.0, 11.0))
+    steps = partial(
+        excitation._steps, np.arange(0.0, 90.0, 0.7), (-0.2, 0.5), (3.0, 11.0)
+    )
     return {
         "binary": lambda: excitation.prbs_rudder(ship, duration=120.0, dt=1.5),
-        "binary, own": lambda: excitation.prbs_rudder(other, 7.0, 3, 13.0, 90.0, 1.5, weather="moderate"),
+        "binary, own": lambda: excitation.prbs_rudder(
+            other, 7.0, 3, 13.0, 90.0, 1.5, weather="moderate"
+        ),
         "sines": lambda: excitation.multi_sine_rudder(ship, duration=300.0, dt=2.0),
-        "sines, own": lambda: excitation.multi_sine_rudder(other, 7.0, 3, 70.0, 20.0, 210.0, 1.5),
+        "sines, own": lambda: excitation.multi_sine_rudder(
+            other, 7.0, 3, 70.0, 20.0, 210.0, 1.5
+        ),
         "steps": lambda: excitation.random_rudder_steps(ship, duration=150.0, dt=1.5),
-        "steps, own": lambda: excitation.random_rudder_steps(other, 9.0, 5, 7.0, 19.0, 100.0, 1.5),
+        "steps, own": lambda: excitation.random_rudder_steps(
+            other, 9.0, 5, 7.0, 19.0, 100.0, 1.5
+        ),
         "shaft": lambda: excitation.shaft_speed_steps(other, duration=400.0, dt=2.0),
-        "shaft, own": lambda: excitation.shaft_speed_steps(other, 0.6, 0.9, 7, 30.0, 70.0, 4.0, 300.0, 2.0),
+        "shaft, own": lambda: excitation.shaft_speed_steps(
+            other, 0.6, 0.9, 7, 30.0, 70.0, 4.0, 300.0, 2.0
+        ),
         "tanker": lambda: excitation.shaft_speed_steps(
             model("tanker"), duration=300.0, dt=2.0, water_depth=30.0
         ),
@@ -73,16 +93,22 @@ def excited() -> Answers:
             lambda: excitation.random_rudder_steps(ship, -3.0),
         ],
         "clock": [
-            lambda c=c: excitation.prbs_rudder(ship, clock_s=c, duration=5.0, dt=1.0) for c in (0.9, 0.0)
+            lambda c=c: excitation.prbs_rudder(ship, clock_s=c, duration=5.0, dt=1.0)
+            for c in (0.9, 0.0)
         ],
         "band": [
-            lambda: excitation.multi_sine_rudder(ship, shortest_period_s=0.1, duration=30.0),
-            lambda: excitation.multi_sine_rudder(ship, longest_period_s=30.0, duration=30.0),
+            lambda: excitation.multi_sine_rudder(
+                ship, shortest_period_s=0.1, duration=30.0
+            ),
+            lambda: excitation.multi_sine_rudder(
+                ship, longest_period_s=30.0, duration=30.0
+            ),
             lambda: excitation.multi_sine_rudder(ship, 5.0, 0, 29.0, 25.0, 20.0),
             lambda: excitation.multi_sine_rudder(ship, 5.0, 0, 40.0, 29.0, 50.0),
         ],
         "lengths": [
-            lambda a=a: excitation.random_rudder_steps(ship, 5.0, 0, *a) for a in ((0.0, 3.0), (5.0, 4.0))
+            lambda a=a: excitation.random_rudder_steps(ship, 5.0, 0, *a)
+            for a in ((0.0, 3.0), (5.0, 4.0))
         ],
         "ratios": [
             lambda a=a: excitation.shaft_speed_steps(other, *a)
@@ -102,7 +128,10 @@ def zigzagged() -> Answers:
     """Zigzags, as simulated and as measured."""
     ship, other = model("mariner"), model("container")
     zigzag, indices = zigzags.zigzag, zigzags.zigzag_indices
-    long, port = zigzag(ship, 15.0, 10.0, duration=420.0, dt=1.5), zigzag(other, 20.0, 17.0, True, 300.0, 1.5)
+    long, port = (
+        zigzag(ship, 15.0, 10.0, duration=420.0, dt=1.5),
+        zigzag(other, 20.0, 17.0, True, 300.0, 1.5),
+    )
     step, deep = (
         zigzag(ship, 15.0, 10.0, duration=200.0, dt=1.5, switch="step"),
         zigzag(model("tanker"), 10.0, 7.0, duration=900.0, dt=2.0, water_depth=35.0),
@@ -113,7 +142,10 @@ def zigzagged() -> Answers:
     )
     never = zigzag(ship, 5.0, 60.0, duration=40.0, dt=2.0, must_reverse=False)
     approach = np.r_[np.zeros(11), long["delta"][:-11]]
-    shifted = {name: np.r_[np.full(11, long[name][0]), long[name][:-11]] for name in ("psi", "u", "v", "r")}
+    shifted = {
+        name: np.r_[np.full(11, long[name][0]), long[name][:-11]]
+        for name in ("psi", "u", "v", "r")
+    }
     sailed = {
         "long": long,
         "port": port,
@@ -130,9 +162,18 @@ def zigzagged() -> Answers:
     return {
         "trials": sailed,
         "indices": {name: lambda one=one: indices(one) for name, one in sailed.items()},
-        "switched": {name: lambda one=one: zigzags.switch_heading_deg(one) for name, one in sailed.items()},
-        "reversals": {name: lambda one=one: execution.reversals(one) for name, one in sailed.items()},
-        "executed": {name: lambda one=one: execution.execute_time(one) for name, one in sailed.items()},
+        "switched": {
+            name: lambda one=one: zigzags.switch_heading_deg(one)
+            for name, one in sailed.items()
+        },
+        "reversals": {
+            name: lambda one=one: execution.reversals(one)
+            for name, one in sailed.items()
+        },
+        "executed": {
+            name: lambda one=one: execution.execute_time(one)
+            for name, one in sailed.items()
+        },
         "other length": lambda: indices(long, 100.0),
         "other heading": lambda: indices(long, heading_deg=8.5),
         "switch of headings": [
@@ -158,7 +199,9 @@ def zigzagged() -> Answers:
         "port refused": lambda: zigzag(ship, 5.0, 60.0, True, 40.0, 2.0),
         "shallow": lambda: zigzag(ship, water_depth=20.0),
         "departure": [
-            lambda d=d, f=f: execution.departure(np.arange(float(len(d))), np.array(d), max(d), f)
+            lambda d=d, f=f: execution.departure(
+                np.arange(float(len(d))), np.array(d), max(d), f
+            )
             for d, f in (
                 ([0.0] * 5, 0.0),
                 ([0.0, 0.0, 0.4, 1.0, 1.0], 0.0),
@@ -168,11 +211,14 @@ def zigzagged() -> Answers:
             )
         ],
         "reached": [
-            execution.reached(np.array([0.0, 1.0, 3.0]), one, np.array([5.0, 7.0, 13.0]))
+            execution.reached(
+                np.array([0.0, 1.0, 3.0]), one, np.array([5.0, 7.0, 13.0])
+            )
             for one in (-1.0, 0.0, 0.5, 2.2, 3.0, 3.1)
         ],
         "turning rudder": [
-            lambda a=a: execution.turning_rudder(a, 35.0, "the limit") for a in (0.0, -20.0, 36.0)
+            lambda a=a: execution.turning_rudder(a, 35.0, "the limit")
+            for a in (0.0, -20.0, 36.0)
         ],
     }
 
@@ -207,7 +253,10 @@ def turned() -> Answers:
         return pulled(
             Trial(
                 np.arange(float(turn + rest)),
-                {"r": 0.01 * np.ones(turn + rest), "delta": np.r_[np.full(turn, -0.3), np.zeros(rest)]},
+                {
+                    "r": 0.01 * np.ones(turn + rest),
+                    "delta": np.r_[np.full(turn, -0.3), np.zeros(rest)],
+                },
             )
         )
 
@@ -218,24 +267,39 @@ def turned() -> Answers:
         "track": lambda: turning.track_from_order(port, 150.0),
         "refused": [
             lambda k=k: circle(ship, **k)
-            for k in ({"rudder_deg": 0.0}, {"rudder_deg": 91.0}, {"rudder_deg": -91.0}, {"dt": -1.0})
+            for k in (
+                {"rudder_deg": 0.0},
+                {"rudder_deg": 91.0},
+                {"rudder_deg": -91.0},
+                {"dt": -1.0},
+            )
         ],
         "without x": lambda: indices(measured(port, x=None)),
         "without length": lambda: indices(Trial(port.t, port.channels)),
         "full": [
-            turning.full_rudder_deg(one) for one in (ship, replace(ship, steering=SteeringGear(20.0)), other)
+            turning.full_rudder_deg(one)
+            for one in (ship, replace(ship, steering=SteeringGear(20.0)), other)
         ],
-        "circles": lambda: list(turning.standard_circles(replace(ship, steering=SteeringGear(21.0)))),
+        "circles": lambda: list(
+            turning.standard_circles(replace(ship, steering=SteeringGear(21.0)))
+        ),
         "pull-outs": out,
         "pulled": {name: lambda one=one: pulled(one) for name, one in out.items()},
         "made": lambda: pulled(Trial(t, made)),
-        "ordered": lambda: pulled(Trial(t, made | {"delta_command": np.r_[np.full(30, -0.1), np.zeros(45)]})),
-        "samples": [lambda a=a: held(*a) for a in ((9, 30), (10, 30), (30, 9), (30, 10))],
+        "ordered": lambda: pulled(
+            Trial(t, made | {"delta_command": np.r_[np.full(30, -0.1), np.zeros(45)]})
+        ),
+        "samples": [
+            lambda a=a: held(*a) for a in ((9, 30), (10, 30), (30, 9), (30, 10))
+        ],
         "no rate": lambda: pulled(Trial(t, {"delta": made["delta"]})),
         "limit": [lambda a=a: pull_outs.pull_out(ship, a) for a in (41.0, 0.0)],
         "step": lambda: pull_outs.pull_out(ship, 10.0, 50.0),
         "standard": lambda: list(pull_outs.standard_pull_outs(ship)),
-        "few": [execution.number_of_steps(7.4, 2.0), execution.number_of_steps(5.0, 2.0)],
+        "few": [
+            execution.number_of_steps(7.4, 2.0),
+            execution.number_of_steps(5.0, 2.0),
+        ],
     }
 
 
@@ -250,9 +314,25 @@ def spiralled() -> Answers:
     read, found = spirals.spiral_indices, spirals.spiral_from_trial
 
     def points(angles: list[float], rates: list[float], method: str = "direct") -> Any:
-        return read(spirals.Spiral(direct.trial, np.array(angles), np.array(rates), method))  # type: ignore[arg-type]
+        return read(
+            spirals.Spiral(direct.trial, np.array(angles), np.array(rates), method)
+        )  # type: ignore[arg-type]
 
-    there_and_back = [20.0, 10.0, 2.0, 0.0, -3.0, -12.0, -20.0, -12.0, -3.0, 0.0, 2.0, 10.0, 20.0]
+    there_and_back = [
+        20.0,
+        10.0,
+        2.0,
+        0.0,
+        -3.0,
+        -12.0,
+        -20.0,
+        -12.0,
+        -3.0,
+        0.0,
+        2.0,
+        10.0,
+        20.0,
+    ]
     rates = [1.0, 0.7, 0.5, 0.4, 0.2, -0.6, -0.9, -0.7, -0.4, -0.3, 0.1, 0.8, 1.1]
     drifting = direct.trial["delta"] + 0.002 * np.sin(np.arange(len(direct.trial)))
     return {
@@ -261,20 +341,31 @@ def spiralled() -> Answers:
         "loop": loop,
         "indices": [lambda one=one: read(one) for one in (direct, reverse)],
         "usual rates": lambda: spirals._one_way(
-            [180.0 / np.pi * a / ship.travel_time for a in spirals.REVERSE_RATES], "a", "b", 9.0, "c"
+            [180.0 / np.pi * a / ship.travel_time for a in spirals.REVERSE_RATES],
+            "a",
+            "b",
+            9.0,
+            "c",
         ),
         "points": lambda: points(there_and_back, rates),
         "mirrored": lambda: points([-a for a in there_and_back], [-a for a in rates]),
         "narrow": lambda: points(
-            there_and_back, [1.0, 0.7, 0.3, 0.1, -0.2, -0.6, -0.9, -0.7, -0.1, 0.1, 0.2, 0.8, 1.1]
+            there_and_back,
+            [1.0, 0.7, 0.3, 0.1, -0.2, -0.6, -0.9, -0.7, -0.1, 0.1, 0.2, 0.8, 1.1],
         ),
         "reversed": lambda: points(
-            [3.0, 1.0, -0.7, 0.2, 1.1, -0.5, -3.0], [0.5, 0.3, 0.2, 0.05, -0.1, -0.3, -0.5], "reverse"
+            [3.0, 1.0, -0.7, 0.2, 1.1, -0.5, -3.0],
+            [0.5, 0.3, 0.2, 0.05, -0.1, -0.3, -0.5],
+            "reverse",
         ),
-        "no fold": lambda: points([3.0, 1.0, 0.3, -2.0], [0.5, 0.2, -0.1, -0.4], "reverse"),
+        "no fold": lambda: points(
+            [3.0, 1.0, 0.3, -2.0], [0.5, 0.2, -0.1, -0.4], "reverse"
+        ),
         "one side": lambda: points(there_and_back, [abs(a) for a in rates]),
         "one way": lambda: points([10.0, 0.0, -10.0], [1.0, 0.2, -1.0]),
-        "no change": lambda: points([20.0, 0.0, -20.0, 0.0, 20.0], [1.0, 0.5, 0.1, -0.2, -1.0]),
+        "no change": lambda: points(
+            [20.0, 0.0, -20.0, 0.0, 20.0], [1.0, 0.5, 0.1, -0.2, -1.0]
+        ),
         "method": lambda: points([1.0], [1.0], "sideways"),
         "from trial": lambda: found(direct.trial),
         "measured": lambda: found(measured(direct.trial, delta=drifting)),
@@ -284,7 +375,8 @@ def spiralled() -> Answers:
         "tolerance": lambda: found(direct.trial, None, 0.0),
         "no rate": lambda: found(measured(direct.trial, r=None)),
         "turning point": [
-            spirals.turning_point(np.array(a)) for a in (there_and_back, [-3.0, 1.0, 4.0, 0.0, -3.0])
+            spirals.turning_point(np.array(a))
+            for a in (there_and_back, [-3.0, 1.0, 4.0, 0.0, -3.0])
         ],
         "refused": [
             lambda a=a: spirals.direct_spiral(ship, a)
@@ -298,18 +390,30 @@ def spiralled() -> Answers:
         ],
         "fast": lambda: spirals.reverse_spiral(ship, (9.0, 0.0, -9.0)),
         "step": lambda: spirals.reverse_spiral(ship, (0.1, 0.0, -0.1), 90.0),
-        "standard": [lambda one=one: list(spirals.standard_spirals(one)) for one in (ship, unstable)],
-        "effect": [settling._rudder_effect(one, np.inf) for one in (ship, model("container"), unstable)],
-        "angles": spirals.standard_spirals(replace(ship, steering=SteeringGear(12.0)))[
-            "direct spiral"
-        ].sail.keywords["rudder_deg"],
+        "standard": [
+            lambda one=one: list(spirals.standard_spirals(one))
+            for one in (ship, unstable)
+        ],
+        "effect": [
+            settling._rudder_effect(one, np.inf)
+            for one in (ship, model("container"), unstable)
+        ],
+        "angles": (
+            spirals.standard_spirals(replace(ship, steering=SteeringGear(12.0)))[
+                "direct spiral"
+            ].sail.keywords["rudder_deg"]
+        ),
     }
 
 
 def stopped() -> Answers:
     """Stops and accelerations."""
     ship, tanker = model("container"), model("tanker")
-    stop, read, faster = stopping.stopping, stopping.stopping_indices, stopping.acceleration
+    stop, read, faster = (
+        stopping.stopping,
+        stopping.stopping_indices,
+        stopping.acceleration,
+    )
     sailed = {
         "inertia": stop(ship, speed_ratio=0.4, dt=2.0),
         "slower": stop(ship, 0.6, 0.7, 2.0),
@@ -337,14 +441,20 @@ def stopped() -> Answers:
         "part": lambda: gained(speeds["usual"], 1.0),
         "slows": lambda: gained(crash),
         "without u": lambda: gained(measured(crash, u=None)),
-        "refused": [lambda a=a: stop(ship, *a) for a in ((1.4,), (-0.1,), (0.0, 1.0), (0.0, 0.0), (-2.1,))],
+        "refused": [
+            lambda a=a: stop(ship, *a)
+            for a in ((1.4,), (-0.1,), (0.0, 1.0), (0.0, 0.0), (-2.1,))
+        ],
         "astern": lambda: stop(tanker, -2.1),
         "no shaft": lambda: stop(model("mariner")),
         "never": lambda: stop(ship, 1.1, 0.3, 2.0),
         "crash refused": lambda: stopping.crash_stop(ship),
         "starts": [lambda a=a: faster(ship, *a) for a in ((0.0,), (1.0,), (0.5, 1.0))],
         "no propeller": lambda: faster(model("mariner")),
-        "goes astern": [stopping.goes_astern(model(name)) for name in ("tanker", "container", "mariner")],
+        "goes astern": [
+            stopping.goes_astern(model(name))
+            for name in ("tanker", "container", "mariner")
+        ],
         "standard": [
             lambda name=name: list(stopping.standard_stops(model(name)))
             for name in ("tanker", "container", "mariner")
@@ -376,9 +486,13 @@ def judged() -> Answers:
         "tactical_diameter_lengths": interval(5.5, *(lengths + 3.0)),
         "transfer_lengths": interval(2.0, *lengths),
     }
-    found = {name: dict(zigzag if name.startswith("zigzag") else circle) for name in names}
+    found = {
+        name: dict(zigzag if name.startswith("zigzag") else circle) for name in names
+    }
     found[names[0]]["advance_lengths"] = interval(None, *lengths)
-    found["zigzag 20/20, port first"]["overshoot_1_deg"] = interval(26.0, *np.linspace(25.5, 27.0, 40))
+    found["zigzag 20/20, port first"]["overshoot_1_deg"] = interval(
+        26.0, *np.linspace(25.5, 27.0, 40)
+    )
     plain_criteria = imo.imo_criteria(ship, found)
     stop = {"track_reach_lengths": interval(14.0, 13.0, 14.5, 16.0)}
     boxed = replace(
@@ -394,50 +508,93 @@ def judged() -> Answers:
     runs = [circling, zigzagging, wide]
 
     def by(trial: Trial, **changed: Any) -> Any:
-        return imo._measured(ship, Trial(trial.t, trial.channels | changed, kind=trial.kind))
+        return imo._measured(
+            ship, Trial(trial.t, trial.channels | changed, kind=trial.kind)
+        )
 
     def sure(share: float) -> Any:
         draws = interval(2.0, *np.where(np.arange(200) < share * 200, 2.0, 3.0))
-        return imo._decided(imo._criterion([{"a_lengths": draws}], "a_lengths", 2.5, "5.3"), "turn", False)
+        return imo._decided(
+            imo._criterion([{"a_lengths": draws}], "a_lengths", 2.5, "5.3"),
+            "turn",
+            False,
+        )
 
     def outside(scale: float) -> bool:
         narrow = replace(boxed.envelope, shape=np.diag([1e-3, 1e-3, 1e-3, scale]))
         return imo._outside(
-            replace(ship, envelope=narrow), imo.imo_manoeuvres(ship)["zigzag 10/10, starboard first"]
+            replace(ship, envelope=narrow),
+            imo.imo_manoeuvres(ship)["zigzag 10/10, starboard first"],
         )
 
     return {
         "criteria": {
-            name: [lambda one=one: one.to_dict(), one.interval, one.share_passed, one.probability]
+            name: [
+                lambda one=one: one.to_dict(),
+                one.interval,
+                one.share_passed,
+                one.probability,
+            ]
             for name, one in plain_criteria.items()
         },
-        "tanker": lambda: imo.imo_criteria(
-            tanker, {**{name: found.get(name, stop) for name in imo.imo_manoeuvres(tanker)}}
-        )["stopping"].to_dict(),
+        "tanker": (
+            lambda: imo.imo_criteria(
+                tanker,
+                {
+                    **{
+                        name: found.get(name, stop)
+                        for name in imo.imo_manoeuvres(tanker)
+                    }
+                },
+            )["stopping"].to_dict()
+        ),
         "container": lambda: imo._stopping(model("container"), None).to_dict(),
         "measured": {
             name: lambda one=one: one.to_dict()
             for name, one in imo.with_measured(plain_criteria, ship, runs).items()
         },
-        "probabilities": [one.probability for one in imo.with_measured(plain_criteria, ship, runs).values()],
+        "probabilities": [
+            one.probability
+            for one in imo.with_measured(plain_criteria, ship, runs).values()
+        ],
         "trials": [lambda one=one: by(one) for one in runs],
-        "fast": [by(circling, u=k * circling["u"]) == {} for k in (0.88, 0.92, 1.08, 1.12)],
-        "angles": [len(by(wide, delta_command=wide["delta_command"] * k)) for k in (0.93, 0.96, 1.04, 1.06)],
+        "fast": [
+            by(circling, u=k * circling["u"]) == {} for k in (0.88, 0.92, 1.08, 1.12)
+        ],
+        "angles": [
+            len(by(wide, delta_command=wide["delta_command"] * k))
+            for k in (0.93, 0.96, 1.04, 1.06)
+        ],
         "other kind": lambda: imo._measured(ship, circling.with_(kind="spiral")),
         "no position": lambda: imo._measured(ship, measured(circling, x=None)),
         "no speed": lambda: imo._measured(ship, measured(circling, u=None)),
-        "limits": [imo.overshoot_limits_deg(one) for one in (5.0, 9.0, 10.5, 20.0, 28.0, 29.0, 30.5, 40.0)],
-        "words": [imo.trial_in_words(ship, one) for one in ("turning circle", "zigzag 10/10")],
-        "limited": imo.trial_in_words(replace(ship, steering=SteeringGear(25.0)), "turning circle"),
+        "limits": [
+            imo.overshoot_limits_deg(one)
+            for one in (5.0, 9.0, 10.5, 20.0, 28.0, 29.0, 30.5, 40.0)
+        ],
+        "words": [
+            imo.trial_in_words(ship, one) for one in ("turning circle", "zigzag 10/10")
+        ],
+        "limited": imo.trial_in_words(
+            replace(ship, steering=SteeringGear(25.0)), "turning circle"
+        ),
         "sure": [lambda k=k: sure(k) for k in (0.0, 0.02, 0.03, 0.5, 0.97, 0.98, 1.0)],
         "beyond": lambda: imo._decided(plain_criteria["advance"], "35 deg turn", True),
         "outside": [outside(k) for k in (1.0, 5.6, 6.3, 6.9, 20.0)],
-        "unboxed": [imo._outside(one, imo.imo_manoeuvres(tanker)["crash stop"]) for one in (ship, boxed)],
+        "unboxed": [
+            imo._outside(one, imo.imo_manoeuvres(tanker)["crash stop"])
+            for one in (ship, boxed)
+        ],
         "assessed": lambda: {
             name: one.to_dict()
             for name, one in imo.assess_draws(
                 ship,
-                [ship.with_coefficients(k * np.array(list(ship.coefficients.values()))) for k in (1.0, 1.01)],
+                [
+                    ship.with_coefficients(
+                        k * np.array(list(ship.coefficients.values()))
+                    )
+                    for k in (1.0, 1.01)
+                ],
             ).items()
         },
         "draws": lambda: imo.imo_assessment(model("mariner"), 3),
@@ -468,7 +625,9 @@ def spread() -> Answers:
         return replace(
             ship,
             covariance=None,
-            coefficients={k: v * factors.get(k, 1.0) for k, v in ship.coefficients.items()},
+            coefficients={
+                k: v * factors.get(k, 1.0) for k, v in ship.coefficients.items()
+            },
         )
 
     draws = [ship, changed(X_u=-1.0), changed(Y_v=-1.0), changed(N_d=1.1)]
@@ -481,11 +640,16 @@ def spread() -> Answers:
         registry._check_physical(
             ship,
             Trial(
-                t, {"u": 0.0 * t, "v": 0.0 * t, "r": 0.0 * t} | {name: np.array([0.0, 0.3, 1.0, -0.5]) * size}
+                t,
+                {"u": 0.0 * t, "v": 0.0 * t, "r": 0.0 * t}
+                | {name: np.array([0.0, 0.3, 1.0, -0.5]) * size},
             ),
         )
 
-    certain = replace(ship, covariance=1e-24 * np.diag(np.array(list(ship.coefficients.values())) ** 2))
+    certain = replace(
+        ship,
+        covariance=1e-24 * np.diag(np.array(list(ship.coefficients.values())) ** 2),
+    )
     return {
         "intervals": {
             name: [
@@ -499,29 +663,45 @@ def spread() -> Answers:
             ]
             for name, one in values.items()
         },
-        "worst": lambda: intervals.worst([values["a"], interval(7.0, *np.linspace(0.0, 6.0, 41))]).to_dict(),
-        "worst of none": lambda: intervals.worst(
-            [values["lost"], interval(None, 9.0, 0.0, 1.0, 2.0, lost=5)]
-        ).to_dict(),
-        "of": lambda: intervals.intervals_of(own, draws, {"circle": evaluate}, done.append)["circle"],
+        "worst": (
+            lambda: intervals.worst(
+                [values["a"], interval(7.0, *np.linspace(0.0, 6.0, 41))]
+            ).to_dict()
+        ),
+        "worst of none": (
+            lambda: intervals.worst(
+                [values["lost"], interval(None, 9.0, 0.0, 1.0, 2.0, lost=5)]
+            ).to_dict()
+        ),
+        "of": lambda: intervals.intervals_of(
+            own, draws, {"circle": evaluate}, done.append
+        )["circle"],
         "done": lambda: done,
         "attempts": [lambda one=one: intervals.attempt(evaluate, one) for one in draws],
         "index": lambda: {
-            name: one.value for name, one in intervals.index_intervals(certain, evaluate, 2).items()
+            name: one.value
+            for name, one in intervals.index_intervals(certain, evaluate, 2).items()
         },
         "draws": lambda: intervals.index_intervals(ship, evaluate, 1),
         "name": lambda: intervals.index_intervals(ship, "zigzag"),
-        "no covariance": lambda: intervals.index_intervals(model("mariner"), evaluate, 2),
+        "no covariance": lambda: intervals.index_intervals(
+            model("mariner"), evaluate, 2
+        ),
         "families": {
-            name: {family: list(ones) for family, ones in registry.families_of(model(name)).items()}
+            name: {
+                family: list(ones)
+                for family, ones in registry.families_of(model(name)).items()
+            }
             for name in ("mariner", "container", "tanker", "kvlcc2")
         },
         "titles": {name: one.title for name, one in standard.FAMILIES.items()},
         "captions": {
-            name: one.caption for name, one in registry.standard_manoeuvres(model("tanker")).items()
+            name: one.caption
+            for name, one in registry.standard_manoeuvres(model("tanker")).items()
         },
         "none": {
-            name: one.no_indices for name, one in registry.standard_manoeuvres(model("tanker"), 40.0).items()
+            name: one.no_indices
+            for name, one in registry.standard_manoeuvres(model("tanker"), 40.0).items()
         },
         "settings": {
             name: getattr(one.sail, "keywords", {})
@@ -532,10 +712,16 @@ def spread() -> Answers:
         "time": registry.standard_time(ship),
         "physical": {
             name: refused(partial(physical, name), [k * most for k in AROUND])
-            for name, most in (("u", 1.5 * speed), ("v", speed), ("r", 3.0 * speed / length))
+            for name, most in (
+                ("u", 1.5 * speed),
+                ("v", speed),
+                ("r", 3.0 * speed / length),
+            )
         },
         "words": lambda: physical("r", 1.0),
-        "twice": lambda: registry.register_manoeuvre("zigzags", zigzags.standard_zigzags),
+        "twice": lambda: registry.register_manoeuvre(
+            "zigzags", zigzags.standard_zigzags
+        ),
         "unnamed": lambda: registry.register_manoeuvre(" ", zigzags.standard_zigzags),
     }
 
@@ -548,13 +734,18 @@ def settled() -> Answers:
     at_rate = voyage.rate_helmsman()
     second = voyage.settle(at_rate(-0.004))
     after = voyage.trial("random")
-    usual = settling.Voyage(model("container"), None, Conditions(), model("container").service_state * 0.7)
+    usual = settling.Voyage(
+        model("container"), None, Conditions(), model("container").service_state * 0.7
+    )
     states, commands = usual.go(usual.hold(-0.2, 1.1), 30)
     rough = settling.Voyage(ship, 2.0, Conditions(weather="rough", seed=3))
     rough.go(rough.hold(0.1, 0.0), 20)
     away = replace(
         ship,
-        coefficients={k: v * (-1.0 if k in ("N_d", "Y_d") else 1.0) for k, v in ship.coefficients.items()},
+        coefficients={
+            k: v * (-1.0 if k in ("N_d", "Y_d") else 1.0)
+            for k, v in ship.coefficients.items()
+        },
     )
     return {
         "means": [first, second],
@@ -565,7 +756,10 @@ def settled() -> Answers:
         "states": states,
         "commands": commands,
         "rough": rough.trial(),
-        "step": [lambda dt=dt: settling.Voyage(ship, dt, Conditions()).dt for dt in (0.0, 20.0, 21.0)],
+        "step": [
+            lambda dt=dt: settling.Voyage(ship, dt, Conditions()).dt
+            for dt in (0.0, 20.0, 21.0)
+        ],
         "wrong rudder": lambda: settling._rudder_effect(away, np.inf),
         "shallow": settling._rudder_effect(model("tanker"), 30.0),
     }

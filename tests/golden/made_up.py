@@ -16,11 +16,21 @@ from shipgym.manoeuvres import zigzag
 from tests.golden.store import Floats, numbers_in
 
 SMALL, KEPT = 1e9, 2.0**-16  # of `packed`
-NOISE = {"x": 1.0, "y": 1.0, "psi": 1e-3, "u": 0.03, "v": 0.03, "r": 2e-4, "delta": 1e-3}
+NOISE = {
+    "x": 1.0,
+    "y": 1.0,
+    "psi": 1e-3,
+    "u": 0.03,
+    "v": 0.03,
+    "r": 2e-4,
+    "delta": 1e-3,
+}
 CHANNELS = ("x", "y", "psi", "u", "v", "r", "delta")
 
 
-def numbers_of(content: Any, path: str = "", left_out: tuple[str, ...] = ()) -> dict[str, Floats]:
+def numbers_of(
+    content: Any, path: str = "", left_out: tuple[str, ...] = ()
+) -> dict[str, Floats]:
     """All numbers of results, however nested: those of arrays, of dataclasses and of trials too.
 
     What is None has none.
@@ -44,19 +54,36 @@ def words_of(content: Any, path: str = "", left_out: tuple[str, ...] = ()) -> li
     if isinstance(content, str):
         return [f"{path}: {content}"]
     if isinstance(content, Mapping):
-        own = {key: value for key, value in content.items() if not any(part in key for part in left_out)}
+        own = {
+            key: value
+            for key, value in content.items()
+            if not any(part in key for part in left_out)
+        }
     else:
         own = dict(enumerate(content)) if isinstance(content, list) else {}
-    return [line for key, value in own.items() for line in words_of(value, f"{path}.{key}", left_out)]
+    return [
+        line
+        for key, value in own.items()
+        for line in words_of(value, f"{path}.{key}", left_out)
+    ]
 
 
 def _plain(content: Any) -> Any:
     if isinstance(content, Trial):
-        return {"t": content.t.tolist(), **{name: row.tolist() for name, row in content.channels.items()}}
+        return {
+            "t": content.t.tolist(),
+            **{name: row.tolist() for name, row in content.channels.items()},
+        }
     if is_dataclass(content) and not isinstance(content, type):
-        return {item.name: _plain(getattr(content, item.name)) for item in fields(content)}
+        return {
+            item.name: _plain(getattr(content, item.name)) for item in fields(content)
+        }
     if isinstance(content, Mapping):
-        return {str(key): _plain(value) for key, value in content.items() if value is not None}
+        return {
+            str(key): _plain(value)
+            for key, value in content.items()
+            if value is not None
+        }
     if isinstance(content, np.ndarray | np.generic):
         return np.asarray(content, dtype=float).reshape(-1).tolist()
     if isinstance(content, list | tuple | set | frozenset):
@@ -129,11 +156,15 @@ def mariner() -> ShipModel:
     return shipgym.load_model("mariner")
 
 
-def noisy(run: Trial, seed: int, every: int = 1, noise: float = 1.0, **changes: Any) -> Trial:
+def noisy(
+    run: Trial, seed: int, every: int = 1, noise: float = 1.0, **changes: Any
+) -> Trial:
     """What sensors would have recorded of a simulated trial; their errors are evenly distributed."""
     random, t = np.random.default_rng(seed), run.t[::every]
     channels = {
-        name: run[name][::every] + noise * NOISE[name] * random.uniform(-1.7, 1.7, len(t))
+        name: (
+            run[name][::every] + noise * NOISE[name] * random.uniform(-1.7, 1.7, len(t))
+        )
         for name in CHANNELS
     }
     if "n_command" in run:
@@ -144,11 +175,17 @@ def noisy(run: Trial, seed: int, every: int = 1, noise: float = 1.0, **changes: 
 @cache
 def trials() -> tuple[Trial, ...]:
     """Two short zigzags to fit and one held out, with noise."""
-    plan = ((20.0, 15.0, False, "fit"), (10.0, 10.0, True, "fit"), (15.0, 20.0, False, "validate"))
+    plan = (
+        (20.0, 15.0, False, "fit"),
+        (10.0, 10.0, True, "fit"),
+        (15.0, 20.0, False, "validate"),
+    )
     return tuple(
         noisy(
             zigzag(mariner(), rudder, heading, duration=240.0, dt=1.0, port_first=port),
-            k, name=f"runs/{k}", use=use,
+            k,
+            name=f"runs/{k}",
+            use=use,
         )
         for k, (rudder, heading, port, use) in enumerate(plan)
-    )  # fmt: skip
+    )

@@ -82,11 +82,25 @@ def motions(length: float, speed: float, shaft: float, count: int = 12) -> list[
     random = np.random.default_rng(11)
     found = []
     for k in range(count):
-        u = speed * random.uniform(0.3, 1.1) * (-0.4 if k == 3 else 0.01 if k == 5 else 1.0)
+        u = (
+            speed
+            * random.uniform(0.3, 1.1)
+            * (-0.4 if k == 3 else 0.01 if k == 5 else 1.0)
+        )
         v, r = random.uniform(-0.3, 0.3) * u, random.uniform(-0.7, 0.7) * u / length
-        p, phi, q = random.uniform(-0.02, 0.02), random.uniform(-0.3, 0.3), random.uniform(-1e-4, 1e-4)
-        n = shaft * random.uniform(0.5, 1.1) * (-0.6 if k in (4, 7) else 0.1 if k == 6 else 1.0)
-        found.append(Motion(3.0, -5.0, 0.7, u, v, r, p, phi, q, random.uniform(-0.6, 0.6), n))
+        p, phi, q = (
+            random.uniform(-0.02, 0.02),
+            random.uniform(-0.3, 0.3),
+            random.uniform(-1e-4, 1e-4),
+        )
+        n = (
+            shaft
+            * random.uniform(0.5, 1.1)
+            * (-0.6 if k in (4, 7) else 0.1 if k == 6 else 1.0)
+        )
+        found.append(
+            Motion(3.0, -5.0, 0.7, u, v, r, p, phi, q, random.uniform(-0.6, 0.6), n)
+        )
     return found
 
 
@@ -107,15 +121,25 @@ def reference_ships() -> Answers:
         p, n = one.particulars, one.service_shaft_speed
         values = one.coefficients_record()._asdict()
         nonzero = {
-            k: v or 0.003 * (i % 5 + 1) for i, (k, v) in enumerate(values.items()) if k != "PACKAGE_FORM"
+            k: v or 0.003 * (i % 5 + 1)
+            for i, (k, v) in enumerate(values.items())
+            if k != "PACKAGE_FORM"
         }
         c = one.coefficients_record(**values | nonzero)
         at = motions(p.length, p["speed"], n)
         for depth in (math.inf, *depths):
-            found[f"{one.name} {depth:g}"] = [list(one.accelerations(m, c, of(p, n, depth))) for m in at]
+            found[f"{one.name} {depth:g}"] = [
+                list(one.accelerations(m, c, of(p, n, depth))) for m in at
+            ]
         if one.shaft_acceleration is not None:
-            pairs = [(n * a, n * b) for a in (-0.7, 0.0, 0.1, 0.2, 0.24, 0.7, 1.2) for b in (-9.0, 0.9, 9.0)]
-            found[f"{one.name} shaft"] = [one.shaft_acceleration(*pair, c, of(p, n)) for pair in pairs]
+            pairs = [
+                (n * a, n * b)
+                for a in (-0.7, 0.0, 0.1, 0.2, 0.24, 0.7, 1.2)
+                for b in (-9.0, 0.9, 9.0)
+            ]
+            found[f"{one.name} shaft"] = [
+                one.shaft_acceleration(*pair, c, of(p, n)) for pair in pairs
+            ]
         found[f"{one.name} facts"] = [
             one.particulars,
             one.steering,
@@ -135,16 +159,21 @@ def reference_ships() -> Answers:
         found[f"{one.name} numbers"] = lambda one=one, p=p: one.numbers(
             one.coefficients, replace(p, water_density=1013.0)
         )
-        found[f"{one.name} vessel"] = lambda one=one: one.vessel(one.coefficients, True).state_names
+        found[f"{one.name} vessel"] = lambda one=one: (
+            one.vessel(one.coefficients, True).state_names
+        )
     kvlcc2.PACKAGE_FORM = True
     try:
         p, c = kvlcc2.SHIP.particulars, kvlcc2.Coefficients(PACKAGE_FORM=1.0)
         found["package form"] = [
-            list(kvlcc2.accelerations(m, c, of(p, 11.9))) for m in motions(7.0, 1.179, 11.9)
+            list(kvlcc2.accelerations(m, c, of(p, 11.9)))
+            for m in motions(7.0, 1.179, 11.9)
         ]
     finally:
         kvlcc2.PACKAGE_FORM = False
-    found["power law"] = [mmg.power_law(x, 0.37) for x in (0.0, 0.009, 0.012, 0.3, 1.7, 3.9, 4.5)]
+    found["power law"] = [
+        mmg.power_law(x, 0.37) for x in (0.0, 0.009, 0.012, 0.3, 1.7, 3.9, 4.5)
+    ]
     found["dimensions"] = [
         lambda k=k: mmg.dimensions(replace(HULL, **k))
         for k in (
@@ -155,7 +184,9 @@ def reference_ships() -> Answers:
             {"rudder_aspect_ratio": 0.3},
         )
     ]
-    found["standard form"] = lambda: mmg.standard_form(kvlcc2.SHIP.coefficients, 1.3, 10.0)
+    found["standard form"] = lambda: mmg.standard_form(
+        kvlcc2.SHIP.coefficients, 1.3, 10.0
+    )
     found["no standard form"] = lambda: mmg.standard_form(
         {**kvlcc2.SHIP.coefficients, "PACKAGE_FORM": 1.0}, 1.3, 10.0
     )
@@ -168,20 +199,36 @@ def tables() -> Answers:
     random = np.random.default_rng(4)
     at = motions(151.0, 6.9, 1.9, 4)
     samples = {
-        name: np.array([getattr(m, name) for m in at]) for name in ("u", "v", "r", "p", "phi", "delta", "n")
+        name: np.array([getattr(m, name) for m in at])
+        for name in ("u", "v", "r", "p", "phi", "delta", "n")
     }
     p = HULL.completed()
-    formulas = {"u": "du, |n| u, n^2", "v": "v, r, n delta", "r": "v, |v| r, delta^3, dn"}
+    formulas = {
+        "u": "du, |n| u, n^2",
+        "v": "v, r, n delta",
+        "r": "v, |v| r, delta^3, dn",
+    }
     own = {
         f"own {unit}": term_table.Structure(
-            "own", "own", {q: terms.read_terms(t) for q, t in (formulas | more).items()}, unit, "acceleration"
+            "own",
+            "own",
+            {q: terms.read_terms(t) for q, t in (formulas | more).items()},
+            unit,
+            "acceleration",
         )
-        for unit, more in (("prime", {"p": "p, phi, n p"}), ("service", {"q": "r, delta, n r"}))
+        for unit, more in (
+            ("prime", {"p": "p, phi, n p"}),
+            ("service", {"q": "r, delta, n r"}),
+        )
     }
     for name, table in (structures.STRUCTURES | own).items():
         shaft = 1.9 if "n" in table.command_names else 0.0
         values = dict(
-            zip(table.coefficient_names, random.uniform(-1.0, 1.0, len(table.coefficient_names)), strict=True)
+            zip(
+                table.coefficient_names,
+                random.uniform(-1.0, 1.0, len(table.coefficient_names)),
+                strict=True,
+            )
         )
         if isinstance(table, shared_structure.SharedStructure):
             values |= {one: -0.01 for one in values if one.endswith("dot")}
@@ -197,11 +244,29 @@ def tables() -> Answers:
             "states": " ".join(table.state_names),
             "commands": " ".join(table.command_names),
             "channels": " ".join(table.required_channels),
-            "flags": [table.has_rudder, table.captive, table.astern, table.needs_shaft_speed],
-            "features": {q: table.features(q, samples, p, shaft) for q in table.equations},
-            "powers": {q: [table.speed_power(q, t) for t in ts] for q, ts in table.equations.items()},
+            "flags": [
+                table.has_rudder,
+                table.captive,
+                table.astern,
+                table.needs_shaft_speed,
+            ],
+            "features": {
+                q: table.features(q, samples, p, shaft) for q in table.equations
+            },
+            "powers": {
+                q: [table.speed_power(q, t) for t in ts]
+                for q, ts in table.equations.items()
+            },
         }
-        if name in ("nomoto2", "surge-perturbed", "linear", "steering5", "zhu-9", "cubic", "abkowitz"):
+        if name in (
+            "nomoto2",
+            "surge-perturbed",
+            "linear",
+            "steering5",
+            "zhu-9",
+            "cubic",
+            "abkowitz",
+        ):
             found[name]["source"] = table._source
             found[name]["back"] = table.from_dict(table.to_dict()) == table
     found["matrix"] = lambda: structures.STRUCTURES["linear"].acceleration_matrix(p)
@@ -232,12 +297,18 @@ def terms_and_refusals() -> Answers:
         **given: str,
     ) -> Any:
         return term_table.Structure(
-            name, source, {q: terms.read_terms(text) for q, text in given.items()}, normalisation, quantity
+            name,
+            source,
+            {q: terms.read_terms(text) for q, text in given.items()},
+            normalisation,
+            quantity,
         ).to_dict()
 
     def shares(**given: str) -> Any:
         return shared_structure.shared_structure(
-            "own", "own", {q: shared_structure.read_shares(text) for q, text in given.items()}
+            "own",
+            "own",
+            {q: shared_structure.read_shares(text) for q, text in given.items()},
         )
 
     formulas = (
@@ -263,21 +334,39 @@ def terms_and_refusals() -> Answers:
         ("v", -1),
         ("v", 1.5),
     ]
-    captive = {"u": "X_u X_uu X_udot", "v": "Y_v Y_|r|v -Y_vdot:rdot Y_vdot", "r": "N_v N_rdot Y_vdot:vdot"}
+    captive = {
+        "u": "X_u X_uu X_udot",
+        "v": "Y_v Y_|r|v -Y_vdot:rdot Y_vdot",
+        "r": "N_v N_rdot Y_vdot:vdot",
+    }
     made = shares(**captive)
     values = dict(
-        zip(made.coefficient_names, (-0.02, 0.01, -0.001, -0.3, 0.2, -0.012, 0.05, -0.0007), strict=False)
+        zip(
+            made.coefficient_names,
+            (-0.02, 0.01, -0.001, -0.3, 0.2, -0.012, 0.05, -0.0007),
+            strict=False,
+        )
     )
     p = HULL.completed()
     return {
-        "formulas": [lambda f=f: [[t.name, dict(t.powers)] for t in terms.read_terms(f)] for f in formulas],
-        "short": [[t.name, dict(t.powers)] for t in terms.short_terms("u 0u 0 vvr |v|r uud d|d|", "u")],
+        "formulas": [
+            lambda f=f: [[t.name, dict(t.powers)] for t in terms.read_terms(f)]
+            for f in formulas
+        ],
+        "short": [
+            [t.name, dict(t.powers)]
+            for t in terms.short_terms("u 0u 0 vvr |v|r uud d|d|", "u")
+        ],
         "powers": [lambda w=w: term("t", (w,)).check("here") for w in wrong],
         "factors": refused(
-            lambda n: term("t", tuple((s, 5) for s in terms.SYMBOLS[:n])).check("here"), (3, 4, 5)
+            lambda n: term("t", tuple((s, 5) for s in terms.SYMBOLS[:n])).check("here"),
+            (3, 4, 5),
         ),
         "power": term("t", (("v", 2), ("r", 3), ("U", -1))).power("v", "U"),
-        "products": term("a", (("v", 1), ("r", 2))).product == term("b", (("r", 2), ("v", 1))).product,
+        "products": (
+            term("a", (("v", 1), ("r", 2))).product
+            == term("b", (("r", 2), ("v", 1))).product
+        ),
         "tables": {
             str(k): lambda k=k: table(**k)
             for k in (
@@ -294,7 +383,12 @@ def terms_and_refusals() -> Answers:
                 {"q": "r"},
                 {"r": "r", "p": "p", "q": "r"},
                 {"r": "r", "p": "p", "quantity": "force", "normalisation": "prime"},
-                {"v": "v, r", "r": "r, v", "quantity": "force", "normalisation": "prime"},
+                {
+                    "v": "v, r",
+                    "r": "r, v",
+                    "quantity": "force",
+                    "normalisation": "prime",
+                },
                 {"v": "v, r", "quantity": "force"},
                 {"r": "r, r"},
                 {"r": "r U", "normalisation": "prime"},
@@ -303,12 +397,22 @@ def terms_and_refusals() -> Answers:
         },
         "many": refused(
             lambda n: term_table._check_terms(
-                tuple(term(f"t{i}", (("u", i % 9 + 1), ("v", i // 9 + 1))) for i in range(n)), "si", "here"
+                tuple(
+                    term(f"t{i}", (("u", i % 9 + 1), ("v", i // 9 + 1)))
+                    for i in range(n)
+                ),
+                "si",
+                "here",
             ),
             (0, 1, 81),
         ),
-        "most": refused(lambda n: term_table._check_terms((term("a", ()),) * n, "si", "here"), (201,)),
-        "too many": asked(lambda: term_table._check_terms((term("a", ()),) * 201, "si", "here")),
+        "most": refused(
+            lambda n: term_table._check_terms((term("a", ()),) * n, "si", "here"),
+            (201,),
+        ),
+        "too many": asked(
+            lambda: term_table._check_terms((term("a", ()),) * 201, "si", "here")
+        ),
         "own": [
             lambda o=o: own(o)
             for o in (
@@ -326,7 +430,8 @@ def terms_and_refusals() -> Answers:
             )
         ],
         "get": [
-            lambda n=n: structures.get_structure(n).name for n in ("mmg", "grey-box", "abkowitsch", "nomoto")
+            lambda n=n: structures.get_structure(n).name
+            for n in ("mmg", "grey-box", "abkowitsch", "nomoto")
         ],
         "dynamics": [structures.get_dynamics(n).name for n in ("tanker", "linear")],
         "list": structures.list_structures(),
@@ -358,7 +463,12 @@ def terms_and_refusals() -> Answers:
 def particulars() -> Answers:
     """Estimates, bounds, and values that do not belong together."""
     mapping = partial(Particulars.from_mapping, where="[ship]")
-    plain_hull = {"length": 151.0, "beam": 24.5, "draught": 8.1, "block_coefficient": 0.63}
+    plain_hull = {
+        "length": 151.0,
+        "beam": 24.5,
+        "draught": 8.1,
+        "block_coefficient": 0.63,
+    }
     shares = {
         "beam": 1.0,
         "draught": 0.5,
@@ -397,12 +507,16 @@ def particulars() -> Answers:
         "from block": mapping(plain_hull).completed(),
         "lone": lambda: mapping({"length": 151.0}).completed(),
         "with mass": lambda: mapping({"length": 151.0, "mass": 1.7e7}).completed(),
-        "added": lambda: mapping(
-            {**plain_hull, "added_mass": {"Y_vdot": -0.01, "N_rdot": -0.0005}}
-        ).completed(),
-        "flat": lambda: mapping(
-            {"length": 30.0, "beam": 29.0, "draught": 0.5, "block_coefficient": 0.9}
-        ).completed(),
+        "added": (
+            lambda: mapping(
+                {**plain_hull, "added_mass": {"Y_vdot": -0.01, "N_rdot": -0.0005}}
+            ).completed()
+        ),
+        "flat": (
+            lambda: mapping(
+                {"length": 30.0, "beam": 29.0, "draught": 0.5, "block_coefficient": 0.9}
+            ).completed()
+        ),
         "clarke": clarke_added_masses(151.0, 24.5, 8.1, 0.63),
         "primes": [HULL.mass_prime, HULL.xg_prime, HULL.inertia_prime],
         "require": lambda: mapping({"length": 151.0}).require("mass"),
@@ -413,7 +527,10 @@ def particulars() -> Answers:
         "shares": {
             name: refused(
                 lambda k, name=name, share=share: mapping(
-                    {"length": 40.0, name: k * share * (1600.0 if name in areas else 40.0)}
+                    {
+                        "length": 40.0,
+                        name: k * share * (1600.0 if name in areas else 40.0),
+                    }
                 ),
                 AROUND,
             )
@@ -422,20 +539,38 @@ def particulars() -> Answers:
         "bounds": {
             name: refused(
                 lambda k, name=name, given=given: mapping({"length": 4.0, name: k}),
-                [k * given[edge] for edge in ("above", "below") if edge in given for k in (0.95, 1.05)],
+                [
+                    k * given[edge]
+                    for edge in ("above", "below")
+                    if edge in given
+                    for k in (0.95, 1.05)
+                ],
             )
             for name, given in BOUNDS.items()
             if name != "length"
         },
         "masses": [
-            refused(lambda k, given=given, m=m: mapping({**given, "mass": k * m}), AROUND)
+            refused(
+                lambda k, given=given, m=m: mapping({**given, "mass": k * m}), AROUND
+            )
             for given, ms in (
                 ({"length": 151.0}, (2e-4 * 1025 * 151**3, 0.2 * 1025 * 151**3)),
                 (
-                    {"length": 151.0, "beam": 24.0, "draught": 8.0, "water_density": 1000.0},
+                    {
+                        "length": 151.0,
+                        "beam": 24.0,
+                        "draught": 8.0,
+                        "water_density": 1000.0,
+                    },
                     (0.2 * 1e3 * 151 * 192, 1e3 * 151 * 192),
                 ),
-                ({**plain_hull}, (0.5 * 1025 * 151 * 24.5 * 8.1 * 0.63, 2 * 1025 * 151 * 24.5 * 8.1 * 0.63)),
+                (
+                    {**plain_hull},
+                    (
+                        0.5 * 1025 * 151 * 24.5 * 8.1 * 0.63,
+                        2 * 1025 * 151 * 24.5 * 8.1 * 0.63,
+                    ),
+                ),
             )
             for m in ms
         ],
@@ -456,7 +591,9 @@ def particulars() -> Answers:
             GEAR.rate,
             GEAR.to_dict(),
             lambda: SteeringGear.from_mapping({"limit": 3.0}, "[steering]"),
-            lambda: SteeringGear.from_mapping({"rudder_rate_deg_s": -3.0}, "[steering]"),
+            lambda: SteeringGear.from_mapping(
+                {"rudder_rate_deg_s": -3.0}, "[steering]"
+            ),
             lambda: SteeringGear.from_mapping(3, "[steering]"),
         ],
     }
@@ -472,16 +609,26 @@ def linear_forms() -> Answers:
         found[name] = {
             "straight": at,
             "state": at.state(ship),
-            "slow": lambda ship=ship: linear.straight_running(ship, 0.8 * ship.particulars["speed"]),
-            "sides": [lambda ship=ship, at=at, k=k: linear.linearise(ship, at, k) for k in (-1, 0, 1)],
-            "nomoto": lambda ship=ship: linear.nomoto(ship) if ship.name != "kvlcc2" else None,
+            "slow": lambda ship=ship: linear.straight_running(
+                ship, 0.8 * ship.particulars["speed"]
+            ),
+            "sides": [
+                lambda ship=ship, at=at, k=k: linear.linearise(ship, at, k)
+                for k in (-1, 0, 1)
+            ],
+            "nomoto": lambda ship=ship: (
+                linear.nomoto(ship) if ship.name != "kvlcc2" else None
+            ),
             "effect": lambda ship=ship: linear.nomoto(ship).rudder_effect,
             "stable": linear.is_course_stable(ship) if ship.name != "kvlcc2" else None,
             "turn": [
-                lambda ship=ship, k=k, r=rate: linear.steady_turn_rudder(ship, r, k) for k in (True, False)
+                lambda ship=ship, k=k, r=rate: linear.steady_turn_rudder(ship, r, k)
+                for k in (True, False)
             ],
             "port": lambda ship=ship, r=rate: linear.steady_turn_rudder(ship, -0.7 * r),
-            "at once": lambda ship=ship, r=rate: linear.steady_turn_rudder(ship, 90.0 * r),
+            "at once": lambda ship=ship, r=rate: linear.steady_turn_rudder(
+                ship, 90.0 * r
+            ),
         }
         stability = linear.straight_line_stability(ship)
         found[name]["stability"] = [
@@ -493,11 +640,15 @@ def linear_forms() -> Answers:
         ]
     A, B = np.array([[-0.021, -2.9], [-0.0013, -0.071]]), np.array([[0.091], [-0.0047]])
     B = -B
-    form, unstable = linear.nomoto_of(A, B), linear.nomoto_of(np.array([[0.02, -2.9], [-0.0013, -0.071]]), B)
+    form, unstable = (
+        linear.nomoto_of(A, B),
+        linear.nomoto_of(np.array([[0.02, -2.9], [-0.0013, -0.071]]), B),
+    )
     turned = replace(
         model("mariner"),
         coefficients={
-            k: v * (30.0 if k in ("N_0", "Y_0") else 1.0) for k, v in model("mariner").coefficients.items()
+            k: v * (30.0 if k in ("N_0", "Y_0") else 1.0)
+            for k, v in model("mariner").coefficients.items()
         },
     )
     oscillating = linear.nomoto_of(np.array([[-0.02, -3.0], [0.01, -0.02]]), B)
@@ -506,7 +657,9 @@ def linear_forms() -> Answers:
         "first": lambda: conversions.nomoto1_ship(0.07, 31.0, HULL, GEAR, "one"),
         "second": lambda: conversions.nomoto2_ship(form, HULL, GEAR, "two"),
         "linear": lambda: conversions.linear_steering_ship(A, B, HULL, GEAR, "three"),
-        "mapping": lambda: conversions.nomoto1_ship(-0.07, -31.0, {"length": 151.0, "speed": 6.0}),
+        "mapping": lambda: conversions.nomoto1_ship(
+            -0.07, -31.0, {"length": 151.0, "speed": 6.0}
+        ),
         "wrong side": lambda: conversions.nomoto1_ship(-0.07, 31.0, HULL),
         "nothing": lambda: conversions.nomoto1_ship(0.0, 31.0, HULL),
         "complex": lambda: conversions.nomoto2_ship(oscillating, HULL),
@@ -520,7 +673,10 @@ def linear_forms() -> Answers:
         "form": form,
         "unstable": unstable,
         "oscillating": oscillating,
-        "no effect": [lambda: linear.nomoto_of(A, 0.0 * B), lambda: linear.nomoto_of(0.0 * A, B)],
+        "no effect": [
+            lambda: linear.nomoto_of(A, 0.0 * B),
+            lambda: linear.nomoto_of(0.0 * A, B),
+        ],
         "no course": lambda: linear.straight_running(turned),
         "no course at": lambda: linear.straight_running(turned, 4.0),
         "prime": conversions.prime_matrices(A, B, 151.0, 6.9),
@@ -577,9 +733,9 @@ def masses_and_scales() -> Answers:
             ship.structure,
         ]
     random = np.random.default_rng(9)
-    samples = random.standard_normal((4, 60)) * np.array([[0.3], [0.1], [0.01], [0.2]]) + np.array(
-        [[7.0], [0.05], [-0.002], [0.03]]
-    )
+    samples = random.standard_normal((4, 60)) * np.array(
+        [[0.3], [0.1], [0.01], [0.2]]
+    ) + np.array([[7.0], [0.05], [-0.002], [0.03]])
     envelope, still = (
         Envelope.from_samples(*samples),
         Envelope.from_samples(7.0 * np.ones(20), *samples[1:, :20]),
@@ -629,7 +785,9 @@ def masses_and_scales() -> Answers:
         ]
 
     return found | {
-        "scaled": {name: lambda make=make: told(make()) for name, make in scaled.items()},
+        "scaled": {
+            name: lambda make=make: told(make()) for name, make in scaled.items()
+        },
         "envelope": [
             envelope.low,
             envelope.high,
@@ -648,16 +806,27 @@ def towed() -> Answers:
     tank = towing_tank.Tank
     ship, other, shallow = model("mariner"), model("container"), model("tanker")
     tests = {
-        "drift": lambda: towing_tank.static_drift(ship, [-7.0, 3.0, 12.0], 2.0, tank(samples=8)),
+        "drift": lambda: towing_tank.static_drift(
+            ship, [-7.0, 3.0, 12.0], 2.0, tank(samples=8)
+        ),
         "surge": lambda: towing_tank.pure_surge(
             ship, 0.7, tank=tank(speed=5.0, rudder_deg=4.0, cycles=2, samples=12)
         ),
         "sway": lambda: towing_tank.pure_sway(
-            other, 0.6, 90.0, tank(shaft_speed=1.1, model_inertia=False, cycles=1, samples=20)
+            other,
+            0.6,
+            90.0,
+            tank(shaft_speed=1.1, model_inertia=False, cycles=1, samples=20),
         ),
-        "yaw": lambda: towing_tank.pure_yaw(other, 0.4, tank=tank(noise=0.1, seed=3, cycles=1, samples=20)),
+        "yaw": lambda: towing_tank.pure_yaw(
+            other, 0.4, tank=tank(noise=0.1, seed=3, cycles=1, samples=20)
+        ),
         "yaw with drift": lambda: towing_tank.yaw_with_drift(
-            shallow, 0.2, -5.0, 300.0, tank(water_depth=30.0, model_inertia=False, cycles=1, samples=16)
+            shallow,
+            0.2,
+            -5.0,
+            300.0,
+            tank(water_depth=30.0, model_inertia=False, cycles=1, samples=16),
         ),
         "kvlcc2": lambda: towing_tank.yaw_with_drift(
             model("kvlcc2"), 0.2, 5.0, None, tank(cycles=1, samples=9)
@@ -691,7 +860,9 @@ def towed() -> Answers:
         "tests": tests,
         "wrong": wrong,
         "rigid": towing_tank.rigid_body_forces(
-            (3.0, 0.7, 5.0), np.array([[2.0], [0.3], [0.2]]), np.array([[0.4], [-0.5], [0.6]])
+            (3.0, 0.7, 5.0),
+            np.array([[2.0], [0.3], [0.2]]),
+            np.array([[0.4], [-0.5], [0.6]]),
         ),
     }
 
@@ -725,10 +896,14 @@ def simulated() -> Answers:
         "degrees": lambda: ship.simulate(np.full((3, 1), 20.0), 1.0),
         "rpm": lambda: other.simulate(np.full((3, 2), [0.1, 80.0]), 1.0),
         "astern": lambda: other.simulate(np.full((3, 2), [0.1, -0.5]), 1.0),
-        "tanker astern": lambda: model("tanker").simulate(np.full((3, 2), [0.1, -7.0]), 1.0),
+        "tanker astern": (
+            lambda: model("tanker").simulate(np.full((3, 2), [0.1, -7.0]), 1.0)
+        ),
         "state": lambda: ship.simulate(np.zeros((3, 1)), 1.0, [1.0, 2.0]),
         "shallow": lambda: ship.simulate(np.zeros((3, 1)), 1.0, water_depth=20.0),
-        "aground": lambda: model("tanker").derivatives(np.zeros(8) + 1.0, [0.0, 1.0], 18.0),
+        "aground": (
+            lambda: model("tanker").derivatives(np.zeros(8) + 1.0, [0.0, 1.0], 18.0)
+        ),
         "depth": lambda: model("tanker").check_depth(-1.0),
         "long step": lambda: ship.simulate(np.full((40, 1), 0.6), 400.0),
         "seed": lambda: ship.simulate(np.zeros((3, 1)), 1.0, weather="rough", seed=-1),
@@ -746,8 +921,12 @@ def simulated() -> Answers:
     of_ship = partial(replace, model("norrbin"))
     made = {
         "missing": lambda: of_ship(coefficients={}),
-        "unknown": lambda: of_ship(coefficients={**model("norrbin").coefficients, **values}),
-        "nan": lambda: of_ship(coefficients=dict.fromkeys(model("norrbin").coefficients, math.nan)),
+        "unknown": lambda: of_ship(
+            coefficients={**model("norrbin").coefficients, **values}
+        ),
+        "nan": lambda: of_ship(
+            coefficients=dict.fromkeys(model("norrbin").coefficients, math.nan)
+        ),
         "covariance": lambda: of_ship(covariance=np.eye(2)),
         "shaft": lambda: replace(model("cubic"), service_shaft_speed=0.0),
         "speed": lambda: of_ship(particulars=Particulars(7.0)),
@@ -759,25 +938,47 @@ def simulated() -> Answers:
         "container": lambda: other.simulate(rolled, 1.0),
         "weather": lambda: other.simulate(rolled, 1.0, weather="rough", seed=4),
         "prime": lambda: simulate.simulate(ship, swing[:, None], 2.0, kind="random"),
-        "tanker": lambda: model("tanker").simulate(
-            np.stack([swing, -0.9 + 0.0 * swing], axis=1), 2.0, water_depth=30.0
+        "tanker": (
+            lambda: model("tanker").simulate(
+                np.stack([swing, -0.9 + 0.0 * swing], axis=1), 2.0, water_depth=30.0
+            )
         ),
-        "kvlcc2": lambda: model("kvlcc2").simulate(np.stack([swing, 1.7 + 0.0 * swing], axis=1), 3.0),
+        "kvlcc2": (
+            lambda: model("kvlcc2").simulate(
+                np.stack([swing, 1.7 + 0.0 * swing], axis=1), 3.0
+            )
+        ),
         "open loop": lambda: simulate.open_loop(
-            model("mariner-tls-svm"), Trial(t, measured, name="sea", kind="zigzag", use="validate")
+            model("mariner-tls-svm"),
+            Trial(t, measured, name="sea", kind="zigzag", use="validate"),
         ),
-        "in wind": lambda: simulate.open_loop(model("mariner-tls-svm"), Trial(t, blown)),
-        "memory": lambda: simulate.open_loop(model("mariner-nomoto"), Trial(t, measured)),
+        "in wind": lambda: simulate.open_loop(
+            model("mariner-tls-svm"), Trial(t, blown)
+        ),
+        "memory": lambda: simulate.open_loop(
+            model("mariner-nomoto"), Trial(t, measured)
+        ),
         "wind": [
             simulate.wind_accelerations(Trial(t, blown)),
-            simulate.wind_accelerations(Trial(t, blown), structures.STRUCTURES["nomoto"]),
+            simulate.wind_accelerations(
+                Trial(t, blown), structures.STRUCTURES["nomoto"]
+            ),
         ],
         "wrong": wrong,
         "made": made,
-        "drawn": lambda: [[one.name, one.coefficients, one.covariance is None] for one in drawn.sample(3, 5)],
-        "with": lambda: drawn.with_accelerations({"r": np.array([1.0, 2.0, 3.0])}).coefficients,
-        "rates": lambda: ship.rates({name: np.array([0.1, 0.2]) for name in ("u", "v", "delta")}),
-        "many": lambda: ship.derivatives(np.tile(start, (2, 3, 1)), np.full((3, 1), 0.2)),
+        "drawn": lambda: [
+            [one.name, one.coefficients, one.covariance is None]
+            for one in drawn.sample(3, 5)
+        ],
+        "with": lambda: (
+            drawn.with_accelerations({"r": np.array([1.0, 2.0, 3.0])}).coefficients
+        ),
+        "rates": lambda: ship.rates(
+            {name: np.array([0.1, 0.2]) for name in ("u", "v", "delta")}
+        ),
+        "many": lambda: ship.derivatives(
+            np.tile(start, (2, 3, 1)), np.full((3, 1), 0.2)
+        ),
     }
 
 
@@ -833,7 +1034,9 @@ def files() -> Answers:
         for one in places:
             place = place[one]
         place[last] = value
-        wrong[path] = asked(lambda fields=fields: plain(ShipModel.from_dict(fields, "model.json").name))
+        wrong[path] = asked(
+            lambda fields=fields: plain(ShipModel.from_dict(fields, "model.json").name)
+        )
     for name in ("format", "structure", "steering", "coefficients"):
         wrong[f"without {name}"] = asked(
             lambda name=name: ShipModel.from_dict(
@@ -859,7 +1062,9 @@ def files() -> Answers:
         )
     }
     converted = catalogue.converted_model("tanker", HULL, GEAR, 1.7, "converted")
-    box = catalogue.grey_box("mariner", {"v": "v, r", "r": terms.read_terms("delta")}, name="box")
+    box = catalogue.grey_box(
+        "mariner", {"v": "v, r", "r": terms.read_terms("delta")}, name="box"
+    )
     random = np.random.default_rng(6)
     samples = {
         name: random.uniform(low, high, 5)
@@ -885,7 +1090,11 @@ def files() -> Answers:
         "name": lambda: catalogue.load_model("marine"),
         "path": lambda: catalogue.load_model(Path("mariner")),
         "forms": [
-            lambda f=f, k=k: [f(k).coefficients["PACKAGE_FORM"], f(k).provenance, f(k).name]
+            lambda f=f, k=k: [
+                f(k).coefficients["PACKAGE_FORM"],
+                f(k).provenance,
+                f(k).name,
+            ]
             for f in (catalogue.kvlcc2, catalogue.kvlcc2_l7)
             for k in ("published", "shipmmg")
         ],
@@ -909,9 +1118,17 @@ def files() -> Answers:
             lambda: box.converted_accelerations(samples, HULL),
         ],
         "container box": [
-            lambda: catalogue.grey_box("container").converted_accelerations(samples, HULL, 1.7),
-            lambda: [(c := catalogue.grey_box("container")).required_channels, c.shaft, c.needs_shaft_speed],
-            lambda: catalogue.grey_box("container", shaft=False).converted_accelerations(samples, HULL),
+            lambda: catalogue.grey_box("container").converted_accelerations(
+                samples, HULL, 1.7
+            ),
+            lambda: [
+                (c := catalogue.grey_box("container")).required_channels,
+                c.shaft,
+                c.needs_shaft_speed,
+            ],
+            lambda: catalogue.grey_box(
+                "container", shaft=False
+            ).converted_accelerations(samples, HULL),
         ],
         "unknown shaft": lambda: [
             catalogue.converted_model("tanker", HULL, GEAR).own_table.shaft,
@@ -921,10 +1138,16 @@ def files() -> Answers:
         "box of box": lambda: catalogue.grey_box("kvlcc2-rm-svm"),
         "box's shaft": lambda: catalogue.grey_box("mariner", shaft=True),
         "no ship": lambda: catalogue.grey_box("none"),
-        "register": lambda: catalogue.register_ship_equations(replace(tanker.SHIP, name="mariner")),
-        "hash": model_file.numbers_hash(model("norrbin"))
-        == json.loads(Path("saved.json").read_text())["sha256"],
-        "envelope": lambda: model_file.read_envelope(model("mariner-tls-svm").envelope.to_dict(), "here"),
+        "register": lambda: catalogue.register_ship_equations(
+            replace(tanker.SHIP, name="mariner")
+        ),
+        "hash": (
+            model_file.numbers_hash(model("norrbin"))
+            == json.loads(Path("saved.json").read_text())["sha256"]
+        ),
+        "envelope": lambda: model_file.read_envelope(
+            model("mariner-tls-svm").envelope.to_dict(), "here"
+        ),
     }
 
 
@@ -944,7 +1167,10 @@ def kernels() -> Answers:
     own = numbers_[len(box.ship.ship_numbers()) :]
     c = kernel_boxes.KernelCoefficients(*own[:8], table=own[8:])
     at = motions(151.0, 6.9, 1.9, 6)
-    samples = {name: np.array([getattr(m, name) for m in at]) for name in ("u", "v", "r", "delta")}
+    samples = {
+        name: np.array([getattr(m, name) for m in at])
+        for name in ("u", "v", "r", "delta")
+    }
     kernel_boxes.N_CENTRES, kernel_boxes.row_of = kernel.size, lambda table, i: table[i]
     rates = [list(kernel_boxes.kernel_accelerations(m, c, of(HULL, 1.9))) for m in at]
     kernel_boxes.N_CENTRES, kernel_boxes.row_of = KERNEL_PARTS
@@ -960,14 +1186,16 @@ def kernels() -> Answers:
         "numbers": numbers_,
         "rates": rates,
         "features": features,
-        "same": float(
-            np.abs(
-                features @ np.array(list(values.values())).reshape(3, 2).T / 151.0
-                - np.array(rates)[:, :3] * [1.0, 1.0, 151.0]
-            )[[0, 1, 2, 4]].max()
-        )
-        < 1e-9
-        or features,
+        "same": (
+            float(
+                np.abs(
+                    features @ np.array(list(values.values())).reshape(3, 2).T / 151.0
+                    - np.array(rates)[:, :3] * [1.0, 1.0, 151.0]
+                )[[0, 1, 2, 4]].max()
+            )
+            < 1e-9
+            or features
+        ),
         "inputs": kernel_boxes.kernel_inputs(samples, HULL),
         "gaussians": kernel_boxes.gaussians(centres, centres[:2]),
         "sizes": [
@@ -975,7 +1203,12 @@ def kernels() -> Answers:
             for n in (1, 32, 33, 64, 65, 100)
         ],
         "dict": box.to_dict()["kernel"],
-        "names": [box.coefficient_names, box.required_channels, box.quantity, box.normalisation],
+        "names": [
+            box.coefficient_names,
+            box.required_channels,
+            box.quantity,
+            box.normalisation,
+        ],
         "wrong": [lambda w=w: kernel_boxes.Kernel(*w) for w in wrong],
         "none": lambda: replace(box, kernel=None),
         "again": lambda: (
@@ -984,7 +1217,9 @@ def kernels() -> Answers:
             ).own_table.kernel
         ),
         "vessel": lambda: len(box.vessel(values, True).state_names),
-        "sum": kernel_boxes.sum_accelerations(at[1], Sums(0.3, -0.2, 0.1), of(HULL, 1.0)),
+        "sum": kernel_boxes.sum_accelerations(
+            at[1], Sums(0.3, -0.2, 0.1), of(HULL, 1.0)
+        ),
     }
 
 
@@ -996,7 +1231,12 @@ def checked() -> Answers:
 
     def spoilt(name: str, **factors: float) -> ShipModel:
         ship = model(name)
-        return replace(ship, coefficients={k: v * factors.get(k, 1.0) for k, v in ship.coefficients.items()})
+        return replace(
+            ship,
+            coefficients={
+                k: v * factors.get(k, 1.0) for k, v in ship.coefficients.items()
+            },
+        )
 
     ships: dict[str, Any] = {
         "mariner": "mariner",
@@ -1014,7 +1254,11 @@ def checked() -> Answers:
     skew[0, 1] = skew[1, 0] = 1.5
     ships["correlations"] = replace(model("mariner-tls-svm"), covariance=skew)
     return {
-        name: lambda ship=ship: [str(check := checker.check_ship_model(ship)), check.asymmetry, check.ok]
+        name: lambda ship=ship: [
+            str(check := checker.check_ship_model(ship)),
+            check.asymmetry,
+            check.ok,
+        ]
         for name, ship in ships.items()
     }
 
@@ -1035,8 +1279,12 @@ def own_equations() -> Answers:
         "no shaft": lambda: replace(ship, service_shaft_speed=0.0),
         "speed": lambda: replace(ship, particulars=Particulars(3.0)),
         "raises": lambda: replace(ship, accelerations=failing),
-        "four": lambda: replace(ship, accelerations=lambda m, c, s: (0.0, 0.0, 0.0, 0.0)),
-        "text": lambda: replace(ship, accelerations=lambda m, c, s: ("a", 0.0, 0.0, 0.0, 0.0)),
+        "four": lambda: replace(
+            ship, accelerations=lambda m, c, s: (0.0, 0.0, 0.0, 0.0)
+        ),
+        "text": lambda: replace(
+            ship, accelerations=lambda m, c, s: ("a", 0.0, 0.0, 0.0, 0.0)
+        ),
         "shaft": lambda: replace(ship, shaft_acceleration=lambda n, command, c, s: "a"),
     }
 
@@ -1053,9 +1301,21 @@ def own_equations() -> Answers:
     return {
         "wrong": {name: told(question) for name, question in wrong.items()},
         "record": [record._fields, record().a, record(b=3.0).b],
-        "no ship": lambda: str(asked(lambda: equations.read_ship_equations("ship.py"))).rpartition("/")[2],
-        "missing": lambda: str(asked(lambda: equations.read_ship_equations("none.py"))).rpartition("/")[2],
-        "container": [container.SHIP.state_names, container.SHIP.command_names, container.SHIP.to_dict()],
+        "no ship": (
+            lambda: str(
+                asked(lambda: equations.read_ship_equations("ship.py"))
+            ).rpartition("/")[2]
+        ),
+        "missing": (
+            lambda: str(
+                asked(lambda: equations.read_ship_equations("none.py"))
+            ).rpartition("/")[2]
+        ),
+        "container": [
+            container.SHIP.state_names,
+            container.SHIP.command_names,
+            container.SHIP.to_dict(),
+        ],
         "named": equations._named("shipgym.ships.kvlcc2") is kvlcc2.SHIP,
         "reduced": [str(one) for one in container.SHIP.__reduce__()[1]],
         "arms": container.hull(0.1, 0.2, 0.3, 0.4, 1, 2, 3, 4, 5, 6, 7, 8),
@@ -1081,7 +1341,10 @@ def exchanged() -> Answers:
         catalogue.kvlcc2(form="shipmmg"),
     )
     mmg_parameters = interchange.to_shipmmg(package, 1019.0)
-    basic = {**mmg_parameters["basic_params"], "I_zG": 1.3 * mmg_parameters["basic_params"]["I_zG"]}
+    basic = {
+        **mmg_parameters["basic_params"],
+        "I_zG": 1.3 * mmg_parameters["basic_params"]["I_zG"],
+    }
 
     def ship(one: ShipModel) -> Any:
         return [
@@ -1095,7 +1358,9 @@ def exchanged() -> Answers:
         ]
 
     def without(given: Mapping[str, Any], *names: str, **more: Any) -> dict[str, Any]:
-        return {name: value for name, value in given.items() if name not in names} | more
+        return {
+            name: value for name, value in given.items() if name not in names
+        } | more
 
     frame, dataset = interchange.to_frame(trial), interchange.to_xarray(trial)
     return {
@@ -1104,9 +1369,11 @@ def exchanged() -> Answers:
         "no mss": lambda: interchange.to_mss(model("tanker")),
         "from mss": lambda: ship(interchange.from_mss(mss, "back", 1000.0)),
         "from container": lambda: ship(interchange.from_mss(boxed, "back")),
-        "changed": lambda: ship(
-            interchange.from_mss({**boxed, "Xvv": -0.005, "delta_max": 12.0})
-        ).__getitem__(2),
+        "changed": (
+            lambda: ship(
+                interchange.from_mss({**boxed, "Xvv": -0.005, "delta_max": 12.0})
+            ).__getitem__(2)
+        ),
         "length": lambda: interchange.from_mss({**boxed, "L": 170.0}),
         "missing": lambda: interchange.from_mss(without(mss, "Xu")),
         "unknown": lambda: interchange.from_mss({**mss, "Zw": 1.0}),
@@ -1127,12 +1394,18 @@ def exchanged() -> Answers:
         ),
         "usual": lambda: ship(interchange.from_shipmmg(mmg_parameters, 7.7)),
         "kt": lambda: ship(
-            interchange.from_shipmmg({"kt_params": {"K": 0.07, "T": 31.0}}, 7.7, length=151.0, steering=GEAR)
+            interchange.from_shipmmg(
+                {"kt_params": {"K": 0.07, "T": 31.0}}, 7.7, length=151.0, steering=GEAR
+            )
         ),
-        "kt length": lambda: interchange.from_shipmmg({"kt_params": {"K": 0.07, "T": 31.0}}, 7.7),
+        "kt length": lambda: interchange.from_shipmmg(
+            {"kt_params": {"K": 0.07, "T": 31.0}}, 7.7
+        ),
         "no table": lambda: interchange.from_shipmmg({}, 7.7),
         "a field": lambda: interchange.from_shipmmg({"kt_params": {"K": 0.07}}, 7.7),
-        "a text": lambda: interchange.from_shipmmg({"kt_params": {"K": "a", "T": 1.0}}, 7.7),
+        "a text": lambda: interchange.from_shipmmg(
+            {"kt_params": {"K": "a", "T": 1.0}}, 7.7
+        ),
         "frame": [
             frame.index.to_numpy(),
             frame.to_numpy(),

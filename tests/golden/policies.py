@@ -1,7 +1,8 @@
 """Golden sections `policies` and `bridge`: what steers on board, over fixed observations and readings.
 
-`policies` has networks with weights at random in every option, shields, and the policy for all ships.
-`bridge` has autopilots as they stand on a bridge, the helm, routes, and a simulated ship's instruments.
+`policies` has networks with weights at random in every option, shields, and the policy
+for all ships. `bridge` has autopilots as they stand on a bridge, the helm, routes, and
+a simulated ship's instruments.
 """
 
 from __future__ import annotations
@@ -35,11 +36,17 @@ from tests.golden.store import Floats, numbers_in, vector
 TOLERANCES = {"": 1e-5}
 POLICIES: dict[str, Callable[[], Any]] = {
     "plain": random_policy,
-    "tanh": lambda: random_policy(network=random_network(8, 16, 1, activation="tanh", output="tanh")),
+    "tanh": lambda: random_policy(
+        network=random_network(8, 16, 1, activation="tanh", output="tanh")
+    ),
     "discrete": lambda: random_policy(action="rudder-discrete", frame_stack=2),
-    "shaft": lambda: random_policy(action="rudder-shaft", rate_limit=0.13, action_repeat=2),
+    "shaft": lambda: random_policy(
+        action="rudder-shaft", rate_limit=0.13, action_repeat=2
+    ),
     "frames": lambda: random_policy(frame_stack=3, seed=4),
-    "residual": lambda: random_policy(base=LQ.from_model(MARINER), authority=0.37, frame_stack=2, seed=1),
+    "residual": lambda: random_policy(
+        base=LQ.from_model(MARINER), authority=0.37, frame_stack=2, seed=1
+    ),
     "slow": lambda: random_policy(
         base=PID.from_model(MARINER), authority=0.8, action_repeat=3, rate_limit=0.07
     ),
@@ -82,23 +89,32 @@ def of_policy(policy: Any) -> dict[str, Floats]:
     """What a policy's file says, what it commands side by side and alone, and what it remembers."""
     content, tensors = policy.file_fields()
     found = numbers_in(content, left_out=("training",))
-    found |= {name: np.array([one.sum(), np.abs(one).sum()], float) for name, one in tensors.items()}
+    found |= {
+        name: np.array([one.sum(), np.abs(one).sum()], float)
+        for name, one in tensors.items()
+    }
     state, alone, actions, own = None, None, [], []
     for step, seen in enumerate(series(policy.observation_names, 24)):
-        begins = np.arange(SHIPS) == 1 if step == 13 else np.zeros(SHIPS, dtype=np.bool_)
+        begins = (
+            np.arange(SHIPS) == 1 if step == 13 else np.zeros(SHIPS, dtype=np.bool_)
+        )
         action, state = policy.predict(seen, state, begins)
         actions.append(action)
         if step < 7:
             action, alone = policy.predict(seen[2], alone)
             own.append(action)
     found |= {"commands": vector(actions), "alone": vector(own)}
-    return found | {f"memory {k}": vector(one) for k, one in enumerate(flattened(state))}
+    return found | {
+        f"memory {k}": vector(one) for k, one in enumerate(flattened(state))
+    }
 
 
 class Swinging:
     """Swings the rudder whatever it sees, and once gives no number."""
 
-    def predict(self, observation: Any, state: Any = None, *_: Any, **__: Any) -> tuple[Any, Any]:
+    def predict(
+        self, observation: Any, state: Any = None, *_: Any, **__: Any
+    ) -> tuple[Any, Any]:
         """Commands of rudder and shaft."""
         step = 0 if state is None else state
         rudder = np.full(np.shape(observation)[:-1], np.sin(0.3 * step))
@@ -129,26 +145,37 @@ def of_shield(case: str) -> dict[str, Floats]:
     shield = Shielded.from_model(model, policy, **more)
     state, actions, watched, who = None, [], [], []
     for step, seen in enumerate(series(shield.observation_names, 70, 0.3)):
-        action, state = shield.predict(seen, state, np.full(SHIPS, step in (0, 50)) & (np.arange(SHIPS) < 2))
+        action, state = shield.predict(
+            seen, state, np.full(SHIPS, step in (0, 50)) & (np.arange(SHIPS) < 2)
+        )
         actions.append(action)
         watched.append(state.watch.sum(axis=0))
         who.append(interventions(state).steering)
     met = interventions(state)
     return {
-        "commands": vector(actions), "watch": vector(watched), "who": vector(who), "count": vector(met.count),
-        "intervals": vector(met.intervals), **numbers_in(shield.limits.__dict__, "limits"),
-        "scales": vector(shield.observation_scales), "dt": vector(shield.dt),
-    }  # fmt: skip
+        "commands": vector(actions),
+        "watch": vector(watched),
+        "who": vector(who),
+        "count": vector(met.count),
+        "intervals": vector(met.intervals),
+        **numbers_in(shield.limits.__dict__, "limits"),
+        "scales": vector(shield.observation_scales),
+        "dt": vector(shield.dt),
+    }
 
 
 def record_functions() -> dict[str, Floats]:
     """Functions of policies at numbers worth a look."""
     single = np.array([[0.7, -1.3], [0.2, 0.4]], np.float32)
     policy = random_policy(rate_limit=0.3)
-    broken = np.array([[0.0, 0.7, np.nan], [2.0, np.nan, 0.1], [1.0, -0.4, 0.9]], np.float32)
+    broken = np.array(
+        [[0.0, 0.7, np.nan], [2.0, np.nan, 0.1], [1.0, -0.4, 0.9]], np.float32
+    )
     inputs = series(policy.observation_names, 2)[1].astype(np.float32)
     return {
-        "toward": vector(toward(single, np.array([[0.1, -0.2], [0.25, -0.9]], np.float32), 0.17)),
+        "toward": vector(
+            toward(single, np.array([[0.1, -0.2], [0.25, -0.9]], np.float32), 0.17)
+        ),
         "orders": vector(order_numbers([[-0.93], [0.11], [0.49], [1.0]])),
         "decided": vector(policy._decided(inputs, broken)),
     }
@@ -161,21 +188,39 @@ def record_one_for_all() -> dict[str, Floats]:
         "v1": Task.of("PathFollowing-v1"),
         "narrow": Task.of("PathFollowing-v1", corridor=0.6, turn_radius=3.3),
     }
-    rule = {"lookahead": 1.3, "reach": 0.8, "crab_share": 1.7, "rudder_weight": 0.6, "rate_weight": 1.9,
-            "integral": 0.7, "lookahead_power": 0.4, "reach_power": -0.3, "integral_power": 1.1}  # fmt: skip
+    rule = {
+        "lookahead": 1.3,
+        "reach": 0.8,
+        "crab_share": 1.7,
+        "rudder_weight": 0.6,
+        "rate_weight": 1.9,
+        "integral": 0.7,
+        "lookahead_power": 0.4,
+        "reach_power": -0.3,
+        "integral_power": 1.1,
+    }
     for name in ("mariner", "tanker"):
         model = load_model(name)
         for where, task in tasks.items():
             told = context(model, task)
             base = base_for(model, task, rule).to_dict()
-            found |= {f"{name} {where} told": told, f"{name} {where} inputs": agent.inputs(told)}
-            found |= numbers_in(base, f"{name} {where} base", left_out=("margins", "format"))
+            found |= {
+                f"{name} {where} told": told,
+                f"{name} {where} inputs": agent.inputs(told),
+            }
+            found |= numbers_in(
+                base, f"{name} {where} base", left_out=("margins", "format")
+            )
     ship = scale_model(load_model("container-abc-lssvr"), 1.7)
     made = agent.for_ship(ship, tasks["narrow"])
     found |= {f"made {name}": values for name, values in of_policy(made).items()}
-    found |= numbers_in(made.training["outside"], "outside") | {"authority": vector(made.authority)}
+    found |= numbers_in(made.training["outside"], "outside") | {
+        "authority": vector(made.authority)
+    }
     low, high = agent.fleet[:, 2], agent.fleet[:, 3]
-    beyond = agent.outside(low + (high - low) * np.linspace(-0.13, 1.17, len(low)), "ship")
+    beyond = agent.outside(
+        low + (high - low) * np.linspace(-0.13, 1.17, len(low)), "ship"
+    )
     return found | numbers_in(beyond, "beyond") | {"fleet": vector(agent.fleet)}
 
 
@@ -183,12 +228,23 @@ def record_one_for_all() -> dict[str, Floats]:
 ABOARD: dict[str, Callable[[], Any]] = {
     **{
         kind: lambda kind=kind: controller_class(kind).from_model(MARINER)  # type: ignore[misc]
-        for kind in ("pid", "pid-filtered", "lq", "lqg", "turn-rate", "los", "ilos", "alos")
+        for kind in (
+            "pid",
+            "pid-filtered",
+            "lq",
+            "lqg",
+            "turn-rate",
+            "los",
+            "ilos",
+            "alos",
+        )
     },
     "wheel-over": lambda: controller_class("wheel-over").from_model(
         MARINER, task=Task.of("PathFollowing-v1")
     ),  # type: ignore[attr-defined]
-    "old wheel-over": lambda: controller_class("wheel-over").from_model(MARINER, task=path_following_task()),  # type: ignore[attr-defined]
+    "old wheel-over": lambda: controller_class("wheel-over").from_model(
+        MARINER, task=path_following_task()
+    ),  # type: ignore[attr-defined]
     "learned": random_policy,
     "residual": POLICIES["residual"],
     "learned paths": path_policy,
@@ -235,16 +291,33 @@ def of_autopilots() -> dict[str, Floats]:
 
 def track(radius: float = 610.0) -> Route:
     """A route with turns to both sides, in the south and across the date line."""
-    return Route(np.array([[-33.9, 179.95], [-33.86, 179.97], [-33.85, -179.99], [-33.8, -179.98]]), radius)
+    return Route(
+        np.array(
+            [[-33.9, 179.95], [-33.86, 179.97], [-33.85, -179.99], [-33.8, -179.98]]
+        ),
+        radius,
+    )
 
 
 def of_route() -> dict[str, Floats]:
     """What a route tells a ship beside it, leg after leg."""
     route, found = track(), []
     for k in range(60):
-        latitude, longitude = -33.9 + 0.0017 * k, 179.95 + 0.00115 * k + 0.004 * np.sin(0.2 * k)
-        found.append([*route.given(np.radians(latitude), np.radians(longitude)).values(), route.ended])
-    return {"given": vector(found), "plan": vector(route.plan), "origin": vector(route.origin)}
+        latitude, longitude = (
+            -33.9 + 0.0017 * k,
+            179.95 + 0.00115 * k + 0.004 * np.sin(0.2 * k),
+        )
+        found.append(
+            [
+                *route.given(np.radians(latitude), np.radians(longitude)).values(),
+                route.ended,
+            ]
+        )
+    return {
+        "given": vector(found),
+        "plan": vector(route.plan),
+        "origin": vector(route.origin),
+    }
 
 
 def of_helm() -> dict[str, Floats]:
@@ -262,19 +335,36 @@ def of_helm() -> dict[str, Floats]:
         off_track_m=130.0,
         early_s=45.0,
     )
-    found = {"between": vector([limits.between(one) for one in (
-        "heading", "yaw_rate", "latitude", "cross_track", "surge", "waypoint_distance")])}  # fmt: skip
+    found = {
+        "between": vector(
+            [
+                limits.between(one)
+                for one in (
+                    "heading",
+                    "yaw_rate",
+                    "latitude",
+                    "cross_track",
+                    "surge",
+                    "waypoint_distance",
+                )
+            ]
+        )
+    }
     sensors = Sensors(limits)
     for one in (("course", 0.7), ("speed", 6.1), ("heading", 0.4)):
         sensors.take(Reading(*one, "GP"), 1.0)
-    found["over ground"] = vector(list(sensors.numbers(["surge", "sway", "heading"], 2.0).values()))
+    found["over ground"] = vector(
+        list(sensors.numbers(["surge", "sway", "heading"], 2.0).values())
+    )
     for name, heading, rate in (
         ("pid", 0.6, None),
         ("turn-rate", None, -0.004),
         ("turn-rate", 0.9, 0.003),
         ("los", None, None),
     ):
-        helm = Helm(controller_class(name).from_model(MARINER), heading, limits, rate=rate)  # type: ignore[attr-defined]
+        helm = Helm(
+            controller_class(name).from_model(MARINER), heading, limits, rate=rate
+        )  # type: ignore[attr-defined]
         rows = []
         for k in range(40):
             now, turned = 1.0 * k, 0.3 + 0.2 * np.sin(0.2 * k)
@@ -309,12 +399,21 @@ def of_helm() -> dict[str, Floats]:
 
 def of_helm_on_a_route() -> dict[str, Floats]:
     """A ship in a current and wind, steered along a route by what her instruments show."""
-    guide = controller_class("wheel-over").from_model(MARINER, task=Task.of("PathFollowing-v1"))  # type: ignore[attr-defined]
+    guide = controller_class("wheel-over").from_model(
+        MARINER, task=Task.of("PathFollowing-v1")
+    )  # type: ignore[attr-defined]
     places = np.array([[54.0, 7.5], [54.012, 7.5], [54.02, 7.53], [54.03, 7.53]])
     helm = Helm(
-        guide, None, Limits(off_track_m=30.0, early_s=70.0), Route(places, guide.gains["path_radius"])
+        guide,
+        None,
+        Limits(off_track_m=30.0, early_s=70.0),
+        Route(places, guide.gains["path_radius"]),
     )
-    ship, rows, said = SimulatedShip(MARINER, leg=0.3, weather="slight", seed=5, step=0.5), [], []
+    ship, rows, said = (
+        SimulatedShip(MARINER, leg=0.3, weather="slight", seed=5, step=0.5),
+        [],
+        [],
+    )
     for k in range(420):
         for name, value in ship.measured().items():
             helm.sensors.take(Reading(name, value, "II"), 1.0 * k)
@@ -359,13 +458,20 @@ def texts(name: str) -> str:
     """A text of what is exported or sent over NMEA 0183."""
     kind, _, what = name.partition(" ")
     if kind == "ship":
-        models = {"deep": ("mariner", np.inf), "shallow": ("tanker", 31.0), "rolling": ("container", np.inf)}
+        models = {
+            "deep": ("mariner", np.inf),
+            "shallow": ("tanker", 31.0),
+            "rolling": ("container", np.inf),
+        }
         source = ship_source(load_model(models[what][0]), f"my-{what}", models[what][1])
         notes = f"{source.notes} {source.step!r} {source.inputs} {source.outputs}"
         return f"{source.header}\n{source.source}\n{notes}"
     if kind == "autopilot":
         source = autopilot_source(ABOARD[what]())
-        return f"{source.header}\n{source.source}\n{source.step!r} {source.inputs} {source.outputs}"
+        return (
+            f"{source.header}\n{source.source}\n{source.step!r} {source.inputs}"
+            f" {source.outputs}"
+        )
     return "\n".join(said_by_helm() if what == "helm" else said_by_ship())
 
 
@@ -373,8 +479,14 @@ def said_by_helm() -> list[str]:
     """Sentences and statuses of helms, from standby to an alarm, with warnings."""
     said = []
     limits = Limits(off_heading_deg=3.0, off_track_m=30.0, persistence_s=1.0)
-    for kind, heading, rate in (("lq", 0.7, None), ("turn-rate", None, 0.004), ("ilos", None, None)):
-        helm = Helm(controller_class(kind).from_model(MARINER), heading, limits, rate=rate)  # type: ignore[attr-defined]
+    for kind, heading, rate in (
+        ("lq", 0.7, None),
+        ("turn-rate", None, 0.004),
+        ("ilos", None, None),
+    ):
+        helm = Helm(
+            controller_class(kind).from_model(MARINER), heading, limits, rate=rate
+        )  # type: ignore[attr-defined]
         said += [helm.status, helm.sentences()]
         for now in (0.0, 1.0, 2.0, 3.0, 4.0):
             told = {
@@ -413,7 +525,9 @@ def said_by_ship() -> list[str]:
                 for line in said[-1].splitlines()
                 for one in readings(line) or ()
             ]
-        for line in sentences("AGROR,-7.5,A,,V,B" if k < 20 else "AGROR,3.0,V,,V,B").splitlines():
+        for line in sentences(
+            "AGROR,-7.5,A,,V,B" if k < 20 else "AGROR,3.0,V,,V,B"
+        ).splitlines():
             ship.hear(line)
         said.append(f"order {ship.order:.4f}")
         if k == 28:  # to where latitude and longitude have odd degrees
@@ -423,7 +537,15 @@ def said_by_ship() -> list[str]:
 
 
 TEXTS = (
-    "ship deep", "ship shallow", "ship rolling", "autopilot pid-filtered", "autopilot lqg",
-    "autopilot wheel-over", "autopilot residual", "autopilot turn-rate", "autopilot ilos", "nmea helm",
+    "ship deep",
+    "ship shallow",
+    "ship rolling",
+    "autopilot pid-filtered",
+    "autopilot lqg",
+    "autopilot wheel-over",
+    "autopilot residual",
+    "autopilot turn-rate",
+    "autopilot ilos",
+    "nmea helm",
     "nmea ship",
-)  # fmt: skip
+)

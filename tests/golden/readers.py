@@ -55,7 +55,9 @@ def sailed(n: int = 481, step: float = 0.5) -> dict[str, Floats]:
     delta[(t > 147.0) & (t <= 200.0)] = 0.26
     r, psi = np.zeros(n), np.full(n, 6.1)
     for k in range(1, n):
-        r[k] = r[k - 1] + step * (0.09 * delta[k - 1] - r[k - 1]) / (3.0 if steady[k] else 7.0)
+        r[k] = r[k - 1] + step * (0.09 * delta[k - 1] - r[k - 1]) / (
+            3.0 if steady[k] else 7.0
+        )
         psi[k] = psi[k - 1] + 0.5 * step * (r[k] + r[k - 1])
     u, v = 6.7 - 500.0 * r**2, -40.0 * r + 0.05
     north = u * np.cos(psi) - v * np.sin(psi) + 0.31
@@ -97,10 +99,15 @@ def gnss(forward: float = 25.0, starboard: float = -3.0) -> dict[str, Floats]:
     }
 
 
-def csv(name: str, content: Mapping[str, Any], delimiter: str = ",", digits: int = 7) -> str:
+def csv(
+    name: str, content: Mapping[str, Any], delimiter: str = ",", digits: int = 7
+) -> str:
     """Write columns, numbers or texts; the name of the file."""
     rows = zip(*(list(values) for values in content.values()), strict=True)
-    cells = [[one if isinstance(one, str) else f"{one:.{digits}g}" for one in row] for row in rows]
+    cells = [
+        [one if isinstance(one, str) else f"{one:.{digits}g}" for one in row]
+        for row in rows
+    ]
     lines = [delimiter.join(row) for row in [list(content), *cells]]
     Path(name).write_text("\n".join(lines) + "\n", encoding="utf-8")
     return name
@@ -108,7 +115,9 @@ def csv(name: str, content: Mapping[str, Any], delimiter: str = ",", digits: int
 
 def own_names(**changed: Any) -> dict[str, Any]:
     """Columns named like channels, some of them changed; None leaves one out."""
-    found = {name: sailed()[name] for name in ("t", "x", "y", "psi", "u", "v", "r", "delta")} | changed
+    found = {
+        name: sailed()[name] for name in ("t", "x", "y", "psi", "u", "v", "r", "delta")
+    } | changed
     return {name: values for name, values in found.items() if values is not None}
 
 
@@ -146,26 +155,61 @@ def log_csv() -> Answers:
     csv("units.csv", other_units, digits=10)
     csv("own.csv", own_names(), digits=10)
     csv("earth.csv", own_names(u=s["north"], v=s["east"]), digits=10)
-    cg = {"x": s["x"] + 4.2 * np.cos(psi), "y": s["y"] + 4.2 * np.sin(psi), "v": s["v"] + 4.2 * s["r"]}
-    csv("cg.csv", own_names(**cg, Y=300.0 * s["v"], N=5e3 * s["r"], X=20.0 * s["u"]), digits=10)
+    cg = {
+        "x": s["x"] + 4.2 * np.cos(psi),
+        "y": s["y"] + 4.2 * np.sin(psi),
+        "v": s["v"] + 4.2 * s["r"],
+    }
+    csv(
+        "cg.csv",
+        own_names(**cg, Y=300.0 * s["v"], N=5e3 * s["r"], X=20.0 * s["u"]),
+        digits=10,
+    )
     csv("position.csv", own_names(u=None, v=None, r=None), digits=10)
     csv("rate.csv", {name: s[name] for name in ("t", "u", "r", "delta")}, digits=10)
-    csv("holes.csv", own_names(psi=blank(psi % (2 * np.pi), 0, 1, 40, 41, 42, 120), u=blank(s["u"], 7, 480)))
-    csv("semicolons.csv", {"t": s["t"], "u": [f"{one:.4f}".replace(".", ",") for one in s["u"]]}, ";")
-    north = {"t": s["t"], "lat": s["x"] / 110_574.0, "lon": s["y"] / 111_320.0, "psi": psi}
+    csv(
+        "holes.csv",
+        own_names(
+            psi=blank(psi % (2 * np.pi), 0, 1, 40, 41, 42, 120), u=blank(s["u"], 7, 480)
+        ),
+    )
+    csv(
+        "semicolons.csv",
+        {"t": s["t"], "u": [f"{one:.4f}".replace(".", ",") for one in s["u"]]},
+        ";",
+    )
+    north = {
+        "t": s["t"],
+        "lat": s["x"] / 110_574.0,
+        "lon": s["y"] / 111_320.0,
+        "psi": psi,
+    }
     csv("equator.csv", north, digits=10)
-    plain_columns = {name: name for name in ("t", "lat", "lon", "sog", "cog", "psi", "delta")}
-    knots = {"sog": {"column": "sog", "unit": "kn"}, "cog": {"column": "cog", "unit": "deg"}}
+    plain_columns = {
+        name: name for name in ("t", "lat", "lon", "sog", "cog", "psi", "delta")
+    }
+    knots = {
+        "sog": {"column": "sog", "unit": "kn"},
+        "cog": {"column": "cog", "unit": "deg"},
+    }
     over_ground = {**g, "sog": g["sog"] / KNOT, "cog": g["cog"] / DEGREE}
     csv(
         "gnss.csv",
-        {"t": s["t"], **over_ground, "psi": psi + 0.06, "delta": s["delta"], "stw": s["stw"]},
+        {
+            "t": s["t"],
+            **over_ground,
+            "psi": psi + 0.06,
+            "delta": s["delta"],
+            "stw": s["stw"],
+        },
         digits=12,
     )
     antenna = {"gnss_antenna": {"forward": 25.0, "starboard": -3.0}}
     estimated = antenna | {"heading_offset_deg": "estimate", "rudder_offset_deg": 0.4}
     drift = {**plain_columns, **knots, "stw": "stw"}
-    gyro_only = {name: plain_columns[name] for name in ("t", "lat", "lon", "psi", "delta")}
+    gyro_only = {
+        name: plain_columns[name] for name in ("t", "lat", "lon", "psi", "delta")
+    }
     return {
         "units, port": lambda: read("units.csv", in_units, "port"),
         "own": lambda: read("own.csv", kind="zigzag", use="validate", length=151.5),
@@ -177,14 +221,24 @@ def log_csv() -> Answers:
         "holes": lambda: read("holes.csv", repair="interpolate"),
         "semicolons": lambda: read("semicolons.csv"),
         "over ground": lambda: read("gnss.csv", {**plain_columns, **knots}),
-        "antenna": lambda: read("gnss.csv", {**plain_columns, **knots}, sensors=antenna),
-        "estimated": lambda: read("gnss.csv", {**plain_columns, **knots}, sensors=estimated),
+        "antenna": lambda: read(
+            "gnss.csv", {**plain_columns, **knots}, sensors=antenna
+        ),
+        "estimated": lambda: read(
+            "gnss.csv", {**plain_columns, **knots}, sensors=estimated
+        ),
         "rudder estimated": lambda: read(
-            "gnss.csv", {**plain_columns, **knots}, sensors={"rudder_offset_deg": "estimate"}
+            "gnss.csv",
+            {**plain_columns, **knots},
+            sensors={"rudder_offset_deg": "estimate"},
         ),
         "speed log": lambda: read("gnss.csv", drift, sensors=antenna),
-        "track alone": lambda: read("gnss.csv", gyro_only, sensors=antenna | {"heading_offset_deg": 3.4}),
-        "without rudder": lambda: read("gnss.csv", {n: n for n in ("t", "lat", "lon", "psi")}),
+        "track alone": lambda: read(
+            "gnss.csv", gyro_only, sensors=antenna | {"heading_offset_deg": 3.4}
+        ),
+        "without rudder": lambda: read(
+            "gnss.csv", {n: n for n in ("t", "lat", "lon", "psi")}
+        ),
     }
 
 
@@ -195,14 +249,22 @@ def refusals() -> Answers:
     found: Answers = {}
 
     def tried(name: str, content: Mapping[str, Any], *words: Any, **more: Any) -> None:
-        found[name] = asked(lambda: Trial.from_csv(csv("log.csv", content, digits=10), *words, **more).notes)
+        found[name] = asked(
+            lambda: (
+                Trial.from_csv(csv("log.csv", content, digits=10), *words, **more).notes
+            )
+        )
 
     def text(name: str, content: str | bytes) -> None:
-        Path("log.csv").write_bytes(content if isinstance(content, bytes) else content.encode())
+        Path("log.csv").write_bytes(
+            content if isinstance(content, bytes) else content.encode()
+        )
         found[name] = asked(lambda: Trial.from_csv("log.csv").notes)
 
     tried("degrees", own_names(psi=psi / DEGREE))
-    tried("degrees for radians of the rate", own_names(psi=None, r=s["r"] / DEGREE * 3.0))
+    tried(
+        "degrees for radians of the rate", own_names(psi=None, r=s["r"] / DEGREE * 3.0)
+    )
     tried("rudder in degrees", own_names(delta=s["delta"] / DEGREE))
     tried("knots", own_names(u=s["u"] * 20.0))
     tried("rate of the other sign", own_names(r=-s["r"]))
@@ -215,11 +277,18 @@ def refusals() -> Answers:
     tried("earth for body", own_names(u=s["north"], v=s["east"]))
     tried("body for earth", own_names(), velocity_frame="earth")
     tried("velocities in knots", own_names(u=s["u"] / KNOT, v=s["v"] / KNOT))
-    tried("one heading", own_names(psi=np.where(np.arange(n) == 33, psi + 1.3, psi), x=None, r=None))
+    tried(
+        "one heading",
+        own_names(psi=np.where(np.arange(n) == 33, psi + 1.3, psi), x=None, r=None),
+    )
     tried("missing value", own_names(u=blank(s["u"], 12, 13)))
     tried("missing time", own_names(t=blank(s["t"], 12)), repair="interpolate")
     tried("hole", own_names(u=blank(s["u"], *range(50, 80))), repair="interpolate")
-    tried("mostly empty", own_names(u=blank(s["u"], *(k for k in range(n) if k % 3))), repair="interpolate")
+    tried(
+        "mostly empty",
+        own_names(u=blank(s["u"], *(k for k in range(n) if k % 3))),
+        repair="interpolate",
+    )
     tried("time back", own_names(t=np.where(np.arange(n) == 9, 2.0, s["t"])))
     tried("time stands", own_names(t=np.where(np.arange(n) == 9, 4.0, s["t"])))
     tried("two rows", {name: values[:2] for name, values in own_names().items()})
@@ -240,33 +309,78 @@ def refusals() -> Answers:
     tried("no xg", own_names(), origin="cg")
     tried("xg", own_names(), origin="cg", xg=float("nan"))
     tried("cg without rate", {k: s[k] for k in ("t", "v", "u")}, origin="cg", xg=1.0)
-    tried("earth without heading", {k: s[k] for k in ("t", "v", "u")}, velocity_frame="earth")
+    tried(
+        "earth without heading",
+        {k: s[k] for k in ("t", "v", "u")},
+        velocity_frame="earth",
+    )
     tried("latitude alone", {"t": s["t"], "lat": g["lat"]})
     tried("speed alone", {"t": s["t"], "sog": g["sog"]})
     tried("no position", {"t": s["t"], "lat": ["57 north"] * n, "lon": g["lon"]})
     far = np.where(np.isin(np.arange(n), [20, 77]), g["lat"] + 0.2, g["lat"])
     tried("outlier", {"t": s["t"], "lat": far, "lon": g["lon"], "psi": psi})
-    tried("outlier repaired", {"t": s["t"], "lat": far, "lon": g["lon"], "psi": psi}, repair="interpolate")
-    tried("beyond the pole", {"t": s["t"], "lat": g["lat"] - 57.0, "lon": g["lon"], "psi": psi})
-    tried("two ships", {"t": s["t"], "lat": g["lat"] + 0.2 * (np.arange(n) % 2), "lon": g["lon"], "psi": psi})
+    tried(
+        "outlier repaired",
+        {"t": s["t"], "lat": far, "lon": g["lon"], "psi": psi},
+        repair="interpolate",
+    )
+    tried(
+        "beyond the pole",
+        {"t": s["t"], "lat": g["lat"] - 57.0, "lon": g["lon"], "psi": psi},
+    )
+    tried(
+        "two ships",
+        {
+            "t": s["t"],
+            "lat": g["lat"] + 0.2 * (np.arange(n) % 2),
+            "lon": g["lon"],
+            "psi": psi,
+        },
+    )
     tried("berth", {"t": s["t"], "sog": 0.01 * g["sog"], "cog": g["cog"], "psi": psi})
-    tried("course as heading", {"t": s["t"], "sog": g["sog"], "cog": g["cog"], "psi": g["cog"] + 0.001})
-    tried("mirrored heading", {"t": s["t"], "sog": g["sog"], "cog": g["cog"], "psi": -psi})
-    tried("turned heading", {"t": s["t"], "sog": g["sog"], "cog": g["cog"], "psi": psi + 0.9})
-    tried("offset", {"t": s["t"], "sog": g["sog"], "cog": g["cog"], "psi": psi + 0.09, "delta": s["delta"]})
+    tried(
+        "course as heading",
+        {"t": s["t"], "sog": g["sog"], "cog": g["cog"], "psi": g["cog"] + 0.001},
+    )
+    tried(
+        "mirrored heading", {"t": s["t"], "sog": g["sog"], "cog": g["cog"], "psi": -psi}
+    )
+    tried(
+        "turned heading",
+        {"t": s["t"], "sog": g["sog"], "cog": g["cog"], "psi": psi + 0.9},
+    )
+    tried(
+        "offset",
+        {
+            "t": s["t"],
+            "sog": g["sog"],
+            "cog": g["cog"],
+            "psi": psi + 0.09,
+            "delta": s["delta"],
+        },
+    )
     magnetic = {"t": "t", "sog": "sog", "cog": "cog", "psi": "mag"}
-    tried("magnetic", {"t": s["t"], "sog": g["sog"], "cog": g["cog"], "mag": psi}, magnetic)
+    tried(
+        "magnetic",
+        {"t": s["t"], "sog": g["sog"], "cog": g["cog"], "mag": psi},
+        magnetic,
+    )
     tried("no heading", {"t": s["t"], "sog": g["sog"], "cog": g["cog"], "u": s["u"]})
     tried("against the rudder", own_names(delta=-s["delta"]))
     circle = np.linspace(0.0, 2.0, n)
-    tried("circle against the rudder", {"t": s["t"], "psi": -circle, "delta": 0.3 + 0.0 * circle})
+    tried(
+        "circle against the rudder",
+        {"t": s["t"], "psi": -circle, "delta": 0.3 + 0.0 * circle},
+    )
     tried("late rudder", own_names(delta=np.interp(s["t"] - 4.0, s["t"], s["delta"])))
     tried("late rate", own_names(r=np.interp(s["t"] - 2.2, s["t"], s["r"])))
     for choice in ("correct", "keep"):
         content = own_names(r=np.interp(s["t"] + 2.2, s["t"], s["r"]))
         path = csv("log.csv", content, digits=10)
         found[f"early rate, {choice}"] = asked(
-            lambda path=path, choice=choice: Trial.from_csv(path, sensors={"clock_offsets": choice})
+            lambda path=path, choice=choice: Trial.from_csv(
+                path, sensors={"clock_offsets": choice}
+            )
         )
     wide = {"t": s["t"], "psi": psi, "delta": s["delta"]}
     tried("estimate", wide, sensors={"heading_offset_deg": "estimate"})
@@ -319,7 +433,10 @@ def clocks() -> Answers:
     start = clock_texts.read_clock(["2024-05-31T09:30:00Z"])[0][0]
     s, ticks = (
         sailed(),
-        [datetime(2024, 5, 31, 9, 30, tzinfo=UTC) + timedelta(seconds=0.5 * k) for k in range(481)],
+        [
+            datetime(2024, 5, 31, 9, 30, tzinfo=UTC) + timedelta(seconds=0.5 * k)
+            for k in range(481)
+        ],
     )
     dated = {
         "date": [one.strftime("%d.%m.%Y") for one in ticks],
@@ -332,7 +449,9 @@ def clocks() -> Answers:
     zone = {"t": {"column": "time", "date": "date", "zone": "+03:30"}, "u": "u"}
 
     def started(path: str, given: dict[str, Any]) -> Any:
-        log = trial_import.import_tables([tables.read_log(path)], given, trial_import.Conventions())
+        log = trial_import.import_tables(
+            [tables.read_log(path)], given, trial_import.Conventions()
+        )
         return log.t, log.start
 
     def angle_error(values: list[str]) -> Any:
@@ -360,8 +479,12 @@ def clocks() -> Answers:
             for one in (start, start + 0.26, 34_200.0, 86_399.0, 172_799.0, 200_000.0)
         ],
         "dated": lambda: started("dated.csv", zone),
-        "unix ms": lambda: started("unix.csv", {"t": {"column": "clock", "unit": "unix ms"}, "u": "u"}),
-        "unix": lambda: started("both.csv", {"t": {"column": "clock", "unit": "unix"}, "u": "u"}),
+        "unix ms": lambda: started(
+            "unix.csv", {"t": {"column": "clock", "unit": "unix ms"}, "u": "u"}
+        ),
+        "unix": lambda: started(
+            "both.csv", {"t": {"column": "clock", "unit": "unix"}, "u": "u"}
+        ),
     }
 
 
@@ -371,7 +494,10 @@ def derivatives() -> Answers:
     t = np.cumsum(random.uniform(0.2, 0.4, 240)) + 13.0
     signal = 1.7 * np.sin(0.11 * t) + 0.002 * t**2
     noise = random.standard_normal(240)
-    found = {f"noise {size:g}": time_derivative(t, signal + size * noise) for size in (0.0, 1e-3, 0.02, 0.3)}
+    found = {
+        f"noise {size:g}": time_derivative(t, signal + size * noise)
+        for size in (0.0, 1e-3, 0.02, 0.3)
+    }
     walk = np.cumsum(noise)
     found |= {
         "walk": time_derivative(t, signal + 0.003 * walk),
@@ -383,10 +509,15 @@ def derivatives() -> Answers:
     }
     found |= {"nothing": time_derivative(t, 0.0 * t)}
     steep = [
-        np.abs(time_derivative(t, signal + size * noise) - time_derivative(t, signal)).max()
+        np.abs(
+            time_derivative(t, signal + size * noise) - time_derivative(t, signal)
+        ).max()
         for size in np.geomspace(1e-4, 0.1, 13)
     ]
-    return {name: asked(lambda one=one: one) for name, one in (found | {"error": np.array(steep)}).items()}
+    return {
+        name: asked(lambda one=one: one)
+        for name, one in (found | {"error": np.array(steep)}).items()
+    }
 
 
 def one_clock() -> Answers:
@@ -410,29 +541,43 @@ def one_clock() -> Answers:
         Path("log.csv"), {"t": t, "rate": t}, range(2, 22), "line {line} (row {row})"
     )
     source = columns.Source(
-        table, {"t": columns.Column("t", "s"), "r": columns.Column("rate", "rad/s")}, np.arange(20)
+        table,
+        {"t": columns.Column("t", "s"), "r": columns.Column("rate", "rad/s")},
+        np.arange(20),
     )
     sparse = np.where(np.arange(20) % 3 == 1, t, np.nan)
     presents = [random.random((24, 2)) < share for share in (0.2, 0.5, 0.8)]
     halves = np.array([[True, k % 2 == 0] for k in range(24)])
     return {
         "rates": lambda: joined(
-            psi=series(0.5, 30.0), u=series(1.7, 28.0, start=2.0), wind_speed=series(9.0, 40.0)
+            psi=series(0.5, 30.0),
+            u=series(1.7, 28.0, start=2.0),
+            wind_speed=series(9.0, 40.0),
         ),
         "holes": lambda: joined(
-            psi=series(0.5, 60.0, (10.0, 15.2)), u=series(2.0, 60.0, (30.0, 44.0), (47.0, 50.0))
+            psi=series(0.5, 60.0, (10.0, 15.2)),
+            u=series(2.0, 60.0, (30.0, 44.0), (47.0, 50.0)),
         ),
         "hole lengths": [
-            lambda long=long: joined(psi=series(1.0, 90.0), r=series(1.0, 90.0, (10.0, 10.0 + long)))["notes"]
+            lambda long=long: joined(
+                psi=series(1.0, 90.0), r=series(1.0, 90.0, (10.0, 10.0 + long))
+            )["notes"]
             for long in (5.0, 6.0, 7.0, 8.0)
         ],
-        "no motion": lambda: joined(wind_speed=series(3.0, 30.0), wind_from=series(1.0, 33.0)),
+        "no motion": lambda: joined(
+            wind_speed=series(3.0, 30.0), wind_from=series(1.0, 33.0)
+        ),
         "apart": lambda: joined(psi=series(1.0, 20.0), u=series(2.0, 60.0, start=18.0)),
         "own": lambda: resampling.own_clock("r", t, sparse, source),
-        "few": lambda: resampling.own_clock("r", t, np.where(t < 2.0, t, np.nan), source),
-        "back": lambda: resampling.own_clock("r", np.where(t == 7.0, 2.5, t), sparse, source),
+        "few": lambda: resampling.own_clock(
+            "r", t, np.where(t < 2.0, t, np.nan), source
+        ),
+        "back": lambda: resampling.own_clock(
+            "r", np.where(t == 7.0, 2.5, t), sparse, source
+        ),
         "own clocks": [
-            resampling.have_own_clocks(one) for one in (*presents, halves, halves[:4], halves[:, :1], ~halves)
+            resampling.have_own_clocks(one)
+            for one in (*presents, halves, halves[:4], halves[:, :1], ~halves)
         ],
         "at": source.at(7, "r"),
         "declare": source.declare("r", "deg/s"),
@@ -451,17 +596,27 @@ def late_channels() -> Answers:
     def corrected(choice: str | None, own: bool = False, **changed: Floats) -> Any:
         channels = {"psi": psi, "r": r, "delta": delta} | changed
         log = Log(t, channels, "log.csv", [])
-        series = {name: (t.copy() if own else t, values) for name, values in channels.items()}
+        series = {
+            name: (t.copy() if own else t, values) for name, values in channels.items()
+        }
         found, notes = clock_offsets.corrected_clocks(log, series, choice)
         return {name: pair[0] for name, pair in found.items()}, notes
 
     shifts = (-3.3, 0.4, 1.9)
     steps = np.where(np.sin(t / 30.0) > 0.4, 0.2, -0.1)
     return {
-        "rate": [lambda d=d: clock_offsets.clock_offset(t, psi, moved(noisy, d), {}) for d in shifts],
-        "rudder": [lambda d=d: clock_offsets.rudder_offset(t, r, moved(delta, d)) for d in shifts],
+        "rate": [
+            lambda d=d: clock_offsets.clock_offset(t, psi, moved(noisy, d), {})
+            for d in shifts
+        ],
+        "rudder": [
+            lambda d=d: clock_offsets.rudder_offset(t, r, moved(delta, d))
+            for d in shifts
+        ],
         "beside": [
-            lambda d=d: clock_offsets.clock_offset(t, r, moved(delta, d), {"r": r, "r3": r**3})
+            lambda d=d: clock_offsets.clock_offset(
+                t, r, moved(delta, d), {"r": r, "r3": r**3}
+            )
             for d in shifts
         ],
         "long ago": lambda: clock_offsets.clock_offset(t, psi, moved(r, 12.0), {}),
@@ -469,30 +624,40 @@ def late_channels() -> Answers:
             lambda n=n: clock_offsets.clock_offset(t[:n], psi[:n], noisy[:n], {})
             for n in (170, 182, 184, 190, 240)
         ],
-        "slow": lambda: clock_offsets.clock_offset(3.0 * t[::2], psi[::2], noisy[::2], {}),
+        "slow": lambda: clock_offsets.clock_offset(
+            3.0 * t[::2], psi[::2], noisy[::2], {}
+        ),
         "none": lambda: clock_offsets.clock_offset(t, psi, 0.0 * r, {}),
         "reverses": [
             clock_offsets._reverses(one, least)
             for one in (r, delta, steps, np.abs(r))
             for least in (0.0, 0.28, 0.32)
         ],
-        "turns": refused_pairs(
-            lambda angle: clock_offsets._turns_against(-np.linspace(0.0, angle, 50), np.full(50, 0.2)),
-            np.radians(60.0),
-        )
-        + refused_pairs(
-            lambda angle: clock_offsets._turns_against(-np.linspace(0.0, 2.0, 50), np.full(50, angle)),
-            np.radians(8.0),
+        "turns": (
+            refused_pairs(
+                lambda angle: clock_offsets._turns_against(
+                    -np.linspace(0.0, angle, 50), np.full(50, 0.2)
+                ),
+                np.radians(60.0),
+            )
+            + refused_pairs(
+                lambda angle: clock_offsets._turns_against(
+                    -np.linspace(0.0, 2.0, 50), np.full(50, angle)
+                ),
+                np.radians(8.0),
+            )
         ),
         "corrected": {
-            f"{choice}, {own}, {name} {by:g}": lambda c=choice, o=own, n=name, b=by: corrected(
-                c, o, **{n: moved(s[n], b)}
+            f"{choice}, {own}, {name} {by:g}": lambda c=choice, o=own, n=name, b=by: (
+                corrected(c, o, **{n: moved(s[n], b)})
             )
             for choice in (None, "correct", "keep")
             for own in (False, True)
             for name, by in (("r", 1.3), ("delta", 4.7))
         },
-        "least": [lambda d=d: corrected(None, r=moved(r, d)) for d in (0.6, 0.65, 0.95, 1.05)],
+        "least": [
+            lambda d=d: corrected(None, r=moved(r, d)) for d in (0.6, 0.65, 0.95, 1.05)
+        ],
         "by heading": lambda: clock_offsets.corrected_clocks(
             Log(t, {"psi": psi, "delta": moved(delta, 4.0)}, "log", []),
             {"psi": (t, psi), "delta": (t, delta)},
@@ -533,8 +698,14 @@ def ways() -> Answers:
         navigation.to_midship(log, tools)
         return log.channels, sorted(log.derived), log.notes
 
-    tools, ground = Instruments(25.0, -3.0), {"ground_north": s["north"], "ground_east": s["east"]}
-    ship, own = Particulars(150.0, beam=24.0), partial(Instruments.from_mapping, where="[sensors]")
+    tools, ground = (
+        Instruments(25.0, -3.0),
+        {"ground_north": s["north"], "ground_east": s["east"]},
+    )
+    ship, own = (
+        Particulars(150.0, beam=24.0),
+        partial(Instruments.from_mapping, where="[sensors]"),
+    )
     antennas = (
         {"forward": 91.0},
         {"forward": 89.0},
@@ -560,30 +731,50 @@ def ways() -> Answers:
         "offset": lambda: navigation.heading_offset(channels, straight),
         "one course": lambda: navigation.heading_offset(channels, t < 50.0),
         "courses": [
-            navigation.heading_offset({**ground, "psi": a * (t > 120.0) * DEGREE}, t > 0.0) is None
+            navigation.heading_offset(
+                {**ground, "psi": a * (t > 120.0) * DEGREE}, t > 0.0
+            )
+            is None
             for a in (50.0, 58.0, 62.0, 70.0)
         ],
         "corrected": lambda: corrected(
             Instruments(heading_offset="estimate", rudder_offset="estimate"), **channels
         ),
-        "given": lambda: corrected(Instruments(heading_offset=0.05, rudder_offset=-0.03), **channels),
-        "not told": lambda: corrected(Instruments(rudder_offset="estimate"), psi=psi[:], delta=30.0 * r),
+        "given": lambda: corrected(
+            Instruments(heading_offset=0.05, rudder_offset=-0.03), **channels
+        ),
+        "not told": lambda: corrected(
+            Instruments(rudder_offset="estimate"), psi=psi[:], delta=30.0 * r
+        ),
         "drift": lambda: navigation.set_and_drift(psi, s["stw"], along),
-        "drift on a course": lambda: navigation.set_and_drift(0.1 * psi, s["stw"], along),
+        "drift on a course": lambda: navigation.set_and_drift(
+            0.1 * psi, s["stw"], along
+        ),
         "over ground": lambda: midship(tools, psi=psi, r=r, **ground),
         "not moved": lambda: midship(Instruments(), psi=psi, r=r, **ground),
         "through water": lambda: midship(tools, psi=psi, r=r, stw=s["stw"], **ground),
         "positions": lambda: midship(tools, psi=psi, r=r, x=s["x"], y=s["y"]),
-        "velocities kept": lambda: midship(tools, psi=psi, r=r, x=s["x"], y=s["y"], u=s["u"], v=s["v"]),
+        "velocities kept": lambda: midship(
+            tools, psi=psi, r=r, x=s["x"], y=s["y"], u=s["u"], v=s["v"]
+        ),
         "surge kept": lambda: midship(Instruments(), psi=psi, r=r, u=s["u"], **ground),
         "log alone": [
             lambda: midship(Instruments(), stw=s["stw"]),
             lambda: midship(Instruments(), psi=psi, r=r, stw=s["stw"]),
         ],
-        "no psi": [lambda: midship(tools, r=r), lambda: midship(Instruments(), **ground)],
-        "antennas": [lambda one=one: own({"gnss_antenna": one}, ship=ship) for one in antennas],
+        "no psi": [
+            lambda: midship(tools, r=r),
+            lambda: midship(Instruments(), **ground),
+        ],
+        "antennas": [
+            lambda one=one: own({"gnss_antenna": one}, ship=ship) for one in antennas
+        ],
         "instruments": lambda: own(
-            {"heading_offset_deg": 3.0, "rudder_offset_deg": "estimate", "clock_offsets": "keep"}
+            {
+                "heading_offset_deg": 3.0,
+                "rudder_offset_deg": "estimate",
+                "clock_offsets": "keep",
+            }
         ),
         "lat": g["lat"],
     }
@@ -597,14 +788,25 @@ def plausible() -> Answers:
 
     def source(**in_units: str) -> columns.Source:
         named = {name: columns.Column(name, unit) for name, unit in in_units.items()}
-        return columns.Source(table, {"t": columns.Column("t", "s"), **named}, np.arange(t.size))
+        return columns.Source(
+            table, {"t": columns.Column("t", "s"), **named}, np.arange(t.size)
+        )
 
     def in_range(channel: str, unit: str, size: float) -> None:
-        plausibility.check_ranges({channel: np.array([0.0, np.nan, -size])}, source(**{channel: unit}))
+        plausibility.check_ranges(
+            {channel: np.array([0.0, np.nan, -size])}, source(**{channel: unit})
+        )
 
     def consistent(frame: str = "body", **changed: Any) -> None:
-        channels = {name: s[name] for name in ("x", "y", "psi", "u", "v", "r")} | changed
-        log = Log(t, {name: one for name, one in channels.items() if one is not None}, "log", [])
+        channels = {
+            name: s[name] for name in ("x", "y", "psi", "u", "v", "r")
+        } | changed
+        log = Log(
+            t,
+            {name: one for name, one in channels.items() if one is not None},
+            "log",
+            [],
+        )
         plausibility.check_consistency(
             log, frame, source(x="m", y="m", psi="rad", u="m/s", v="m/s", r="rad/s")
         )
@@ -612,20 +814,32 @@ def plausible() -> Answers:
     def turning(step_deg: float, share: float) -> None:
         heading = np.zeros(100)
         heading[:: max(round(1.0 / share), 1)] = step_deg * DEGREE
-        plausibility.check_heading(0.3 * np.arange(100.0), heading, heading, source(psi="rad"))
+        plausibility.check_heading(
+            0.3 * np.arange(100.0), heading, heading, source(psi="rad")
+        )
 
     def berth(speed: float) -> None:
-        log = Log(t, {"ground_north": 0.0 * t + speed, "ground_east": 0.0 * t}, "log", [])
+        log = Log(
+            t, {"ground_north": 0.0 * t + speed, "ground_east": 0.0 * t}, "log", []
+        )
         plausibility.check_log(log, Instruments(), source(), False)
 
-    def course(apart: float, turned: float, sign: float = 1.0, offset: float = 0.0) -> None:
+    def course(
+        apart: float, turned: float, sign: float = 1.0, offset: float = 0.0
+    ) -> None:
         heading = np.linspace(0.0, turned, 300)
         plausibility._check_course(
-            heading, sign * heading + apart, Instruments(heading_offset=offset), source()
+            heading,
+            sign * heading + apart,
+            Instruments(heading_offset=offset),
+            source(),
         )
 
     def apart(begin: float, end: float) -> None:
-        first, second = ({"r": (np.array(ends), np.zeros(2))} for ends in ([0.0, 100.0], [begin, end]))
+        first, second = (
+            {"r": (np.array(ends), np.zeros(2))}
+            for ends in ([0.0, 100.0], [begin, end])
+        )
         plausibility.check_overlap(first, second, Path("second.csv"), "clock")
 
     def jumping(n: int, size: int) -> None:
@@ -639,7 +853,11 @@ def plausible() -> Answers:
         ground = 5.0 * np.exp(1j * heading) + noise * (random[0] + 1j * random[1])
         log = Log(
             np.arange(400.0),
-            {"psi": heading + offset, "ground_north": ground.real, "ground_east": ground.imag},
+            {
+                "psi": heading + offset,
+                "ground_north": ground.real,
+                "ground_east": ground.imag,
+            },
             "log",
             [],
         )
@@ -647,7 +865,9 @@ def plausible() -> Answers:
 
     half = np.where(t > 120.0, 1.0, -1.0)
     limits = {
-        f"{one}, {unit}": lambda one=one, unit=unit: in_range(one, unit, 1.07 * units.LIMITS[one])
+        f"{one}, {unit}": lambda one=one, unit=unit: in_range(
+            one, unit, 1.07 * units.LIMITS[one]
+        )
         for one, quantity in units.QUANTITIES.items()
         for unit in units.UNITS[quantity]
     }
@@ -661,11 +881,19 @@ def plausible() -> Answers:
             f"{gain:g}": lambda g=gain: consistent(u=s["u"] / g, v=s["v"] / g)
             for gain in (0.3, 0.5, 0.53, 0.58, 1.7, 1.9, 3.0)
         },
-        "frames": [lambda: consistent(u=s["north"], v=s["east"]), lambda: consistent("earth")],
-        "noisy": [lambda k=k: consistent(u=s["u"] + k * half, v=s["v"] - k * half) for k in (0.1, 0.5, 2.0)],
+        "frames": [
+            lambda: consistent(u=s["north"], v=s["east"]),
+            lambda: consistent("earth"),
+        ],
+        "noisy": [
+            lambda k=k: consistent(u=s["u"] + k * half, v=s["v"] - k * half)
+            for k in (0.1, 0.5, 2.0)
+        ],
         "little turn": refused(
             lambda a: consistent(
-                psi=6.1 - a * DEGREE * np.sin(t / 20.0), r=a * DEGREE * np.cos(t / 20.0) / 20.0, x=None
+                psi=6.1 - a * DEGREE * np.sin(t / 20.0),
+                r=a * DEGREE * np.cos(t / 20.0) / 20.0,
+                x=None,
             ),
             (0.8, 0.95, 1.05, 1.2),
         ),
@@ -673,10 +901,16 @@ def plausible() -> Answers:
         "jump": refused(lambda a: turning(a, 0.02), (28.0, 29.5, 31.0, 33.0)),
         "share": refused(lambda a: turning(25.0, a), (0.01, 0.02, 0.03, 0.05)),
         "berth": refused(berth, (0.25, 0.28, 0.29, 0.31, 0.33)),
-        "same course": refused(lambda a: course(a * DEGREE, 1.0), (0.25, 0.29, 0.31, 0.35)),
+        "same course": refused(
+            lambda a: course(a * DEGREE, 1.0), (0.25, 0.29, 0.31, 0.35)
+        ),
         "turn": refused(lambda a: course(0.0, a * DEGREE), (17.0, 19.5, 20.5, 23.0)),
-        "mirrored": refused(lambda a: course(0.3, a, -1.0), (0.2, 0.3, 0.36, 0.5, 1.0, 2.0, 3.0)),
-        "contradiction": refused(lambda a: course(a * DEGREE, 0.1), (22.0, 24.5, 25.5, 28.0, -30.0)),
+        "mirrored": refused(
+            lambda a: course(0.3, a, -1.0), (0.2, 0.3, 0.36, 0.5, 1.0, 2.0, 3.0)
+        ),
+        "contradiction": refused(
+            lambda a: course(a * DEGREE, 0.1), (22.0, 24.5, 25.5, 28.0, -30.0)
+        ),
         "known": lambda: course(0.7, 0.1, offset=0.6),
         "told": lambda: course(-0.7, 0.5),
         "overlap": [
@@ -692,7 +926,9 @@ def plausible() -> Answers:
             )
         ],
         "offsets": [
-            lambda a=a, n=n: noted(a, n) for a in (0.033, 0.037, -0.06, 0.09) for n in (0.02, 0.6, 1.2)
+            lambda a=a, n=n: noted(a, n)
+            for a in (0.033, 0.037, -0.06, 0.09)
+            for n in (0.02, 0.6, 1.2)
         ],
         "outliers": [
             lambda a=a: plausibility.find_outliers(
@@ -703,10 +939,15 @@ def plausible() -> Answers:
             )
             for a in (45.0, 49.0, 51.0, 55.0)
         ],
-        "many": [refused(lambda n, size=size: jumping(n, size), (20, 30, 40)) for size in (60, 64)],
+        "many": [
+            refused(lambda n, size=size: jumping(n, size), (20, 30, 40))
+            for size in (60, 64)
+        ],
         "windows": lambda: plausibility._at_windows(np.arange(100.0)),
         "detrended": lambda: plausibility._detrended(t, psi),
-        "fit": lambda: plausibility._fit(s["u"] + 1j * s["v"], s["north"] + 1j * s["east"]),
+        "fit": lambda: plausibility._fit(
+            s["u"] + 1j * s["v"], s["north"] + 1j * s["east"]
+        ),
         "nothing": lambda: plausibility._fit(0.0 * t, t),
     }
 
@@ -720,7 +961,13 @@ def nmea_logs() -> Answers:
     """Logs of NMEA 0183: every sentence, several talkers, damage, no dates, winds of all kinds."""
     s, g = sailed(), gnss()
 
-    def log(name: str, *more: str, every: int = 4, clock: str = "310524", start: int = 34_170) -> str:
+    def log(
+        name: str,
+        *more: str,
+        every: int = 4,
+        clock: str = "310524",
+        start: int = 34_170,
+    ) -> str:
         lines = ["!AIVDM,1,1,,B,13u=gHP3CWPlvs2Q8sHW:5fD0h6a,0*1B"]
         for k in range(0, 240, every):
             now = start + k // 2
@@ -745,7 +992,10 @@ def nmea_logs() -> Answers:
         return name
 
     rmc = "GPRMC,{told}.00,A,{place},{sog:.2f},{cog:.1f},{date},,,A"
-    gga, gll = "IIGGA,{told}.00,{place},1,08,1.0,20.0,M,,M,,", "GPGLL,{place},{told}.00,A,A"
+    gga, gll = (
+        "IIGGA,{told}.00,{place},1,08,1.0,20.0,M,,M,,",
+        "GPGLL,{place},{told}.00,A,A",
+    )
     motion = (
         "HETHS,{psi:.2f},A",
         "HCHDG,{mag:.1f},1.5,W,8.5,E",
@@ -757,7 +1007,12 @@ def nmea_logs() -> Answers:
     winds = ("WIMWV,030.0,R,10.0,N,A", "WIMWV,051.0,R,9.0,K,A")
     true_wind, empty = (
         ("WIMWV,044.0,T,12.5,M,A",),
-        ("GPGLL,,,,,{told}.00,V,N", "HETHS,,V", "GPVTG,,T,,M,,N,,K,N", "WIMWV,030.0,R,10.0,X,A"),
+        (
+            "GPGLL,,,,,{told}.00,V,N",
+            "HETHS,,V",
+            "GPVTG,,T,,M,,N,,K,N",
+            "WIMWV,030.0,R,10.0,X,A",
+        ),
     )
 
     def table(name: str) -> Any:
@@ -782,16 +1037,32 @@ def nmea_logs() -> Answers:
     log("midnight.nmea", gll, "HEHDG,{psi:.2f},,,,", *waters[:1], start=86_370)
     log("empty.nmea", rmc, *motion, *empty)
     log("no wind.nmea", gga, *winds, "HEHDT,{psi:.2f},T")
-    damaged = Path(log("damaged.nmea", rmc, *motion[:1], every=6)).read_text().splitlines()
+    damaged = (
+        Path(log("damaged.nmea", rmc, *motion[:1], every=6)).read_text().splitlines()
+    )
     for count in (7, 8, 9):
         Path(f"damaged {count}.nmea").write_text(
-            "\n".join([one[:-1] + "Z" if k < count + 1 else one for k, one in enumerate(damaged)])
+            "\n".join(
+                [
+                    one[:-1] + "Z" if k < count + 1 else one
+                    for k, one in enumerate(damaged)
+                ]
+            )
         )
     Path("infinite.nmea").write_text(
-        "\n".join([*damaged, sentence("GPVTG,inf,T,,M,5.0,N,,K,A"), damaged[1], "$GPRMC,broken"])
+        "\n".join(
+            [
+                *damaged,
+                sentence("GPVTG,inf,T,,M,5.0,N,,K,A"),
+                damaged[1],
+                "$GPRMC,broken",
+            ]
+        )
     )
     Path("dark.nmea").write_text("\n".join(sentence("HEHDT,30.0,T") for _ in range(5)))
-    Path("still.nmea").write_text("\n".join(sentence("GPZDA,093000,31,05,2024,00,00") for _ in range(5)))
+    Path("still.nmea").write_text(
+        "\n".join(sentence("GPZDA,093000,31,05,2024,00,00") for _ in range(5))
+    )
     sight = {"gnss_antenna": {"forward": 25.0, "starboard": -3.0}}
     names = (
         "all",
@@ -808,9 +1079,14 @@ def nmea_logs() -> Answers:
         "still",
     )
     return (
-        {f"{name} table": asked(lambda name=name: table(f"{name}.nmea")) for name in names}
+        {
+            f"{name} table": asked(lambda name=name: table(f"{name}.nmea"))
+            for name in names
+        }
         | {
-            name: lambda name=name: Trial.from_csv(f"{name}.nmea", sensors=sight, name=name)
+            name: lambda name=name: Trial.from_csv(
+                f"{name}.nmea", sensors=sight, name=name
+            )
             for name in ("all", "true", "midnight")
         }
         | {
@@ -839,27 +1115,41 @@ def kinds_of_files() -> Answers:
             ]
         )
         if ending != "csv":
-            Path(f"cut.{ending}").write_bytes(path.read_bytes()[: path.stat().st_size // 3])
+            Path(f"cut.{ending}").write_bytes(
+                path.read_bytes()[: path.stat().st_size // 3]
+            )
             found[f"cut {ending}"] = asked(
                 lambda e=ending: tables.read_log(f"cut.{e}").header
             ).__class__.__name__
     numbers_of = {name: sailed()[name][:30] for name in ("t", "psi", "u")}
     frame = pd.DataFrame(numbers_of)
-    found["frame"] = asked(lambda: Trial.from_frame(frame.assign(u=frame["u"].astype(object)), name="frame"))
+    found["frame"] = asked(
+        lambda: Trial.from_frame(
+            frame.assign(u=frame["u"].astype(object)), name="frame"
+        )
+    )
     found["indexed"] = asked(
         lambda: Trial.from_frame(
-            frame.set_index("t"), {"t": "t", "u": {"column": "u", "unit": "kn"}}, name="frame"
+            frame.set_index("t"),
+            {"t": "t", "u": {"column": "u", "unit": "kn"}},
+            name="frame",
         )
     )
     found["place"] = asked(lambda: tables.from_frame(frame, "sheet", 3).place(4))
     found["no frame"] = asked(lambda: tables.from_frame([1.0]))
     found["empty frame"] = asked(lambda: tables.from_frame(frame[:0]))
-    found["numbers"] = asked(lambda: tables.read_log(CORPUS / "log" / "bridge.mat").numbers("psi"))
+    found["numbers"] = asked(
+        lambda: tables.read_log(CORPUS / "log" / "bridge.mat").numbers("psi")
+    )
     found["again"] = asked(
-        lambda: tables.read_log(tables.read_log(CORPUS / "log" / "bridge.csv")).numbers("psi [deg]")
+        lambda: tables.read_log(tables.read_log(CORPUS / "log" / "bridge.csv")).numbers(
+            "psi [deg]"
+        )
     )
     for name in ("own", "semicolons"):
-        found[name] = asked(lambda name=name: Trial.from_csv(CORPUS / "trial" / f"{name}.csv"))
+        found[name] = asked(
+            lambda name=name: Trial.from_csv(CORPUS / "trial" / f"{name}.csv")
+        )
     Path("seven.mat").write_bytes(b"MATLAB 7.3 MAT-file" + bytes(200))
     found["seven"] = asked(lambda: tables.read_log("seven.mat"))
     Path("empty.mat").write_bytes(b" " * 124 + b"\0\1IM")
@@ -889,7 +1179,11 @@ def instruments() -> Answers:
         "wind_speed": 0.0 * s["t"] + 7.0,
     }
     trial = Trial(
-        s["t"], {name: s[name] for name in names} | more, name="sea trial", kind="zigzag", length=150.0
+        s["t"],
+        {name: s[name] for name in names} | more,
+        name="sea trial",
+        kind="zigzag",
+        length=150.0,
     )
     errors = {
         "u": sensors.Sensor(0.1, 0.05, 0.2, 40.0, 0.1, 3.0, 1.3),
@@ -905,13 +1199,20 @@ def instruments() -> Answers:
     return {
         "sea trial": lambda: made().measure(trial, 3),
         "errors": lambda: made(by_channel=errors).measure(trial),
-        "sampled": lambda: made(sampling_s=1.3, dropout_probability=0.1, dropout_samples=2.5).measure(
-            trial, 5
+        "sampled": (
+            lambda: made(
+                sampling_s=1.3, dropout_probability=0.1, dropout_samples=2.5
+            ).measure(trial, 5)
         ),
         "sampling": refused(
-            lambda one: made(sampling_s=one).measure(trial), (100.0, 119.0, 120.0, 121.0, 140.0, 0.0)
+            lambda one: made(sampling_s=one).measure(trial),
+            (100.0, 119.0, 120.0, 121.0, 140.0, 0.0),
         ),
-        "gaps": lambda: made(sampling_s=70.0, dropout_probability=0.9, dropout_samples=9.0).measure(trial),
+        "gaps": (
+            lambda: made(
+                sampling_s=70.0, dropout_probability=0.9, dropout_samples=9.0
+            ).measure(trial)
+        ),
         "sensor": [
             lambda one=one: sensors.Sensor(**one)
             for one in (
@@ -935,7 +1236,9 @@ def instruments() -> Answers:
             np.array([0.0, 1.0, 4.0, 4.5]), 3.0, np.random.default_rng(0)
         ),
         "orders": lambda: sensors.orders_at(
-            np.array([0.2, 1.0, 2.9]), np.array([0.0, 1.0, 2.0]), np.array([5.0, 7.0, 11.0])
+            np.array([0.2, 1.0, 2.9]),
+            np.array([0.0, 1.0, 2.0]),
+            np.array([5.0, 7.0, 11.0]),
         ),
     }
 
@@ -977,18 +1280,35 @@ def guessed() -> Answers:
     def sizes(name: str, limit: float) -> list[str]:
         made = csv_reader.column_table(Path("t"), {name: np.zeros(3)}, range(3))
         return [
-            guesses.guess_columns(replace(made, cells=lambda _, size=size: np.full(3, -size)))[0].unit
+            guesses.guess_columns(
+                replace(made, cells=lambda _, size=size: np.full(3, -size))
+            )[0].unit
             for size in (0.93 * limit, limit, 1.04 * limit)
         ]
 
     def read(path: str | Path) -> tuple[Any, ...]:
         found = guesses.guess_trial(path)
-        return found.columns, found.conventions.get("rudder_positive", "starboard"), found.trial
+        return (
+            found.columns,
+            found.conventions.get("rudder_positive", "starboard"),
+            found.trial,
+        )
 
-    limits = {"t": 1e8, "psi": 6.3, "r": 0.2, "n": 10.0, "delta": 1.0, "delta_command": 1.0, "phi": 1.0}
+    limits = {
+        "t": 1e8,
+        "psi": 6.3,
+        "r": 0.2,
+        "n": 10.0,
+        "delta": 1.0,
+        "delta_command": 1.0,
+        "phi": 1.0,
+    }
     return {
         "columns": lambda: guesses.guess_columns(csv_reader.read_table("bridge.csv")),
-        "quoted": [one.quoted for one in guesses.guess_columns(csv_reader.read_table("bridge.csv"))],
+        "quoted": [
+            one.quoted
+            for one in guesses.guess_columns(csv_reader.read_table("bridge.csv"))
+        ],
         "trial": lambda: read("simple.csv"),
         "corpus": lambda: read(CORPUS / "log" / "bridge.csv"),
         "nmea": lambda: read(CORPUS / "log" / "bridge.nmea")[:2],
@@ -1003,36 +1323,65 @@ def parts() -> Answers:
 
     def cut(given: Any, start: float | None = None, delta: Floats | None = None) -> Any:
         cuts.check_cut(given, "[[trials]] 1")
-        log = Log(t, {} if delta is None else {"delta": delta}, "log.csv", [], start=start)
-        return [[one.start, one.stop] for one in cuts.cut_log(given, log, "[[trials]] 1")]
+        log = Log(
+            t, {} if delta is None else {"delta": delta}, "log.csv", [], start=start
+        )
+        return [
+            [one.start, one.stop] for one in cuts.cut_log(given, log, "[[trials]] 1")
+        ]
 
     def helm(*active: tuple[float, float], size: float = 3.2) -> Floats:
-        return 0.02 + DEGREE * size * np.any([(t >= a) & (t < b) for a, b in active], axis=0)
+        return 0.02 + DEGREE * size * np.any(
+            [(t >= a) & (t < b) for a, b in active], axis=0
+        )
 
     morning = 1_717_147_800.0
     return {
         "whole": lambda: cut(None),
         "seconds": lambda: cut([[60, 120.25], [300.5, 899]]),
-        "clock": lambda: cut([["09:31:00", "09:40:30"], ["2024-05-31T09:32:00Z", 200]], morning),
-        "of the day": lambda: cut([["23:59:00", "00:03:00"], ["23:40", "00:02"]], 86_340.0 - 60.0),
+        "clock": lambda: cut(
+            [["09:31:00", "09:40:30"], ["2024-05-31T09:32:00Z", 200]], morning
+        ),
+        "of the day": lambda: cut(
+            [["23:59:00", "00:03:00"], ["23:40", "00:02"]], 86_340.0 - 60.0
+        ),
         "rudder": lambda: cut(
             "rudder",
-            delta=helm((100.0, 150.0), (170.0, 215.0), (300.0, 340.0), (500.0, 520.0), (700.0, 731.0)),
+            delta=helm(
+                (100.0, 150.0),
+                (170.0, 215.0),
+                (300.0, 340.0),
+                (500.0, 520.0),
+                (700.0, 731.0),
+            ),
         ),
         "size": refused(
-            lambda one: cut("rudder", delta=helm((100.0, 150.0), size=one)), (2.7, 2.95, 3.05, 3.3)
+            lambda one: cut("rudder", delta=helm((100.0, 150.0), size=one)),
+            (2.7, 2.95, 3.05, 3.3),
         ),
         "length": refused(
-            lambda one: cut("rudder", delta=helm((100.0, 100.0 + one))), (28.0, 30.0, 31.0, 34.0)
+            lambda one: cut("rudder", delta=helm((100.0, 100.0 + one))),
+            (28.0, 30.0, 31.0, 34.0),
         ),
         "quiet": [
-            lambda one=one: cut("rudder", delta=helm((100.0, 150.0), (150.0 + one, 300.0)))
+            lambda one=one: cut(
+                "rudder", delta=helm((100.0, 150.0), (150.0 + one, 300.0))
+            )
             for one in (55.0, 59.0, 60.0, 61.0, 66.0)
         ],
         "edges": lambda: cut("rudder", delta=helm((0.0, 50.0), (860.0, 900.0))),
         "wrong": {
             str(one): lambda one=one: cut(one)
-            for one in ("helm", [], [[1]], [[1, None]], [[10, 9]], [["a", "b"]], [["09:30:00", 90]], 3)
+            for one in (
+                "helm",
+                [],
+                [[1]],
+                [[1, None]],
+                [[10, 9]],
+                [["a", "b"]],
+                [["09:30:00", 90]],
+                3,
+            )
         },
         "late": lambda: cut([["12:00:00", "12:10:00"]], morning),
     }
@@ -1123,10 +1472,17 @@ def ship_files() -> Answers:
     for name, text in {
         "no trials": SHIP.partition("[[trials]]")[0],
         "one trial": SHIP.partition("[[trials]]")[0] + 'trials = "a.csv"',
-        "skipped": SHIP.partition("[[trials]]")[0] + '[[trials]]\nfile = "c.csv"\nuse = "skip"\n',
+        "skipped": (
+            SHIP.partition("[[trials]]")[0]
+            + '[[trials]]\nfile = "c.csv"\nuse = "skip"\n'
+        ),
         "of two": SHIP.replace('"b.csv"', '["a.csv", "b.csv"]', 1),
         "twice": SHIP.replace('"b.csv"', '"./b.csv"').replace('"c.csv"', '"b.csv"'),
-        "fast": SHIP.replace("length = 151.0", "length = 1900.0").replace("mass = 1.7e7", "mass = 2e8"),
+        "fast": (
+            SHIP.replace("length = 151.0", "length = 1900.0").replace(
+                "mass = 1.7e7", "mass = 2e8"
+            )
+        ),
     }.items():
         Path("wrong.toml").write_text(text)
         found[name] = asked(lambda: ShipFile.load("wrong.toml").trials())
@@ -1139,9 +1495,15 @@ def ship_files() -> Answers:
         "one": lambda: ship.trial("b.csv"),
         "use": lambda: ship.trials("test"),
         "trial": lambda: ship.trial("d.csv"),
-        "entries": lambda: [[e.file, e.cut, e.kind, e.use, e.columns, e.where] for e in ship.entries],
+        "entries": lambda: [
+            [e.file, e.cut, e.kind, e.use, e.columns, e.where] for e in ship.entries
+        ],
         "wrong": found,
-        "corpus": lambda: ShipFile.load(CORPUS / "ship-file" / "mariner" / "ship.toml").structure.to_dict(),
+        "corpus": (
+            lambda: ShipFile.load(
+                CORPUS / "ship-file" / "mariner" / "ship.toml"
+            ).structure.to_dict()
+        ),
     }
 
 
@@ -1159,7 +1521,8 @@ def trials() -> Answers:
         length=7.0,
     )
     other = one.with_channels(
-        {"u": [5.0, 5.1, 5.2, 5.3], "psi": [0.0, 0.1, 0.2, 0.1]}, repaired={"u": 3, "psi": 1}
+        {"u": [5.0, 5.1, 5.2, 5.3], "psi": [0.0, 0.1, 0.2, 0.1]},
+        repaired={"u": 3, "psi": 1},
     )
     wrong: dict[str, Callable[[], Any]] = {
         "short": lambda: Trial([0.0, 1.0], {"u": [1.0, 1.0]}),
@@ -1187,7 +1550,9 @@ def trials() -> Answers:
         "raws": other.with_channels({"u": t}).raw is one,
         "part": lambda: one.part(slice(0, 3)),
         "named": lambda: one.part(slice(1, 4), "part"),
-        "changed": lambda: one.with_(name="two", use="skip", over_ground=False, length=None),
+        "changed": lambda: one.with_(
+            name="two", use="skip", over_ground=False, length=None
+        ),
         "facts": [one.duration, len(one), "t" in one, "v" in one, repr(one)],
         "text": Path("one.csv").read_text(),
         "times": lambda: one.with_channels({"u": t[:3], "r": t[:3]}, t=t[:3]),
@@ -1197,14 +1562,25 @@ def trials() -> Answers:
             for o in (None, False, True)
         ],
         "wrong": {name: asked(question) for name, question in wrong.items()},
-        "hashes": [one.sha256 == other.sha256, one.sha256 == one.with_(name="x").sha256],
+        "hashes": [
+            one.sha256 == other.sha256,
+            one.sha256 == one.with_(name="x").sha256,
+        ],
     }
 
 
 def scales() -> Answers:
     """From where on a trial is another ship's, and names of units and options that are none."""
     t = np.arange(0.0, 100.0)
-    full = Trial(t, {"u": 0.0 * t + 6.0, "v": 0.0 * t + 0.5, "r": 0.01 + 0.0 * t, "n": 2.0 + 0.0 * t})
+    full = Trial(
+        t,
+        {
+            "u": 0.0 * t + 6.0,
+            "v": 0.0 * t + 0.5,
+            "r": 0.01 + 0.0 * t,
+            "n": 2.0 + 0.0 * t,
+        },
+    )
 
     def sized(trial: Trial = full, **ship: Any) -> None:
         check_scale(trial, Particulars(**({"length": 150.0} | ship)), "ship.toml")
@@ -1230,9 +1606,13 @@ def scales() -> Answers:
     return {
         "slender": refused(lambda b: sized(beam=b), (90.0, 98.0, 101.0, 110.0)),
         "turn": refused(turning, np.array(AROUND) * 3.0 * 6.0 / 150.0),
-        "slow": refused(lambda s: sized(speed=s), (2.7, 2.95, 3.05, 3.3, 28.0, 29.9, 30.3, 33.0)),
+        "slow": refused(
+            lambda s: sized(speed=s), (2.7, 2.95, 3.05, 3.3, 28.0, 29.9, 30.3, 33.0)
+        ),
         "knots": lambda: sized(speed=11.7),
-        "froude": refused(lambda s: sized(length=s, speed=11.7), (130.0, 153.0, 158.0, 170.0)),
+        "froude": refused(
+            lambda s: sized(length=s, speed=11.7), (130.0, 153.0, 158.0, 170.0)
+        ),
         "near": [lambda s=s: sized(speed=s) for s in (10.5, 10.7, 12.8, 13.2)],
         "tip": refused(lambda d: sized(propeller_diameter=d), (14.0, 15.7, 16.1, 18.0)),
         "words": [
@@ -1254,19 +1634,28 @@ def scales() -> Answers:
             lambda: units.LIMITS,
         ],
         "options": {
-            name: lambda n=name, o=option: identify_table.check_options({n: o}, "[identify]")
+            name: lambda n=name, o=option: identify_table.check_options(
+                {n: o}, "[identify]"
+            )
             for name, option in options.items()
         },
         "kinds": {
-            kind: [bool(test(one)) for one in (True, 1, 1.5, "a", " ", ["a"], [1, 2], [1], {}, None)]
+            kind: [
+                bool(test(one))
+                for one in (True, 1, 1.5, "a", " ", ["a"], [1, 2], [1], {}, None)
+            ]
             for kind, test in identify_table.KINDS.items()
         },
-        "given": lambda: identify_table.Options.of(
-            {"C": 3.0, "method": "ls", "prior": "mariner", "prior_strength": 2.0}
-        ).settings(),
+        "given": (
+            lambda: identify_table.Options.of(
+                {"C": 3.0, "method": "ls", "prior": "mariner", "prior_strength": 2.0}
+            ).settings()
+        ),
         "own": lambda: identify_table.Options(smooth=False).own(),
         "prior": lambda: identify_table.Options(prior_strength=2.0),
-        "mmg": lambda: identify_table.Options(structure="mmg", prior_folds="ships").prior_folds,
+        "mmg": lambda: (
+            identify_table.Options(structure="mmg", prior_folds="ships").prior_folds
+        ),
         "uncertainty": lambda: identify_table.Options(uncertainty="none at all"),
         "unknown": lambda: identify_table.Options.of({"metod": 1}),
     }

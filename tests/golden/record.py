@@ -1,11 +1,13 @@
 """Golden results of the engine: recorded before it is rebuilt, compared after each step of the rebuilding.
 
-    python tests/golden/record.py                   # write tests/golden/results/SECTION.npz
-    python tests/golden/record.py --compare         # compute again; exit code 1 beyond the tolerance
-    python tests/golden/record.py --compare --only environments --only derivatives --worst 20
+    python tests/golden/record.py                   # write
+    tests/golden/results/SECTION.npz python tests/golden/record.py --compare         #
+    compute again; exit code 1 beyond the tolerance python tests/golden/record.py
+    --compare --only environments --only derivatives --worst 20
 
-Only public names are used, so that it runs whatever modules are called inside. Deviations are differences
-over the largest number of the same quantity. What each section holds is told in its module.
+Only public names are used, so that it runs whatever modules are called inside.
+Deviations are differences over the largest number of the same quantity. What each
+section holds is told in its module.
 """
 
 from __future__ import annotations
@@ -45,7 +47,14 @@ from tests.golden import (  # noqa: E402 - the folder above has to be found firs
     verification,
     voyages,
 )
-from tests.golden.store import Deviation, Floats, Values, compare, load, save  # noqa: E402
+from tests.golden.store import (  # noqa: E402
+    Deviation,
+    Floats,
+    Values,
+    compare,
+    load,
+    save,
+)
 
 RESULTS = Path(__file__).parent / "results"
 
@@ -70,7 +79,9 @@ class Section:
 
 
 SECTIONS = {
-    "environments": Section(environments.cases, environments.record, environments.TOLERANCES),
+    "environments": Section(
+        environments.cases, environments.record, environments.TOLERANCES
+    ),
     "voyages": Section(voyages.cases, voyages.record, environments.TOLERANCES),
     "seas": Section(seas.cases, seas.record, {"": 1e-9}),
     "derivatives": Section(ships.all_ships, ships.record_derivatives, {"": 1e-9}),
@@ -78,22 +89,38 @@ SECTIONS = {
     "readers": Section(readers.QUESTIONS.cases, readers.QUESTIONS.record, {"": 1e-6}),
     "models": Section(models.QUESTIONS.cases, models.QUESTIONS.record, {"": 1e-6}),
     "indices": Section(indices.QUESTIONS.cases, indices.QUESTIONS.record, {"": 1e-6}),
-    "controllers": Section(controllers.cases, controllers.record, controllers.TOLERANCES),
+    "controllers": Section(
+        controllers.cases, controllers.record, controllers.TOLERANCES
+    ),
     "policies": Section(policies.cases, policies.record, policies.TOLERANCES),
-    "bridge": Section(lambda: policies.BRIDGE, policies.record_bridge, policies.TOLERANCES),
+    "bridge": Section(
+        lambda: policies.BRIDGE, policies.record_bridge, policies.TOLERANCES
+    ),
     "rollouts": Section(rollouts.cases, rollouts.record, rollouts.TOLERANCES),
-    "verification": Section(verification.cases, verification.record, verification.TOLERANCES),
+    "verification": Section(
+        verification.cases, verification.record, verification.TOLERANCES
+    ),
     "demo": Section(lambda: ["mariner"], chains.record_demo, {"": 1e-6}),
     "pretrained": Section(lambda: chains.TASKS, chains.record_pretrained, {"": 1e-6}),
-    "identification": Section(lambda: chains.METHODS, chains.record_identification, chains.TOLERANCES),
-    "estimators": Section(estimators.PARTS.cases, estimators.PARTS.record, estimators.TOLERANCES),
-    "regression": Section(regression.PARTS.cases, regression.PARTS.record, regression.TOLERANCES),
-    "validation": Section(validation.PARTS.cases, validation.PARTS.record, validation.TOLERANCES),
+    "identification": Section(
+        lambda: chains.METHODS, chains.record_identification, chains.TOLERANCES
+    ),
+    "estimators": Section(
+        estimators.PARTS.cases, estimators.PARTS.record, estimators.TOLERANCES
+    ),
+    "regression": Section(
+        regression.PARTS.cases, regression.PARTS.record, regression.TOLERANCES
+    ),
+    "validation": Section(
+        validation.PARTS.cases, validation.PARTS.record, validation.TOLERANCES
+    ),
     "fits": Section(fits.cases, fits.record, fits.TOLERANCES),
 }
 
 
-def recorded(section: str, case: str, stored: Mapping[str, Floats] | None) -> dict[str, Floats]:
+def recorded(
+    section: str, case: str, stored: Mapping[str, Floats] | None
+) -> dict[str, Floats]:
     """The values of a case, over as many steps as stored ones have."""
     record = SECTIONS[section].record
     if stored is not None and "steps" in stored:
@@ -101,7 +128,9 @@ def recorded(section: str, case: str, stored: Mapping[str, Floats] | None) -> di
     return record(case)
 
 
-def run_section(section: str, stored: Values | None, pool: ProcessPoolExecutor | None = None) -> Values:
+def run_section(
+    section: str, stored: Values | None, pool: ProcessPoolExecutor | None = None
+) -> Values:
     """The values of all cases of a section, each in one of the pool's processes."""
     cases = list(SECTIONS[section].cases())
     if stored is not None:
@@ -119,7 +148,9 @@ def compared(section: str, stored: Values, found: Values) -> list[Deviation]:
 def beyond_tolerance(section: str, case: str) -> list[Deviation]:
     """Compute one case anew; the quantities that are not what they were."""
     stored = {case: load(RESULTS / f"{section}.npz")[case]}
-    deviations = compared(section, stored, {case: recorded(section, case, stored[case])})
+    deviations = compared(
+        section, stored, {case: recorded(section, case, stored[case])}
+    )
     return [one for one in deviations if one.excess > 1.0]
 
 
@@ -137,19 +168,28 @@ def main(words: list[str] | None = None) -> int:
                 given.out.mkdir(parents=True, exist_ok=True)
                 save(found, path)
                 print(
-                    f"{section:15} {len(found):3} cases, {path.stat().st_size / 1000:.0f} kB, {seconds:.0f} s"
+                    f"{section:15} {len(found):3} cases,"
+                    f" {path.stat().st_size / 1000:.0f} kB, {seconds:.0f} s"
                 )
             else:
-                failed |= _report(section, compared(section, stored, found), seconds, given.worst)
+                failed |= _report(
+                    section, compared(section, stored, found), seconds, given.worst
+                )
             sys.stdout.flush()
     return int(failed)
 
 
-def _report(section: str, deviations: list[Deviation], seconds: float, worst: int) -> bool:
+def _report(
+    section: str, deviations: list[Deviation], seconds: float, worst: int
+) -> bool:
     """Print what was found; whether anything is beyond its tolerance."""
     beyond = [one for one in deviations if one.excess > 1.0]
     largest = max(one.size for one in deviations)
-    verdict = f"{len(beyond)} of {len(deviations)} beyond the tolerance" if beyond else "passed"
+    verdict = (
+        f"{len(beyond)} of {len(deviations)} beyond the tolerance"
+        if beyond
+        else "passed"
+    )
     print(f"{section:15} largest deviation {largest:.1e}, {verdict}, {seconds:.0f} s")
     for one in deviations[: worst if beyond or worst > 5 else 1]:
         print(f"    {one.size:.1e} of {one.tolerance:.0e} allowed   {one.where}")
@@ -157,12 +197,24 @@ def _report(section: str, deviations: list[Deviation], seconds: float, worst: in
 
 
 def _arguments(words: list[str] | None) -> Any:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
-    parser.add_argument("--compare", action="store_true", help="compare with what is stored, write nothing")
-    parser.add_argument(
-        "--only", action="append", choices=list(SECTIONS), metavar="SECTION", help="one section"
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawTextHelpFormatter
     )
-    parser.add_argument("--out", type=Path, default=RESULTS, help="folder of the stored results")
+    parser.add_argument(
+        "--compare",
+        action="store_true",
+        help="compare with what is stored, write nothing",
+    )
+    parser.add_argument(
+        "--only",
+        action="append",
+        choices=list(SECTIONS),
+        metavar="SECTION",
+        help="one section",
+    )
+    parser.add_argument(
+        "--out", type=Path, default=RESULTS, help="folder of the stored results"
+    )
     parser.add_argument("--workers", type=int, default=2, help="processes")
     parser.add_argument("--worst", type=int, default=5, help="deviations that are told")
     return parser.parse_args(words)

@@ -1,6 +1,7 @@
 """What steering's own functions say where they refuse: golden texts, one a part of the package.
 
-Of numbers with a limit one just within it and one just beyond are tried; what is accepted says so.
+Of numbers with a limit one just within it and one just beyond are tried; what is
+accepted says so.
 """
 
 from __future__ import annotations
@@ -38,7 +39,13 @@ from agents.rollouts.course_keeping import sail, step_response
 from agents.rollouts.replay_page import names
 from agents.rollouts.replay_series import outcome
 from agents.rollouts.rollout import rollout
-from agents.suites.suite import BenchmarkTask, find_task, load_suite, parse_suite, suite_of
+from agents.suites.suite import (
+    BenchmarkTask,
+    find_task,
+    load_suite,
+    parse_suite,
+    suite_of,
+)
 from agents.verification.monte_carlo import monte_carlo
 from shipgym import InputError, load_model
 from shipgym.sea.conditions import Current, Weather
@@ -68,8 +75,13 @@ def of_controllers() -> Iterator[str]:
     """Settings of designs, files, states and observations, and what a file may hold."""
     made = {kind: registry.controller_class(kind) for kind in registry.BUILT_IN}
     for kind, one in made.items():
-        ranges = ", ".join(f"{name} {tuple(limits)}" for name, limits in one.ranges.items())
-        yield f"{kind}: observes {one.observes}, {one.alternatives}, gains {one.gain_names}, {ranges}"
+        ranges = ", ".join(
+            f"{name} {tuple(limits)}" for name, limits in one.ranges.items()
+        )
+        yield (
+            f"{kind}: observes {one.observes}, {one.alternatives}, gains"
+            f" {one.gain_names}, {ranges}"
+        )
     tried: dict[str, list[dict[str, Any]]] = {
         "pid": [
             {"dt": 0.0},
@@ -86,7 +98,12 @@ def of_controllers() -> Iterator[str]:
             {"wave_period": 2.0},
             {"wave_period": 2.01},
         ],
-        "lq": [{"rudder_weight": 0.0}, {"rate_weight_s2": 0.0}, {"integral_lengths": 0.0}, {"dt": -1.0}],
+        "lq": [
+            {"rudder_weight": 0.0},
+            {"rate_weight_s2": 0.0},
+            {"integral_lengths": 0.0},
+            {"dt": -1.0},
+        ],
         "lq-scheduled": [
             {"speeds": [0.05, 5.0]},
             {"speeds": [5.0]},
@@ -99,8 +116,16 @@ def of_controllers() -> Iterator[str]:
             {"wave_period": 2.0},
             {"wave_period": 9.0, "wave_heading_deg": 0.0},
         ],
-        "turn-rate": [{"frequency": 0.0}, {"rate_deg_min": 0.0}, {"rate_deg_min": 900.0}],
-        "mpc": [{"horizon_lengths": 0.0}, {"horizon_lengths": 20.0}, {"horizon_lengths": 20.1}],
+        "turn-rate": [
+            {"frequency": 0.0},
+            {"rate_deg_min": 0.0},
+            {"rate_deg_min": 900.0},
+        ],
+        "mpc": [
+            {"horizon_lengths": 0.0},
+            {"horizon_lengths": 20.0},
+            {"horizon_lengths": 20.1},
+        ],
         "lq-adaptive": [
             {"forgetting_lengths": 0.0},
             {"redesign_lengths": 0.0},
@@ -128,31 +153,48 @@ def of_controllers() -> Iterator[str]:
     small = {
         "pid": ("dt", "integral_lengths", "frequency", "damping"),
         "lq": ("rudder_weight", "rate_weight_s2", "integral_lengths"),
-        "pid-filtered": ("reference_share", "tracking_lengths", "largest_turn_rate_deg_s"),
+        "pid-filtered": (
+            "reference_share",
+            "tracking_lengths",
+            "largest_turn_rate_deg_s",
+        ),
         "lqg": ("noise", "disturbance_deg"),
         "turn-rate": ("dt", "frequency", "rate_deg_min"),
         "mpc": ("horizon_lengths",),
         "lq-adaptive": ("forgetting_lengths", "redesign_lengths", "noise"),
         "los": ("lookahead_lengths", "integral_lengths"),
-        "wheel-over": ("lookahead_lengths", "radius_lengths", "reach_lengths", "crab_share"),
+        "wheel-over": (
+            "lookahead_lengths",
+            "radius_lengths",
+            "reach_lengths",
+            "crab_share",
+        ),
         "preview-mpc": ("horizon_lengths", "deviation_deg"),
     }
     for kind, names_ in small.items():
         tried[kind] += [{name: 0.05} for name in names_]
     for kind, settings in tried.items():
         for one in settings:
-            shown = {name: value if isinstance(value, float | list) else "..." for name, value in one.items()}
+            shown = {
+                name: value if isinstance(value, float | list) else "..."
+                for name, value in one.items()
+            }
             yield from refused(
-                f"{kind} {shown}", lambda kind=kind, one=one: made[kind].from_model(MARINER, **one)
+                f"{kind} {shown}",
+                lambda kind=kind, one=one: made[kind].from_model(MARINER, **one),
             )
-    yield from refused("adaptive", lambda: made["lq-adaptive"].from_model(_without_sway()))
+    yield from refused(
+        "adaptive", lambda: made["lq-adaptive"].from_model(_without_sway())
+    )
     yield from refused("turns", lambda: turn_rate.steady_turns(_weak(), 0.0))
     yield from refused(
         "stable",
         lambda: check_stable(np.diag([0.5, 1.0]), "here"),
         lambda: check_stable(np.diag([0.99]), "here"),
     )
-    yield from refused("robustness", lambda: robustness.margin_uncertainty(PID.from_model(MARINER), []))
+    yield from refused(
+        "robustness", lambda: robustness.margin_uncertainty(PID.from_model(MARINER), [])
+    )
     nowhere = robustness.margin_uncertainty(PID.from_model(MARINER), [_weak(-1.0)])
     yield from refused("quantiles", nowhere.quantiles)
     yield from _files(made)
@@ -161,7 +203,10 @@ def of_controllers() -> Iterator[str]:
 
 def _weak(share: float = 0.0) -> Any:
     """The Mariner with another rudder."""
-    changed = {name: value * (share if "d" in name else 1.0) for name, value in MARINER.coefficients.items()}
+    changed = {
+        name: value * (share if "d" in name else 1.0)
+        for name, value in MARINER.coefficients.items()
+    }
     return replace(MARINER, coefficients=changed)
 
 
@@ -197,27 +242,50 @@ def _files(made: dict[str, Any]) -> Iterator[str]:
         ("pid", {"observation_scales": [1.0]}),
         ("pid", {"observation_scales": "1"}),
         ("pid", {"arrays": {}}),
-        ("pid", {"observation_scales": [0.9e-9, *own["pid"]["observation_scales"][1:]]}),
+        (
+            "pid",
+            {"observation_scales": [0.9e-9, *own["pid"]["observation_scales"][1:]]},
+        ),
         ("lqg", {"arrays": {**own["lqg"]["arrays"], "input": [1.0]}}),
         ("lqg", {"arrays": {**own["lqg"]["arrays"], "kalman": [[9.0, 0.0]] * 5}}),
-        ("lqg", {"arrays": {**own["lqg"]["arrays"], "transition": (1.3 * np.eye(5)).tolist()}}),
+        (
+            "lqg",
+            {
+                "arrays": {
+                    **own["lqg"]["arrays"],
+                    "transition": (1.3 * np.eye(5)).tolist(),
+                }
+            },
+        ),
         ("lqg", {"arrays": {**own["lqg"]["arrays"], "output": [[2e9] * 5] * 2}}),
         ("mpc", {"design": {**own["mpc"]["design"], "horizon_steps": 641.0}}),
         ("mpc", {"arrays": {**own["mpc"]["arrays"], "effect": [0.0] * 5}}),
-        ("mpc", {"arrays": {**own["mpc"]["arrays"], "transition": (1.1 * np.eye(5)).tolist()}}),
+        (
+            "mpc",
+            {
+                "arrays": {
+                    **own["mpc"]["arrays"],
+                    "transition": (1.1 * np.eye(5)).tolist(),
+                }
+            },
+        ),
         ("ilos", {"autopilot": own["ilos"]}),
         ("ilos", {"autopilot": 3}),
         ("ilos", {"gains": {**own["ilos"]["gains"], "lookahead": 0.0}}),
     ]
     for kind, change in changes:
         yield from refused(
-            f"{kind} {sorted(change)}", lambda c={**own[kind], **change}: read_controller(c, "file")
+            f"{kind} {sorted(change)}",
+            lambda c={**own[kind], **change}: read_controller(c, "file"),
         )
 
 
 def _controls() -> Iterator[str]:
     """Observations, states, designs for tasks and registration."""
-    lq, ilos = LQ.from_model(MARINER), registry.controller_class("ilos").from_model(MARINER)  # type: ignore[attr-defined]
+    lq, ilos = (
+        LQ.from_model(MARINER),
+        registry.controller_class("ilos").from_model(MARINER),
+    )  # type: ignore[attr-defined]
     filtered = registry.controller_class("pid-filtered").from_model(MARINER)  # type: ignore[attr-defined]
     seen = np.zeros((2, 8))
     yield from refused(
@@ -229,9 +297,15 @@ def _controls() -> Iterator[str]:
         lambda: filtered.predict(seen, np.zeros((2, 14)), [True] * 3),
         lambda: lq.check_fits(["heading_error_sin", "yaw_rate"], [1.0, 1.0]),
         lambda: lq.check_fits_model(load_model("tanker")),
-        lambda: lq.check_fits(lq.observation_names[:-1], lq.observation_scales[:-1], "here"),
-        lambda: lq.check_fits(lq.observation_names, [1.000002, *lq.observation_scales[1:]], "here"),
-        lambda: lq.check_fits(lq.observation_names, [1.0000005, *lq.observation_scales[1:]], "here"),
+        lambda: lq.check_fits(
+            lq.observation_names[:-1], lq.observation_scales[:-1], "here"
+        ),
+        lambda: lq.check_fits(
+            lq.observation_names, [1.000002, *lq.observation_scales[1:]], "here"
+        ),
+        lambda: lq.check_fits(
+            lq.observation_names, [1.0000005, *lq.observation_scales[1:]], "here"
+        ),
         lambda: replace(ilos, autopilot=random_policy()).to_dict(),
         lambda: replace(ilos, autopilot=random_policy()).loop(),
     )
@@ -282,9 +356,13 @@ def _controls() -> Iterator[str]:
                 (a(seen), state) if a(seen) is not None else 3
             )
         )
-        yield from refused(f"check {name}", lambda one=one: check_controller(one, n_steps=2))
+        yield from refused(
+            f"check {name}", lambda one=one: check_controller(one, n_steps=2)
+        )
     wrong = SimpleNamespace(
-        predict=lq.predict, observation_names=lq.observation_names, observation_scales=[2.0]
+        predict=lq.predict,
+        observation_names=lq.observation_names,
+        observation_scales=[2.0],
     )
     yield from refused(
         "check",
@@ -315,7 +393,9 @@ def of_policies() -> Iterator[str]:
         {"base": LQ.from_model(load_model("tanker"))},
     ]
     for one in fields:
-        yield from refused(f"policy {sorted(one)}", lambda one=one: random_policy(**one))
+        yield from refused(
+            f"policy {sorted(one)}", lambda one=one: random_policy(**one)
+        )
     yield from refused(
         "network",
         lambda: Network(()),
@@ -332,7 +412,9 @@ def of_policies() -> Iterator[str]:
         "predict",
         lambda: policy.predict(np.zeros(7)),
         lambda: stacked.predict(np.zeros(8), 3),
-        lambda: stacked.predict(np.zeros((2, 8)), (np.zeros((1, 1, 8)), None, np.zeros((2, 3)))),
+        lambda: stacked.predict(
+            np.zeros((2, 8)), (np.zeros((1, 1, 8)), None, np.zeros((2, 3)))
+        ),
         lambda: policy.check_fits_model(load_model("tanker")),
         lambda: path_policy().check_fits_model(MARINER),
         lambda: policy.check_fits(["a"], [1.0]),
@@ -364,7 +446,12 @@ def of_policies() -> Iterator[str]:
         lambda: Shielded(SimpleNamespace(), base, 1.0).file_fields(),  # type: ignore[arg-type]
     )
     weather = Weather(current=Current(0.7))
-    options = {"a": MARINER, "b": (np.inf, -np.inf, np.nan, np.float64(2.5)), "c": weather, 3: Path("x")}
+    options = {
+        "a": MARINER,
+        "b": (np.inf, -np.inf, np.nan, np.float64(2.5)),
+        "c": weather,
+        3: Path("x"),
+    }
     yield f"as JSON: {as_json(options)}"
     shown = ["a"], ["cross_track"], ["cross_track", "next_turn_angle"]
     yield f"tasks: {[task_showing(some) for some in shown]}"
@@ -390,31 +477,42 @@ def _written(policy: Any, base: Any) -> Iterator[str]:
         one_for_all.save(path)
         yield f"read: {load_agent(path).name} {one_for_all.training['outside']}"
         yield from refused(
-            "file", lambda: policy.save(Path(folder) / "agent.txt"), lambda: load_agent("one-for-all"),
+            "file",
+            lambda: policy.save(Path(folder) / "agent.txt"),
+            lambda: load_agent("one-for-all"),
             lambda: load_agent(Path(folder) / "none.json"),
-        )  # fmt: skip
-    yield from refused("ship", lambda: load_agent("one-for-all", load_model("kvlcc2-l7")))
+        )
+    yield from refused(
+        "ship", lambda: load_agent("one-for-all", load_model("kvlcc2-l7"))
+    )
 
 
 def _exported() -> Iterator[str]:
     """Graphs of ONNX, node by node, and networks of stable-baselines3 by the names of their weights."""
     base = LQ.from_model(MARINER)
     made: dict[str, LearnedPolicy] = {
-        "tanh": random_policy(network=random_network(8, 16, 1, activation="tanh", output="tanh")),
-        "discrete": random_policy(action="rudder-discrete"), "shaft": random_policy(action="rudder-shaft"),
+        "tanh": random_policy(
+            network=random_network(8, 16, 1, activation="tanh", output="tanh")
+        ),
+        "discrete": random_policy(action="rudder-discrete"),
+        "shaft": random_policy(action="rudder-shaft"),
         "residual": random_policy(base=base, authority=0.6, frame_stack=2),
-    }  # fmt: skip
+    }
     for name, policy in made.items():
         graph = onnx_model(policy).graph
         nodes = [
-            f"{node.op_type}({', '.join(node.input)}) {node.output[0]} {len(node.attribute)}"
+            f"{node.op_type}({', '.join(node.input)}) {node.output[0]}"
+            f" {len(node.attribute)}"
             for node in graph.node
         ]
         ends = [
             f"{one.name} {one.type.tensor_type.shape.dim[-1].dim_value}"
             for one in (*graph.input, *graph.output)
         ]
-        yield f"{name}: {'; '.join([*nodes, *ends, *(one.name for one in graph.initializer)])}"
+        yield (
+            f"{name}:"
+            f" {'; '.join([*nodes, *ends, *(one.name for one in graph.initializer)])}"
+        )
     yield from refused("onnx", lambda: onnx_model(base))
 
     def tensor(*shape: int) -> Any:
@@ -444,7 +542,10 @@ def _exported() -> Iterator[str]:
     task = course_keeping_task()
     bounds = np.array([(one.low, one.high) for one in task.observed(MARINER)])
     zipped = Sb3Agent(Path("model.zip"), random_network(8, 16, 1), bounds)
-    yield f"zip: {zipped.policy(task, MARINER).env_id} {zipped.policy(task, MARINER).model_name}"
+    yield (
+        f"zip: {zipped.policy(task, MARINER).env_id}"
+        f" {zipped.policy(task, MARINER).model_name}"
+    )
     yield from refused(
         "zip",
         lambda: replace(zipped, bounds=1.1 * bounds).policy(task, MARINER),
@@ -456,7 +557,9 @@ def of_deployment() -> Iterator[str]:
     """What a helm, a route and C refuse."""
     pid, wheel = (
         PID.from_model(MARINER),
-        registry.controller_class("wheel-over").from_model(MARINER, task=Task.of("PathFollowing-v1")),
+        registry.controller_class("wheel-over").from_model(
+            MARINER, task=Task.of("PathFollowing-v1")
+        ),
     )  # type: ignore[attr-defined]
     rate = registry.controller_class("turn-rate").from_model(MARINER)  # type: ignore[attr-defined]
     places = np.array([[54.0, 7.5], [54.02, 7.5], [54.03, 7.52]])
@@ -491,14 +594,19 @@ def of_deployment() -> Iterator[str]:
         ):
             path = Path(folder) / "route.csv"
             path.write_text(f"latitude,longitude\n{rows}\n")
-            yield from refused(f"csv {rows!r}", lambda path=path: Route.from_csv(path, 300.0))
+            yield from refused(
+                f"csv {rows!r}", lambda path=path: Route.from_csv(path, 300.0)
+            )
     for name in ("ship-1", "1ship", "while", "x" * 31, "x" * 32, "a b", ""):
         yield from refused(f"name {name!r}", lambda name=name: checked_name(name))
     numbers = [literal(x) for x in (1, True, -2.5, np.inf, -np.inf, np.nan, 1e-9)]
     yield f"{checked_name('ship-1 b')} {c_name('while')} {c_name('x')} {numbers}"
     preview = registry.controller_class("preview-mpc").from_model(MARINER)  # type: ignore[attr-defined]
     yield from refused(
-        "C", lambda: c_name("\u00e4"), lambda: autopilot_source(preview), lambda: autopilot_source(pid, "if")
+        "C",
+        lambda: c_name("\u00e4"),
+        lambda: autopilot_source(preview),
+        lambda: autopilot_source(pid, "if"),
     )
 
 
@@ -512,9 +620,15 @@ def of_rollouts() -> Iterator[str]:
     ]
     for answer in answers:
         for tolerant in (False, True):
-            policy = SimpleNamespace(predict=lambda seen, state, starts, sure, a=answer: (a(seen), state))
-            bench = BenchmarkTask("mine", "course-keeping", "mariner", options={"episode_steps": 4})
-            run = lambda p=policy, t=tolerant, b=bench: rollout(p, b.engine(3), [1, 2, 3], tolerant=t)  # noqa: E731
+            policy = SimpleNamespace(
+                predict=lambda seen, state, starts, sure, a=answer: (a(seen), state)
+            )
+            bench = BenchmarkTask(
+                "mine", "course-keeping", "mariner", options={"episode_steps": 4}
+            )
+            run = lambda p=policy, t=tolerant, b=bench: rollout(  # noqa: E731
+                p, b.engine(3), [1, 2, 3], tolerant=t
+            )
             yield from refused(f"tolerant {tolerant}", run)
             yield f"failure: {run().failure}" if tolerant else ""
     yield from refused(
@@ -551,7 +665,8 @@ def of_rollouts() -> Iterator[str]:
         ('name = "mine-v1"', "other = 1"),
     ):
         yield from refused(
-            f"suite {new!r}", lambda old=old, new=new: parse_suite(SUITE.replace(old, new), "mine")
+            f"suite {new!r}",
+            lambda old=old, new=new: parse_suite(SUITE.replace(old, new), "mine"),
         )
     yield from refused(
         "suite",
@@ -559,7 +674,10 @@ def of_rollouts() -> Iterator[str]:
         lambda: find_task("mariner-clam"),
         lambda: load_suite().task("x"),
     )
-    yield f"of: {suite_of('mariner-calm')} {suite_of('mariner')} {find_task('roll-limit').name}"
+    yield (
+        f"of: {suite_of('mariner-calm')} {suite_of('mariner')}"
+        f" {find_task('roll-limit').name}"
+    )
     yield from refused(
         "jobs",
         lambda: check_engine("dask", 1, None),
@@ -575,8 +693,17 @@ def of_rollouts() -> Iterator[str]:
         lambda: check_outcome({"wrong": "it is"}, "job 3"),
         lambda: check_outcome({"failed": "it has", "traceback": ""}, "job 4"),
     )
-    yield f"{died_too_often('{}', 2)} {shortened('x' * 200)[-9:]} {shortened('x' * 201)[-9:]}"
-    packed = pack({"a": (1, np.float32(0.5), None, np.nan), "b": np.array([[1.5, 2.0]]), "c": [np.inf, True]})
+    yield (
+        f"{died_too_often('{}', 2)} {shortened('x' * 200)[-9:]}"
+        f" {shortened('x' * 201)[-9:]}"
+    )
+    packed = pack(
+        {
+            "a": (1, np.float32(0.5), None, np.nan),
+            "b": np.array([[1.5, 2.0]]),
+            "c": [np.inf, True],
+        }
+    )
     yield f"{packed} {unpack(packed)}"
     model = load_model("mariner-tls-svm")
     yield from refused(

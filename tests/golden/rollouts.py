@@ -37,7 +37,17 @@ far = { rudder_weight = 0.7, gear = { rudder_rate_deg_s = 1.7 }, sea = "rough" }
 
 def cases() -> list[str]:
     """Parts of the package."""
-    return ["courses", "paths", "ends", "failing", "fleet", "steps", "replay", "functions", "suites"]
+    return [
+        "courses",
+        "paths",
+        "ends",
+        "failing",
+        "fleet",
+        "steps",
+        "replay",
+        "functions",
+        "suites",
+    ]
 
 
 def record(case: str) -> dict[str, Floats]:
@@ -70,15 +80,24 @@ def figures(policy: Any, task: BenchmarkTask, seeds: int = 3) -> dict[str, Float
 
 def keeping(**options: Any) -> BenchmarkTask:
     """Course keeping with the Mariner."""
-    return BenchmarkTask("keeping", "course-keeping", "mariner", options={"episode_steps": 190, **options})
+    return BenchmarkTask(
+        "keeping",
+        "course-keeping",
+        "mariner",
+        options={"episode_steps": 190, **options},
+    )
 
 
 def of_courses() -> dict[str, Floats]:
     """Course changes under LQ in noise, and under PID that steers hard, in two seas."""
     model = load_model("mariner")
     hard = PID.from_model(model)
-    hard = replace(hard, gains={**hard.gains, "derivative": 0.4 * hard.gains["derivative"]})
-    calm = figures(LQ.from_model(model), keeping(course_changes_deg=[20.0, -33.0], noise=1.0))
+    hard = replace(
+        hard, gains={**hard.gains, "derivative": 0.4 * hard.gains["derivative"]}
+    )
+    calm = figures(
+        LQ.from_model(model), keeping(course_changes_deg=[20.0, -33.0], noise=1.0)
+    )
     found = {f"lq {name}": values for name, values in calm.items()}
     rough = figures(hard, keeping(course_change_deg=47.0))
     return found | {f"pid {name}": values for name, values in rough.items()}
@@ -88,10 +107,15 @@ def of_paths() -> dict[str, Floats]:
     """Paths under wheel-over, and under one whose turns are late, so that she leaves the corridor."""
     options = {"episode_steps": 700, "n_legs": 2, "corridor": 0.35, "ground": 0.9}
     found = {}
-    for name, more in {"in time": {}, "late": {"reach_lengths": 0.02, "lookahead_lengths": 6.0}}.items():
+    for name, more in {
+        "in time": {},
+        "late": {"reach_lengths": 0.02, "lookahead_lengths": 6.0},
+    }.items():
         task = BenchmarkTask("path", "path-following-v1", "mariner", options=options)
         guide = WheelOver.from_model(task.ship, task=task.task, **more)
-        found |= {f"{name} {one}": values for one, values in figures(guide, task).items()}
+        found |= {
+            f"{name} {one}": values for one, values in figures(guide, task).items()
+        }
         found[f"{name} worst"] = vector(metrics.worst_step_cost(task.task))
     return found
 
@@ -99,7 +123,10 @@ def of_paths() -> dict[str, Floats]:
 def of_ends() -> dict[str, Floats]:
     """Episodes in which control is lost, of a ship with a shaft."""
     task = BenchmarkTask(
-        "lost", "course-keeping", "kvlcc2", options={"max_heading_error_deg": 13.0, "course_change_deg": 12.5}
+        "lost",
+        "course-keeping",
+        "kvlcc2",
+        options={"max_heading_error_deg": 13.0, "course_change_deg": 12.5},
     )
     weak = PID.from_model(task.ship, frequency=0.06)
     weak = replace(weak, gains={**weak.gains, "derivative": 0.0, "proportional": -0.1})
@@ -111,11 +138,22 @@ def of_failing() -> dict[str, Floats]:
     """What is charged for a policy that fails, when it is tolerated, and what is kept of its episodes."""
     task = keeping(episode_steps=30)
     found = figures(Failing(task.ship), task)
-    run = rollout(Failing(task.ship), task.engine(3), np.arange(3), record=True, tolerant=True)
+    run = rollout(
+        Failing(task.ship), task.engine(3), np.arange(3), record=True, tolerant=True
+    )
     kept = recorded(Failing(task.ship), task, [3, 4, 5], samples=10)
-    parts = {"costs": run.costs, "failed": vector(run.failed), "sailing": run.steps, "kept": kept.costs}
-    parts["lengths"] = vector([-1 if one is None else one.n_steps for one in kept.episodes])
-    parts["asked"] = vector([len(run.actions), len(run.rewards), len(run.states["psi"]), len(run.failure)])
+    parts = {
+        "costs": run.costs,
+        "failed": vector(run.failed),
+        "sailing": run.steps,
+        "kept": kept.costs,
+    }
+    parts["lengths"] = vector(
+        [-1 if one is None else one.n_steps for one in kept.episodes]
+    )
+    parts["asked"] = vector(
+        [len(run.actions), len(run.rewards), len(run.states["psi"]), len(run.failure)]
+    )
     return found | parts
 
 
@@ -123,7 +161,8 @@ def ships() -> list[ShipModel]:
     """The Mariner, and one with another rudder."""
     model = load_model("mariner")
     changed = {
-        name: value * (0.8 if name.endswith("_d") else 1.0) for name, value in model.coefficients.items()
+        name: value * (0.8 if name.endswith("_d") else 1.0)
+        for name, value in model.coefficients.items()
     }
     return [model, replace(model, coefficients=changed)]
 
@@ -135,14 +174,26 @@ def of_fleet() -> dict[str, Floats]:
     found = {f"many {name}": vector(values) for name, values in vars(many).items()}
     alone = sail(pilot, ships()[0], task, [[3], [8]])
     both = sail(pilot, ships(), task, 5)
-    return found | {"alone": vector(alone.cost), "both": vector(both.cost), "shape": vector(alone.cost.shape)}
+    return found | {
+        "alone": vector(alone.cost),
+        "both": vector(both.cost),
+        "shape": vector(alone.cost.shape),
+    }
 
 
 def of_steps() -> dict[str, Floats]:
     """Responses to steps of the set-point to both sides, of given length and of the usual."""
     pilot = LQ.from_model(ships()[0])
-    usual, port = step_response(pilot, ships()), step_response(pilot, ships()[1], -13.0, duration=47.3)
-    hard = step_response(PID.from_model(ships()[0]), ships()[0], 60.0, task=Task.of("CourseKeeping", dt=1.7))
+    usual, port = (
+        step_response(pilot, ships()),
+        step_response(pilot, ships()[1], -13.0, duration=47.3),
+    )
+    hard = step_response(
+        PID.from_model(ships()[0]),
+        ships()[0],
+        60.0,
+        task=Task.of("CourseKeeping", dt=1.7),
+    )
     rows = {"usual": usual, "port": port, "hard": hard}
     return {
         f"{name} {part}": vector(np.atleast_2d(values)[:, ::9])
@@ -154,7 +205,9 @@ def of_steps() -> dict[str, Floats]:
 def of_replay() -> dict[str, Floats]:
     """What the page of replays shows of episodes on a course, and on a path of a ship that rolls."""
     calm, sea = keeping(episode_steps=40), {"sea": "moderate", "episode_steps": 50}
-    path = BenchmarkTask("path", "path-following", "container", options={**sea, "roll": True})
+    path = BenchmarkTask(
+        "path", "path-following", "container", options={**sea, "roll": True}
+    )
     found = {}
     for name, task in {"course": calm, "path": path}.items():
         policy: Any = PID.from_model(task.ship)
@@ -169,7 +222,9 @@ def of_replay() -> dict[str, Floats]:
 def of_functions() -> dict[str, Floats]:
     """Reversals, figures of steps, sums and quotients of numbers made up."""
     t = np.linspace(0.0, 20.0, 200)
-    angle = np.stack([0.1 * np.sin(t), 0.004 * np.sin(3.0 * t) + 0.01 * np.sin(t), 0.02 * t], axis=-1)
+    angle = np.stack(
+        [0.1 * np.sin(t), 0.004 * np.sin(3.0 * t) + 0.01 * np.sin(t), 0.02 * t], axis=-1
+    )
     going = t[1:, None] < [15.0, 20.0, 20.0]
     swings = [
         np.exp(-0.2 * t) * np.cos(t),
@@ -178,12 +233,18 @@ def of_functions() -> dict[str, Floats]:
         0.1 * np.exp(-t),
     ]
     return {
-        "reversals": metrics.reversals(angle, going), "fine": metrics.reversals(angle, going, 0.002),
+        "reversals": metrics.reversals(angle, going),
+        "fine": metrics.reversals(angle, going, 0.002),
         "changes": vector([metrics.step_figures(error, 0.7) for error in swings]),
-        "total": metrics.total(angle[:3]), "nothing": metrics.total(angle[:0]),
+        "total": metrics.total(angle[:3]),
+        "nothing": metrics.total(angle[:0]),
         "ratio": metrics.ratio(np.array([1.3, 2.0]), np.array([0.7, 0.0])),
-        "rounded": vector(replay_series.rounded(np.array([1234.56789123, -0.00012345678912, 0.0, 7e-10]))),
-    }  # fmt: skip
+        "rounded": vector(
+            replay_series.rounded(
+                np.array([1234.56789123, -0.00012345678912, 0.0, 7e-10])
+            )
+        ),
+    }
 
 
 def of_suites() -> dict[str, Floats]:
@@ -202,7 +263,9 @@ def of_suites() -> dict[str, Floats]:
             len(task.handed_out.name),
             len(task.env_id),
         ]
-        found[f"{task.on} {task.name}"] = vector([*gear, *scales, *told, *task.seeds[[0, -1]]])
+        found[f"{task.on} {task.name}"] = vector(
+            [*gear, *scales, *told, *task.seeds[[0, -1]]]
+        )
     found |= numbers_in(reference_costs(list_suites()[1]), "reference")
     found["best"] = (
         best_costs(first[0], list_suites()[0])[::9]

@@ -1,7 +1,8 @@
 """Golden sections `derivatives` and `manoeuvres`: the physics of every ship, without an environment.
 
-`models.json` has ships beside the shipped ones: KVLCC2 at both scales in the form of the package shipmmg, one
-of each printed structure with made-up coefficients, and two grey boxes, as `ShipModel.save` wrote them.
+`models.json` has ships beside the shipped ones: KVLCC2 at both scales in the form of
+the package shipmmg, one of each printed structure with made-up coefficients, and two
+grey boxes, as `ShipModel.save` wrote them.
 """
 
 from __future__ import annotations
@@ -61,7 +62,10 @@ def record_derivatives(name: str) -> dict[str, Floats]:
     found = {"deep": model.derivatives(states, commands)}
     if name == "tanker":
         draught = model.particulars["draught"]
-        found |= {f"depth {d:g} T": model.derivatives(states, commands, d * draught) for d in DEPTHS}
+        found |= {
+            f"depth {d:g} T": model.derivatives(states, commands, d * draught)
+            for d in DEPTHS
+        }
         commands[:, 1] *= -1.0
         found["astern"] = model.derivatives(states, commands)
     return {
@@ -77,13 +81,22 @@ def random_motions(model: Any) -> tuple[Floats, Floats]:
     length, speed = model.particulars["length"], model.particulars["speed"]
     rudder, shaft = np.radians(35.0), model.service_shaft_speed
     ranges = {
-        "x": (-1e3, 1e3), "y": (-1e3, 1e3), "psi": (-4.0, 4.0), "u": (0.4 * speed, 1.1 * speed),
-        "v": (-0.25 * speed, 0.25 * speed), "r": (-0.6 * speed / length, 0.6 * speed / length),
-        "p": (-0.02, 0.02), "phi": (-0.3, 0.3), "q": (-1e-4, 1e-4), "delta": (-rudder, rudder),
+        "x": (-1e3, 1e3),
+        "y": (-1e3, 1e3),
+        "psi": (-4.0, 4.0),
+        "u": (0.4 * speed, 1.1 * speed),
+        "v": (-0.25 * speed, 0.25 * speed),
+        "r": (-0.6 * speed / length, 0.6 * speed / length),
+        "p": (-0.02, 0.02),
+        "phi": (-0.3, 0.3),
+        "q": (-1e-4, 1e-4),
+        "delta": (-rudder, rudder),
         "n": (0.5 * shaft, 1.1 * shaft),
-    }  # fmt: skip
+    }
     motions = [
-        np.stack([random.uniform(*ranges[quantity], N_STATES) for quantity in names], axis=-1)
+        np.stack(
+            [random.uniform(*ranges[quantity], N_STATES) for quantity in names], axis=-1
+        )
         for names in (model.state_names, model.command_names)
     ]
     return motions[0], motions[1]
@@ -94,10 +107,12 @@ def record_manoeuvres(name: str) -> dict[str, Floats]:
     model = ship_named(name)
     found: dict[str, Floats] = {}
     judged: dict[str, Callable[[], Any]] = {
-        what: (lambda one=one: one.evaluate(model))
+        what: lambda one=one: one.evaluate(model)
         for what, one in manoeuvres.standard_manoeuvres(model).items()
     }
-    judged["reverse spiral"] = lambda: manoeuvres.spiral_indices(manoeuvres.reverse_spiral(model))
+    judged["reverse spiral"] = lambda: manoeuvres.spiral_indices(
+        manoeuvres.reverse_spiral(model)
+    )
     judged["zigzag 20/10 in a rough sea"] = lambda: manoeuvres.zigzag_indices(
         manoeuvres.zigzag(model, 20.0, 10.0, dt=0.5, weather="rough", seed=5)
     )
@@ -109,7 +124,7 @@ def record_manoeuvres(name: str) -> dict[str, Floats]:
     if name == "tanker":
         depth = 1.5 * model.particulars["draught"]
         judged |= {
-            f"shallow {what}": (lambda one=one: one.evaluate(model))
+            f"shallow {what}": lambda one=one: one.evaluate(model)
             for what, one in manoeuvres.standard_manoeuvres(model, depth).items()
         }
     for what, judge in judged.items():

@@ -25,16 +25,26 @@ from tests.golden import texts
         ("1 and 2", "1", False),
     ],
 )
-def test_words_are_compared_exactly_and_numbers_to_their_last_decimal(golden, found, same):
+def test_words_are_compared_exactly_and_numbers_to_their_last_decimal(
+    golden, found, same
+):
     assert texts.alike(golden, found) is same
 
 
 def test_what_differs_from_run_to_run_is_left_out():
-    told = "written: /tmp/a-1/report.html, 2026-05-01T10:20:30 by 0123456789abcdef0123, N/m/s, in 3.1 s  \n\n"
-    assert texts.masked(told, r"[\d.]+ s") == ("written: <...>/report.html, DATE by HASH, N/m/s, in <...>\n")
+    told = (
+        "written: /tmp/a-1/report.html, 2026-05-01T10:20:30 by 0123456789abcdef0123,"
+        " N/m/s, in 3.1 s  \n\n"
+    )
+    assert (
+        texts.masked(told, r"[\d.]+ s")
+        == "written: <...>/report.html, DATE by HASH, N/m/s, in <...>\n"
+    )
 
 
-def test_a_text_that_is_not_the_golden_one_is_told_with_its_lines(tmp_path, monkeypatch):
+def test_a_text_that_is_not_the_golden_one_is_told_with_its_lines(
+    tmp_path, monkeypatch
+):
     monkeypatch.setattr(texts, "TEXTS", tmp_path)
     monkeypatch.setenv(texts.VARIABLE, "write")
     assert texts.same_text("one", "a 1.0\nb 2.0")
@@ -47,7 +57,8 @@ def test_a_text_that_is_not_the_golden_one_is_told_with_its_lines(tmp_path, monk
 
 def test_the_text_of_a_page_has_its_rows_and_what_is_drawn():
     page = (
-        '<p class="good">It <b>passes</b></p><table><tr><td>a</td><td>1.5</td></tr></table>'
+        '<p class="good">It'
+        " <b>passes</b></p><table><tr><td>a</td><td>1.5</td></tr></table>"
         "<style>p {}</style>"
         '<script>Plotly.newPlot("plot-one",[{"x":[0,1,2,3,4,5,60],"y":{"dtype":"f8","bdata":"AAAAAAAA+D8="}}],'
         '{"height":300},{"responsive":true});</script>'

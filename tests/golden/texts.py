@@ -1,8 +1,9 @@
 """Golden texts: what commands print, messages say and pages show, kept in results/texts.
 
-`SHIPGYM_GOLDEN=write python -m pytest TESTS` writes them anew. Words and whole numbers are compared exactly,
-others to a thousandth or one unit of their last printed decimal; spaces and ends of lines too, where all
-numbers are as long as they were and nothing was taken out.
+`SHIPGYM_GOLDEN=write python -m pytest TESTS` writes them anew. Words and whole numbers
+are compared exactly, others to a thousandth or one unit of their last printed decimal;
+spaces and ends of lines too, where all numbers are as long as they were and nothing was
+taken out.
 """
 
 from __future__ import annotations
@@ -24,26 +25,49 @@ import shipgym
 
 TEXTS = Path(__file__).parent / "results" / "texts"
 VARIABLE = "SHIPGYM_GOLDEN"
-WRITTEN: set[str] = set()  # names, each once: a second text of one name has to be the same
+WRITTEN: set[str] = (
+    set()
+)  # names, each once: a second text of one name has to be the same
 
 RELATIVE = 1e-3
-NUMBER = re.compile(r"(?<![A-Za-z_\d.])[-−]?\d+(?:\.\d+)?(?:[eE][-+]?\d+)?(?![A-Za-z_\d])")  # noqa: RUF001
+NUMBER = re.compile(
+    r"(?<![A-Za-z_\d.])[-−]?\d+(?:\.\d+)?(?:[eE][-+]?\d+)?(?![A-Za-z_\d])"  # noqa: RUF001
+)
 CUT = "<...>"
 PATH = r"(?<![\w.)\]<])(?:/[\w.~+-]+)+/([\w.~+-]+)"  # of which the last part stays
-#: What differs from run to run or from computer to computer, and what is put in its place.
+#: What differs from run to run or from computer to computer, and what is put in its
+#: place.
 MASKS = {
     rf"\b{re.escape(shipgym.__version__)}\b": "VERSION",
-    r"\b\d{4}-\d\d-\d\d(?:[T ]\d\d:\d\d(?::\d\d)?(?:\.\d+)?(?:Z|[+-]\d\d:?\d\d)?)?": "DATE",
+    r"\b\d{4}-\d\d-\d\d(?:[T ]\d\d:\d\d(?::\d\d)?(?:\.\d+)?(?:Z|[+-]\d\d:?\d\d)?)?": (
+        "DATE"
+    ),
     r"\b(?=[a-f]*\d)(?=\d*[a-f])[0-9a-f]{12,64}\b": "HASH",
 }
 
-THINNED = 5  # of the numbers of a row that a page draws, the first and the last among them
+THINNED = (
+    5  # of the numbers of a row that a page draws, the first and the last among them
+)
 DIGITS = 5  # of the largest of a row
 LONGEST = 200  # characters of a text among data
 BLOCKS = {
-    "button", "caption", "div", "figcaption", "figure", "h1", "h2", "h3", "h4", "header", "li", "option", "p",
-    "section", "title", "tr",
-}  # fmt: skip
+    "button",
+    "caption",
+    "div",
+    "figcaption",
+    "figure",
+    "h1",
+    "h2",
+    "h3",
+    "h4",
+    "header",
+    "li",
+    "option",
+    "p",
+    "section",
+    "title",
+    "tr",
+}
 CODE = {"script", "style"}
 
 
@@ -52,7 +76,10 @@ def same_text(name: str, text: str, *masks: str) -> bool:
 
     `masks` are regular expressions of what differs from run to run, such as durations.
     """
-    path, found = TEXTS / f"{re.sub('[^A-Za-z0-9/]+', '-', name)}.txt", masked(text, *masks)
+    path, found = (
+        TEXTS / f"{re.sub('[^A-Za-z0-9/]+', '-', name)}.txt",
+        masked(text, *masks),
+    )
     if os.environ.get(VARIABLE) == "write" and name not in WRITTEN:
         WRITTEN.add(name)
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -83,9 +110,13 @@ def alike(golden: str, found: str) -> bool:
     """Whether two texts say the same."""
     words, numbers = parted(golden)
     other_words, other_numbers = parted(found)
-    if len(numbers) != len(other_numbers) or not all(map(close, numbers, other_numbers)):
+    if len(numbers) != len(other_numbers) or not all(
+        map(close, numbers, other_numbers)
+    ):
         return False
-    if CUT not in golden and [len(one) for one in numbers] == [len(one) for one in other_numbers]:
+    if CUT not in golden and [len(one) for one in numbers] == [
+        len(one) for one in other_numbers
+    ]:
         return words == other_words
     return [one.split() for one in words] == [one.split() for one in other_words]
 
@@ -102,7 +133,9 @@ def close(golden: str, found: str) -> bool:
     decimals = len(mantissa.partition(".")[2])
     if not decimals and not exponent:
         return a == b
-    return abs(a - b) <= max(RELATIVE * abs(a), 1.001 * 10.0 ** (int(exponent or 0) - decimals))
+    return abs(a - b) <= max(
+        RELATIVE * abs(a), 1.001 * 10.0 ** (int(exponent or 0) - decimals)
+    )
 
 
 def page_text(page: str) -> str:
@@ -126,7 +159,11 @@ class _Shown(HTMLParser):
             self._end_line()
         if tag in CODE:
             self.code = tag
-        told = [f"{key}={value}" for key, value in attrs if key in ("class", "style", "title", "href")]
+        told = [
+            f"{key}={value}"
+            for key, value in attrs
+            if key in ("class", "style", "title", "href")
+        ]
         self.line += [f"<{' '.join(told)}>"] if told else []
         if tag in ("td", "th"):
             self.line.append("|")
@@ -143,7 +180,9 @@ class _Shown(HTMLParser):
         elif self.code == "script":
             self._end_line()
             for line in drawn(data):
-                if "layout" not in line or line not in self.lines:  # most of it all figures share
+                if (
+                    "layout" not in line or line not in self.lines
+                ):  # most of it all figures share
                     self.lines.append(line)
 
     def _end_line(self) -> None:
@@ -171,16 +210,27 @@ def drawn(script: str) -> Iterator[str]:
 def flat(content: Any, path: str) -> Iterator[str]:
     """Lines of nested data: words and single numbers of a table in one, rows of numbers in one each."""
     if isinstance(content, dict) and "bdata" in content:
-        content = np.frombuffer(base64.b64decode(content["bdata"]), content["dtype"]).tolist()
+        content = np.frombuffer(
+            base64.b64decode(content["bdata"]), content["dtype"]
+        ).tolist()
     if isinstance(content, dict):
-        single = {key: _word(value) for key, value in content.items() if not isinstance(value, dict | list)}
+        single = {
+            key: _word(value)
+            for key, value in content.items()
+            if not isinstance(value, dict | list)
+        }
         if single:
-            yield f"{path}: {', '.join(f'{key} {value}' for key, value in single.items())}"
+            yield (
+                f"{path}:"
+                f" {', '.join(f'{key} {value}' for key, value in single.items())}"
+            )
         for key, value in content.items():
             if key not in single:
                 yield from flat(value, f"{path}.{key}" if path else str(key))
     elif (
-        isinstance(content, list) and content and all(isinstance(one, int | float | None) for one in content)
+        isinstance(content, list)
+        and content
+        and all(isinstance(one, int | float | None) for one in content)
     ):
         yield f"{path}: {_row(content)}"
     elif isinstance(content, list):
@@ -197,18 +247,27 @@ def _row(numbers: list[float | None]) -> str:
     places = np.linspace(0, len(row) - 1, min(len(row), THINNED)).astype(int)
     largest = float(np.abs(known).max(initial=0.0))
     whole = all(isinstance(one, int) for one in numbers)
-    shown = [str(numbers[place]) if whole else _rounded(row[place], largest) for place in places]
+    shown = [
+        str(numbers[place]) if whole else _rounded(row[place], largest)
+        for place in places
+    ]
     mean = _rounded(known.mean() if len(known) else np.nan, largest)
     return f"{len(row)} of {len(known)}, {' '.join(shown)}, mean {mean}"
 
 
 def _word(value: Any) -> str:
-    return _rounded(value, abs(value)) if isinstance(value, float) else str(value)[:LONGEST]
+    return (
+        _rounded(value, abs(value))
+        if isinstance(value, float)
+        else str(value)[:LONGEST]
+    )
 
 
 def _rounded(value: float, largest: float) -> str:
     """A number as one of a row has it whose largest has so many digits."""
     if not np.isfinite(value):
         return str(value)
-    decimals = DIGITS - 1 - int(np.floor(np.log10(largest))) if 0.0 < largest < np.inf else 0
+    decimals = (
+        DIGITS - 1 - int(np.floor(np.log10(largest))) if 0.0 < largest < np.inf else 0
+    )
     return f"{round(value, decimals) + 0.0:.{max(decimals, 1)}f}"

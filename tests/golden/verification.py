@@ -1,6 +1,7 @@
 """Golden section `verification`: draws, tracks, standards, refusals and what a report says of them.
 
-The models drawn are made by hand: another processor could draw others in the last digit.
+The models drawn are made by hand: another processor could draw others in the last
+digit.
 """
 
 from __future__ import annotations
@@ -29,7 +30,12 @@ from agents.verification.figures import (
 from agents.verification.index_uncertainty import nominal_runs, uncertainty_of
 from agents.verification.monte_carlo import do_draws, draw_jobs, keeps_course
 from agents.verification.page import headline, verification_view
-from agents.verification.refusal import lost_control, rudder_effect, simpler_structures, why_refused
+from agents.verification.refusal import (
+    lost_control,
+    rudder_effect,
+    simpler_structures,
+    why_refused,
+)
 from agents.verification.result import Verification, verification_metrics
 from agents.verification.tracks import Track, keep_track, track_task
 from shipgym import InputError, ShipFile, ShipModel, load_model
@@ -69,7 +75,15 @@ def verified() -> Verification:
     """What is found of her, with two ships in place of the draws."""
     guests = [PID.from_model(model(), damping=1.3)]
     with patch.object(ShipModel, "sample", lambda self, n, seed: made_up(count=n)):
-        return verify(model(), 2, 3, lambda *one: TOLD.append(one), HERE, guests, ("pid", "lq", "wheel-over"))
+        return verify(
+            model(),
+            2,
+            3,
+            lambda *one: TOLD.append(one),
+            HERE,
+            guests,
+            ("pid", "lq", "wheel-over"),
+        )
 
 
 @cache
@@ -81,7 +95,16 @@ def track() -> Track:
 
 def cases() -> list[str]:
     """Parts of a verification."""
-    return ["draws", "track", "heading control", "seas", "track control", "metrics", "figures", "refusals"]
+    return [
+        "draws",
+        "track",
+        "heading control",
+        "seas",
+        "track control",
+        "metrics",
+        "figures",
+        "refusals",
+    ]
 
 
 def record(case: str) -> dict[str, Floats]:
@@ -93,12 +116,20 @@ def record(case: str) -> dict[str, Floats]:
 def of_draws() -> dict[str, Floats]:
     """Manoeuvres, stability and episodes of ships that differ much, one of which runs away."""
     wild = made_up(0.05, 3)
-    wild[1] = replace(wild[1], coefficients={name: -value for name, value in wild[1].coefficients.items()})
+    wild[1] = replace(
+        wild[1],
+        coefficients={name: -value for name, value in wild[1].coefficients.items()},
+    )
     (job,) = draw_jobs([PID.from_model(model())], model(), wild, 11)
     part = do_draws(job)
     told = uncertainty_of(model(), nominal_runs(model()), [part["sailed"]])
-    found = {f"episodes {name}": vector(values) for name, values in part["episodes"][0].items()}
-    found |= numbers_in({name: one.to_dict() for name, one in told.criteria.items()}, "criteria")
+    found = {
+        f"episodes {name}": vector(values)
+        for name, values in part["episodes"][0].items()
+    }
+    found |= numbers_in(
+        {name: one.to_dict() for name, one in told.criteria.items()}, "criteria"
+    )
     found |= {
         "lost": vector(part["sailed"]["lost"]),
         "course unstable": vector(part["course_unstable"]),
@@ -123,7 +154,10 @@ def of_track() -> dict[str, Floats]:
         "rms": one.rms,
         "arrived": vector(one.arrived),
         "current": vector(
-            [track_task(model()).weather.current.speed, track_task(model()).weather.current.towards_deg]
+            [
+                track_task(model()).weather.current.speed,
+                track_task(model()).weather.current.towards_deg,
+            ]
         ),
     }
 
@@ -132,7 +166,9 @@ def of_heading_control() -> dict[str, Floats]:
     """Values of heading control and of turns at a set rate, under PID that overshoots."""
     pilot = PID.from_model(model(), damping=0.5)
     with patch.object(asked, "LENGTHS", 17.0):
-        return numbers_in(asked.heading_control(model(), pilot) | asked._rate_of_turn(model()))
+        return numbers_in(
+            asked.heading_control(model(), pilot) | asked._rate_of_turn(model())
+        )
 
 
 def of_seas() -> dict[str, Floats]:
@@ -150,12 +186,24 @@ def of_metrics() -> dict[str, Floats]:
     """The metrics of a verification, and what its page is given."""
     view = verification_view(verified())
     shown = {
-        name: view[name] for name in ("unstable", "course_unstable", "met", "missed", "pilots", "cheaper")
+        name: view[name]
+        for name in (
+            "unstable",
+            "course_unstable",
+            "met",
+            "missed",
+            "pilots",
+            "cheaper",
+        )
     }
     with patch.object(asked, "LENGTHS", 6.0):
         rows = asked.standards(model(), LQ.from_model(model()), [])
     limits = {
-        row.name: [row.limit, float(row.least), -1.0 if row.passed is None else float(row.passed)]
+        row.name: [
+            row.limit,
+            float(row.least),
+            -1.0 if row.passed is None else float(row.passed),
+        ]
         for row in rows
     }
     return (
@@ -174,20 +222,28 @@ def of_figures() -> dict[str, Floats]:
         "manoeuvres": manoeuvres_figure(one.manoeuvres, length),
         "steps": steps_figure(one.pilots[0].step[0], steps, STEP_DEG),
         "tracks": tracks_figure({"A": one.tracks[0], "B": track()}, length),
-        "costs": costs_figure({pilot.name: pilot.episodes.cost for pilot in one.pilots}),
+        "costs": costs_figure(
+            {pilot.name: pilot.episodes.cost for pilot in one.pilots}
+        ),
     }
     found = {}
     for name, figure in drawn.items():
         for k, trace in enumerate(figure.data):
             for axis in "xy":
                 values = np.asarray([] if trace[axis] is None else trace[axis], float)
-                found[f"{name} {k} {axis}"] = vector([len(values), *values[:: max(1, len(values) // 9)]])
+                found[f"{name} {k} {axis}"] = vector(
+                    [len(values), *values[:: max(1, len(values) // 9)]]
+                )
             found[f"{name} {k} width"] = vector(
                 [np.nan if (w := getattr(trace.line, "width", None)) is None else w]
             )
         sizes = [figure.layout.height, figure.layout.margin.l]
-        found[f"{name} layout"] = vector([np.nan if one is None else one for one in sizes])
-        found |= numbers_in(figure.layout.to_plotly_json(), f"{name} layout", left_out=("template",))
+        found[f"{name} layout"] = vector(
+            [np.nan if one is None else one for one in sizes]
+        )
+        found |= numbers_in(
+            figure.layout.to_plotly_json(), f"{name} layout", left_out=("template",)
+        )
     return found
 
 
@@ -196,11 +252,21 @@ def fits() -> dict[str, Any]:
     trials = ShipFile.load(SHIP_FILE).trials()
     found = {"as in the trials": model()}
     for name, factors in {
-        "other side": {"N_d": -1.0, "Y_d": -1.0}, "sway": {"Y_v": -1.0, "N_d": -1.0},
-    }.items():  # fmt: skip
-        changed = {one: value * factors.get(one, 1.0) for one, value in model().coefficients.items()}
-        found[name] = replace(model(), coefficients=changed, covariance=1e-4 * np.asarray(model().covariance))
-    return {name: SimpleNamespace(model=one, trials=trials) for name, one in found.items()}
+        "other side": {"N_d": -1.0, "Y_d": -1.0},
+        "sway": {"Y_v": -1.0, "N_d": -1.0},
+    }.items():
+        changed = {
+            one: value * factors.get(one, 1.0)
+            for one, value in model().coefficients.items()
+        }
+        found[name] = replace(
+            model(),
+            coefficients=changed,
+            covariance=1e-4 * np.asarray(model().covariance),
+        )
+    return {
+        name: SimpleNamespace(model=one, trials=trials) for name, one in found.items()
+    }
 
 
 def of_refusals() -> dict[str, Floats]:
@@ -218,13 +284,32 @@ def said() -> str:
     """Verdicts and refusals in words."""
     view = verification_view(verified())
     ranking = [
-        {"structure": name, "coefficients": count, "stable": name != "c", "ran_away": name == "d"}
-        for name, count in (("a", 9), ("b", 7), ("c", 3), ("d", 2), ("b", 7), ("e", 4), ("f", 1))
+        {
+            "structure": name,
+            "coefficients": count,
+            "stable": name != "c",
+            "ran_away": name == "d",
+        }
+        for name, count in (
+            ("a", 9),
+            ("b", 7),
+            ("c", 3),
+            ("d", 2),
+            ("b", 7),
+            ("e", 4),
+            ("f", 1),
+        )
     ]
-    lines = [headline(verified()), *(f"{name}: {why_refused(fit)}" for name, fit in fits().items())]
+    lines = [
+        headline(verified()),
+        *(f"{name}: {why_refused(fit)}" for name, fit in fits().items()),
+    ]
     lines += [str(lost_control(np.arange(41) < lost)) for lost in (2, 3)]
     lines += [str(simpler_structures(ranking, "a")), str(view["gains"])]
-    lines += [f"{name}: {', '.join(view[name])}" for name in ("criteria", "designs", "linear", "learned")]
+    lines += [
+        f"{name}: {', '.join(view[name])}"
+        for name in ("criteria", "designs", "linear", "learned")
+    ]
     lines += [f"{name}: {view[name]}" for name in ("best", "certain", "draws", "seed")]
     return "\n".join([*lines, *_decided()])
 
@@ -241,24 +326,39 @@ def _decided() -> list[str]:
     lines = [str(one) for one in TOLD]
     for lost in (("pid", "pid-2"), ("pid", "lq", "pid-2")):
         worse = [
-            replace(one, episodes=replace(one.episodes, terminated=np.full(2, one.key in lost)))
+            replace(
+                one,
+                episodes=replace(one.episodes, terminated=np.full(2, one.key in lost)),
+            )
             for one in found.pilots
         ]
         after, refusal = chain._decided(replace(found, pilots=tuple(worse)), fit)
         lines += [f"lost {lost}: {refusal}", str(after.refused)]
-    controllers, guides, refused = chain._designed(model(), ["lq", "lq", "turn-rate", "los", "wheel-over"])
-    lines += [f"{[one.kind for one in controllers]} {[one.kind for one in guides]} {refused}"]
+    controllers, guides, refused = chain._designed(
+        model(), ["lq", "lq", "turn-rate", "los", "wheel-over"]
+    )
+    lines += [
+        f"{[one.kind for one in controllers]} {[one.kind for one in guides]} {refused}"
+    ]
     for call in (
         lambda: chain._designed(model(), ["los"]),
         lambda: chain._check_fits(guides[0], model(), "agent 'los'"),
-        lambda: chain._check_fits(PID.from_model(load_model("kvlcc2")), model(), "agent 'pid'"),
+        lambda: chain._check_fits(
+            PID.from_model(load_model("kvlcc2")), model(), "agent 'pid'"
+        ),
     ):
         try:
             lines.append(str(call()))
         except InputError as error:
             lines.append(str(error))
     result = chain.examined(SimpleNamespace(), _identified(fit), [], verified)
-    return [*lines, f"{result.stable} {result.instability} {result.refusal} {sorted(result.metrics)}"]
+    return [
+        *lines,
+        (
+            f"{result.stable} {result.instability} {result.refusal}"
+            f" {sorted(result.metrics)}"
+        ),
+    ]
 
 
 def _identified(fit: Any) -> Any:

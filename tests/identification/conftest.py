@@ -24,12 +24,15 @@ NOISE = {
 }
 
 
-def measured(trial: Trial, every: int = 1, noise: float = 0.0, seed: int = 0, **changes: str) -> Trial:
+def measured(
+    trial: Trial, every: int = 1, noise: float = 0.0, seed: int = 0, **changes: str
+) -> Trial:
     """What sensors would have recorded of a simulated trial: no orders, every so many samples, noise."""
     rng = np.random.default_rng(seed)
     t = trial.t[::every]
     channels = {
-        name: trial[name][::every] + noise * NOISE[name] * rng.standard_normal(len(t)) for name in MEASURED
+        name: trial[name][::every] + noise * NOISE[name] * rng.standard_normal(len(t))
+        for name in MEASURED
     }
     return Trial(t, channels, kind=trial.kind, **changes)
 
@@ -47,7 +50,9 @@ def mariner() -> ShipModel:
 @pytest.fixture(scope="session")
 def cao_zigzag(mariner: ShipModel) -> Trial:
     """The 15/15 zigzag of Cao 2015: 500 s by Runge-Kutta steps of 0.1 s, recorded every 0.5 s."""
-    return measured(zigzag(mariner, 15, 15, duration=500, dt=0.1), every=5, name="zigzag_15_15")
+    return measured(
+        zigzag(mariner, 15, 15, duration=500, dt=0.1), every=5, name="zigzag_15_15"
+    )
 
 
 @pytest.fixture(scope="session")
@@ -61,7 +66,9 @@ def noisy_trials(mariner: ShipModel) -> list[Trial]:
     plan = [(10, 10, "fit"), (20, 20, "fit"), (30, 20, "fit"), (15, 15, "validate")]
     return [
         measured(
-            zigzag(mariner, rudder, heading, duration=400, dt=0.1, port_first=i % 2 == 1),
+            zigzag(
+                mariner, rudder, heading, duration=400, dt=0.1, port_first=i % 2 == 1
+            ),
             every=10,
             noise=1.0,
             seed=i,
@@ -74,4 +81,6 @@ def noisy_trials(mariner: ShipModel) -> list[Trial]:
 
 @pytest.fixture(scope="session")
 def noisy_fit(mariner: ShipModel, noisy_trials: list[Trial]) -> IdentificationResult:
-    return identify(noisy_trials, particulars=mariner.particulars, steering=mariner.steering)
+    return identify(
+        noisy_trials, particulars=mariner.particulars, steering=mariner.steering
+    )

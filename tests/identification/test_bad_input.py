@@ -33,22 +33,28 @@ def refusal(mariner: ShipModel) -> Callable[..., str]:
     return message
 
 
-def test_a_rudder_that_never_moves_excites_nothing(cao_zigzag: Trial, refusal: Callable[..., str]) -> None:
+def test_a_rudder_that_never_moves_excites_nothing(
+    cao_zigzag: Trial, refusal: Callable[..., str]
+) -> None:
     told = refusal(changed(cao_zigzag, "still", delta=0.0 * cao_zigzag.t))
     assert "trial 'still': the rudder stays at 0.00 deg throughout" in told
     assert "such as a zigzag" in told
 
 
 @pytest.mark.parametrize(
-    ("channel", "more"), [("u", "; nomoto, norrbin and nomoto2 take the speed of [ship]"), ("v", "")]
+    ("channel", "more"),
+    [("u", "; nomoto, norrbin and nomoto2 take the speed of [ship]"), ("v", "")],
 )
 def test_a_channel_that_is_missing_is_named(
     cao_zigzag: Trial, refusal: Callable[..., str], channel: str, more: str
 ) -> None:
-    kept = {name: values for name, values in cao_zigzag.channels.items() if name != channel}
+    kept = {
+        name: values for name, values in cao_zigzag.channels.items() if name != channel
+    }
     told = refusal(Trial(cao_zigzag.t, kept, name="short"), structure="abkowitz")
     assert told == (
-        f"trial 'short': channel '{channel}' is missing, structure 'abkowitz' needs u, v, r, delta; name its "
+        f"trial 'short': channel '{channel}' is missing, structure 'abkowitz' needs u,"
+        " v, r, delta; name its "
         f'column, or leave the trial out (use = "skip"){more}'
     )
 
@@ -57,7 +63,10 @@ def test_a_channel_that_is_missing_is_named(
 def test_a_motion_that_never_changes_is_named(
     cao_zigzag: Trial, refusal: Callable[..., str], channel: str, structure: str
 ) -> None:
-    told = refusal(changed(cao_zigzag, "flat", **{channel: 0.0 * cao_zigzag.t}), structure=structure)
+    told = refusal(
+        changed(cao_zigzag, "flat", **{channel: 0.0 * cao_zigzag.t}),
+        structure=structure,
+    )
     assert f"trial 'flat': channel '{channel}' never changes" in told
     assert "choose a structure without that equation" in told
 
@@ -72,33 +81,51 @@ def test_of_exactly_collinear_terms_what_was_left_out_is_told(
     assert "left out: b_v, b_r" in " ".join(fit.summary().split())
 
 
-@pytest.mark.parametrize("method", ["ls-svm", "ridge", "abc-lssvr", "svr", "rls", "tmils"])
+@pytest.mark.parametrize(
+    "method", ["ls-svm", "ridge", "abc-lssvr", "svr", "rls", "tmils"]
+)
 def test_a_method_that_leaves_nothing_out_marks_exactly_collinear_terms(
     cao_zigzag: Trial, mariner: ShipModel, method: str
 ) -> None:
     tied = changed(cao_zigzag, "tied", v=-20.0 * cao_zigzag["r"])
     fit = identify([tied], "linear-steering", method, particulars=mariner.particulars)
-    marked = "yaw: exactly collinear in the data: c_v and c_r; only combinations are determined"
+    marked = (
+        "yaw: exactly collinear in the data: c_v and c_r; only combinations are"
+        " determined"
+    )
     assert marked in " ".join(fit.summary().split())
     assert any(text.startswith(marked) for text in model_warnings(fit))
     assert np.all(np.isfinite(list(fit.coefficients.values())))
 
 
-def test_without_collinear_terms_nothing_is_marked(cao_zigzag: Trial, mariner: ShipModel) -> None:
-    fit = identify([cao_zigzag], "linear-steering", "ls-svm", particulars=mariner.particulars)
+def test_without_collinear_terms_nothing_is_marked(
+    cao_zigzag: Trial, mariner: ShipModel
+) -> None:
+    fit = identify(
+        [cao_zigzag], "linear-steering", "ls-svm", particulars=mariner.particulars
+    )
     assert "collinear" not in fit.summary()
 
 
-def test_fewer_samples_than_terms(cao_zigzag: Trial, refusal: Callable[..., str]) -> None:
-    few = Trial(cao_zigzag.t[:12], {c: v[:12] for c, v in cao_zigzag.channels.items()}, name="short")
+def test_fewer_samples_than_terms(
+    cao_zigzag: Trial, refusal: Callable[..., str]
+) -> None:
+    few = Trial(
+        cao_zigzag.t[:12],
+        {c: v[:12] for c, v in cao_zigzag.channels.items()},
+        name="short",
+    )
     told = refusal(few)
     assert "trial 'short': 12 samples found, in all 11 rows for 15 coefficients" in told
 
 
 @pytest.mark.parametrize("rank", [0, -1, 1.5, np.nan])
-def test_a_truncation_that_keeps_nothing(cao_zigzag: Trial, refusal: Callable[..., str], rank: float) -> None:
-    assert refusal(cao_zigzag, rank=rank) == (
-        f"rank: {rank} found, expected a whole number of at least 1, or None"
+def test_a_truncation_that_keeps_nothing(
+    cao_zigzag: Trial, refusal: Callable[..., str], rank: float
+) -> None:
+    assert (
+        refusal(cao_zigzag, rank=rank)
+        == f"rank: {rank} found, expected a whole number of at least 1, or None"
     )
 
 
@@ -115,12 +142,30 @@ def test_a_weight_that_is_none(
     [
         ({"window": 1.5}, "window: 1.5 found, expected a whole number of at least 1"),
         ({"method": "abc-lssvr", "seed": -1}, "seed: -1 found"),
-        ({"method": "abc-lssvr", "optimiser": {"name": "abc", "round": 3}}, "optimiser: round found"),
-        ({"method": "abc-lssvr", "optimiser": {"rounds": 3}}, "optimiser: None found, expected one of 'abc'"),
-        ({"method": "ls", "C": 1.0}, "settings: C found, which method 'ls' does not know"),
+        (
+            {"method": "abc-lssvr", "optimiser": {"name": "abc", "round": 3}},
+            "optimiser: round found",
+        ),
+        (
+            {"method": "abc-lssvr", "optimiser": {"rounds": 3}},
+            "optimiser: None found, expected one of 'abc'",
+        ),
+        (
+            {"method": "ls", "C": 1.0},
+            "settings: C found, which method 'ls' does not know",
+        ),
         ({"prior": "clarke", "prior_strength": np.nan}, "prior_strength: nan found"),
-        ({"method": "rm-svm"}, "method: 'rm-svm' found with structure 'abkowitz', expected structure 'grey"),
-        ({"structure": "grey-box", "method": "rm-svm"}, "reference_model: None found, expected the name"),
+        (
+            {"method": "rm-svm"},
+            (
+                "method: 'rm-svm' found with structure 'abkowitz', expected structure"
+                " 'grey"
+            ),
+        ),
+        (
+            {"structure": "grey-box", "method": "rm-svm"},
+            "reference_model: None found, expected the name",
+        ),
         (
             {"structure": "grey-box", "reference_model": "auto", "prior": "clarke"},
             "prior: 'clarke' found with",
@@ -128,25 +173,42 @@ def test_a_weight_that_is_none(
     ],
 )
 def test_settings_that_do_not_fit(
-    cao_zigzag: Trial, refusal: Callable[..., str], arguments: dict[str, Any], message: str
+    cao_zigzag: Trial,
+    refusal: Callable[..., str],
+    arguments: dict[str, Any],
+    message: str,
 ) -> None:
     assert refusal(cao_zigzag, **arguments).startswith(message)
 
 
-def test_arguments_of_another_kind_are_named(cao_zigzag: Trial, mariner: ShipModel) -> None:
-    for trials, found in ((cao_zigzag, "Trial"), ("a.csv", "'a.csv'"), ([cao_zigzag, 3], "3")):
-        with pytest.raises(InputError, match=rf"trials: {found}.* found, expected a list of Trials"):
+def test_arguments_of_another_kind_are_named(
+    cao_zigzag: Trial, mariner: ShipModel
+) -> None:
+    for trials, found in (
+        (cao_zigzag, "Trial"),
+        ("a.csv", "'a.csv'"),
+        ([cao_zigzag, 3], "3"),
+    ):
+        with pytest.raises(
+            InputError, match=rf"trials: {found}.* found, expected a list of Trials"
+        ):
             identify(trials, particulars=mariner.particulars)  # type: ignore[arg-type]
     with pytest.raises(InputError, match="steering: 35 found, expected a SteeringGear"):
         identify([cao_zigzag], particulars=mariner.particulars, steering=35)  # type: ignore[arg-type]
 
 
-def test_a_misspelt_option_is_told_with_the_one_meant(refusal: Callable[..., str], cao_zigzag: Trial) -> None:
-    assert refusal(cao_zigzag, preprocesing="rts").endswith("Did you mean 'preprocessing'?")
+def test_a_misspelt_option_is_told_with_the_one_meant(
+    refusal: Callable[..., str], cao_zigzag: Trial
+) -> None:
+    assert refusal(cao_zigzag, preprocesing="rts").endswith(
+        "Did you mean 'preprocessing'?"
+    )
     assert "Did you mean" not in refusal(cao_zigzag, epsilon=1.0)
 
 
-def test_trials_of_a_model_at_another_scale(cao_zigzag: Trial, refusal: Callable[..., str]) -> None:
+def test_trials_of_a_model_at_another_scale(
+    cao_zigzag: Trial, refusal: Callable[..., str]
+) -> None:
     """The Mariner at a scale of 1 to 100 in Froude's time."""
     speed = {c: 0.1 * cao_zigzag[c] for c in ("u", "v")}
     channels = {**cao_zigzag.channels, **speed, "r": 10.0 * cao_zigzag["r"]}
@@ -155,15 +217,23 @@ def test_trials_of_a_model_at_another_scale(cao_zigzag: Trial, refusal: Callable
     assert "likely the trial of another ship or scale" in told
 
 
-def test_trials_of_a_ship_of_another_speed(cao_zigzag: Trial, refusal: Callable[..., str]) -> None:
+def test_trials_of_a_ship_of_another_speed(
+    cao_zigzag: Trial, refusal: Callable[..., str]
+) -> None:
     fast = changed(cao_zigzag, "frigate", u=3.0 * cao_zigzag["u"])
-    assert "expected 1.544 to 15.44 m/s of a ship with a service speed of 7.7175 m/s" in refusal(fast)
+    assert (
+        "expected 1.544 to 15.44 m/s of a ship with a service speed of 7.7175 m/s"
+        in refusal(fast)
+    )
 
 
 def test_values_that_are_none(cao_zigzag: Trial) -> None:
     sway = cao_zigzag["v"].copy()
     sway[100] = np.nan
-    with pytest.raises(InputError, match=r"trial 'holes': v: nan found at sample 100, .*repair = \"interp"):
+    with pytest.raises(
+        InputError,
+        match=r"trial 'holes': v: nan found at sample 100, .*repair = \"interp",
+    ):
         changed(cao_zigzag, "holes", v=sway)
 
 
@@ -181,23 +251,37 @@ def holed(tmp_path: Path) -> Callable[[str], Path]:
             lines[row] = ",".join([*cells[:column], "", *cells[column + 1 :]])
         (tmp_path / "zigzag_20_20.csv").write_text("\n".join(lines) + "\n")
         text = (DEMO / "ship.toml").read_text()
-        (tmp_path / "ship.toml").write_text(text.replace("[conventions]", f"[conventions]\n{convention}"))
+        (tmp_path / "ship.toml").write_text(
+            text.replace("[conventions]", f"[conventions]\n{convention}")
+        )
         return tmp_path / "ship.toml"
 
     return write
 
 
-def test_rows_without_a_value_are_named_where_nothing_is_repaired(holed: Callable[[str], Path]) -> None:
-    with pytest.raises(InputError, match=r"zigzag_20_20\.csv.*line 201.*gyro_deg_s.*interpolate"):
+def test_rows_without_a_value_are_named_where_nothing_is_repaired(
+    holed: Callable[[str], Path],
+) -> None:
+    with pytest.raises(
+        InputError, match=r"zigzag_20_20\.csv.*line 201.*gyro_deg_s.*interpolate"
+    ):
         ShipFile.load(holed("")).trials()
 
 
-def test_rows_without_a_value_are_filled_where_asked(holed: Callable[[str], Path]) -> None:
+def test_rows_without_a_value_are_filled_where_asked(
+    holed: Callable[[str], Path],
+) -> None:
     ship = ShipFile.load(holed('repair = "interpolate"'))
-    repaired = identify(ship.trials(), particulars=ship.particulars, steering=ship.steering)
+    repaired = identify(
+        ship.trials(), particulars=ship.particulars, steering=ship.steering
+    )
     whole = ShipFile.load(DEMO / "ship.toml")
-    sound = identify(whole.trials(), particulars=whole.particulars, steering=whole.steering)
-    assert repaired.coefficients["N_r"] == pytest.approx(sound.coefficients["N_r"], rel=0.02)
+    sound = identify(
+        whole.trials(), particulars=whole.particulars, steering=whole.steering
+    )
+    assert repaired.coefficients["N_r"] == pytest.approx(
+        sound.coefficients["N_r"], rel=0.02
+    )
     assert repaired.coefficients != sound.coefficients
 
 
@@ -206,8 +290,12 @@ def test_an_unstable_model_is_kept_and_marked_and_no_environment_takes_it(
 ) -> None:
     """A turning circle cannot tell 40 coefficients apart, and least squares has no guard."""
     ship = ShipFile.load(DEMO / "ship.toml")
-    trials = [t.with_(use="fit" if "turning" in t.name else "validate") for t in ship.trials()]
-    result = identify(trials, method="ls", particulars=ship.particulars, steering=ship.steering)
+    trials = [
+        t.with_(use="fit" if "turning" in t.name else "validate") for t in ship.trials()
+    ]
+    result = identify(
+        trials, method="ls", particulars=ship.particulars, steering=ship.steering
+    )
     assert not result.stable
     assert "runs away" in (why_unstable(result) or "")
     assert "NOT STABLE" in result.summary()
@@ -218,7 +306,9 @@ def test_an_unstable_model_is_kept_and_marked_and_no_environment_takes_it(
     assert kept.coefficients == result.coefficients
     assert (kept.provenance or {})["stable"] is False
     path = str(tmp_path / "ship" / "model.json")
-    with pytest.raises(InputError, match=r"found unstable when it was identified.*allow_unstable=True"):
+    with pytest.raises(
+        InputError, match=r"found unstable when it was identified.*allow_unstable=True"
+    ):
         gymnasium.make("shipgym/CourseKeeping-v0", model=path)
     with pytest.warns(UserWarning, match="found unstable when it was identified"):
         gymnasium.make("shipgym/CourseKeeping-v0", model=path, allow_unstable=True)

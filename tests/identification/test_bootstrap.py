@@ -20,7 +20,9 @@ from shipgym import InputError, ShipModel, Trial
 
 def regression(rng: np.random.Generator, lasting: int = 1, n: int = 400) -> Samples:
     """One equation with two terms of coefficients 1 and -2, and errors that last over some rows."""
-    smooth = [np.convolve(rng.standard_normal(n + 9), np.ones(10), "valid") for _ in range(2)]
+    smooth = [
+        np.convolve(rng.standard_normal(n + 9), np.ones(10), "valid") for _ in range(2)
+    ]
     features = np.column_stack(smooth)
     white = rng.standard_normal(n + lasting - 1)
     errors = np.convolve(white, np.ones(lasting), "valid") / np.sqrt(lasting)
@@ -40,7 +42,9 @@ def coverage(lasting: int, memory: float, seeds: int = 60) -> float:
     for seed in range(seeds):
         samples = regression(np.random.default_rng(seed), lasting)
         estimators = fit_all(get_method("ls").estimator, samples)
-        deviation = np.sqrt(np.diag(bootstrap_covariance(estimators, samples, memory, draws=40)))
+        deviation = np.sqrt(
+            np.diag(bootstrap_covariance(estimators, samples, memory, draws=40))
+        )
         hits.append(np.abs(estimators["u"].coef_ - [1.0, -2.0]) < 1.96 * deviation)
     return float(np.mean(hits))
 
@@ -80,12 +84,16 @@ def test_a_block_holds_the_rows_of_its_time() -> None:
 
 
 @pytest.mark.parametrize("method", ["ridge", "tls-svm", "svr"])
-def test_svms_are_fitted_again_with_the_rank_they_had_and_others_take_a_linear_step(method: str) -> None:
+def test_svms_are_fitted_again_with_the_rank_they_had_and_others_take_a_linear_step(
+    method: str,
+) -> None:
     rng = np.random.default_rng(3)
     X = rng.standard_normal((40, 3)) * [1.0, 0.3, 0.01] @ rng.standard_normal((3, 3))
     y = X @ [1.0, 2.0, -1.0] + 0.5 * rng.standard_normal(40)
     t = np.arange(40.0)
-    samples = Samples({"u": X}, {"u": y}, t, np.ones(40), np.zeros(40, dtype=np.int64), 1)
+    samples = Samples(
+        {"u": X}, {"u": y}, t, np.ones(40), np.zeros(40, dtype=np.int64), 1
+    )
     fitted = fit_all(get_method(method).estimator, samples)["u"]
     again = LSSVM(C=1e6, fit_intercept=False, scale=False)
     if method == "tls-svm":
@@ -107,20 +115,31 @@ def test_influences_of_white_noise_add_up_as_variances_do() -> None:
 
 @pytest.mark.parametrize("method", ["ls", "output-error"])
 def test_identify_offers_the_bootstrap(
-    method: str, mariner: ShipModel, noisy_trials: list[Trial], record: Callable[..., Trial]
+    method: str,
+    mariner: ShipModel,
+    noisy_trials: list[Trial],
+    record: Callable[..., Trial],
 ) -> None:
-    ship = {"particulars": mariner.particulars, "steering": mariner.steering, "method": method}
+    ship = {
+        "particulars": mariner.particulars,
+        "steering": mariner.steering,
+        "method": method,
+    }
     drawn, analytic = (
         identify(noisy_trials[:1], uncertainty=kind, **ship)  # type: ignore[arg-type]
         for kind in ("bootstrap", "analytic")
     )
     assert drawn.coefficients == analytic.coefficients
     assert (drawn.model.provenance or {})["uncertainty"] == "bootstrap"
-    ratio = np.array(list(drawn.standard_errors.values())) / list(analytic.standard_errors.values())
+    ratio = np.array(list(drawn.standard_errors.values())) / list(
+        analytic.standard_errors.values()
+    )
     assert 0.5 < np.median(ratio) < 2.0
     assert np.all((ratio > 0.1) & (ratio < 10.0))
 
 
-def test_an_uncertainty_that_does_not_exist_is_refused(mariner: ShipModel, cao_zigzag: Trial) -> None:
+def test_an_uncertainty_that_does_not_exist_is_refused(
+    mariner: ShipModel, cao_zigzag: Trial
+) -> None:
     with pytest.raises(InputError, match="uncertainty: 'jackknife'"):
         identify([cao_zigzag], uncertainty="jackknife", particulars=mariner.particulars)

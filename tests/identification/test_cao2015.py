@@ -10,7 +10,9 @@ def rows():
 
 
 def test_all_forty_derivatives_come_within_one_per_cent(rows):
-    tables = [row for row in rows if row.case.startswith("Table") and row.met is not None]
+    tables = [
+        row for row in rows if row.case.startswith("Table") and row.met is not None
+    ]
     assert len(tables) == 80
     assert all(row.best < 0.1 and row.met for row in tables)
 
@@ -23,7 +25,11 @@ def test_predictions_by_the_best_model_are_within_a_thousandth_of_the_span(rows)
 
 @pytest.mark.parametrize("samples", ["integral", "euler"])
 def test_their_way_fails_where_and_as_much_as_printed(samples):
-    printed = {name: error for q in FORCES for name, error in printed_errors(samples, q).items()}
+    printed = {
+        name: error
+        for q in FORCES
+        for name, error in printed_errors(samples, q).items()
+    }
     ours = errors(as_printed(samples))
     assert printed.keys() == ours.keys()
     decades = [np.log10((ours[name] + 1.0) / (printed[name] + 1.0)) for name in printed]
@@ -36,15 +42,20 @@ def test_their_way_fails_where_and_as_much_as_printed(samples):
 def test_what_the_columns_hold_decides_the_errors(rows):
     """With r in place of r L the penalty drives X_rr away; without the constant Y_0, N_0 are as printed."""
     found = {
-        row.quantity: row for row in rows if " with r and not " in row.quantity or "without" in row.quantity
+        row.quantity: row
+        for row in rows
+        if " with r and not " in row.quantity or "without" in row.quantity
     }
     assert found["X_rr with r and not r L in the columns: error, %"].as_paper > 80.0
-    assert [found[f"{name} without the constant b: error, %"].as_paper for name in ("Y_0", "N_0")] == (
-        pytest.approx([0.64, 0.22], abs=0.01)
-    )
+    assert [
+        found[f"{name} without the constant b: error, %"].as_paper
+        for name in ("Y_0", "N_0")
+    ] == (pytest.approx([0.64, 0.22], abs=0.01))
 
 
 def test_additional_excitation_pins_the_coefficient_of_the_state_at_one():
-    plain, excited = (as_printed("integral", excitation).coefficients for excitation in (0.0, 0.1))
+    plain, excited = (
+        as_printed("integral", excitation).coefficients for excitation in (0.0, 0.1)
+    )
     for name in ("Y_v", "Y_r", "Y_d", "N_v", "N_r", "N_d", "Y_vvv", "N_vvr"):
         assert excited[name] == pytest.approx(plain[name], rel=0.02)

@@ -17,4 +17,6 @@ def test_a_network_steps_the_record_that_it_learned():
     trial = first_samples(song2020.trial("nomoto"), 400)
     found = comparators.trained([trial], ("psi", "r"), 0).run(trial, ("psi", "r"))
     for name, values in found.items():
-        assert np.sqrt(np.mean((values - trial[name]) ** 2)) < 0.05 * np.ptp(trial[name])
+        assert np.sqrt(np.mean((values - trial[name]) ** 2)) < 0.05 * np.ptp(
+            trial[name]
+        )

@@ -23,7 +23,12 @@ from tests.golden.texts import same_page
 @pytest.fixture(scope="module")
 def comparison(noisy_trials: list[Trial], mariner: ShipModel) -> Comparison:
     methods = ["sg", "ls", "tls-svm", "rm-svm", "ls-svm"]
-    options = {"particulars": mariner.particulars, "steering": mariner.steering, "C": 1e4, "rank": 8}
+    options = {
+        "particulars": mariner.particulars,
+        "steering": mariner.steering,
+        "C": 1e4,
+        "rank": 8,
+    }
     return compare_methods(noisy_trials, methods, **options)
 
 
@@ -44,7 +49,9 @@ def test_errors_are_those_of_the_trials_held_out(comparison: Comparison) -> None
     assert not comparison.in_turn
 
 
-def test_a_method_that_does_not_fit_the_structure_is_told(comparison: Comparison) -> None:
+def test_a_method_that_does_not_fit_the_structure_is_told(
+    comparison: Comparison,
+) -> None:
     assert comparison.refused.keys() == {"rm-svm"}
     assert "expected structure 'grey-box'" in comparison.refused["rm-svm"]
 
@@ -63,10 +70,17 @@ def test_it_is_written_with_every_model(comparison: Comparison, tmp_path: Path) 
     assert names == {"comparison.json", "comparison.html"} | models
     assert names <= set(COMPARISON_FILES)
     told = json.loads((tmp_path / "comparison.json").read_text())
-    assert [row["method"] for row in told["ranking"]] == [s.method for s in comparison.standings]
-    assert ShipModel.load(tmp_path / "model-ls.json").coefficients == comparison.results["ls"].coefficients
+    assert [row["method"] for row in told["ranking"]] == [
+        s.method for s in comparison.standings
+    ]
+    assert (
+        ShipModel.load(tmp_path / "model-ls.json").coefficients
+        == comparison.results["ls"].coefficients
+    )
     (first, result), *_ = comparison.results.items()
-    alone = replace(comparison, standings=comparison.standings[:1], results={first: result})
+    alone = replace(
+        comparison, standings=comparison.standings[:1], results={first: result}
+    )
     alone.save(tmp_path / "alone")
     assert (tmp_path / "alone" / f"model-{first}.json").exists()
 
@@ -80,10 +94,15 @@ def test_no_name_or_message_becomes_html(comparison: Comparison) -> None:
     hostile = "<script>alert(1)</script>\"'&{{ 7 * 7 }}"
     first = replace(comparison.standings[0], errors={hostile: 0.1}, method=hostile)
     results = {hostile: comparison.best}
-    changed = replace(comparison, standings=(first,), results=results, refused={hostile: hostile})
+    changed = replace(
+        comparison, standings=(first,), results=results, refused={hostile: hostile}
+    )
     page = comparison_page(changed)
     assert "<script>alert" not in page
-    assert page.count("&lt;script&gt;alert(1)&lt;/script&gt;&#34;&#39;&amp;{{ 7 * 7 }}") == 4
+    assert (
+        page.count("&lt;script&gt;alert(1)&lt;/script&gt;&#34;&#39;&amp;{{ 7 * 7 }}")
+        == 4
+    )
     assert page.count("</script>") == 4  # plotly.js, two figures, printing
 
 
@@ -91,38 +110,54 @@ def test_without_trials_to_validate_each_is_held_out_in_turn(
     noisy_trials: list[Trial], mariner: ShipModel
 ) -> None:
     options = {"particulars": mariner.particulars, "steering": mariner.steering}
-    found = compare_methods(noisy_trials[:3], ["ls", "tls-svm"], structure="linear-steering", **options)
+    found = compare_methods(
+        noisy_trials[:3], ["ls", "tls-svm"], structure="linear-steering", **options
+    )
     assert found.in_turn
     assert list(found.standings[0].errors) == [trial.name for trial in noisy_trials[:3]]
 
 
-def test_two_trials_are_enough_to_hold_each_out(noisy_trials: list[Trial], mariner: ShipModel) -> None:
+def test_two_trials_are_enough_to_hold_each_out(
+    noisy_trials: list[Trial], mariner: ShipModel
+) -> None:
     options = {"structure": "nomoto", "particulars": mariner.particulars}
     (first,) = compare_methods(noisy_trials[:2], ["ls"], **options).standings
     seen = cross_validate(noisy_trials[:2], method="ls", **options)
-    assert list(first.errors) == list(seen) == [trial.name for trial in noisy_trials[:2]]
+    assert (
+        list(first.errors) == list(seen) == [trial.name for trial in noisy_trials[:2]]
+    )
     headings = [np.degrees(metrics["rmse"]["psi"]) for metrics in seen.values()]
     assert first.heading_deg == pytest.approx(np.mean(headings))
-    with pytest.raises(InputError, match="trials: 1 to fit found, expected at least 2 to hold one out"):
+    with pytest.raises(
+        InputError, match="trials: 1 to fit found, expected at least 2 to hold one out"
+    ):
         cross_validate(noisy_trials[:1], **options)
 
 
 def test_the_four_best_are_drawn_with_the_error_of_their_headings() -> None:
     """Running means over a hundredth of 210 samples, which are two; three panels in two rows."""
     t = np.arange(210.0)
-    held = [Trial(t, {"psi": 0.1 * t}, name=f"runs/{k}.csv", use="validate") for k in range(3)]
+    held = [
+        Trial(t, {"psi": 0.1 * t}, name=f"runs/{k}.csv", use="validate")
+        for k in range(3)
+    ]
     others = [Trial(t, {"psi": t}, use="fit"), Trial(t, {"r": t}, use="validate")]
     results = {
         f"method {k}": SimpleNamespace(
             trials=[*others, *held],
-            predictions={one.name: {"psi": 0.1 * t + np.radians(0.01 * k * t)} for one in held},
+            predictions={
+                one.name: {"psi": 0.1 * t + np.radians(0.01 * k * t)} for one in held
+            },
         )
         for k in range(6)
     }
     results["method 1"].predictions["runs/2.csv"] = None
     figure = headings_figure(SimpleNamespace(results=results, best=results["method 0"]))  # type: ignore[arg-type]
     assert figure.layout.height == 540
-    drawn = {axis: [one for one in figure.data if one.xaxis == axis] for axis in ("x", "x2", "x3")}
+    drawn = {
+        axis: [one for one in figure.data if one.xaxis == axis]
+        for axis in ("x", "x2", "x3")
+    }
     assert [len(lines) for lines in drawn.values()] == [4, 4, 3]
     assert [line.name for line in drawn["x"]] == [f"method {k}" for k in range(4)]
     np.testing.assert_allclose(drawn["x"][2].x, t[1:] - 0.5)
@@ -130,7 +165,9 @@ def test_the_four_best_are_drawn_with_the_error_of_their_headings() -> None:
     np.testing.assert_array_equal(_smoothed(t[:199] ** 2), t[:199] ** 2)
 
 
-def test_what_cannot_be_compared_is_named(noisy_trials: list[Trial], mariner: ShipModel) -> None:
+def test_what_cannot_be_compared_is_named(
+    noisy_trials: list[Trial], mariner: ShipModel
+) -> None:
     options = {"particulars": mariner.particulars}
     with pytest.raises(InputError, match="method: 'lsq'"):
         compare_methods(noisy_trials, ["ls", "lsq"], **options)
@@ -138,7 +175,9 @@ def test_what_cannot_be_compared_is_named(noisy_trials: list[Trial], mariner: Sh
         compare_methods(noisy_trials, [], **options)
     with pytest.raises(InputError, match="1 to fit and none to validate found"):
         compare_methods(noisy_trials[:1], ["ls"], **options)
-    with pytest.raises(InputError, match="settings: folds found, which none of the methods ls knows"):
+    with pytest.raises(
+        InputError, match="settings: folds found, which none of the methods ls knows"
+    ):
         compare_methods(noisy_trials, ["ls"], folds=3, **options)
     with pytest.raises(InputError, match="expected structure 'grey-box'"):
         compare_methods(noisy_trials, ["rm-svm"], **options)
@@ -163,9 +202,15 @@ def test_a_single_trial_is_held_out_in_pieces_that_cover_it(
         build_samples(noisy_trials[:1], get_structure("abkowitz"), mariner.particulars),
     )
     held = list(held_out_rows([trial], samples, "trials"))
-    np.testing.assert_array_equal(np.concatenate([piece.t for _, piece in held]), trial.t)
-    assert [piece.name for _, piece in held] == [f"{trial.name}, part {n}" for n in (1, 2, 3)]
-    both = build_samples(noisy_trials[:2], get_structure("abkowitz"), mariner.particulars)
+    np.testing.assert_array_equal(
+        np.concatenate([piece.t for _, piece in held]), trial.t
+    )
+    assert [piece.name for _, piece in held] == [
+        f"{trial.name}, part {n}" for n in (1, 2, 3)
+    ]
+    both = build_samples(
+        noisy_trials[:2], get_structure("abkowitz"), mariner.particulars
+    )
     for k, (rows, other) in enumerate(held_out_rows(noisy_trials[:2], both, "trials")):
         assert other is noisy_trials[k]
         assert set(both.trial[rows]) == {1 - k}

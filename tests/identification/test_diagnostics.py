@@ -26,7 +26,9 @@ def test_variance_inflation_of_two_correlated_features() -> None:
     a, b, c = np.linalg.qr(rng.standard_normal((400, 3)))[0].T * 20.0
     correlated = 0.8 * a + 0.6 * b
     factors = variance_inflation(np.column_stack([a, correlated, c]))
-    np.testing.assert_allclose(factors, [1 / (1 - 0.64), 1 / (1 - 0.64), 1.0], rtol=1e-9)
+    np.testing.assert_allclose(
+        factors, [1 / (1 - 0.64), 1 / (1 - 0.64), 1.0], rtol=1e-9
+    )
     twice, alone = variance_inflation(np.column_stack([a, -a, c]))[[0, 2]]
     assert twice > 1e10
     assert alone == pytest.approx(1.0)
@@ -48,32 +50,44 @@ def test_fit_without_noise_explains_everything(cao_fit: IdentificationResult) ->
 
 
 def test_collinear_terms_of_a_zigzag_are_named(cao_fit: IdentificationResult) -> None:
-    pairs = {(first, second) for first, second, _ in cao_fit.diagnostics["v"].collinear_pairs}
+    pairs = {
+        (first, second) for first, second, _ in cao_fit.diagnostics["v"].collinear_pairs
+    }
     assert ("Y_d", "Y_ddd") in pairs
 
 
 def test_diagnostics_are_plain_values(noisy_fit: IdentificationResult) -> None:
-    text = json.dumps({q: fit.to_dict() for q, fit in noisy_fit.diagnostics.items()}, allow_nan=False)
+    text = json.dumps(
+        {q: fit.to_dict() for q, fit in noisy_fit.diagnostics.items()}, allow_nan=False
+    )
     assert json.loads(text)["r"]["terms"] == 15
 
 
 def with_rudder(delta_deg: np.ndarray, step: float = 0.5) -> Trial:
-    channels = {name: np.zeros(len(delta_deg)) for name in "uvr"} | {"delta": np.radians(delta_deg)}
+    channels = {name: np.zeros(len(delta_deg)) for name in "uvr"} | {
+        "delta": np.radians(delta_deg)
+    }
     return Trial(step * np.arange(len(delta_deg)), channels, name="straight.csv")
 
 
 @pytest.mark.parametrize("samples", [40, 400, 20000])
 @pytest.mark.parametrize("noise", [0.05, 0.15, 0.4])
-def test_noise_on_a_constant_rudder_moves_nothing(mariner: ShipModel, samples: int, noise: float) -> None:
+def test_noise_on_a_constant_rudder_moves_nothing(
+    mariner: ShipModel, samples: int, noise: float
+) -> None:
     for seed in range(5):
         delta = 10.0 + noise * np.random.default_rng(seed).standard_normal(samples)
-        with pytest.raises(InputError, match=r"straight\.csv.*stays at (9\.[789]|10\.[0123]).*zigzag"):
+        with pytest.raises(
+            InputError, match=r"straight\.csv.*stays at (9\.[789]|10\.[0123]).*zigzag"
+        ):
             check_trials([with_rudder(delta)], mariner.table)
 
 
 @pytest.mark.parametrize("noise", [0.0, 0.15])
 @pytest.mark.parametrize("row", [0, 150, 399])
-def test_an_outlier_on_a_constant_rudder_moves_nothing(mariner: ShipModel, row: int, noise: float) -> None:
+def test_an_outlier_on_a_constant_rudder_moves_nothing(
+    mariner: ShipModel, row: int, noise: float
+) -> None:
     delta = -5.0 + noise * np.random.default_rng(0).standard_normal(400)
     delta[row] = 30.0
     with pytest.raises(InputError, match=r"stays at -(4\.9|5\.0)\d deg throughout"):
@@ -91,18 +105,23 @@ def test_small_zigzags_and_coarse_ones_move(
 
 def test_a_short_zigzag_in_a_long_record_moves(mariner: ShipModel) -> None:
     delta = 0.15 * np.random.default_rng(0).standard_normal(20000)
-    delta[9000:9150] += zigzag(mariner, 10, 10, duration=150, dt=1.0)["delta"][:150] * 180.0 / np.pi
+    delta[9000:9150] += (
+        zigzag(mariner, 10, 10, duration=150, dt=1.0)["delta"][:150] * 180.0 / np.pi
+    )
     check_trials([with_rudder(delta)], mariner.table)
 
 
 @pytest.mark.parametrize(
-    ("noise_deg", "limit_deg"), [(0.0, 0.5), (0.08, 0.5), (0.2, 1.2), (0.45, 2.7), (0.6, 3.0)]
+    ("noise_deg", "limit_deg"),
+    [(0.0, 0.5), (0.08, 0.5), (0.2, 1.2), (0.45, 2.7), (0.6, 3.0)],
 )
 def test_a_rudder_moves_by_half_a_degree_and_six_times_its_noise_but_for_three_degrees(
     noise_deg: float, limit_deg: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """For three samples at least: two beside each other are outliers."""
-    monkeypatch.setattr(diagnostics.preprocess, "noise_level", lambda t, values: np.radians(noise_deg))
+    monkeypatch.setattr(
+        diagnostics.preprocess, "noise_level", lambda t, values: np.radians(noise_deg)
+    )
     t, plateau = np.arange(100.0), np.zeros(100)
     for size, samples, still in ((0.98, 3, True), (1.02, 3, False), (9.0, 2, True)):
         plateau[50:53] = 0.0
@@ -111,7 +130,10 @@ def test_a_rudder_moves_by_half_a_degree_and_six_times_its_noise_but_for_three_d
 
 
 def test_orders_at_every_sample_are_no_noise(mariner: ShipModel) -> None:
-    check_trials([with_rudder(np.random.default_rng(0).choice([-10.0, 10.0], 300))], mariner.table)
+    check_trials(
+        [with_rudder(np.random.default_rng(0).choice([-10.0, 10.0], 300))],
+        mariner.table,
+    )
 
 
 @pytest.mark.parametrize("apart", [1e-9, 1e-6, 4e-5])
@@ -120,8 +142,15 @@ def test_times_that_nearly_coincide_are_refused(
 ) -> None:
     run = noisy_trials[0]
     t = np.insert(run.t, 101, run.t[100] + apart)
-    twice = Trial(t, {c: np.insert(v, 101, v[100]) for c, v in run.channels.items()}, name="twice.csv")
-    message = r"twice\.csv': samples at 100 and 100\.0000\d+ s are only .* remove the repeated row"
+    twice = Trial(
+        t,
+        {c: np.insert(v, 101, v[100]) for c, v in run.channels.items()},
+        name="twice.csv",
+    )
+    message = (
+        r"twice\.csv': samples at 100 and 100\.0000\d+ s are only .* remove the"
+        r" repeated row"
+    )
     with pytest.raises(InputError, match=message):
         identify([twice], particulars=mariner.particulars)
 
@@ -132,7 +161,9 @@ def test_the_shortest_step_is_a_ten_thousandth_of_the_usual_one() -> None:
         return Trial(np.append(t, t[-1] + shortest), {"u": np.ones(10)}, name="run")
 
     diagnostics._check_steps(stepping(2.05e-4))
-    with pytest.raises(InputError, match=r"only 0\.00019 s apart, expected a step near the usual 2 s"):
+    with pytest.raises(
+        InputError, match=r"only 0\.00019 s apart, expected a step near the usual 2 s"
+    ):
         diagnostics._check_steps(stepping(1.9e-4))
 
 
@@ -143,7 +174,9 @@ def test_each_equation_tells_its_numbers() -> None:
     b = np.where(rows // 2 % 2 == 0, 100.0, -100.0)
     error = 0.5 * np.where(rows // 4 % 2 == 0, 1.0, -1.0)
     X, y = np.column_stack([a, b]), 300.0 * a + error
-    samples = Samples({"r": X}, {"r": y}, 1.0 * rows, np.ones(400), np.zeros(400, dtype=np.int64), 1)
+    samples = Samples(
+        {"r": X}, {"r": y}, 1.0 * rows, np.ones(400), np.zeros(400, dtype=np.int64), 1
+    )
     fit = LSSVM(C=np.inf, fit_intercept=False).fit(X, y)
     found = diagnose({"r": fit}, samples, get_structure("nomoto"))["r"]
     assert (found.samples, found.terms, found.rank) == (400, 2, 2)
@@ -155,9 +188,9 @@ def test_each_equation_tells_its_numbers() -> None:
     assert found.residual_autocorrelation[3] == pytest.approx(-0.99)
     assert len(found.residual_autocorrelation) == 10
     alike = replace(samples, features={"r": np.column_stack([a, a + 1e-6 * b])})
-    ((first, second, correlation),) = diagnose({"r": fit}, alike, get_structure("nomoto"))[
-        "r"
-    ].collinear_pairs
+    ((first, second, correlation),) = diagnose(
+        {"r": fit}, alike, get_structure("nomoto")
+    )["r"].collinear_pairs
     assert (first, second) == get_structure("nomoto").names("r")
     assert correlation == pytest.approx(1.0, abs=1e-3)
 

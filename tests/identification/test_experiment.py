@@ -23,7 +23,14 @@ from identification.design.experiment import (
     fisher_information,
     standard_candidates,
 )
-from shipgym import InputError, Particulars, ShipModel, SteeringGear, Trial, UnstableModelError
+from shipgym import (
+    InputError,
+    Particulars,
+    ShipModel,
+    SteeringGear,
+    Trial,
+    UnstableModelError,
+)
 from shipgym.manoeuvres import turning_circle, zigzag
 from shipgym.ships import converted_model, get_structure
 
@@ -34,7 +41,9 @@ SIGMA = 2e-5  # noise of the yaw rate, rad/s
 
 @pytest.fixture(scope="module")
 def ship() -> ShipModel:
-    return ShipModel("virtual", "norrbin", PARTICULARS, SteeringGear(35.0, 5.0, 1.0), COEFFICIENTS)
+    return ShipModel(
+        "virtual", "norrbin", PARTICULARS, SteeringGear(35.0, 5.0, 1.0), COEFFICIENTS
+    )
 
 
 def recorded(run: Trial, name: str, seed: int = 0) -> Trial:
@@ -49,7 +58,9 @@ def gentle(ship: ShipModel, seed: int = 0) -> Trial:
 
 def test_information_adds_over_trials(ship: ShipModel) -> None:
     runs = [gentle(ship), recorded(turning_circle(ship, 20, 300, 0.5), "turn")]
-    parts = [build_samples([run], ship.table, PARTICULARS, "integral", 10) for run in runs]
+    parts = [
+        build_samples([run], ship.table, PARTICULARS, "integral", 10) for run in runs
+    ]
     both = build_samples(runs, ship.table, PARTICULARS, "integral", 10)
     noise = {"r": 1e-9}
     total = sum(fisher_information(ship, part, noise) for part in parts)
@@ -57,15 +68,21 @@ def test_information_adds_over_trials(ship: ShipModel) -> None:
     assert np.all(np.linalg.eigvalsh(total) > 0.0)
 
 
-def test_information_is_the_inverse_of_the_covariance_of_least_squares(ship: ShipModel) -> None:
+def test_information_is_the_inverse_of_the_covariance_of_least_squares(
+    ship: ShipModel,
+) -> None:
     samples = build_samples([gentle(ship)], ship.table, PARTICULARS, "integral", 10)
     X = samples.features["r"]
     np.testing.assert_allclose(
-        np.linalg.inv(fisher_information(ship, samples, {"r": 4.0})), 4.0 * np.linalg.inv(X.T @ X), rtol=1e-8
+        np.linalg.inv(fisher_information(ship, samples, {"r": 4.0})),
+        4.0 * np.linalg.inv(X.T @ X),
+        rtol=1e-8,
     )
 
 
-def test_the_advised_manoeuvre_really_shrinks_the_error_in_a_refit(ship: ShipModel) -> None:
+def test_the_advised_manoeuvre_really_shrinks_the_error_in_a_refit(
+    ship: ShipModel,
+) -> None:
     """A gentle zigzag hardly tells the cubic term; refits with each candidate show which one helps most."""
     first = gentle(ship)
     times = {"duration": 600.0, "dt": 0.5}
@@ -80,9 +97,16 @@ def test_the_advised_manoeuvre_really_shrinks_the_error_in_a_refit(ship: ShipMod
     def scatter(name: str) -> float:
         found = []
         for seed in range(12):
-            runs = [gentle(ship, seed), recorded(candidates[name](ship), name, 100 + seed)]
-            samples = build_samples(runs, ship.table, PARTICULARS, "integral", 4, smooth=False)
-            coefficients = np.linalg.lstsq(samples.features["r"], samples.targets["r"], rcond=None)[0]
+            runs = [
+                gentle(ship, seed),
+                recorded(candidates[name](ship), name, 100 + seed),
+            ]
+            samples = build_samples(
+                runs, ship.table, PARTICULARS, "integral", 4, smooth=False
+            )
+            coefficients = np.linalg.lstsq(
+                samples.features["r"], samples.targets["r"], rcond=None
+            )[0]
             found.append(coefficients[1])
         return float(np.std(found))
 
@@ -113,7 +137,9 @@ def test_criteria_ask_for_volume_longest_axis_or_one_coefficient() -> None:
         return _gains(known, offers, size, criterion, at)
 
     assert gains("E") == pytest.approx({"first": 1.0, "longest": 4.0})
-    assert gains("D") == pytest.approx({"first": (1.0 + 1e6) ** (1 / 6), "longest": 16 ** (1 / 6)})
+    assert gains("D") == pytest.approx(
+        {"first": (1.0 + 1e6) ** (1 / 6), "longest": 16 ** (1 / 6)}
+    )
     assert gains("c", 2) == pytest.approx({"first": 1.0, "longest": 4.0})
     assert gains("c", 1) == pytest.approx({"first": 1.0, "longest": 1.0})
 
@@ -121,7 +147,11 @@ def test_criteria_ask_for_volume_longest_axis_or_one_coefficient() -> None:
 def test_advice_for_an_identified_mariner_of_forty_coefficients() -> None:
     mariner = shipgym.load_model("mariner")
     run = zigzag(mariner, 10, 10, duration=400, dt=0.5)
-    trial = Trial(run.t, {c: run[c] for c in ("x", "y", "psi", "u", "v", "r", "delta")}, name="10/10")
+    trial = Trial(
+        run.t,
+        {c: run[c] for c in ("x", "y", "psi", "u", "v", "r", "delta")},
+        name="10/10",
+    )
     advice = advise(mariner, [trial], criterion="D")
     assert set(advice.before) == set(get_structure("abkowitz").coefficient_names)
     assert "zigzag 5/5" not in advice.chosen
@@ -133,10 +163,17 @@ def test_a_grey_box_that_explains_her_trials_is_certain_of_her_coefficients() ->
     """The accelerations that the reference ship explains are not counted as noise."""
     mariner = shipgym.load_model("mariner")
     blank = converted_model("mariner", mariner.particulars, mariner.steering)
-    coefficients = {name: -0.1 if name in ("a_du", "b_v", "c_r") else 0.01 for name in blank.coefficients}
+    coefficients = {
+        name: -0.1 if name in ("a_du", "b_v", "c_r") else 0.01
+        for name in blank.coefficients
+    }
     box = replace(blank, coefficients=coefficients)
     run = zigzag(box, 20, 20, duration=600, dt=0.5)
-    trial = Trial(run.t, {c: run[c] for c in ("x", "y", "psi", "u", "v", "r", "delta")}, name="20/20")
+    trial = Trial(
+        run.t,
+        {c: run[c] for c in ("x", "y", "psi", "u", "v", "r", "delta")},
+        name="20/20",
+    )
     assert max(advise(box, [trial], {"same": gentle}).before.values()) < 0.1
 
 
@@ -146,12 +183,20 @@ def test_what_cannot_be_advised_is_named(ship: ShipModel) -> None:
     with pytest.raises(InputError, match="coefficient: 'Y_v' found"):
         advise(ship, [gentle(ship)], coefficient="Y_v")
     for criterion in ("D", "E"):
-        with pytest.raises(InputError, match=f"which criterion '{criterion}' has no use for"):
-            advise(ship, [gentle(ship)], criterion=criterion, coefficient=next(iter(ship.coefficients)))
+        with pytest.raises(
+            InputError, match=f"which criterion '{criterion}' has no use for"
+        ):
+            advise(
+                ship,
+                [gentle(ship)],
+                criterion=criterion,
+                coefficient=next(iter(ship.coefficients)),
+            )
     with pytest.raises(InputError, match="trials: none found"):
         advise(ship, [])
     with pytest.raises(
-        InputError, match="structure: 'container' found, expected a table of terms, as 'abkowitz'"
+        InputError,
+        match="structure: 'container' found, expected a table of terms, as 'abkowitz'",
     ):
         advise(shipgym.load_model("container"), [gentle(ship)])
 
@@ -160,7 +205,9 @@ def test_candidates_that_no_ship_survives_are_refused(ship: ShipModel) -> None:
     def lost(model: ShipModel) -> Trial:
         raise UnstableModelError("lost", 1.0, {})
 
-    with pytest.raises(InputError, match="candidates: 1 found, none that model 'virtual' survives"):
+    with pytest.raises(
+        InputError, match="candidates: 1 found, none that model 'virtual' survives"
+    ):
         advise(ship, [gentle(ship)], {"hard": lost})
     both = {"hard": lost, "gentle": gentle}
     assert list(advise(ship, [gentle(ship)], both).steps[0]) == ["gentle"]
@@ -175,13 +222,18 @@ def test_the_condition_of_a_trial_does_not_depend_on_units(ship: ShipModel) -> N
     X = _regression(ship, trial).features["r"]
     assert np.sqrt(np.mean(X**2, axis=0)).min() < 0.1
     scaled = X / np.sqrt(np.mean(X**2, axis=0))
-    assert known.condition_number["r"] == pytest.approx(np.linalg.cond(scaled), rel=1e-9)
+    assert known.condition_number["r"] == pytest.approx(
+        np.linalg.cond(scaled), rel=1e-9
+    )
     moment = np.linalg.inv(scaled.T @ scaled / len(scaled))
-    np.testing.assert_allclose(list(known.inflation.values()), np.diag(moment), rtol=1e-6)
+    np.testing.assert_allclose(
+        list(known.inflation.values()), np.diag(moment), rtol=1e-6
+    )
 
 
 @pytest.mark.parametrize(
-    ("samples", "dt", "window"), [(200, 0.5, 8), (40, 0.1, 4), (90, 20.0, 1), (9, 0.1, 1)]
+    ("samples", "dt", "window"),
+    [(200, 0.5, 8), (40, 0.1, 4), (90, 20.0, 1), (9, 0.1, 1)],
 )
 def test_windows_last_a_fifth_of_a_ship_length_but_a_tenth_of_a_short_trial(
     ship: ShipModel, samples: int, dt: float, window: int
@@ -189,7 +241,9 @@ def test_windows_last_a_fifth_of_a_ship_length_but_a_tenth_of_a_short_trial(
     """A ship length takes 20.85 s, a fifth of it 4.17 s; a window has a step at least."""
     t = dt * np.arange(samples)
     swing = np.sin(2.0 * np.pi * t / t[-1])
-    trial = Trial(t, {"u": 7.0 + 0.0 * t, "v": 0.0 * t, "r": 0.01 * swing, "delta": 0.1 * swing})
+    trial = Trial(
+        t, {"u": 7.0 + 0.0 * t, "v": 0.0 * t, "r": 0.01 * swing, "delta": 0.1 * swing}
+    )
     assert _regression(ship, trial).window == window
 
 
@@ -200,7 +254,10 @@ def test_noise_is_what_the_model_leaves_over_all_trials_and_of_exact_data_the_ro
     exact = X @ (ship.acceleration_matrix @ np.array(list(ship.coefficients.values())))
 
     def noise(*targets: np.ndarray) -> float:
-        return _noise(ship, [SimpleNamespace(features={"r": X}, targets={"r": one}) for one in targets])["r"]
+        return _noise(
+            ship,
+            [SimpleNamespace(features={"r": X}, targets={"r": one}) for one in targets],
+        )["r"]
 
     assert noise(exact + 1e3, exact - 3e3) == pytest.approx((1e6 + 9e6) / 2.0)
     assert noise(exact) == pytest.approx(1e-12 * np.mean(exact**2))
@@ -210,23 +267,40 @@ def test_noise_is_what_the_model_leaves_over_all_trials_and_of_exact_data_the_ro
 
 def test_an_error_is_felt_by_the_acceleration_that_it_is_a_part_of() -> None:
     """A tenth of the sway by the rudder is more in m/s^2, a third of the yaw more of its equation."""
-    given = {"b_v": -1.0, "b_r": -0.3, "b_d": -1.0, "c_v": -0.3, "c_r": -1.0, "c_d": 0.5}
-    model = ShipModel("virtual", "linear-steering", PARTICULARS, SteeringGear(35.0, 5.0, 1.0), given)
+    given = {
+        "b_v": -1.0,
+        "b_r": -0.3,
+        "b_d": -1.0,
+        "c_v": -0.3,
+        "c_r": -1.0,
+        "c_d": 0.5,
+    }
+    model = ShipModel(
+        "virtual", "linear-steering", PARTICULARS, SteeringGear(35.0, 5.0, 1.0), given
+    )
     size = np.abs(list(given.values()))
     assert _most_felt(model, size * [0.0, 0.0, 0.1, 0.0, 0.0, 0.3]) == "c_d"
     assert _most_felt(model, size * [0.0, 0.0, 0.3, 0.0, 0.0, 0.1]) == "b_d"
 
 
 def test_what_is_not_excited_is_uncertain_beyond_measure_but_not_infinitely() -> None:
-    np.testing.assert_allclose(_errors(np.diag([4.0, 0.0]), np.array([1.0, 1.0])), [0.5, 0.5e7])
-    np.testing.assert_allclose(_errors(np.diag([4.0, 1.0]), np.array([2.0, 0.1])), [0.25, 10.0])
+    np.testing.assert_allclose(
+        _errors(np.diag([4.0, 0.0]), np.array([1.0, 1.0])), [0.5, 0.5e7]
+    )
+    np.testing.assert_allclose(
+        _errors(np.diag([4.0, 1.0]), np.array([2.0, 0.1])), [0.25, 10.0]
+    )
 
 
 def test_candidates_go_up_to_the_rudders_limit(ship: ShipModel) -> None:
     def angles(limit: float) -> list[str]:
         gear = replace(ship.steering, rudder_limit_deg=limit)
         names = standard_candidates(replace(ship, steering=gear))
-        return [name.removeprefix("turning circle ") for name in names if name.startswith("turning")]
+        return [
+            name.removeprefix("turning circle ")
+            for name in names
+            if name.startswith("turning")
+        ]
 
     assert angles(40.0) == ["5", "10", "20", "35"]
     assert angles(33.0) == ["5", "10", "20", "33"]
@@ -237,20 +311,37 @@ def test_candidates_go_up_to_the_rudders_limit(ship: ShipModel) -> None:
     assert times["dt"] == pytest.approx(160.93 / 7.7175 / 60.0)
 
 
-@pytest.mark.parametrize(("told", "shares"), [((0.02, 0.03), ("40", "60")), ((0.0, 0.0), ("0", "0"))])
+@pytest.mark.parametrize(
+    ("told", "shares"), [((0.02, 0.03), ("40", "60")), ((0.0, 0.0), ("0", "0"))]
+)
 def test_each_trial_has_its_share_of_the_information(
     told: tuple[float, float], shares: tuple[str, str]
 ) -> None:
     trials = tuple(
-        TrialInformation(f"run {k}", {"r": 3.0}, {"c_r": 1.0, "c_d": 2.6}, np.diag([9.0, one]))
+        TrialInformation(
+            f"run {k}", {"r": 3.0}, {"c_r": 1.0, "c_d": 2.6}, np.diag([9.0, one])
+        )
         for k, one in enumerate(told)
     )
     errors = {"c_r": 0.1, "c_d": 0.5}
-    text = str(Advice("c", "c_d", trials, errors, ({"turn": 1.5, "zigzag": 2.0},), ("zigzag",), errors))
+    text = str(
+        Advice(
+            "c",
+            "c_d",
+            trials,
+            errors,
+            ({"turn": 1.5, "zigzag": 2.0},),
+            ("zigzag",),
+            errors,
+        )
+    )
     for k, share in enumerate(shares):
         (row,) = (line for line in text.splitlines() if f"run {k}" in line)
         assert [cell.strip() for cell in row.split("│")[1:-1]] == [
-            f"run {k}", "r 3", "3 (c_d)", f"{share} % of all"
-        ]  # fmt: skip
+            f"run {k}",
+            "r 3",
+            "3 (c_d)",
+            f"{share} % of all",
+        ]
     assert text.index("zigzag") < text.index("turn ")
     assert "2.00 *" in text

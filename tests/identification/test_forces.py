@@ -19,13 +19,27 @@ from identification.regression.forces import (
     identify_forces,
 )
 from shipgym import InputError, Particulars, ShipModel, Trial
-from shipgym.manoeuvres.towing_tank import Tank, pure_surge, pure_sway, pure_yaw, static_drift, yaw_with_drift
+from shipgym.manoeuvres.towing_tank import (
+    Tank,
+    pure_surge,
+    pure_sway,
+    pure_yaw,
+    static_drift,
+    yaw_with_drift,
+)
 from shipgym.ships.shared_structure import VR, Share, read_shares, shared_structure
 from shipgym.ships.structures import get_structure
 
 # a stand-in for what the paper does not print: a coaster's mass
 PARTICULARS = Particulars(
-    length=28.9, beam=9.6, draught=2.7, mass=417e3, speed=5.0, xg=-0.5, yaw_gyradius=7.2, water_density=1025.0
+    length=28.9,
+    beam=9.6,
+    draught=2.7,
+    mass=417e3,
+    speed=5.0,
+    xg=-0.5,
+    yaw_gyradius=7.2,
+    water_density=1025.0,
 )
 SHIP = xu_ship(PARTICULARS)
 PRIME_MASS = 0.5 * 1025.0 * 28.9**3
@@ -35,11 +49,15 @@ PRIME_MASS = 0.5 * 1025.0 * 28.9**3
 def tank_tests(noise: float = 0.0, model_inertia: bool = True) -> tuple[Trial, ...]:
     tank = Tank(noise=noise, model_inertia=model_inertia)
     runs = [
-        pure_surge(SHIP, 0.5, tank=tank), pure_sway(SHIP, 0.5, tank=tank), pure_sway(SHIP, 1.5, tank=tank),
-        pure_yaw(SHIP, 3.0, tank=tank), pure_yaw(SHIP, 6.0, tank=tank),
-        yaw_with_drift(SHIP, 4.0, 6.0, tank=tank), yaw_with_drift(SHIP, 4.0, -12.0, tank=tank),
+        pure_surge(SHIP, 0.5, tank=tank),
+        pure_sway(SHIP, 0.5, tank=tank),
+        pure_sway(SHIP, 1.5, tank=tank),
+        pure_yaw(SHIP, 3.0, tank=tank),
+        pure_yaw(SHIP, 6.0, tank=tank),
+        yaw_with_drift(SHIP, 4.0, 6.0, tank=tank),
+        yaw_with_drift(SHIP, 4.0, -12.0, tank=tank),
         static_drift(SHIP, [-15.0, -8.0, -4.0, 4.0, 8.0, 15.0], tank=tank),
-    ]  # fmt: skip
+    ]
     return tuple(run.with_(name=f"{i}") for i, run in enumerate(runs))
 
 
@@ -49,7 +67,10 @@ def test_the_models_have_the_coefficients_of_the_paper() -> None:
     assert set(PMM18.coefficient_names) == TABLE_11.keys()
     assert TABLE_11.keys() < set(PMM38.coefficient_names)
     for table, counts in ((PMM38, (10, 14, 14)), (PMM18, (5, 6, 7))):
-        owned = [sum(name[0] == letter for name in table.coefficient_names) for letter in "XYN"]
+        owned = [
+            sum(name[0] == letter for name in table.coefficient_names)
+            for letter in "XYN"
+        ]
         assert tuple(owned) == counts
     assert {"Y_vdot", "Y_rdot"} < set(PMM18.names("u"))
     assert "X_udot" in PMM18.names("v")
@@ -80,27 +101,38 @@ def test_a_kept_acceleration_feels_mass_and_added_mass() -> None:
     rates = SHIP.derivatives([0.0, 0.0, 0.0, U * u, U * v, 0.0, 0.0], [0.0])
     udot, vdot, rdot = rates[3] * L / U**2, rates[4] * L / U**2, rates[5] * (L / U) ** 2
     c = TABLE_11
-    assert udot == pytest.approx((c["X_uuu"] * u**3 + c["X_uvv"] * u * v * v) / (m - c["X_udot"]))
+    assert udot == pytest.approx(
+        (c["X_uuu"] * u**3 + c["X_uvv"] * u * v * v) / (m - c["X_udot"])
+    )
     Y = c["Y_uuv"] * u * u * v + c["Y_v|v|"] * v * abs(v)
     N = (c["Y_vdot"] - c["X_udot"]) * u * v + c["N_uuv"] * u * u * v
     static, yaw = m * -0.5 / L, m * ((7.2 / L) ** 2 + (0.5 / L) ** 2)
     assert (m - c["Y_vdot"]) * vdot + (static - c["Y_rdot"]) * rdot == pytest.approx(Y)
-    assert (static - c["N_vdot"]) * vdot + (yaw - c["N_rdot"]) * rdot == pytest.approx(N)
+    assert (static - c["N_vdot"]) * vdot + (yaw - c["N_rdot"]) * rdot == pytest.approx(
+        N
+    )
 
 
 @pytest.mark.parametrize("model_inertia", [True, False])
 def test_table_11_is_recovered_from_the_virtual_tank(model_inertia: bool) -> None:
     """Added mass, and coefficients that stand in three equations, from all tests at once."""
     model = identify_forces(
-        tank_tests(model_inertia=model_inertia), "pmm18", PARTICULARS, model_inertia=model_inertia
+        tank_tests(model_inertia=model_inertia),
+        "pmm18",
+        PARTICULARS,
+        model_inertia=model_inertia,
     )
-    np.testing.assert_allclose(list(model.coefficients.values()), list(SHIP.coefficients.values()), rtol=1e-6)
+    np.testing.assert_allclose(
+        list(model.coefficients.values()), list(SHIP.coefficients.values()), rtol=1e-6
+    )
 
 
 def test_noise_is_told_by_the_standard_errors() -> None:
     model = identify_forces(tank_tests(noise=0.05), "pmm18", PARTICULARS, method="ls")
     assert model.covariance is not None
-    errors = np.array(list(model.coefficients.values())) - list(SHIP.coefficients.values())
+    errors = np.array(list(model.coefficients.values())) - list(
+        SHIP.coefficients.values()
+    )
     t = errors / np.sqrt(np.diag(model.covariance))
     assert 0.3 < np.sqrt(np.mean(t**2)) < 2.0
     assert np.abs(t).max() < 5.0
@@ -113,10 +145,14 @@ def test_each_force_has_the_noise_of_its_own_residuals() -> None:
     for run in tank_tests(noise=0.05):
         spoilt = run["X"] + 3.0 * np.std(run["X"]) * rng.standard_normal(len(run))
         channels = {name: run[name] for name in run.channels} | {"X": spoilt}
-        runs.append(Trial(run.t, channels, name=run.name, kind="captive", length=run.length))
+        runs.append(
+            Trial(run.t, channels, name=run.name, kind="captive", length=run.length)
+        )
     model = identify_forces(runs, "pmm18", PARTICULARS, method="ls")
     assert model.covariance is not None
-    errors = np.array(list(model.coefficients.values())) - list(SHIP.coefficients.values())
+    errors = np.array(list(model.coefficients.values())) - list(
+        SHIP.coefficients.values()
+    )
     t = errors / np.sqrt(np.diag(model.covariance))
     for force in "XN":
         own = [name[0] == force for name in model.coefficients]
@@ -159,14 +195,23 @@ def test_a_table_of_shares_survives_its_file(tmp_path) -> None:  # type: ignore[
 
 def test_trials_of_the_other_kind_are_refused() -> None:
     free = SHIP.simulate(np.zeros((600, 1)), 0.1)
-    with pytest.raises(InputError, match="'pmm18' found, which is identified from captive tests"):
+    with pytest.raises(
+        InputError, match="'pmm18' found, which is identified from captive tests"
+    ):
         identify([free], "pmm18", particulars=PARTICULARS)
-    with pytest.raises(InputError, match="channel 'X' is missing, structure 'pmm18' needs"):
+    with pytest.raises(
+        InputError, match="channel 'X' is missing, structure 'pmm18' needs"
+    ):
         identify_forces([free], "pmm18", PARTICULARS)
-    with pytest.raises(InputError, match="'abkowitz' found, which is identified from free-running trials"):
+    with pytest.raises(
+        InputError,
+        match="'abkowitz' found, which is identified from free-running trials",
+    ):
         identify_forces(tank_tests(), "abkowitz", PARTICULARS)
     with pytest.raises(InputError, match="mass of the ship and the added mass"):
-        ShipModel("wrong", "pmm18", PARTICULARS, SHIP.steering, TABLE_11 | {"Y_vdot": 1.0}).ship_numbers()
+        ShipModel(
+            "wrong", "pmm18", PARTICULARS, SHIP.steering, TABLE_11 | {"Y_vdot": 1.0}
+        ).ship_numbers()
     with pytest.raises(InputError, match="structure: name: ' ' found"):
         replace(PMM18, name=" ")
 
@@ -179,28 +224,39 @@ def test_rows_of_the_regression_know_their_force_and_their_trial() -> None:
     assert found.equation.shape == found.trial.shape == (rows,)
     of_axis = [found.trial[found.equation == k].tolist() for k in range(3)]
     assert of_axis[0] == of_axis[1] == of_axis[2] == sorted(of_axis[0])
-    assert {k: of_axis[0].count(k) for k in range(3)} == {k: len(run) for k, run in enumerate(runs)}
+    assert {k: of_axis[0].count(k) for k in range(3)} == {
+        k: len(run) for k, run in enumerate(runs)
+    }
 
 
 def test_tests_that_tell_nothing_are_refused() -> None:
     run = tank_tests()[0]
     with pytest.raises(InputError, match="trials: none found, expected captive tests"):
         force_regression([], PMM18, PARTICULARS)
-    stopped = Trial(run.t, {name: 0.0 * run[name] for name in run.channels}, name="stopped")
+    stopped = Trial(
+        run.t, {name: 0.0 * run[name] for name in run.channels}, name="stopped"
+    )
     with pytest.raises(InputError, match="trial 'stopped': a ship at rest found"):
         force_regression([stopped], PMM18, PARTICULARS)
-    with pytest.raises(InputError, match="rank: 3 found with method 'ls', which keeps all"):
+    with pytest.raises(
+        InputError, match="rank: 3 found with method 'ls', which keeps all"
+    ):
         identify_forces([run], "pmm18", PARTICULARS, method="ls", rank=3)
-    with pytest.raises(InputError, match="particulars: None found, expected at least length"):
+    with pytest.raises(
+        InputError, match="particulars: None found, expected at least length"
+    ):
         identify_forces([run], "pmm18", None)
 
 
 def test_the_variance_of_a_force_is_that_of_its_own_residuals_with_one_degree_of_freedom_at_least():
     equation = np.array([0, 0, 0, 1, 1, 2])
-    residuals = np.array([[1.0, 2.0], [1.0, 2.0], [2.0, 0.0], [3.0, 1.0], [4.0, 1.0], [5.0, 6.0]])
+    residuals = np.array(
+        [[1.0, 2.0], [1.0, 2.0], [2.0, 0.0], [3.0, 1.0], [4.0, 1.0], [5.0, 6.0]]
+    )
     leverages = np.array([0.5, 0.25, 0.25, 0.9, 0.9, 1.0])
     np.testing.assert_allclose(
-        force_variances(equation, residuals, leverages), [[3.0, 4.0], [25.0, 2.0], [25.0, 36.0]]
+        force_variances(equation, residuals, leverages),
+        [[3.0, 4.0], [25.0, 2.0], [25.0, 36.0]],
     )
 
 
@@ -210,25 +266,43 @@ def test_a_static_test_is_cut_where_a_velocity_jumps_by_twenty_usual_changes() -
         u = 5.0 + 0.01 * np.append(0.0, np.cumsum(change))
         trial = Trial(np.arange(20.0), {"u": u, "v": np.zeros(20), "r": np.zeros(20)})
         assert _between_jumps(trial) == pieces
-    angle = np.repeat([0.0, 0.2, 0.4, 0.6], [5, 3, 4, 8])  # of three samples none tells an acceleration
+    angle = np.repeat(
+        [0.0, 0.2, 0.4, 0.6], [5, 3, 4, 8]
+    )  # of three samples none tells an acceleration
     held = Trial(np.arange(20.0), {"u": np.ones(20), "v": -angle, "r": np.zeros(20)})
     assert _between_jumps(held) == [slice(0, 5), slice(8, 12), slice(12, 20)]
 
 
-def test_each_force_is_scaled_by_its_root_mean_square_and_one_that_is_zero_not_at_all() -> None:
+def test_each_force_is_scaled_by_its_root_mean_square_and_one_that_is_zero_not_at_all() -> (
+    None
+):
     regression = ForceRegression(
-        np.ones((6, 1)), np.array([0.0, 0.0, 3.0, 4.0, 5.0, -5.0]), ("a",), np.repeat(np.arange(3), 2),
+        np.ones((6, 1)),
+        np.array([0.0, 0.0, 3.0, 4.0, 5.0, -5.0]),
+        ("a",),
+        np.repeat(np.arange(3), 2),
         np.tile([0, 1], 3),
-    )  # fmt: skip
-    np.testing.assert_allclose(regression.scales(), [1.0, 1.0, *[np.sqrt(12.5)] * 2, 5.0, 5.0])
+    )
+    np.testing.assert_allclose(
+        regression.scales(), [1.0, 1.0, *[np.sqrt(12.5)] * 2, 5.0, 5.0]
+    )
     found = regression.r_squared(np.array([3.5]))
-    assert (found["Y"], found["N"]) == (pytest.approx(0.0), pytest.approx(1.0 - (1.5**2 + 8.5**2) / 50.0))
+    assert (found["Y"], found["N"]) == (
+        pytest.approx(0.0),
+        pytest.approx(1.0 - (1.5**2 + 8.5**2) / 50.0),
+    )
 
 
 def test_a_test_of_jumps_alone_is_refused_and_rounding_is_none() -> None:
     steps = np.repeat([0.0, 0.2, 0.4], 3)
-    run = {name: np.ones(9) for name in ("X", "Y", "N", "u")} | {"v": -steps, "r": np.zeros(9)}
-    with pytest.raises(InputError, match="trial 'held': nowhere 4 samples between jumps of the velocity"):
+    run = {name: np.ones(9) for name in ("X", "Y", "N", "u")} | {
+        "v": -steps,
+        "r": np.zeros(9),
+    }
+    with pytest.raises(
+        InputError,
+        match="trial 'held': nowhere 4 samples between jumps of the velocity",
+    ):
         force_regression([Trial(np.arange(9.0), run, name="held")], PMM18, PARTICULARS)
     for off, pieces in ((1.9e-9, 1), (2.1e-9, 2)):  # of the largest velocity
         u = np.where(np.arange(12) < 6, 5.0, 5.0 * (1.0 + off))
@@ -241,7 +315,10 @@ def test_forces_are_those_of_the_prime_system_less_the_inertia_of_the_ship() -> 
     length, density, U, n = 28.9, 1025.0, 2.0, 8
     still = np.ones(n)
     motion = {"u": 1.6 * still, "v": 1.2 * still, "r": 0.05 * still}
-    run = Trial(np.arange(float(n)), {**motion, "X": 1e4 * still, "Y": 2e4 * still, "N": 3e5 * still})
+    run = Trial(
+        np.arange(float(n)),
+        {**motion, "X": 1e4 * still, "Y": 2e4 * still, "N": 3e5 * still},
+    )
     unit = 0.5 * density * length**2 * U**2
     plain = force_regression([run], PMM18, PARTICULARS, model_inertia=False)
     forces = [1e4 / unit, 2e4 / unit, 3e5 / unit / length]

@@ -12,7 +12,11 @@ import shipgym
 from identification import IdentificationResult, Samples, identify
 from identification.estimators.methods import fit_held
 from identification.validation import guard
-from identification.validation.guard import _runs_away, hard_turn_features, reasons_unstable
+from identification.validation.guard import (
+    _runs_away,
+    hard_turn_features,
+    reasons_unstable,
+)
 from shipgym import ShipModel, Trial
 from shipgym.manoeuvres import zigzag
 from shipgym.ships import get_structure
@@ -20,26 +24,39 @@ from shipgym.ships import get_structure
 
 def runaway(model: ShipModel) -> ShipModel:
     """The ship with yaw damping turned into its opposite."""
-    return replace(model, coefficients=model.coefficients | {"N_r": -model.coefficients["N_r"]})
+    return replace(
+        model, coefficients=model.coefficients | {"N_r": -model.coefficients["N_r"]}
+    )
 
 
 def test_the_reference_ship_passes(mariner: ShipModel, cao_zigzag: Trial) -> None:
     assert reasons_unstable(mariner, [cao_zigzag]) == []
 
 
-def test_a_ship_that_runs_away_is_found_with_the_reason(mariner: ShipModel, cao_zigzag: Trial) -> None:
+def test_a_ship_that_runs_away_is_found_with_the_reason(
+    mariner: ShipModel, cao_zigzag: Trial
+) -> None:
     reasons = reasons_unstable(runaway(mariner), [cao_zigzag])
     assert "trial 'zigzag_15_15', open loop" in reasons[0]
-    assert any("turning circle" in reason for reason in reasons_unstable(runaway(mariner), []))
+    assert any(
+        "turning circle" in reason for reason in reasons_unstable(runaway(mariner), [])
+    )
 
 
-def test_a_ship_that_resonates_is_found_by_reversing_the_rudder(mariner: ShipModel) -> None:
+def test_a_ship_that_resonates_is_found_by_reversing_the_rudder(
+    mariner: ShipModel,
+) -> None:
     """A restoring moment and hardly any damping: she turns steadily, but swings up where the rudder does."""
     c = mariner.coefficients
-    swinging = replace(mariner, coefficients=c | {"N_v": -c["N_v"], "N_r": -0.3 * c["N_r"]})
+    swinging = replace(
+        mariner, coefficients=c | {"N_v": -c["N_v"], "N_r": -0.3 * c["N_r"]}
+    )
     reasons = reasons_unstable(swinging, [])
     assert reasons
-    assert all(re.match(r"rudder [+-]\d+ deg reversed every [\d.]+ L/U: ", reason) for reason in reasons)
+    assert all(
+        re.match(r"rudder [+-]\d+ deg reversed every [\d.]+ L/U: ", reason)
+        for reason in reasons
+    )
 
 
 def test_ships_are_tried_to_both_sides_with_35_and_10_degrees_but_not_beyond_their_limit(
@@ -47,11 +64,17 @@ def test_ships_are_tried_to_both_sides_with_35_and_10_degrees_but_not_beyond_the
 ) -> None:
     """Over 50 ship lengths in steps of a fiftieth, and with rudders reversed every 2.5 to 20 lengths."""
     turns, reversals = list[Any](), list[Any]()
-    calm = Trial(np.arange(3.0), {"u": np.full(3, 5.0), "v": np.zeros(3), "r": np.zeros(3)})
-    monkeypatch.setattr(
-        guard, "turning_circle", lambda _, angle, **times: turns.append((angle, times)) or calm
+    calm = Trial(
+        np.arange(3.0), {"u": np.full(3, 5.0), "v": np.zeros(3), "r": np.zeros(3)}
     )
-    monkeypatch.setattr(guard, "_reversed", lambda _, *given: reversals.append(given) or calm)
+    monkeypatch.setattr(
+        guard,
+        "turning_circle",
+        lambda _, angle, **times: turns.append((angle, times)) or calm,
+    )
+    monkeypatch.setattr(
+        guard, "_reversed", lambda _, *given: reversals.append(given) or calm
+    )
     for limit, angles in ((40.0, (35.0, 10.0)), (30.0, (30.0, 10.0)), (8.0, (8.0,))):
         turns.clear()
         reversals.clear()
@@ -59,12 +82,18 @@ def test_ships_are_tried_to_both_sides_with_35_and_10_degrees_but_not_beyond_the
         assert reasons_unstable(replace(mariner, steering=gear), []) == []
         sides = [side * angle for angle in angles for side in (1.0, -1.0)]
         assert [angle for angle, _ in turns] == sides
-        assert reversals == [(side, gap) for side in sides for gap in (2.5, 5.0, 10.0, 20.0)]
+        assert reversals == [
+            (side, gap) for side in sides for gap in (2.5, 5.0, 10.0, 20.0)
+        ]
     length = 160.93 / 7.7175  # s
-    assert turns[0][1] == pytest.approx({"duration": 50.0 * length, "dt": 0.02 * length})
+    assert turns[0][1] == pytest.approx(
+        {"duration": 50.0 * length, "dt": 0.02 * length}
+    )
 
 
-def test_penalties_grow_by_sixths_of_a_decade_from_a_thousandth_to_all_that_terms_contribute() -> None:
+def test_penalties_grow_by_sixths_of_a_decade_from_a_thousandth_to_all_that_terms_contribute() -> (
+    None
+):
     assert guard.STRENGTHS[::6] == pytest.approx((1e-3, 1e-2, 0.1, 1.0))
     np.testing.assert_allclose(np.diff(np.log10(guard.STRENGTHS)), 1.0 / 6.0)
 
@@ -88,7 +117,9 @@ def test_sizes_of_shaft_heel_and_memory_in_the_hard_turn(mariner: ShipModel) -> 
     assert hard_turn_features(get_structure("cubic"), p, 2.0)["u"][:5] == pytest.approx(
         [1.8**2, 1.8 * u, u**2, v**2, v * r]
     )
-    rolling = shipgym.register_structure("heeling", {"v": "v", "r": "r, delta", "p": "p, phi"})
+    rolling = shipgym.register_structure(
+        "heeling", {"v": "v", "r": "r, delta", "p": "p, phi"}
+    )
     p_term, phi_term = hard_turn_features(rolling, p, 1.0)["p"]
     assert p_term / phi_term == pytest.approx(speed / 160.93)
     assert phi_term == pytest.approx(heel)
@@ -97,21 +128,28 @@ def test_sizes_of_shaft_heel_and_memory_in_the_hard_turn(mariner: ShipModel) -> 
 @pytest.mark.parametrize(
     ("channel", "value", "said"),
     [
-        ("u", 15.1, "surge speed from 8 to 15.1 m/s"), ("v", -10.1, "sway speed of 10.1 m/s"),
+        ("u", 15.1, "surge speed from 8 to 15.1 m/s"),
+        ("v", -10.1, "sway speed of 10.1 m/s"),
         ("r", -0.302, "yaw rate of 17.3 deg/s"),
     ],
-)  # fmt: skip
+)
 def test_what_no_ship_does(channel: str, value: float, said: str) -> None:
     """Of 100 m and 10 m/s: half as fast again, as fast sideways, turning at 3 U / L, astern if never seen."""
     model: Any = SimpleNamespace(particulars={"length": 100.0, "speed": 10.0})
 
     def found(least: float = 3.0, **changed: float) -> str | None:
         values = {"u": 8.0, "v": 0.0, "r": 0.0}
-        channels = {name: np.array([now, now, changed.get(name, now)]) for name, now in values.items()}
+        channels = {
+            name: np.array([now, now, changed.get(name, now)])
+            for name, now in values.items()
+        }
         return _runs_away(model, lambda: Trial(np.arange(3.0), channels), least)
 
     assert (found(**{channel: value}), found(**{channel: 0.99 * value})) == (said, None)
-    assert (found(u=-0.1), found(-0.2, u=-0.1)) == ("surge speed from -0.1 to 8 m/s", None)
+    assert (found(u=-0.1), found(-0.2, u=-0.1)) == (
+        "surge speed from -0.1 to 8 m/s",
+        None,
+    )
     assert found(u=0.01) is None
 
 
@@ -119,7 +157,9 @@ def test_the_rudder_is_reversed_at_intervals_by_the_ship_s_length() -> None:
     """For 50 ship lengths in steps of a fiftieth; a ship that sails 10 m/s and is 100 m long takes 10 s."""
     given: list[Any] = []
     model: Any = SimpleNamespace(
-        service_command=np.array([0.0, 1.5]), travel_time=10.0, simulate=lambda *what: given.extend(what)
+        service_command=np.array([0.0, 1.5]),
+        travel_time=10.0,
+        simulate=lambda *what: given.extend(what),
     )
     guard._reversed(model, -35.0, 2.5)
     orders, dt = given
@@ -146,7 +186,9 @@ def weak_trials(mariner: ShipModel, record: Any) -> list[Trial]:
     ]
 
 
-def test_a_fit_that_runs_away_is_held_and_says_so(mariner: ShipModel, weak_trials: list[Trial]) -> None:
+def test_a_fit_that_runs_away_is_held_and_says_so(
+    mariner: ShipModel, weak_trials: list[Trial]
+) -> None:
     plain = identify(weak_trials, particulars=mariner.particulars, guarded=False)
     assert not plain.stable
     assert plain.model.provenance is not None
@@ -160,7 +202,9 @@ def test_a_fit_that_runs_away_is_held_and_says_so(mariner: ShipModel, weak_trial
     assert reasons_unstable(held.model, weak_trials) == []
 
 
-def test_least_squares_is_never_penalised_but_marked(mariner: ShipModel, weak_trials: list[Trial]) -> None:
+def test_least_squares_is_never_penalised_but_marked(
+    mariner: ShipModel, weak_trials: list[Trial]
+) -> None:
     fit = identify(weak_trials, method="ls", particulars=mariner.particulars)
     assert not fit.stable
     assert fit.model.provenance is not None
@@ -195,7 +239,10 @@ def test_a_model_that_runs_away_on_a_trial_held_out_is_marked(
     assert not fit.stable
     assert fit.metrics["stable"] is False
     assert fit.model.provenance is not None
-    assert (fit.model.provenance["stable"], fit.model.provenance["runs_away_on"]) == (False, ["hard"])
+    assert (fit.model.provenance["stable"], fit.model.provenance["runs_away_on"]) == (
+        False,
+        ["hard"],
+    )
     assert "NOT STABLE" in fit.summary()
 
 
@@ -208,11 +255,17 @@ def test_a_stable_fit_is_left_alone(cao_fit: IdentificationResult) -> None:
 def test_the_penalty_of_a_held_fit_is_relative_to_the_terms_of_a_hard_turn() -> None:
     """Ridge of strength^2 times the number of samples on each term by its size over the mean window."""
     rng = np.random.default_rng(0)
-    X, sizes, duration = rng.standard_normal((50, 3)), np.array([1.0, 5.0, 0.2]), np.linspace(1.0, 3.0, 50)
+    X, sizes, duration = (
+        rng.standard_normal((50, 3)),
+        np.array([1.0, 5.0, 0.2]),
+        np.linspace(1.0, 3.0, 50),
+    )
     y = X @ [1.0, 2.0, 3.0] + 0.1 * rng.standard_normal(50)
     none = np.zeros(50, dtype=np.int64)
     samples = Samples({"r": X}, {"r": y}, np.arange(50.0), duration, none, 1)
     held = fit_held(samples, {"r": sizes}, 0.3)["r"]
     scaled = X / (2.0 * sizes)
-    coefficients = np.linalg.solve(scaled.T @ scaled + 50 * 0.3**2 * np.eye(3), scaled.T @ y) / (2.0 * sizes)
+    coefficients = np.linalg.solve(
+        scaled.T @ scaled + 50 * 0.3**2 * np.eye(3), scaled.T @ y
+    ) / (2.0 * sizes)
     np.testing.assert_allclose(held.coef_, coefficients, rtol=1e-9)

@@ -32,7 +32,13 @@ from shipgym.errors import InputError
 from shipgym.manoeuvres import zigzag
 from shipgym.ships.catalogue import fitted_box
 from shipgym.ships.checker import check_ship_model
-from shipgym.ships.kernel_boxes import Kernel, KernelBox, gaussians, kernel_box, kernel_inputs
+from shipgym.ships.kernel_boxes import (
+    Kernel,
+    KernelBox,
+    gaussians,
+    kernel_box,
+    kernel_inputs,
+)
 from shipgym.ships.linear import nomoto
 from shipgym.ships.particulars import Particulars
 from shipgym.ships.scaling import scale_model
@@ -42,10 +48,20 @@ from tests.golden.texts import same_page, same_text
 SHIP = Particulars(name="made up", length=7.0, speed=1.2)
 GEAR = SteeringGear(rudder_limit_deg=35.0, rudder_rate_deg_s=16.0, time_constant=0.0)
 LINEAR = {
-    "a_0": 0.0, "a_du": -0.04, "b_0": 0.0, "b_v": -1.0, "b_r": -0.35, "b_d": -0.15, "c_0": 0.0, "c_v": -1.5,
-    "c_r": -2.0, "c_d": 1.0,
-}  # fmt: skip
-ONE_SIDE = np.array([[0.9, -0.7, 0.4, -0.5], [0.2, -0.4, 1.0, 0.4], [1.5, -1.4, -0.3, -1.2]])
+    "a_0": 0.0,
+    "a_du": -0.04,
+    "b_0": 0.0,
+    "b_v": -1.0,
+    "b_r": -0.35,
+    "b_d": -0.15,
+    "c_0": 0.0,
+    "c_v": -1.5,
+    "c_r": -2.0,
+    "c_d": 1.0,
+}
+ONE_SIDE = np.array(
+    [[0.9, -0.7, 0.4, -0.5], [0.2, -0.4, 1.0, 0.4], [1.5, -1.4, -0.3, -1.2]]
+)
 CENTRES = np.concatenate([ONE_SIDE, ONE_SIDE * [-1.0, -1.0, -1.0, 1.0]])
 
 
@@ -58,16 +74,23 @@ def reference() -> ShipModel:
 def truth(reference: ShipModel) -> ShipModel:
     """The linear ship with a smooth addition that is the same to both sides."""
     functions = Kernel(
-        np.array([0.0, 0.0, 0.0, 0.9]), np.array([0.15, 0.4, 0.3, 0.1]), CENTRES, np.eye(len(CENTRES))
+        np.array([0.0, 0.0, 0.0, 0.9]),
+        np.array([0.15, 0.4, 0.3, 0.1]),
+        CENTRES,
+        np.eye(len(CENTRES)),
     )
     table = kernel_box(fitted_box(reference), functions)
     even, odd = np.ones(2), np.array([1.0, -1.0])
-    values = np.concatenate([
-        np.outer(side, weights).ravel()
-        for side, weights in (
-            (even, [-0.02, -0.01, -0.03]), (odd, [0.05, 0.02, 0.04]), (odd, [0.2, 0.3, -0.3])
-        )
-    ])  # fmt: skip
+    values = np.concatenate(
+        [
+            np.outer(side, weights).ravel()
+            for side, weights in (
+                (even, [-0.02, -0.01, -0.03]),
+                (odd, [0.05, 0.02, 0.04]),
+                (odd, [0.2, 0.3, -0.3]),
+            )
+        ]
+    )
     coefficients = dict(zip(table.coefficient_names, values.tolist(), strict=True))
     return ShipModel("truth", table.name, SHIP, GEAR, coefficients, own_table=table)
 
@@ -75,24 +98,38 @@ def truth(reference: ShipModel) -> ShipModel:
 @pytest.fixture(scope="module")
 def trials(truth: ShipModel) -> list[Trial]:
     found = []
-    for angle, port_first in ((10, False), (10, True), (30, False), (30, True), (20, False)):
+    for angle, port_first in (
+        (10, False),
+        (10, True),
+        (30, False),
+        (30, True),
+        (20, False),
+    ):
         run = zigzag(truth, angle, angle, duration=100, dt=0.1, port_first=port_first)
         channels = {name: run[name][::4] for name in ("psi", "u", "v", "r", "delta")}
         use, name = "validate" if angle == 20 else "fit", f"{angle}-{port_first}"
-        found.append(Trial(run.t[::4], channels, name=name, kind="zigzag", use=use, length=7.0))
+        found.append(
+            Trial(run.t[::4], channels, name=name, kind="zigzag", use=use, length=7.0)
+        )
     return found
 
 
 def fit(trials: list[Trial], **settings: Any) -> IdentificationResult:
-    return identify(trials, particulars=SHIP, steering=GEAR, kernel="rbf", centres=32, **settings)
+    return identify(
+        trials, particulars=SHIP, steering=GEAR, kernel="rbf", centres=32, **settings
+    )
 
 
 @pytest.fixture(scope="module")
 def corrected(trials: list[Trial], reference: ShipModel) -> IdentificationResult:
-    return fit(trials, method="rm-svm", reference_model=reference, kernel_length=2.0, C=1e6)
+    return fit(
+        trials, method="rm-svm", reference_model=reference, kernel_length=2.0, C=1e6
+    )
 
 
-def test_the_report_of_a_kernel_ship_is_the_golden_one(corrected: IdentificationResult) -> None:
+def test_the_report_of_a_kernel_ship_is_the_golden_one(
+    corrected: IdentificationResult,
+) -> None:
     assert same_text("kernel summary", corrected.summary())
     assert same_page("kernel", report_page(corrected))
 
@@ -104,26 +141,49 @@ def black_box(trials: list[Trial]) -> IdentificationResult:
 
 def errors(result: IdentificationResult, use: str, of: str = "model") -> float:
     """Largest error of the heading over trials of one use, deg rms."""
-    metrics = result.metrics["trials"] if of == "model" else result.metrics["reference"]["trials"]
-    return float(np.degrees(max(m["rmse"]["psi"] for m in metrics.values() if m["use"] == use)))
+    metrics = (
+        result.metrics["trials"]
+        if of == "model"
+        else result.metrics["reference"]["trials"]
+    )
+    return float(
+        np.degrees(max(m["rmse"]["psi"] for m in metrics.values() if m["use"] == use))
+    )
 
 
-def accelerations(model: ShipModel, trial: Trial, scale: float = 1.0, sign: float = 1.0) -> np.ndarray:
+def accelerations(
+    model: ShipModel, trial: Trial, scale: float = 1.0, sign: float = 1.0
+) -> np.ndarray:
     """Prime accelerations at the states of a trial, drift, turn and rudder times a factor."""
-    states = np.stack([np.zeros(len(trial))] * 3 + [trial[n] for n in ("u", "v", "r", "delta")], axis=-1)
+    states = np.stack(
+        [np.zeros(len(trial))] * 3 + [trial[n] for n in ("u", "v", "r", "delta")],
+        axis=-1,
+    )
     states[:, 4:] *= scale * sign
     rates = model.derivatives(states, np.zeros((len(trial), 1)))[:, 3:6]
     return rates * np.array([1.0, sign, sign * 7.0]) * 7.0 / 1.2**2
 
 
 def test_a_known_smooth_residual_is_recovered(
-    corrected: IdentificationResult, truth: ShipModel, reference: ShipModel, trials: list[Trial]
+    corrected: IdentificationResult,
+    truth: ShipModel,
+    reference: ShipModel,
+    trials: list[Trial],
 ) -> None:
     for trial in trials:
-        found, true, bare = (accelerations(m, trial) for m in (corrected.model, truth, reference))
-        left, there = (np.sqrt(np.mean((one - true) ** 2, axis=0)) for one in (found, bare))
+        found, true, bare = (
+            accelerations(m, trial) for m in (corrected.model, truth, reference)
+        )
+        left, there = (
+            np.sqrt(np.mean((one - true) ** 2, axis=0)) for one in (found, bare)
+        )
         assert np.all(left < 0.2 * there)
-    assert errors(corrected, "validate") < 0.5 < 2.0 < errors(corrected, "validate", "reference")
+    assert (
+        errors(corrected, "validate")
+        < 0.5
+        < 2.0
+        < errors(corrected, "validate", "reference")
+    )
 
 
 def test_far_from_the_data_it_is_the_reference_ship(
@@ -131,38 +191,55 @@ def test_far_from_the_data_it_is_the_reference_ship(
 ) -> None:
     turning = trials[2]
     hard = np.abs(turning["r"]) > 0.5 * np.abs(turning["r"]).max()
-    found, bare = (accelerations(model, turning, scale=8.0)[hard] for model in (corrected.model, reference))
+    found, bare = (
+        accelerations(model, turning, scale=8.0)[hard]
+        for model in (corrected.model, reference)
+    )
     np.testing.assert_allclose(found, bare, rtol=0.0, atol=1e-3 * np.abs(bare).max())
 
 
 def test_trials_to_both_sides_give_the_same_ship_to_both(
-    corrected: IdentificationResult, black_box: IdentificationResult, trials: list[Trial]
+    corrected: IdentificationResult,
+    black_box: IdentificationResult,
+    trials: list[Trial],
 ) -> None:
     for model in (corrected.model, black_box.model):
-        port, starboard = (accelerations(model, trials[2], sign=sign) for sign in (-1.0, 1.0))
-        np.testing.assert_allclose(port, starboard, rtol=0.0, atol=2e-3 * np.abs(starboard).max())
+        port, starboard = (
+            accelerations(model, trials[2], sign=sign) for sign in (-1.0, 1.0)
+        )
+        np.testing.assert_allclose(
+            port, starboard, rtol=0.0, atol=2e-3 * np.abs(starboard).max()
+        )
 
 
-def test_a_black_box_predicts_a_zigzag_that_was_held_out(black_box: IdentificationResult) -> None:
+def test_a_black_box_predicts_a_zigzag_that_was_held_out(
+    black_box: IdentificationResult,
+) -> None:
     report = (black_box.model.provenance or {})["kernel"]
     held_out = report["heading_errors_held_out"]
     assert black_box.stable
     assert (black_box.model.provenance or {})["structure"] == "linear"
     assert held_out["kernel"] < 0.5 * held_out["reference"]
-    assert errors(black_box, "validate") < min(2.0, 0.3 * errors(black_box, "validate", "reference"))
+    assert errors(black_box, "validate") < min(
+        2.0, 0.3 * errors(black_box, "validate", "reference")
+    )
     assert black_box.model.covariance is not None
     assert check_ship_model(black_box.model).problems == ()
     assert nomoto(black_box.model).K / nomoto(black_box.model).T > 0.0
 
 
-def test_the_report_tells_the_kernel_and_not_its_weights(black_box: IdentificationResult) -> None:
+def test_the_report_tells_the_kernel_and_not_its_weights(
+    black_box: IdentificationResult,
+) -> None:
     page = report_page(black_box)
     assert " radial basis functions of length " in page
     assert "a_k1" in black_box.coefficients
     assert "a_k1" not in page
 
 
-def test_its_file_holds_numbers_only(black_box: IdentificationResult, tmp_path: Path) -> None:
+def test_its_file_holds_numbers_only(
+    black_box: IdentificationResult, tmp_path: Path
+) -> None:
     model, path = black_box.model, tmp_path / "model.json"
     model.save(path)
     again = ShipModel.load(path)
@@ -185,7 +262,9 @@ def test_its_file_holds_numbers_only(black_box: IdentificationResult, tmp_path: 
             ShipModel.load(path)
 
 
-def test_models_drawn_differ_in_kernel_and_fitted_reference(black_box: IdentificationResult) -> None:
+def test_models_drawn_differ_in_kernel_and_fitted_reference(
+    black_box: IdentificationResult,
+) -> None:
     one, other = black_box.model.sample(2, seed=0)
     assert one.vessel is black_box.model.vessel
     assert one.table.ship.coefficients != other.table.ship.coefficients  # type: ignore[attr-defined]
@@ -201,15 +280,21 @@ def test_it_is_the_same_ship_at_another_scale(black_box: IdentificationResult) -
     np.testing.assert_allclose(ours["psi"], theirs["psi"], rtol=0.0, atol=1e-9)
 
 
-def test_in_environments_it_sails_as_it_is_simulated(black_box: IdentificationResult) -> None:
+def test_in_environments_it_sails_as_it_is_simulated(
+    black_box: IdentificationResult,
+) -> None:
     model = black_box.model
-    envs = gymnasium.make_vec("shipgym/CourseKeeping-v0", num_envs=3, model=model, sea="calm")
+    envs = gymnasium.make_vec(
+        "shipgym/CourseKeeping-v0", num_envs=3, model=model, sea="calm"
+    )
     env = gymnasium.make("shipgym/CourseKeeping-v0", model=model, sea="calm")
     envs.reset(seed=3)
     single, _ = env.reset(seed=4)
     engine = envs.unwrapped._engine  # type: ignore[attr-defined]
     names = ("u", "v", "r", "delta")
-    start = np.array([engine.read(name)[0] if name in names else 0.0 for name in model.state_names])
+    start = np.array(
+        [engine.read(name)[0] if name in names else 0.0 for name in model.state_names]
+    )
     rudders = [0.8, 0.8, 0.8, -1.0, -1.0, -1.0, -1.0, 0.3]
     for rudder in rudders:
         seen, _, _, _, info = envs.step(np.full((3, 1), rudder, dtype=np.float32))
@@ -219,36 +304,67 @@ def test_in_environments_it_sails_as_it_is_simulated(black_box: IdentificationRe
     orders = model.steering.limit * np.array(rudders, dtype=np.float32)[:, None]
     trial = model.simulate(orders, engine.dt, start)
     for name in names:
-        assert engine.read(name)[0] == pytest.approx(trial[name][-1], rel=1e-9, abs=1e-12)
+        assert engine.read(name)[0] == pytest.approx(
+            trial[name][-1], rel=1e-9, abs=1e-12
+        )
 
 
-def test_what_cannot_be(trials: list[Trial], reference: ShipModel, truth: ShipModel) -> None:
+def test_what_cannot_be(
+    trials: list[Trial], reference: ShipModel, truth: ShipModel
+) -> None:
     few = [trials[0].with_(name="few")]
-    short = [Trial(few[0].t[:60], {k: v[:60] for k, v in few[0].channels.items()}, name="short")]
+    short = [
+        Trial(
+            few[0].t[:60], {k: v[:60] for k, v in few[0].channels.items()}, name="short"
+        )
+    ]
     for given, settings, message in (
-        (trials, {"method": "rls"}, "kernel: 'rbf' found with method 'rls', which has none"),
+        (
+            trials,
+            {"method": "rls"},
+            "kernel: 'rbf' found with method 'rls', which has none",
+        ),
         (trials, {"regression": "svr", "method": "rm-svm"}, "fitted by LS-SVM only"),
         (trials, {"centres": 101}, "centres: 101 found"),
         (trials, {"kernel_length": 0.0}, "kernel_length"),
-        (short, {"method": "rm-svm", "reference_model": reference}, "samples found for 32 centres"),
-        (trials, {"method": "rm-svm", "reference_model": truth}, "is a grey box itself"),
+        (
+            short,
+            {"method": "rm-svm", "reference_model": reference},
+            "samples found for 32 centres",
+        ),
+        (
+            trials,
+            {"method": "rm-svm", "reference_model": truth},
+            "is a grey box itself",
+        ),
     ):
         with pytest.raises(InputError, match=message):
-            identify(given, particulars=SHIP, steering=GEAR, **{"kernel": "rbf", "centres": 32, **settings})
+            identify(
+                given,
+                particulars=SHIP,
+                steering=GEAR,
+                **{"kernel": "rbf", "centres": 32, **settings},
+            )
     with pytest.raises(InputError, match="kernel: 'poly' found, expected 'rbf'"):
         identify(trials, particulars=SHIP, kernel="poly")
     with pytest.raises(InputError, match=r"identify\(\.\.\., kernel='rbf'\)"):
-        identify(trials, structure="linear", particulars=SHIP, method=LSSVM(kernel="rbf"))
+        identify(
+            trials, structure="linear", particulars=SHIP, method=LSSVM(kernel="rbf")
+        )
     with pytest.raises(InputError, match="no kernel found"):
         replace(truth.table, kernel=None)
     with pytest.raises(InputError, match="no reference found"):
         replace(truth.table, reference=None)
 
 
-SIDES = np.array([-1.0, -1.0, -1.0, 1.0])  # of drift, turn, rudder and speed seen from the other side
+SIDES = np.array(
+    [-1.0, -1.0, -1.0, 1.0]
+)  # of drift, turn, rudder and speed seen from the other side
 
 
-def test_centres_are_those_of_samples_brought_to_one_side_and_the_same_of_the_other() -> None:
+def test_centres_are_those_of_samples_brought_to_one_side_and_the_same_of_the_other() -> (
+    None
+):
     """Two groups of samples beside each other, a third of both from the other side: their means are found."""
     random = np.random.default_rng(0)
     groups = np.repeat([[0.1, 0.4, -0.3, 1.0], [-0.2, 0.8, 0.5, 1.1]], 300, axis=0)
@@ -263,12 +379,20 @@ def test_centres_are_those_of_samples_brought_to_one_side_and_the_same_of_the_ot
     still = chosen_centres(around * [1.0, 1.0, 1.0, 0.0], 4)[1]
     assert still[3] == 0.02
     assert len(chosen_centres(around[:12], 4)[2]) == 4
-    with pytest.raises(InputError, match="12 samples found for 5 centres of the kernel, expected at least 3"):
+    with pytest.raises(
+        InputError,
+        match="12 samples found for 5 centres of the kernel, expected at least 3",
+    ):
         chosen_centres(around[:12], 5)
 
 
 def test_features_are_the_principal_components_of_samples_of_both_sides() -> None:
-    x = np.random.default_rng(1).standard_normal((400, 4)) * [0.2, 0.4, 0.3, 0.1] + [0.0, 0.0, 0.0, 0.9]
+    x = np.random.default_rng(1).standard_normal((400, 4)) * [0.2, 0.4, 0.3, 0.1] + [
+        0.0,
+        0.0,
+        0.0,
+        0.9,
+    ]
     kernel = principal(Kernel(*chosen_centres(x, 48), np.eye(48)), x)
     z = (x - kernel.offset) / kernel.scale
     features = gaussians(np.concatenate([z, z * SIDES]), kernel.centres) @ kernel.basis
@@ -288,7 +412,9 @@ def linear_ship(**changes: float) -> ShipModel:
 def test_the_linear_ship_beneath_a_kernel_is_damped_as_little_as_steadies_her() -> None:
     steady = linear_ship(a_du=-0.06)
     assert stabilised(steady).coefficients == steady.coefficients
-    assert stabilised(linear_ship(a_du=0.3, a_0=0.01)).coefficients["a_du"] == pytest.approx(-0.07)
+    assert stabilised(linear_ship(a_du=0.3, a_0=0.01)).coefficients[
+        "a_du"
+    ] == pytest.approx(-0.07)
     for given in ({"b_v": 0.4, "c_r": 0.2}, {"c_d": 9.0}, {"b_d": -3.0, "c_d": 0.0}):
         ship = linear_ship(**given)
         found = stabilised(ship).coefficients
@@ -296,11 +422,15 @@ def test_the_linear_ship_beneath_a_kernel_is_damped_as_little_as_steadies_her() 
         assert shift == pytest.approx(ship.coefficients["c_r"] - found["c_r"])
         steady_at = [worst_of(ship, damping) < 1.0 for damping in (shift, shift - 0.05)]
         assert steady_at == [True, False]
-    with pytest.raises(InputError, match="no damping stabilises the linear ship beneath it"):
+    with pytest.raises(
+        InputError, match="no damping stabilises the linear ship beneath it"
+    ):
         stabilised(linear_ship(c_d=1e4))
     # by 100 in the prime system at most: a turn of 1.2 takes c_d limit / 1.2 of it
     assert stabilised(linear_ship(c_d=190.0)).coefficients["c_r"] < -90.0
-    with pytest.raises(InputError, match="no damping stabilises the linear ship beneath it"):
+    with pytest.raises(
+        InputError, match="no damping stabilises the linear ship beneath it"
+    ):
         stabilised(linear_ship(c_d=205.0))
 
 
@@ -320,7 +450,11 @@ def worst_of(ship: ShipModel, damping: float) -> float:
         ({"method": "ls-svm", "structure": "norrbin"}, "norrbin", "ls-svm"),
         ({"method": "rm-svm", "reference_model": "tanker"}, "grey-box", "rm-svm"),
         ({"method": "rm-svm", "structure": "norrbin"}, "norrbin", "ls-svm"),
-        ({"regression": "ls-svm", "C": 3.0, "centres": 9, "kernel_length": 2.0}, "linear", "tls-svm"),
+        (
+            {"regression": "ls-svm", "C": 3.0, "centres": 9, "kernel_length": 2.0},
+            "linear",
+            "tls-svm",
+        ),
     ],
 )
 def test_beneath_a_kernel_lies_a_linear_ship_unless_another_is_named(
@@ -328,14 +462,20 @@ def test_beneath_a_kernel_lies_a_linear_ship_unless_another_is_named(
 ) -> None:
     found = reference_options(Options(kernel="rbf", **asked))
     assert (found.structure, found.method) == (structure, method)
-    assert (found.kernel, found.centres, found.kernel_length, found.C, found.folds) == (None,) * 5
+    assert (found.kernel, found.centres, found.kernel_length, found.C, found.folds) == (
+        None,
+    ) * 5
 
 
 @pytest.mark.parametrize(
-    "band", [{"epsilon": 0.0}, {"epsilon": 0.1, "regression": "ls-svm"}, {"regression": "svr"}]
+    "band",
+    [{"epsilon": 0.0}, {"epsilon": 0.1, "regression": "ls-svm"}, {"regression": "svr"}],
 )
 def test_a_kernel_has_no_insensitive_band(band: dict[str, Any]) -> None:
-    with pytest.raises(InputError, match="regression: epsilon-SVR found with kernel 'rbf', which is fitted"):
+    with pytest.raises(
+        InputError,
+        match="regression: epsilon-SVR found with kernel 'rbf', which is fitted",
+    ):
         reference_options(Options(kernel="rbf", method="rm-svm", **band))
 
 
@@ -348,16 +488,29 @@ def test_centres_are_sought_among_four_thousand_samples_at_most() -> None:
 def two_folds(monkeypatch: pytest.MonkeyPatch) -> Any:
     """A search over a regression of one term: of either trial the coefficient is the error of the other."""
     X, y = np.array([[1.0], [2.0], [3.0]]), np.array([2.0, 4.0, 3.0])
-    samples = Samples({"r": X}, {"r": y}, np.arange(3.0), np.array([1.0, 2.0, 3.0]), np.array([0, 0, 1]), 1)
+    samples = Samples(
+        {"r": X},
+        {"r": y},
+        np.arange(3.0),
+        np.array([1.0, 2.0, 3.0]),
+        np.array([0, 0, 1]),
+        1,
+    )
     folds = [(samples.trial == k, f"trial {1 - k}") for k in (0, 1)]
     monkeypatch.setattr(kernel_residual, "held_out_rows", lambda *_: folds)
-    monkeypatch.setattr(kernel_residual, "heading_error", lambda model, held, _: float(model["r"][0]))
+    monkeypatch.setattr(
+        kernel_residual, "heading_error", lambda model, held, _: float(model["r"][0])
+    )
     blank: Any = SimpleNamespace(particulars=SHIP)
-    stage = SimpleNamespace(samples=samples, model=SimpleNamespace(with_accelerations=lambda found: found))
+    stage = SimpleNamespace(
+        samples=samples, model=SimpleNamespace(with_accelerations=lambda found: found)
+    )
     return _Search(blank, (), None, {}, "trials"), stage  # type: ignore[arg-type]
 
 
-def test_errors_are_weighed_over_a_ship_length_in_the_prime_system(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_errors_are_weighed_over_a_ship_length_in_the_prime_system(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     """A weight of 1 is 1 / (L T U^3) of windows of T on average; the coefficient is that of a ridge."""
     search, stage = two_folds(monkeypatch)
     unit = 1.0 / (7.0 * 2.0 * 1.2**3)
@@ -369,13 +522,19 @@ def test_errors_are_weighed_over_a_ship_length_in_the_prime_system(monkeypatch: 
     found = search.fitted(stage, 5.0)
     C = 5.0 * unit
     np.testing.assert_allclose(found.model["r"], [C * 19.0 / (C * 14.0 + 1.0)])  # type: ignore[index]
-    np.testing.assert_allclose(found.estimators["r"].inverse_moment_, [[C / (C * 14.0 + 1.0)]])
+    np.testing.assert_allclose(
+        found.estimators["r"].inverse_moment_, [[C / (C * 14.0 + 1.0)]]
+    )
 
 
 @pytest.mark.parametrize(
     ("errors", "chosen", "remarks"),
     [
-        ((1.09, 1.0, 1.2, 2.0), (2.0, 0.1), []),  # the smoothest within a tenth of the best
+        (
+            (1.09, 1.0, 1.2, 2.0),
+            (2.0, 0.1),
+            [],
+        ),  # the smoothest within a tenth of the best
         ((1.12, 1.11, 1.2, 1.0), (1.0, 10.0), []),
         ((1.12, 1.05, 1.2, 1.0), (1.0, 0.1), []),
         ((3.0, 3.0, 3.0, 3.0), (2.0, 0.1), ["(1.7e+02 and 86 deg rms)"]),
@@ -390,9 +549,12 @@ def test_the_smoothest_kernel_nearly_as_good_as_the_best_is_taken_and_one_that_i
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """Of lengths 2 and 1 at weights 0.1 and 10; the reference ship alone misses by 1.5 rad."""
-    table = dict(zip([(2.0, 0.1), (1.0, 0.1), (2.0, 10.0), (1.0, 10.0)], errors, strict=True))
+    table = dict(
+        zip([(2.0, 0.1), (1.0, 0.1), (2.0, 10.0), (1.0, 10.0)], errors, strict=True)
+    )
     kernels = {
-        one: SimpleNamespace(centres=np.zeros((8, 4)), basis=np.zeros((8, 5)), one=one) for one in (2.0, 1.0)
+        one: SimpleNamespace(centres=np.zeros((8, 4)), basis=np.zeros((8, 5)), one=one)
+        for one in (2.0, 1.0)
     }
 
     class Search:
@@ -417,14 +579,21 @@ def test_the_smoothest_kernel_nearly_as_good_as_the_best_is_taken_and_one_that_i
     assert (found.report["length"], found.report["C"]) == chosen
     assert (found.report["centres"], found.report["features"]) == (8, 5)
     kernel = table[chosen] if np.isfinite(table[chosen]) else None
-    assert found.report["heading_errors_held_out"] == {"kernel": kernel, "reference": 1.5}
-    assert [remark.endswith(told) for remark, told in zip(found.report["remarks"], remarks, strict=True)] == (
-        [True] * len(remarks)
-    )
+    assert found.report["heading_errors_held_out"] == {
+        "kernel": kernel,
+        "reference": 1.5,
+    }
+    assert [
+        remark.endswith(told)
+        for remark, told in zip(found.report["remarks"], remarks, strict=True)
+    ] == ([True] * len(remarks))
     kernels.pop(1.0)
     given = fit_kernel(none, (), none, Options(C=10.0), {})  # nothing is left to choose
     assert given.model == (2.0, 10.0)
-    assert (given.report["heading_errors_held_out"], given.report["remarks"]) == ({"reference": 1.5}, [])
+    assert (given.report["heading_errors_held_out"], given.report["remarks"]) == (
+        {"reference": 1.5},
+        [],
+    )
 
 
 def test_a_kernel_has_two_centres_at_least_and_widths_in_root_mean_squares(
@@ -433,7 +602,11 @@ def test_a_kernel_has_two_centres_at_least_and_widths_in_root_mean_squares(
     """A length of 2 makes the scale twice as large and the centres half as far, in its units."""
     rng, t = np.random.default_rng(0), np.arange(80.0)
     sizes = {"u": 0.1, "v": 0.05, "r": 0.02, "delta": 0.3}
-    trial = Trial(t, {c: (c == "u") + s * rng.standard_normal(80) for c, s in sizes.items()}, name="random")
+    trial = Trial(
+        t,
+        {c: (c == "u") + s * rng.standard_normal(80) for c, s in sizes.items()},
+        name="random",
+    )
     blank: Any = SimpleNamespace(particulars=SHIP)
     search = _Search(blank, [trial], None, {"smooth": False}, "trials")  # type: ignore[arg-type]
     for wrong, bound in ((1, "at least 2"), (0, "at least 2"), (101, "100")):
@@ -445,11 +618,17 @@ def test_a_kernel_has_two_centres_at_least_and_widths_in_root_mean_squares(
     np.testing.assert_allclose(two.scale, 2.0 * one.scale)
     np.testing.assert_allclose(2.0 * two.centres, one.centres)
     x = kernel_inputs(dict(trial.channels), SHIP)
-    np.testing.assert_allclose(one.scale, np.sqrt(np.mean((x - one.offset) ** 2, axis=0)), rtol=1e-9)
-    assert list(kernel_residual._kernels(search, Options(centres=2, kernel_length=0.9))) == [0.9]
+    np.testing.assert_allclose(
+        one.scale, np.sqrt(np.mean((x - one.offset) ** 2, axis=0)), rtol=1e-9
+    )
+    assert list(
+        kernel_residual._kernels(search, Options(centres=2, kernel_length=0.9))
+    ) == [0.9]
     asked: list[int] = []
     monkeypatch.setattr(
-        kernel_residual, "chosen_centres", lambda x, count: asked.append(count) or chosen_centres(x, 2)
+        kernel_residual,
+        "chosen_centres",
+        lambda x, count: asked.append(count) or chosen_centres(x, 2),
     )
     kernel_residual._kernels(search, Options())
     assert asked == [64]

@@ -21,22 +21,29 @@ MARINER_TRIALS = ROOT / "examples" / "mariner" / "ship.toml"
 def off_in_standard_errors(model, shipped):
     """Largest difference of a coefficient from the shipped one."""
     assert list(model.coefficients) == list(shipped.coefficients)
-    difference = np.array(list(model.coefficients.values())) - list(shipped.coefficients.values())
+    difference = np.array(list(model.coefficients.values())) - list(
+        shipped.coefficients.values()
+    )
     return np.abs(difference / np.sqrt(np.diag(shipped.covariance))).max()
 
 
 def test_mariner_tls_svm_is_what_its_trials_give():
     """As `scripts/build_models.py` does; coefficients to the last digits of the linear algebra.
 
-    The file, which the agents' files name by its hash, has a model error of before measured rudders were
-    traced back to the angle that was held. The trials are those of her own equations.
+    The file, which the agents' files name by its hash, has a model error of before
+    measured rudders were traced back to the angle that was held. The trials are those
+    of her own equations.
     """
     ship = shipgym.ShipFile.load(MARINER_TRIALS)
-    result = identify(ship.trials(), particulars=ship.particulars, steering=ship.steering)
+    result = identify(
+        ship.trials(), particulars=ship.particulars, steering=ship.steering
+    )
     shipped = shipgym.load_model("mariner-tls-svm")
     assert off_in_standard_errors(result.model, shipped) < 1e-3
     assert result.model.provenance["trials"] == shipped.provenance["trials"]
-    factors = [one.provenance["model_error"]["factor"] for one in (result.model, shipped)]
+    factors = [
+        one.provenance["model_error"]["factor"] for one in (result.model, shipped)
+    ]
     assert factors == pytest.approx([1.0, 1.4898], rel=0.02)
     scaled = (factors[0] / factors[1]) ** 2 * shipped.covariance
     np.testing.assert_allclose(result.model.covariance, scaled, rtol=0.05)
@@ -46,33 +53,56 @@ def test_mariner_tls_svm_is_what_its_trials_give():
 def test_mariner_tls_svm_sails_like_the_ship_behind_its_trials(angle):
     """Overshoots within 0.1 deg and 3 per cent of the simulated ship's, from noisy trials."""
     found, truth = (
-        manoeuvres.zigzag_indices(manoeuvres.zigzag(shipgym.load_model(name), angle, angle))
+        manoeuvres.zigzag_indices(
+            manoeuvres.zigzag(shipgym.load_model(name), angle, angle)
+        )
         for name in ("mariner-tls-svm", "mariner")
     )
-    assert found.overshoot_1_deg == pytest.approx(truth.overshoot_1_deg, rel=0.03, abs=0.1)
-    assert found.overshoot_2_deg == pytest.approx(truth.overshoot_2_deg, rel=0.03, abs=0.1)
+    assert found.overshoot_1_deg == pytest.approx(
+        truth.overshoot_1_deg, rel=0.03, abs=0.1
+    )
+    assert found.overshoot_2_deg == pytest.approx(
+        truth.overshoot_2_deg, rel=0.03, abs=0.1
+    )
 
 
 def test_every_environment_has_an_identified_model_by_default():
     """Three quarters of them by different pairs of method and ship; ids of version 0 keep their ships."""
     names = ("", "Discrete", "Shaft", "Roll")
-    ids = [f"shipgym/{task}{name}-v1" for task in ("CourseKeeping", "PathFollowing") for name in names]
+    ids = [
+        f"shipgym/{task}{name}-v1"
+        for task in ("CourseKeeping", "PathFollowing")
+        for name in names
+    ]
     assert set(IDENTIFIED) <= set(ids)
     models = [shipgym.load_model(IDENTIFIED.get(name, DEFAULT_MODEL)) for name in ids]
-    found = [(model.provenance["method"], shipgym.truth_of(model).name) for model in models]
-    assert all(model.provenance["stable"] and model.covariance is not None for model in models)
+    found = [
+        (model.provenance["method"], shipgym.truth_of(model).name) for model in models
+    ]
+    assert all(
+        model.provenance["stable"] and model.covariance is not None for model in models
+    )
     assert len(set(found)) >= 0.75 * len(ids)
     assert {"tls-svm", "abc-lssvr", "rm-svm"} <= {method for method, _ in found}
-    assert gymnasium.spec("shipgym/CourseKeepingShaft-v1").kwargs["model"] == "kvlcc2-mmg"
+    assert (
+        gymnasium.spec("shipgym/CourseKeepingShaft-v1").kwargs["model"] == "kvlcc2-mmg"
+    )
     assert gymnasium.spec("shipgym/CourseKeepingShaft-v0").kwargs["model"] == "kvlcc2"
 
 
 @pytest.mark.parametrize(
     ("name", "turn", "overshoot"),
-    [("kvlcc2-mmg", 0.02, 0.3), ("kvlcc2-tanker-rm-svm", 0.045, 0.6), ("tanker-tls-svm", 0.05, 1.1),
-     ("container-4dof-output-error", 0.02, 0.6), ("container-two-zigzags", 0.09, 0.6)],
-)  # fmt: skip
-def test_models_sail_like_the_ships_behind_their_trials_where_these_did_not_reach(name, turn, overshoot):
+    [
+        ("kvlcc2-mmg", 0.02, 0.3),
+        ("kvlcc2-tanker-rm-svm", 0.045, 0.6),
+        ("tanker-tls-svm", 0.05, 1.1),
+        ("container-4dof-output-error", 0.02, 0.6),
+        ("container-two-zigzags", 0.09, 0.6),
+    ],
+)
+def test_models_sail_like_the_ships_behind_their_trials_where_these_did_not_reach(
+    name, turn, overshoot
+):
     """Turning circles at 35 deg and zigzags 15/15 and 25/25 are in no model's trials."""
     model = shipgym.load_model(name)
     turns, held_out, _ = build_models.errors(model, *build_models.COMPARED_DEG)
@@ -82,24 +112,37 @@ def test_models_sail_like_the_ships_behind_their_trials_where_these_did_not_reac
 
 @pytest.mark.parametrize("name", ["tanker-tls-svm", "container-two-zigzags"])
 def test_a_recipe_gives_its_model_again(name):
-    model, shipped = build_models.MODELS[name].identify(name).model, shipgym.load_model(name)
+    model, shipped = (
+        build_models.MODELS[name].identify(name).model,
+        shipgym.load_model(name),
+    )
     assert off_in_standard_errors(model, shipped) < 0.1
     assert model.provenance["truth"] == shipped.provenance["truth"]
 
 
 def test_the_ship_behind_a_model_is_known_or_the_error_says_what_to_do():
-    assert {name: shipgym.truth_of(name).name for name in ("mariner-nomoto", "tanker-tls-svm")} == {
-        "mariner-nomoto": "mariner", "tanker-tls-svm": "tanker"
-    }  # fmt: skip
+    assert {
+        name: shipgym.truth_of(name).name
+        for name in ("mariner-nomoto", "tanker-tls-svm")
+    } == {"mariner-nomoto": "mariner", "tanker-tls-svm": "tanker"}
     drawn = shipgym.load_model("tanker-tls-svm").sample(1, 0)[0]
     assert shipgym.truth_of(drawn).name == "tanker"
-    for other in ("kvlcc2", shipgym.scale_model(shipgym.load_model("mariner-tls-svm"), 100.0)):
-        with pytest.raises(shipgym.InputError, match=r"provenance.truth .* found, expected the reference"):
+    for other in (
+        "kvlcc2",
+        shipgym.scale_model(shipgym.load_model("mariner-tls-svm"), 100.0),
+    ):
+        with pytest.raises(
+            shipgym.InputError,
+            match=r"provenance.truth .* found, expected the reference",
+        ):
             shipgym.truth_of(other)
 
 
 def test_the_tanker_is_unstable_on_her_course_and_her_model_knows_it():
-    for model in (shipgym.load_model("tanker-tls-svm"), shipgym.truth_of("tanker-tls-svm")):
+    for model in (
+        shipgym.load_model("tanker-tls-svm"),
+        shipgym.truth_of("tanker-tls-svm"),
+    ):
         assert not shipgym.straight_line_stability(model).stable
 
 
@@ -110,22 +153,30 @@ def test_kvlcc2_is_what_her_virtual_sea_trials_give(name):
     assert result.model.name == name
     assert result.stable
     assert off_in_standard_errors(result.model, shipped) < 0.1
-    assert [t["name"] for t in shipped.provenance["trials"]] == [t.name for t in build_models.kvlcc2_trials()]
+    assert [t["name"] for t in shipped.provenance["trials"]] == [
+        t.name for t in build_models.kvlcc2_trials()
+    ]
 
 
 def kvlcc2_turns(model):
     """Advance and tactical diameter at 35 deg to both sides, lengths."""
     found = [
-        manoeuvres.turning_indices(manoeuvres.turning_circle(model, rudder, duration=1000, dt=0.5), 320.0)
+        manoeuvres.turning_indices(
+            manoeuvres.turning_circle(model, rudder, duration=1000, dt=0.5), 320.0
+        )
         for rudder in (35, -35)
     ]
-    return np.array([[each.advance_lengths, each.tactical_diameter_lengths] for each in found])
+    return np.array(
+        [[each.advance_lengths, each.tactical_diameter_lengths] for each in found]
+    )
 
 
 def kvlcc2_overshoots(model):
     """First and second of 10/10 and 20/20 zigzags to both sides, degrees."""
     found = [
-        manoeuvres.zigzag_indices(manoeuvres.zigzag(model, angle, angle, port, duration=1000, dt=0.5))
+        manoeuvres.zigzag_indices(
+            manoeuvres.zigzag(model, angle, angle, port, duration=1000, dt=0.5)
+        )
         for angle in (10, 20)
         for port in (False, True)
     ]
@@ -146,7 +197,10 @@ def test_kvlcc2_rm_svm_turns_like_the_ship_behind_its_zigzags():
 
 def test_kvlcc2_nomoto_overshoots_like_the_ship_within_its_form():
     """First order and symmetric: it cannot tell the sides apart."""
-    found, truth = (kvlcc2_overshoots(shipgym.load_model(name)) for name in ("kvlcc2-nomoto", "kvlcc2"))
+    found, truth = (
+        kvlcc2_overshoots(shipgym.load_model(name))
+        for name in ("kvlcc2-nomoto", "kvlcc2")
+    )
     assert found == pytest.approx(truth, abs=4.2)
     assert found[::2] == pytest.approx(found[1::2], abs=1e-6)
     assert found.mean() == pytest.approx(truth.mean(), abs=0.3)
@@ -154,9 +208,16 @@ def test_kvlcc2_nomoto_overshoots_like_the_ship_within_its_form():
 
 @pytest.mark.parametrize(
     ("name", "design"),
-    [("kvlcc2-rm-svm", PID), ("kvlcc2-rm-svm", LQ), ("kvlcc2-nomoto", PID), ("kvlcc2-nomoto", LQ),
-     ("container-abc-lssvr", LQ), ("container-nomoto", PID), ("mariner-nomoto", PID)],
-)  # fmt: skip
+    [
+        ("kvlcc2-rm-svm", PID),
+        ("kvlcc2-rm-svm", LQ),
+        ("kvlcc2-nomoto", PID),
+        ("kvlcc2-nomoto", LQ),
+        ("container-abc-lssvr", LQ),
+        ("container-nomoto", PID),
+        ("mariner-nomoto", PID),
+    ],
+)
 def test_a_ship_is_steered_by_controllers_designed_on_its_models(name, design):
     """The true ship keeps its course: no model of KVLCC2, on the verge of stability, misleads the design."""
     env = gymnasium.make("shipgym/CourseKeeping-v0", model=name.split("-")[0])
@@ -170,28 +231,35 @@ def test_a_ship_is_steered_by_controllers_designed_on_its_models(name, design):
     assert not terminated
 
 
-@pytest.mark.parametrize("name", ["mariner-nomoto", "container-abc-lssvr", "container-nomoto"])
+@pytest.mark.parametrize(
+    "name", ["mariner-nomoto", "container-abc-lssvr", "container-nomoto"]
+)
 def test_the_container_ship_and_nomotos_forms_are_what_their_trials_give(name):
     """A search for C may end a step off where rounding differs."""
     result = build_models.MODELS[name].identify(name)
     shipped = shipgym.load_model(name)
     assert result.model.name == name
     assert result.stable
-    assert shipped.provenance["method"] == ("abc-lssvr" if name.startswith("container") else "tls-svm")
+    assert shipped.provenance["method"] == (
+        "abc-lssvr" if name.startswith("container") else "tls-svm"
+    )
     assert off_in_standard_errors(result.model, shipped) < 0.01
     names = [trial["name"] for trial in shipped.provenance["trials"]]
     assert names == [trial["name"] for trial in result.model.provenance["trials"]]
 
 
 def overshoots(model, angle):
-    found = manoeuvres.zigzag_indices(manoeuvres.zigzag(model, angle, angle, duration=900, dt=0.25))
+    found = manoeuvres.zigzag_indices(
+        manoeuvres.zigzag(model, angle, angle, duration=900, dt=0.25)
+    )
     return found.overshoot_1_deg, found.overshoot_2_deg
 
 
 @pytest.mark.parametrize("angle", [10, 15, 20, 30])
 def test_container_abc_lssvr_sails_like_the_ship_behind_its_trials_which_heels(angle):
     found, truth = (
-        overshoots(shipgym.load_model(name), angle) for name in ("container-abc-lssvr", "container")
+        overshoots(shipgym.load_model(name), angle)
+        for name in ("container-abc-lssvr", "container")
     )
     assert found == pytest.approx(truth, abs=0.6)
 
@@ -200,15 +268,22 @@ def test_container_abc_lssvr_sails_like_the_ship_behind_its_trials_which_heels(a
 def test_container_abc_lssvr_turns_like_it_although_it_saw_no_turn(rudder_deg):
     found, truth = (
         manoeuvres.turning_indices(
-            manoeuvres.turning_circle(shipgym.load_model(name), rudder_deg, duration=1200, dt=0.25), 175.0
+            manoeuvres.turning_circle(
+                shipgym.load_model(name), rudder_deg, duration=1200, dt=0.25
+            ),
+            175.0,
         )
         for name in ("container-abc-lssvr", "container")
     )
     assert found.advance_lengths == pytest.approx(truth.advance_lengths, rel=0.01)
-    assert found.tactical_diameter_lengths == pytest.approx(truth.tactical_diameter_lengths, rel=0.025)
+    assert found.tactical_diameter_lengths == pytest.approx(
+        truth.tactical_diameter_lengths, rel=0.025
+    )
 
 
-@pytest.mark.parametrize(("name", "ship"), [("mariner-nomoto", "mariner"), ("container-nomoto", "container")])
+@pytest.mark.parametrize(
+    ("name", "ship"), [("mariner-nomoto", "mariner"), ("container-nomoto", "container")]
+)
 def test_nomotos_forms_overshoot_like_their_ships_within_their_form(name, ship):
     for angle in (10, 15, 20):
         found, truth = (

@@ -12,9 +12,19 @@ from sklearn.linear_model import Ridge
 from sklearn.utils.estimator_checks import check_estimator
 from threadpoolctl import threadpool_info, threadpool_limits  # type: ignore[import-untyped]
 
-from identification import LSSVM, ArtificialBeeColony, TruncatedLSSVM, TunedLSSVM, polynomial_coefficients
+from identification import (
+    LSSVM,
+    ArtificialBeeColony,
+    TruncatedLSSVM,
+    TunedLSSVM,
+    polynomial_coefficients,
+)
 from identification.estimators.comparators import LinearSupportVectorMachine
-from identification.estimators.decomposition import decompose, decompose_triangle, triangle
+from identification.estimators.decomposition import (
+    decompose,
+    decompose_triangle,
+    triangle,
+)
 from identification.estimators.estimator import weights
 from identification.estimators.l_curve import variance_rank
 from identification.estimators.robust import fit_weighted, hampel_weights
@@ -24,10 +34,14 @@ from shipgym import InputError
 Floats = np.ndarray[Any, np.dtype[np.float64]]
 
 
-def regression(n: int = 300, m: int = 7, noise: float = 0.1, seed: int = 0) -> tuple[Floats, Floats, Floats]:
+def regression(
+    n: int = 300, m: int = 7, noise: float = 0.1, seed: int = 0
+) -> tuple[Floats, Floats, Floats]:
     """Features like those of manoeuvres: correlated, of very different size, with an offset."""
     rng = np.random.default_rng(seed)
-    X = (rng.standard_normal((n, m)) @ rng.standard_normal((m, m)) + 1.0) * np.geomspace(1e-3, 1.0, m)
+    X = (
+        rng.standard_normal((n, m)) @ rng.standard_normal((m, m)) + 1.0
+    ) * np.geomspace(1e-3, 1.0, m)
     coefficients = rng.standard_normal(m)
     return X, X @ coefficients + 3.0 + noise * rng.standard_normal(n), coefficients
 
@@ -51,13 +65,17 @@ def regression(n: int = 300, m: int = 7, noise: float = 0.1, seed: int = 0) -> t
 )
 def test_estimators_pass_the_battery_of_scikit_learn(estimator: Any) -> None:
     checks = check_estimator(estimator, on_skip=None, on_fail=None)
-    assert [(c["check_name"], c["exception"]) for c in checks if c["status"] == "failed"] == []
+    assert [
+        (c["check_name"], c["exception"]) for c in checks if c["status"] == "failed"
+    ] == []
     assert sum(c["status"] == "passed" for c in checks) > 40
 
 
 @pytest.mark.parametrize("C", [0.1, 5.0, 1e6])
 @pytest.mark.parametrize("fit_intercept", [True, False])
-def test_primal_form_equals_the_printed_dual_system(C: float, fit_intercept: bool) -> None:
+def test_primal_form_equals_the_printed_dual_system(
+    C: float, fit_intercept: bool
+) -> None:
     X, y, _ = regression(n=120)
     coef, intercept = dense_dual_solution(X, y, C, fit_intercept)
     estimator = LSSVM(C=C, scale=False, fit_intercept=fit_intercept).fit(X, y)
@@ -69,7 +87,9 @@ def test_primal_form_keeps_thirteen_digits_where_the_dual_keeps_six() -> None:
     X, y, _ = regression(n=200, noise=0.0)
     C = 1e9
     Xc = X - X.mean(axis=0)
-    exact = solve(Xc.T @ Xc + np.eye(X.shape[1]) / C, Xc.T @ (y - y.mean()), assume_a="pos")
+    exact = solve(
+        Xc.T @ Xc + np.eye(X.shape[1]) / C, Xc.T @ (y - y.mean()), assume_a="pos"
+    )
     scale = np.abs(exact).max()
     assert np.abs(LSSVM(C=C, scale=False).fit(X, y).coef_ - exact).max() < 1e-8 * scale
     assert np.abs(dense_dual_solution(X, y, C)[0] - exact).max() < 1e-3 * scale
@@ -91,7 +111,9 @@ def test_without_penalty_it_is_least_squares() -> None:
     bordered = np.column_stack([X, np.ones(len(X))])
     expected = np.linalg.lstsq(bordered, y, rcond=None)[0]
     estimator = LSSVM(C=np.inf).fit(X, y)
-    np.testing.assert_allclose([*estimator.coef_, estimator.intercept_], expected, rtol=1e-8)
+    np.testing.assert_allclose(
+        [*estimator.coef_, estimator.intercept_], expected, rtol=1e-8
+    )
 
 
 @pytest.mark.parametrize("n", [60, 9])
@@ -104,8 +126,14 @@ def test_gcv_keeps_the_rank_of_least_generalised_cross_validation(n: int) -> Non
     for rank in range(1, 9):
         fit = TruncatedLSSVM(rank=rank, scale=False, fit_intercept=False).fit(X, y)
         residual = y - fit.predict(X)
-        scores.append(float(residual @ residual) / (n - rank) ** 2 if n > rank else np.inf)
-    chosen = TruncatedLSSVM(selection="gcv", scale=False, fit_intercept=False).fit(X, y).rank_
+        scores.append(
+            float(residual @ residual) / (n - rank) ** 2 if n > rank else np.inf
+        )
+    chosen = (
+        TruncatedLSSVM(selection="gcv", scale=False, fit_intercept=False)
+        .fit(X, y)
+        .rank_
+    )
     assert chosen == int(np.argmin(scores)) + 1
     assert 2 <= chosen < 8
 
@@ -115,7 +143,9 @@ def test_standardised_fit_does_not_depend_on_units() -> None:
     units = np.geomspace(1e-4, 1e4, X.shape[1])
     for estimator in (LSSVM(C=0.3), TruncatedLSSVM(rank=4)):
         before = estimator.fit(X, y).coef_
-        np.testing.assert_allclose(estimator.fit(X * units, y).coef_ * units, before, rtol=1e-6)
+        np.testing.assert_allclose(
+            estimator.fit(X * units, y).coef_ * units, before, rtol=1e-6
+        )
 
 
 def test_data_without_noise_keep_every_direction() -> None:
@@ -164,7 +194,9 @@ def test_polynomial_kernel_learns_a_quadratic() -> None:
     estimator = LSSVM(C=1e9, kernel="poly", degree=2, scale=False).fit(
         x, 1.0 + 2.0 * x[:, 0] - 3.0 * x[:, 0] ** 2
     )
-    np.testing.assert_allclose(estimator.predict([[0.3], [-0.7]]), [1.33, -1.87], atol=1e-5)
+    np.testing.assert_allclose(
+        estimator.predict([[0.3], [-0.7]]), [1.33, -1.87], atol=1e-5
+    )
 
 
 @pytest.mark.parametrize(
@@ -173,13 +205,19 @@ def test_polynomial_kernel_learns_a_quadratic() -> None:
         (LSSVM(kernel="sigmoid"), "kernel: 'sigmoid'"),
         (LSSVM(C=0.0), "C: 0"),
         (LSSVM(C=-1.0), "C: -1"),
-        (LSSVM(C=np.nan), "C: nan found, expected a number above 0 .infinity gives least squares"),
+        (
+            LSSVM(C=np.nan),
+            "C: nan found, expected a number above 0 .infinity gives least squares",
+        ),
         (LSSVM(C="big"), "C: 'big'"),  # type: ignore[arg-type]
         (TruncatedLSSVM(C=0.0), "C: 0"),
         (TruncatedLSSVM(explained_variance=0.0), "explained_variance: 0"),
         (LSSVM(kernel="polly"), "Did you mean 'poly'"),
         (TunedLSSVM(optimiser="abd"), "optimiser: 'abd'.*Did you mean 'abc'"),
-        (TunedLSSVM(objective="training error"), "objective: 'training error'.*Did you mean 'training'"),
+        (
+            TunedLSSVM(objective="training error"),
+            "objective: 'training error'.*Did you mean 'training'",
+        ),
         (TunedLSSVM(objective="free-running"), "identify"),
         (TunedLSSVM(bounds=(1.0, 0.1)), "bounds"),
         (TunedLSSVM(bounds=(0.0, 1.0)), "bounds: 0"),
@@ -204,7 +242,9 @@ def test_wrong_settings_are_named(estimator: Any, message: str) -> None:
 
 @pytest.mark.parametrize("C", [1e-3, 1.0, 1e4])
 @pytest.mark.parametrize("fit_intercept", [True, False])
-def test_it_is_the_ridge_regression_of_scikit_learn(C: float, fit_intercept: bool) -> None:
+def test_it_is_the_ridge_regression_of_scikit_learn(
+    C: float, fit_intercept: bool
+) -> None:
     X, y, _ = regression()
     oracle = Ridge(alpha=1.0 / C, fit_intercept=fit_intercept, solver="svd").fit(X, y)
     estimator = LSSVM(C=C, scale=False, fit_intercept=fit_intercept).fit(X, y)
@@ -213,11 +253,21 @@ def test_it_is_the_ridge_regression_of_scikit_learn(C: float, fit_intercept: boo
 
 
 @pytest.mark.parametrize("kernel", ["rbf", "poly"])
-def test_kernels_without_intercept_are_the_kernel_ridge_of_scikit_learn(kernel: str) -> None:
+def test_kernels_without_intercept_are_the_kernel_ridge_of_scikit_learn(
+    kernel: str,
+) -> None:
     X, y, _ = regression(n=80)
-    oracle = KernelRidge(alpha=0.1, kernel=kernel, gamma=0.2, degree=2, coef0=1.0).fit(X, y)
+    oracle = KernelRidge(alpha=0.1, kernel=kernel, gamma=0.2, degree=2, coef0=1.0).fit(
+        X, y
+    )
     estimator = LSSVM(
-        C=10.0, kernel=kernel, gamma=0.2, degree=2, coef0=1.0, scale=False, fit_intercept=False
+        C=10.0,
+        kernel=kernel,
+        gamma=0.2,
+        degree=2,
+        coef0=1.0,
+        scale=False,
+        fit_intercept=False,
     ).fit(X, y)
     np.testing.assert_allclose(estimator.predict(X), oracle.predict(X), rtol=1e-8)
 
@@ -226,10 +276,21 @@ def test_coefficients_are_read_out_of_a_polynomial_kernel() -> None:
     x = np.random.default_rng(0).uniform(-1.0, 2.0, (60, 2))
     y = 1.0 + 2.0 * x[:, 0] - 3.0 * x[:, 0] ** 2 + 0.5 * x[:, 0] * x[:, 1]
     for scale, fit_intercept in ((True, True), (False, False)):
-        estimator = LSSVM(C=1e9, kernel="poly", degree=2, scale=scale, fit_intercept=fit_intercept).fit(x, y)
+        estimator = LSSVM(
+            C=1e9, kernel="poly", degree=2, scale=scale, fit_intercept=fit_intercept
+        ).fit(x, y)
         found = polynomial_coefficients(estimator)
-        expected = {(0, 0): 1.0, (1, 0): 2.0, (0, 1): 0.0, (2, 0): -3.0, (1, 1): 0.5, (0, 2): 0.0}
-        assert found == {powers: pytest.approx(c, abs=1e-5) for powers, c in expected.items()}
+        expected = {
+            (0, 0): 1.0,
+            (1, 0): 2.0,
+            (0, 1): 0.0,
+            (2, 0): -3.0,
+            (1, 1): 0.5,
+            (0, 2): 0.0,
+        }
+        assert found == {
+            powers: pytest.approx(c, abs=1e-5) for powers, c in expected.items()
+        }
     with pytest.raises(InputError, match="poly"):
         polynomial_coefficients(LSSVM().fit(x, y))
 
@@ -238,7 +299,11 @@ def with_outliers(seed: int = 0) -> tuple[Floats, Floats, Floats]:
     X, y, coefficients = regression(seed=seed)
     rng = np.random.default_rng(seed + 1)
     rows = rng.choice(len(y), len(y) // 10, replace=False)
-    y[rows] += rng.uniform(10.0, 50.0, len(rows)) * 0.1 * rng.choice([-1.0, 1.0, 1.0], len(rows))
+    y[rows] += (
+        rng.uniform(10.0, 50.0, len(rows))
+        * 0.1
+        * rng.choice([-1.0, 1.0, 1.0], len(rows))
+    )
     return X, y, coefficients
 
 
@@ -250,7 +315,9 @@ def test_robust_fit_is_not_moved_by_outliers(estimator: Any) -> None:
         X, y, coefficients = with_outliers(seed)
         size = np.std(X, axis=0)
         plain, robust = (
-            np.linalg.norm((estimator(robust=on, **options).fit(X, y).coef_ - coefficients) * size)
+            np.linalg.norm(
+                (estimator(robust=on, **options).fit(X, y).coef_ - coefficients) * size
+            )
             for on in (False, True)
         )
         gains.append(plain / robust)
@@ -263,15 +330,33 @@ def test_robust_kernel_fit_is_not_moved_by_outliers() -> None:
     y = truth + 0.02 * np.random.default_rng(0).standard_normal(120)
     y[::11] += 3.0
     error = {
-        on: np.sqrt(np.mean((LSSVM(C=10.0, kernel="rbf", robust=on).fit(x, y).predict(x) - truth) ** 2))
+        on: np.sqrt(
+            np.mean(
+                (LSSVM(C=10.0, kernel="rbf", robust=on).fit(x, y).predict(x) - truth)
+                ** 2
+            )
+        )
         for on in (False, True)
     }
     assert error[True] < 0.03 < 0.2 < error[False]
 
 
-def test_hampel_s_weights_fall_from_one_to_nearly_none_between_2_5_and_3_deviations() -> None:
+def test_hampel_s_weights_fall_from_one_to_nearly_none_between_2_5_and_3_deviations() -> (
+    None
+):
     """1.4826 times the median absolute deviation, here of 1, is the standard deviation."""
-    sizes = np.array([0.5, 1.0, 1.4826 * 2.49, 1.4826 * 2.6, 1.4826 * 2.75, 1.4826 * 2.9, 1.4826 * 3.0, 9.0])
+    sizes = np.array(
+        [
+            0.5,
+            1.0,
+            1.4826 * 2.49,
+            1.4826 * 2.6,
+            1.4826 * 2.75,
+            1.4826 * 2.9,
+            1.4826 * 3.0,
+            9.0,
+        ]
+    )
     residuals = np.concatenate([[0.0] * 5, np.full(4, 1.0), sizes])
     residuals = np.concatenate([residuals, -residuals])
     assert np.median(np.abs(residuals)) == 1.0
@@ -282,18 +367,23 @@ def test_hampel_s_weights_fall_from_one_to_nearly_none_between_2_5_and_3_deviati
 
 def test_robust_fit_of_clean_data_is_the_plain_one() -> None:
     X, _, coefficients = regression()
-    plain, robust = (LSSVM(C=np.inf, robust=on).fit(X, X @ coefficients) for on in (False, True))
+    plain, robust = (
+        LSSVM(C=np.inf, robust=on).fit(X, X @ coefficients) for on in (False, True)
+    )
     np.testing.assert_array_equal(robust.coef_, plain.coef_)
     np.testing.assert_array_equal(robust.weights_, 1.0)
 
 
-def test_intervals_of_the_robust_fit_cover_the_truth_in_95_per_cent_in_spite_of_outliers() -> None:
+def test_intervals_of_the_robust_fit_cover_the_truth_in_95_per_cent_in_spite_of_outliers() -> (
+    None
+):
     covered = []
     for seed in range(150):
         X, y, coefficients = with_outliers(seed)
         estimator = TruncatedLSSVM(selection="full", robust=True).fit(X, y)
         covered.append(
-            np.abs(estimator.coef_ - coefficients) < 1.96 * np.sqrt(np.diag(estimator.covariance_))
+            np.abs(estimator.coef_ - coefficients)
+            < 1.96 * np.sqrt(np.diag(estimator.covariance_))
         )
     assert 0.93 < np.mean(covered) < 0.97
 
@@ -303,7 +393,9 @@ def test_weighting_a_sample_by_two_is_having_it_twice() -> None:
     weights = np.ones(60)
     weights[:10] = 2.0
     once = decompose_triangle(triangle(X, y, True, weights), 70, False, True)
-    twice = decompose_triangle(triangle(np.vstack([X, X[:10]]), np.append(y, y[:10]), True), 70, False, True)
+    twice = decompose_triangle(
+        triangle(np.vstack([X, X[:10]]), np.append(y, y[:10]), True), 70, False, True
+    )
     np.testing.assert_allclose(once.singular_values, twice.singular_values, rtol=1e-10)
     np.testing.assert_allclose(once.centre, twice.centre, rtol=1e-10)
     assert once.outside == pytest.approx(twice.outside, rel=1e-10)
@@ -315,7 +407,11 @@ def test_explained_variance_keeps_the_principal_directions() -> None:
     X = (X - X.mean(axis=0)) * np.sqrt([90.0, 9.0, 1.0])
     y = X.sum(axis=1)
     ranks = [
-        TruncatedLSSVM(selection="explained-variance", explained_variance=share, scale=False).fit(X, y).rank_
+        TruncatedLSSVM(
+            selection="explained-variance", explained_variance=share, scale=False
+        )
+        .fit(X, y)
+        .rank_
         for share in (0.5, 0.95, 1.0)
     ]
     assert ranks == [1, 2, 3]
@@ -325,9 +421,15 @@ def test_collinear_terms_are_named() -> None:
     pandas = pytest.importorskip("pandas")
     X, y, _ = regression(m=3)
     names = ["v", "r", "v|v|"]
-    table = pandas.DataFrame(np.column_stack([X, 2.0 * X[:, 0]]), columns=[*names, "v again"])
-    assert TruncatedLSSVM(selection="full").fit(table, y).collinear_names_ == (("v", "v again"),)
-    assert TruncatedLSSVM(selection="full").fit(table.to_numpy(), y).collinear_names_ == (("x0", "x3"),)
+    table = pandas.DataFrame(
+        np.column_stack([X, 2.0 * X[:, 0]]), columns=[*names, "v again"]
+    )
+    assert TruncatedLSSVM(selection="full").fit(table, y).collinear_names_ == (
+        ("v", "v again"),
+    )
+    assert TruncatedLSSVM(selection="full").fit(
+        table.to_numpy(), y
+    ).collinear_names_ == (("x0", "x3"),)
 
 
 def test_support_vectors_shrug_off_outliers_too() -> None:
@@ -337,21 +439,29 @@ def test_support_vectors_shrug_off_outliers_too() -> None:
     plain = np.linalg.norm((LSSVM(C=1e9).fit(X, y).coef_ - coefficients) * size)
     assert np.linalg.norm((estimator.coef_ - coefficients) * size) < 0.5 * plain
     assert (
-        estimator.weights_[np.argmax(np.abs(y - estimator.predict(X)))] < 0.1 < np.median(estimator.weights_)
+        estimator.weights_[np.argmax(np.abs(y - estimator.predict(X)))]
+        < 0.1
+        < np.median(estimator.weights_)
     )
     assert np.all(np.linalg.eigvalsh(estimator.covariance_) > 0.0)
 
 
 def test_what_an_estimator_cannot_do_is_refused() -> None:
     X, y, _ = regression(n=40, m=3)
-    with pytest.raises(InputError, match="C: inf found, expected a finite number with kernel 'rbf'"):
+    with pytest.raises(
+        InputError, match="C: inf found, expected a finite number with kernel 'rbf'"
+    ):
         LSSVM(C=np.inf, kernel="rbf").fit(X, y)
     for scale in ([1.0, 1.0], [1.0, 0.0, 1.0], [1.0, np.nan, 1.0]):
-        with pytest.raises(InputError, match="expected 3 finite numbers above 0, True or False"):
+        with pytest.raises(
+            InputError, match="expected 3 finite numbers above 0, True or False"
+        ):
             LSSVM(scale=scale).fit(X, y)
     for share in (0.0, 1.1):
         with pytest.raises(InputError, match="expected a share above 0 and at most 1"):
-            TruncatedLSSVM(selection="explained-variance", explained_variance=share).fit(X, y)
+            TruncatedLSSVM(
+                selection="explained-variance", explained_variance=share
+            ).fit(X, y)
     with pytest.raises(InputError, match="objective: 'free-running' found"):
         TunedLSSVM(objective="free-running").fit(X, y)
 
@@ -359,13 +469,19 @@ def test_what_an_estimator_cannot_do_is_refused() -> None:
 def test_variance_is_held_by_squares_of_singular_values() -> None:
     """Of 2, 1 and 1 the first holds four sixths, the first two five sixths."""
     values = np.array([2.0, 1.0, 1.0])
-    ranks = [variance_rank(values, share) for share in (0.5, 0.66, 0.67, 0.83, 0.84, 1.0)]
+    ranks = [
+        variance_rank(values, share) for share in (0.5, 0.66, 0.67, 0.83, 0.84, 1.0)
+    ]
     assert ranks == [1, 1, 2, 2, 3, 3]
 
 
 @pytest.mark.parametrize(
     ("given", "message"),
-    [({"gamma": -1.0}, "gamma: -1"), ({"degree": 0}, "degree: 0"), ({"coef0": np.inf}, "coef0: inf")],
+    [
+        ({"gamma": -1.0}, "gamma: -1"),
+        ({"degree": 0}, "degree: 0"),
+        ({"coef0": np.inf}, "coef0: inf"),
+    ],
 )
 def test_settings_of_kernels_are_checked(given, message):
     X = np.random.default_rng(0).standard_normal((10, 2))
@@ -399,8 +515,12 @@ def test_weights_are_renewed_until_they_settle_for_fifty_rounds_at_most() -> Non
 
 
 @pytest.mark.parametrize(("change", "fits"), [(0.9e-3, 2), (1.05e-3, 3)])
-def test_weights_settle_where_none_changes_by_a_thousandth(change: float, fits: int) -> None:
-    outlying = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 1.4826, -1.4826])  # to either side, by the deviation
+def test_weights_settle_where_none_changes_by_a_thousandth(
+    change: float, fits: int
+) -> None:
+    outlying = np.array(
+        [0.0, 0.0, 0.0, 0.0, 0.0, 1.4826, -1.4826]
+    )  # to either side, by the deviation
     base = np.array([0.0, 1.0, -1.0, 1.0, -1.0, 0.0, 0.0]) + 2.75 * outlying
     rounds: list[Any] = []
 
@@ -408,7 +528,9 @@ def test_weights_settle_where_none_changes_by_a_thousandth(change: float, fits: 
         rounds.append(weights)
         return base - 0.5 * change * outlying * (len(rounds) > 1)
 
-    assert fit_weighted(fit, base, True)[-1] == pytest.approx(0.5 + change * (fits == 3))
+    assert fit_weighted(fit, base, True)[-1] == pytest.approx(
+        0.5 + change * (fits == 3)
+    )
     assert len(rounds) == fits
 
 
@@ -418,7 +540,9 @@ def test_features_that_are_zero_throughout_have_no_coefficient() -> None:
     assert problem.numerical_rank == 1
     np.testing.assert_array_equal(problem.filters(np.inf, 2), [0.0, 0.0])
     np.testing.assert_array_equal(problem.scale, [1.0, 1.0])
-    assert problem.outside + problem.projections @ problem.projections == pytest.approx(y @ y)
+    assert problem.outside + problem.projections @ problem.projections == pytest.approx(
+        y @ y
+    )
     np.testing.assert_array_equal(LSSVM().fit(np.zeros((5, 2)), y).coef_, [0.0, 0.0])
 
 
@@ -433,7 +557,9 @@ def test_a_feature_that_is_constant_but_for_rounding_is_constant() -> None:
 def test_what_was_not_fitted_has_no_polynomial_and_no_names() -> None:
     with pytest.raises(NotFittedError, match="This LSSVM instance is not fitted yet"):
         polynomial_coefficients(LSSVM(kernel="poly"))
-    with pytest.raises(NotFittedError, match="This TruncatedLSSVM instance is not fitted yet"):
+    with pytest.raises(
+        NotFittedError, match="This TruncatedLSSVM instance is not fitted yet"
+    ):
         TruncatedLSSVM().collinear_names_  # noqa: B018
 
 
@@ -441,7 +567,9 @@ def test_names_of_columns_are_those_of_the_last_fit() -> None:
     pandas = pytest.importorskip("pandas")
     X, y, _ = regression(m=2)
     twice = np.column_stack([X, X[:, 1]])
-    estimator = TruncatedLSSVM(selection="full").fit(pandas.DataFrame(twice, columns=["v", "r", "again"]), y)
+    estimator = TruncatedLSSVM(selection="full").fit(
+        pandas.DataFrame(twice, columns=["v", "r", "again"]), y
+    )
     assert estimator.collinear_names_ == (("r", "again"),)
     assert estimator.fit(twice, y).collinear_names_ == (("x1", "x2"),)
 
@@ -460,7 +588,9 @@ def test_the_noise_of_as_many_samples_as_directions_is_not_known() -> None:
 
 def test_tall_and_narrow_matrices_are_worked_at_by_one_thread() -> None:
     def threads() -> set[int]:
-        return {one["num_threads"] for one in threadpool_info() if one["user_api"] == "blas"}
+        return {
+            one["num_threads"] for one in threadpool_info() if one["user_api"] == "blas"
+        }
 
     with threadpool_limits(2, user_api="blas"):
         before = threads()

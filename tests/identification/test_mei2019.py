@@ -22,7 +22,9 @@ def test_table_4_gives_its_correlations_and_the_tanker() -> None:
     assert all(row.met for row in found)
 
 
-def test_the_turns_of_the_virtual_ship_come_within_one_per_cent(turns: dict[str, Row]) -> None:
+def test_the_turns_of_the_virtual_ship_come_within_one_per_cent(
+    turns: dict[str, Row],
+) -> None:
     """From zigzags of 10 and 20 degrees; the same hull at another scale is 3 per cent off by itself."""
     aimed = [row for row in turns.values() if row.met is not None]
     assert len(aimed) == 4
@@ -60,7 +62,11 @@ def test_the_turns_that_marin_measured() -> None:
     target = mei.measured()
     found = list(mei.turn_rows(target))
     assert [row.met for row in found if row.aim] == [True, True]
-    bare = next(row for row in found if row.quantity == "+35 deg: tactical diameter, L, bare reference")
+    bare = next(
+        row
+        for row in found
+        if row.quantity == "+35 deg: tactical diameter, L, bare reference"
+    )
     assert bare.best is not None
     assert bare.best < 0.95 * mei.MEASURED["tactical"]
 

@@ -10,7 +10,12 @@ from sklearn.neighbors import KNeighborsRegressor
 
 from identification import LSSVM, ArtificialBeeColony, cross_validate, identify
 from identification.estimators.l_curve import LCurve, corner_rank, gcv_rank
-from identification.estimators.methods import METHODS, Adapted, get_method, without_constant
+from identification.estimators.methods import (
+    METHODS,
+    Adapted,
+    get_method,
+    without_constant,
+)
 from identification.estimators.tuned import free_running_error
 from shipgym import InputError, ShipModel, Trial
 from shipgym.manoeuvres import zigzag
@@ -28,21 +33,35 @@ def yaw_error(result: Any, trial: str) -> float:
 def test_every_method_predicts_a_zigzag_it_has_not_seen(
     noisy_trials: list[Trial], mariner: ShipModel, method: str
 ) -> None:
-    fit = identify(noisy_trials, method=method, particulars=mariner.particulars, steering=mariner.steering)
+    fit = identify(
+        noisy_trials,
+        method=method,
+        particulars=mariner.particulars,
+        steering=mariner.steering,
+    )
     assert fit.stable
     assert yaw_error(fit, "zigzag_15_15") < 0.03
     assert np.all(np.isfinite(list(fit.standard_errors.values())))
 
 
-def test_searches_tell_what_they_chose(noisy_trials: list[Trial], mariner: ShipModel) -> None:
+def test_searches_tell_what_they_chose(
+    noisy_trials: list[Trial], mariner: ShipModel
+) -> None:
     colony = ArtificialBeeColony(sources=8, rounds=10)
     fit = identify(
-        noisy_trials[:2], method="abc-lssvr", particulars=mariner.particulars, optimiser=colony, seed=4
+        noisy_trials[:2],
+        method="abc-lssvr",
+        particulars=mariner.particulars,
+        optimiser=colony,
+        seed=4,
     )
     provenance: Any = json.loads(json.dumps(fit.model.provenance))
     assert provenance["settings"]["optimiser"] == {
-        "kind": "ArtificialBeeColony", "sources": 8, "rounds": 10, "limit": 20,
-    }  # fmt: skip
+        "kind": "ArtificialBeeColony",
+        "sources": 8,
+        "rounds": 10,
+        "limit": 20,
+    }
     assert set(fit.searches) == set(provenance["search"]) == {"u", "v", "r"}
     for equation, search in fit.searches.items():
         assert provenance["search"][equation]["C"] == pytest.approx(10.0 ** search.x[0])
@@ -51,7 +70,12 @@ def test_searches_tell_what_they_chose(noisy_trials: list[Trial], mariner: ShipM
 
 def test_optimisers_agree_on_C(noisy_trials: list[Trial], mariner: ShipModel) -> None:  # noqa: N802
     found = [
-        identify(noisy_trials, method=m, particulars=mariner.particulars, steering=mariner.steering).searches
+        identify(
+            noisy_trials,
+            method=m,
+            particulars=mariner.particulars,
+            steering=mariner.steering,
+        ).searches
         for m in SEARCHES
     ]
     for equation in ("u", "v", "r"):
@@ -62,7 +86,11 @@ def test_optimisers_agree_on_C(noisy_trials: list[Trial], mariner: ShipModel) ->
 def test_free_running_choice_sails_its_trials_at_least_as_well(
     noisy_trials: list[Trial], mariner: ShipModel
 ) -> None:
-    options = {"method": "abc-lssvr", "particulars": mariner.particulars, "steering": mariner.steering}
+    options = {
+        "method": "abc-lssvr",
+        "particulars": mariner.particulars,
+        "steering": mariner.steering,
+    }
     few = ArtificialBeeColony(sources=8, rounds=4)
     used = noisy_trials[:2]
     free = identify(used, objective="free-running", optimiser=few, **options)
@@ -73,7 +101,9 @@ def test_free_running_choice_sails_its_trials_at_least_as_well(
     assert free_running_error(mariner, used) < error + 0.05
 
 
-def test_outliers_spoil_the_plain_fit_and_not_the_robust_one(mariner: ShipModel, record: Any) -> None:
+def test_outliers_spoil_the_plain_fit_and_not_the_robust_one(
+    mariner: ShipModel, record: Any
+) -> None:
     run = record(zigzag(mariner, 20, 20, duration=500, dt=0.1), every=5, name="spikes")
     r = run["r"].copy()
     r[37::83] += np.radians(0.3)
@@ -82,38 +112,65 @@ def test_outliers_spoil_the_plain_fit_and_not_the_robust_one(mariner: ShipModel,
     error = {
         robust: yaw_error(
             identify(
-                [spiky, clean], method="tls-svm", robust=robust, smooth=False, window=1,
-                samples="integral", selection="full", particulars=mariner.particulars, guarded=False,
+                [spiky, clean],
+                method="tls-svm",
+                robust=robust,
+                smooth=False,
+                window=1,
+                samples="integral",
+                selection="full",
+                particulars=mariner.particulars,
+                guarded=False,
             ),
             "clean",
         )
         for robust in (False, True)
-    }  # fmt: skip
+    }
     assert error[True] < 0.5 * error[False]
 
 
-def test_trials_of_different_length_and_sampling_are_fitted_together(mariner: ShipModel, record: Any) -> None:
+def test_trials_of_different_length_and_sampling_are_fitted_together(
+    mariner: ShipModel, record: Any
+) -> None:
     plan = [(10, 10, 300, 5), (20, 20, 500, 10), (30, 20, 200, 20)]
     trials = [
-        record(zigzag(mariner, a, b, duration=length, dt=0.1), every=every, name=f"{a}/{b}")
+        record(
+            zigzag(mariner, a, b, duration=length, dt=0.1), every=every, name=f"{a}/{b}"
+        )
         for a, b, length, every in plan
     ]
-    held = record(zigzag(mariner, 15, 15, duration=400, dt=0.1), every=10, name="15/15", use="validate")
+    held = record(
+        zigzag(mariner, 15, 15, duration=400, dt=0.1),
+        every=10,
+        name="15/15",
+        use="validate",
+    )
     for method in ("tls-svm", "cv-lssvr"):
         fit = identify([*trials, held], method=method, particulars=mariner.particulars)
-        assert fit.diagnostics["r"].samples == sum(round(d / (0.1 * e)) for _, _, d, e in plan)
+        assert fit.diagnostics["r"].samples == sum(
+            round(d / (0.1 * e)) for _, _, d, e in plan
+        )
         assert yaw_error(fit, "15/15") < 0.002
-    by_trial = identify(trials, method="cv-lssvr", folds="trials", particulars=mariner.particulars)
+    by_trial = identify(
+        trials, method="cv-lssvr", folds="trials", particulars=mariner.particulars
+    )
     assert by_trial.stable
 
 
-def test_trials_are_held_out_by_name(noisy_trials: list[Trial], mariner: ShipModel) -> None:
+def test_trials_are_held_out_by_name(
+    noisy_trials: list[Trial], mariner: ShipModel
+) -> None:
     options = {"particulars": mariner.particulars, "steering": mariner.steering}
     by_name = identify(noisy_trials, hold_out=["zigzag_20_20"], **options)
-    marked = [t.with_(use="validate") if t.name == "zigzag_20_20" else t for t in noisy_trials]
+    marked = [
+        t.with_(use="validate") if t.name == "zigzag_20_20" else t for t in noisy_trials
+    ]
     assert by_name.coefficients == identify(marked, **options).coefficients
     assert by_name.metrics["trials"]["zigzag_20_20"]["use"] == "validate"
-    with pytest.raises(InputError, match=r"hold_out: 'zigzag_20_10' found.*Did you mean 'zigzag_\d0_\d0'"):
+    with pytest.raises(
+        InputError,
+        match=r"hold_out: 'zigzag_20_10' found.*Did you mean 'zigzag_\d0_\d0'",
+    ):
         identify(noisy_trials, hold_out=["zigzag_20_10"], **options)
 
 
@@ -131,17 +188,27 @@ def test_cross_validation_predicts_each_trial_by_a_model_of_the_others(
         cross_validate(noisy_trials, folds=4, **options)
 
 
-def test_terms_that_are_exactly_collinear_are_named(cao_zigzag: Trial, mariner: ShipModel) -> None:
+def test_terms_that_are_exactly_collinear_are_named(
+    cao_zigzag: Trial, mariner: ShipModel
+) -> None:
     same = Trial(
-        cao_zigzag.t, {**cao_zigzag.channels, "v": -20.0 * cao_zigzag["r"]}, name="tied", kind="zigzag"
+        cao_zigzag.t,
+        {**cao_zigzag.channels, "v": -20.0 * cao_zigzag["r"]},
+        name="tied",
+        kind="zigzag",
     )
-    fit = identify([same], structure="linear-steering", method="ls", particulars=mariner.particulars)
+    fit = identify(
+        [same],
+        structure="linear-steering",
+        method="ls",
+        particulars=mariner.particulars,
+    )
     assert fit.diagnostics["r"].rank == 2
     (group,) = fit.diagnostics["r"].dropped
     assert len(group) == 2
     assert (
-        f"yaw: the data cannot separate these terms, their combination was left out: {', '.join(group)}"
-        in (" ".join(fit.summary().split()))
+        "yaw: the data cannot separate these terms, their combination was left out:"
+        f" {', '.join(group)}" in (" ".join(fit.summary().split()))
     )
 
 
@@ -149,15 +216,24 @@ def test_terms_that_are_exactly_collinear_are_named(cao_zigzag: Trial, mariner: 
     ("arguments", "message"),
     [
         ({"method": "abc-lsvr"}, "method: 'abc-lsvr'.*Did you mean 'abc-lssvr'"),
-        ({"method": "abc-lssvr", "objective": "kfold"}, "objective: 'kfold'.*Did you mean 'k-fold'"),
-        ({"method": "abc-lssvr", "optimiser": "psi"}, "optimiser: 'psi'.*Did you mean 'pso'"),
+        (
+            {"method": "abc-lssvr", "objective": "kfold"},
+            "objective: 'kfold'.*Did you mean 'k-fold'",
+        ),
+        (
+            {"method": "abc-lssvr", "optimiser": "psi"},
+            "optimiser: 'psi'.*Did you mean 'pso'",
+        ),
         ({"method": "abc-lssvr", "folds": "trials"}, "1 trials"),
         ({"method": "ls-svm", "C": 0}, "C: 0"),
         ({"method": "ls-svm", "C": float("nan")}, "C: nan"),
         ({"method": "tls-svm", "rank": 0}, "rank: 0"),
         ({"method": "ridge", "alpha": -1.0}, "alpha: -1"),
         ({"method": "svr", "C": float("inf")}, "C: inf"),
-        ({"method": "ls", "rank": 3, "epsilon": 0.1}, "settings: epsilon, rank found, which method 'ls'"),
+        (
+            {"method": "ls", "rank": 3, "epsilon": 0.1},
+            "settings: epsilon, rank found, which method 'ls'",
+        ),
         ({"depth": 2}, "depth: identify has no such option"),
     ],
 )
@@ -173,7 +249,9 @@ def test_methods_are_registered_by_their_names() -> None:
     assert {"ls", "ridge", "ls-svm", "tls-svm", "svr", *SEARCHES} <= set(METHODS)
 
 
-def test_an_estimator_object_is_a_method(noisy_trials: list[Trial], mariner: ShipModel) -> None:
+def test_an_estimator_object_is_a_method(
+    noisy_trials: list[Trial], mariner: ShipModel
+) -> None:
     """Scikit-learn's ridge regression, whose constant the equations do not have, and our own estimator."""
     ship = {"particulars": mariner.particulars, "steering": mariner.steering}
     named = identify(noisy_trials, method="ridge", alpha=1e-9, **ship)
@@ -181,11 +259,20 @@ def test_an_estimator_object_is_a_method(noisy_trials: list[Trial], mariner: Shi
     assert own.stable
     for name, value in named.coefficients.items():
         assert own.coefficients[name] == pytest.approx(value, rel=1e-3), name
-    for name, error in identify(noisy_trials, method="ls", **ship).standard_errors.items():
+    for name, error in identify(
+        noisy_trials, method="ls", **ship
+    ).standard_errors.items():
         assert own.standard_errors[name] == pytest.approx(error, rel=1e-3), name
-    assert own.settings["method"]["kind"] == (own.model.provenance or {})["method"] == "Ridge"
+    assert (
+        own.settings["method"]["kind"]
+        == (own.model.provenance or {})["method"]
+        == "Ridge"
+    )
     ours = identify(noisy_trials, method=LSSVM(C=1e4), **ship)
-    assert ours.coefficients == identify(noisy_trials, method="ls-svm", C=1e4, **ship).coefficients
+    assert (
+        ours.coefficients
+        == identify(noisy_trials, method="ls-svm", C=1e4, **ship).coefficients
+    )
 
 
 @pytest.mark.parametrize(
@@ -197,10 +284,16 @@ def test_an_estimator_object_is_a_method(noisy_trials: list[Trial], mariner: Shi
     ],
 )
 def test_an_object_that_is_no_linear_estimator_is_refused(
-    cao_zigzag: Trial, mariner: ShipModel, method: Any, settings: dict[str, Any], told: str
+    cao_zigzag: Trial,
+    mariner: ShipModel,
+    method: Any,
+    settings: dict[str, Any],
+    told: str,
 ) -> None:
     with pytest.raises(InputError, match=told):
-        identify([cao_zigzag], method=method, particulars=mariner.particulars, **settings)
+        identify(
+            [cao_zigzag], method=method, particulars=mariner.particulars, **settings
+        )
 
 
 def test_the_free_running_error_is_relative_to_the_motion_of_each_trial(
@@ -209,15 +302,31 @@ def test_the_free_running_error_is_relative_to_the_motion_of_each_trial(
     ramp = np.arange(4.0)
     moving = Trial(ramp, {"u": 1.0 + ramp, "v": 2.0 * ramp, "r": np.zeros(4)})
     mean = {name: np.full(4, moving[name].mean()) for name in "uvr"}
-    answers = iter([{name: moving[name] for name in "uvr"}, mean, None, {"u": 1e9 * ramp, "v": ramp}])
-    monkeypatch.setattr("identification.estimators.tuned.predict", lambda model, trial: next(answers))
+    answers = iter(
+        [
+            {name: moving[name] for name in "uvr"},
+            mean,
+            None,
+            {"u": 1e9 * ramp, "v": ramp},
+        ]
+    )
+    monkeypatch.setattr(
+        "identification.estimators.tuned.predict", lambda model, trial: next(answers)
+    )
     found = [free_running_error(mariner, [moving]) for _ in range(4)]
-    assert found == [0.0, pytest.approx(1.0), 1e3, 1e3]  # the last is as if it had run away
+    assert found == [
+        0.0,
+        pytest.approx(1.0),
+        1e3,
+        1e3,
+    ]  # the last is as if it had run away
     answers = iter([mean, None])
     assert free_running_error(mariner, [moving, moving]) == pytest.approx(500.5)
 
 
-def test_the_rank_of_few_samples_is_the_corner_and_of_many_what_they_determine() -> None:
+def test_the_rank_of_few_samples_is_the_corner_and_of_many_what_they_determine() -> (
+    None
+):
     """The corner has the smallest product of both norms; a drop by more than chance goes beyond it."""
     curve = LCurve(np.array([10.0, 1.0, 0.8, 0.79]), np.array([1.0, 2.0, 9.0, 90.0]))
     assert [corner_rank(curve, n) for n in (4, 5, 100, 400)] == [2, 2, 3, 4]
@@ -233,13 +342,23 @@ def test_the_rank_of_few_samples_is_the_corner_and_of_many_what_they_determine()
 
 def test_a_method_knows_its_settings_and_an_object_without_fit_is_none() -> None:
     svm = get_method("ls-svm")
-    assert [svm.knows(name) for name in ("C", "scale", "rank", "epsilon")] == [True, True, False, False]
-    assert get_method("tls-svm").knows("selection")  # which 1 is none of: the name is known all the same
+    assert [svm.knows(name) for name in ("C", "scale", "rank", "epsilon")] == [
+        True,
+        True,
+        False,
+        False,
+    ]
+    assert get_method("tls-svm").knows(
+        "selection"
+    )  # which 1 is none of: the name is known all the same
     with pytest.raises(
-        InputError, match=r"method: 3 found, expected one of .*an estimator with scikit-learn"
+        InputError,
+        match=r"method: 3 found, expected one of .*an estimator with scikit-learn",
     ):
         get_method(3)
-    with pytest.raises(InputError, match="LSSVM with kernel 'rbf' found, which has no coefficient"):
+    with pytest.raises(
+        InputError, match="LSSVM with kernel 'rbf' found, which has no coefficient"
+    ):
         get_method(LSSVM(kernel="rbf"))
     assert get_method(LSSVM()).name == "LSSVM"
     with pytest.raises(InputError, match="method: 'lsq' found"):
@@ -249,10 +368,19 @@ def test_a_method_knows_its_settings_and_an_object_without_fit_is_none() -> None
 def test_methods_have_the_settings_that_they_are_known_for() -> None:
     """Scikit-learn's penalty alpha is 1 / C; by default next to none, on columns as they are."""
     ridge: Any = METHODS["ridge"].estimator()
-    assert (ridge.C, ridge.scale, ridge.fit_intercept) == (pytest.approx(1e6), False, False)
+    assert (ridge.C, ridge.scale, ridge.fit_intercept) == (
+        pytest.approx(1e6),
+        False,
+        False,
+    )
     assert METHODS["ridge"].estimator(alpha=4.0).C == 0.25  # type: ignore[attr-defined]
     least: Any = METHODS["ls"].estimator()
-    assert (least.C, least.selection, least.scale, least.robust) == (np.inf, "full", True, False)
+    assert (least.C, least.selection, least.scale, least.robust) == (
+        np.inf,
+        "full",
+        True,
+        False,
+    )
     assert METHODS["nisg"].estimator().omega == 0.5  # type: ignore[attr-defined]
     own = get_method(LSSVM(C=3.0, fit_intercept=True))
     assert (own.regularised, own.refined) == (False, False)
@@ -260,12 +388,18 @@ def test_methods_have_the_settings_that_they_are_known_for() -> None:
     assert (type(made), made.C, made.fit_intercept) == (LSSVM, 3.0, False)
 
 
-def test_an_estimator_of_others_is_copied_without_its_constant_and_given_a_covariance() -> None:
+def test_an_estimator_of_others_is_copied_without_its_constant_and_given_a_covariance() -> (
+    None
+):
     """That of least squares on the features whose coefficients are not zero, by n less their number."""
     theirs = Ridge(alpha=0.5)
     adapted = without_constant(theirs)
     assert isinstance(adapted, Adapted)
-    assert (theirs.fit_intercept, adapted.inner.fit_intercept, adapted.inner.alpha) == (True, False, 0.5)
+    assert (theirs.fit_intercept, adapted.inner.fit_intercept, adapted.inner.alpha) == (
+        True,
+        False,
+        0.5,
+    )
     rng = np.random.default_rng(0)
     X = np.column_stack([rng.standard_normal((12, 2)), np.zeros(12)])
     y = X @ [1.0, -2.0, 0.0] + 0.1 * rng.standard_normal(12)
@@ -274,6 +408,12 @@ def test_an_estimator_of_others_is_copied_without_its_constant_and_given_a_covar
     moment[:2, :2] = np.linalg.inv(X[:, :2].T @ X[:, :2])
     residual = y - X @ adapted.coef_
     np.testing.assert_allclose(adapted.inverse_moment_, moment, atol=1e-12)
-    np.testing.assert_allclose(adapted.covariance_, residual @ residual / 10.0 * moment, atol=1e-12)
-    few: Any = without_constant(theirs).fit(np.eye(2), [1.0, 3.0])  # of two samples one is left at least
-    np.testing.assert_allclose(few.covariance_, np.sum(([1.0, 3.0] - few.coef_) ** 2) * np.eye(2))
+    np.testing.assert_allclose(
+        adapted.covariance_, residual @ residual / 10.0 * moment, atol=1e-12
+    )
+    few: Any = without_constant(theirs).fit(
+        np.eye(2), [1.0, 3.0]
+    )  # of two samples one is left at least
+    np.testing.assert_allclose(
+        few.covariance_, np.sum(([1.0, 3.0] - few.coef_) ** 2) * np.eye(2)
+    )

@@ -44,18 +44,28 @@ L7 = mmg.SHIP.particulars
 
 def ship_of(changes: Mapping[str, float], particulars: Particulars = L7) -> ShipModel:
     """KVLCC2 in the general form, some coefficients changed."""
-    known = mmg.standard_form(kvlcc2.SHIP.coefficients, 1.179, kvlcc2.SHIP.service_shaft_speed)
+    known = mmg.standard_form(
+        kvlcc2.SHIP.coefficients, 1.179, kvlcc2.SHIP.service_shaft_speed
+    )
     return ShipModel(
-        "mmg", "mmg", particulars, mmg.SHIP.steering, known | dict(changes),
+        "mmg",
+        "mmg",
+        particulars,
+        mmg.SHIP.steering,
+        known | dict(changes),
         service_shaft_speed=kvlcc2.SHIP.service_shaft_speed,
-    )  # fmt: skip
+    )
 
 
 def at(model: ShipModel, motion: Motion) -> np.ndarray:
     """Accelerations by the plain functions."""
     length, speed = model.particulars.length, model.particulars["speed"]
-    ship = Ship(length, speed, 0.6, 0.3, 0.0, model.service_shaft_speed, math.inf, speed)
-    numbers = mmg.Coefficients(*model.dynamics.numbers(model.coefficients, model.particulars).tolist())
+    ship = Ship(
+        length, speed, 0.6, 0.3, 0.0, model.service_shaft_speed, math.inf, speed
+    )
+    numbers = mmg.Coefficients(
+        *model.dynamics.numbers(model.coefficients, model.particulars).tolist()
+    )
     return np.array(mmg.accelerations(motion, numbers, ship)[:3])
 
 
@@ -71,12 +81,18 @@ def motions(count: int = 200) -> list[Motion]:
 
 
 def test_kvlcc2_in_the_general_form_has_her_own_accelerations() -> None:
-    ship = Ship(7.0, 1.179, 0.6, 0.3, 0.0, kvlcc2.SHIP.service_shaft_speed, math.inf, 1.179)
+    ship = Ship(
+        7.0, 1.179, 0.6, 0.3, 0.0, kvlcc2.SHIP.service_shaft_speed, math.inf, 1.179
+    )
     for motion in motions():
         own = np.array(kvlcc2.accelerations(motion, kvlcc2.Coefficients(), ship)[:3])
-        np.testing.assert_allclose(at(ship_of({}), motion), own, rtol=0.0, atol=1e-13 * np.abs(own).max())
+        np.testing.assert_allclose(
+            at(ship_of({}), motion), own, rtol=0.0, atol=1e-13 * np.abs(own).max()
+        )
     other_wake = dict(kvlcc2.SHIP.coefficients) | {"PACKAGE_FORM": 1.0}
-    with pytest.raises(InputError, match="form 'shipmmg' found, expected the published one"):
+    with pytest.raises(
+        InputError, match="form 'shipmmg' found, expected the published one"
+    ):
         mmg.standard_form(other_wake, 1.179, 11.85)
 
 
@@ -86,20 +102,32 @@ def test_terms_beyond_the_standard_form_act_as_they_are_named() -> None:
     plain = at(ship_of({}), motion)
     helm = at(ship_of({"delta_0": 0.1}), motion._replace(delta=0.3))
     np.testing.assert_allclose(helm, plain, rtol=1e-12)
-    assert at(ship_of({"c_R": 0.8}), motion)[2] > plain[2]  # a stronger rudder to starboard
+    assert (
+        at(ship_of({"c_R": 0.8}), motion)[2] > plain[2]
+    )  # a stronger rudder to starboard
     slower = at(ship_of({"speed_power": 0.5}), motion)[2] - plain[2]
     speed = math.hypot(motion.u, motion.v) / 1.179
-    less = at(ship_of({"Y_r": 0.083 * speed**0.5, "N_r": -0.049 * speed**0.5}), motion)[2] - plain[2]
+    less = (
+        at(ship_of({"Y_r": 0.083 * speed**0.5, "N_r": -0.049 * speed**0.5}), motion)[2]
+        - plain[2]
+    )
     assert slower == pytest.approx(less, rel=1e-9)
     sides = {"C_2_side": 0.0, "gamma_R_side": 0.0}
-    for name in ("N_absr", "N_rr", "Y_0", "N_0"):  # even in r: without them port and starboard are alike
+    for name in (
+        "N_absr",
+        "N_rr",
+        "Y_0",
+        "N_0",
+    ):  # even in r: without them port and starboard are alike
         ship = ship_of(sides | {name: 0.01})
         assert np.abs(at(ship, motion) - at(ship, mirrored) * [1, -1, -1])[2] > 1e-4
     alike = at(ship_of(sides), motion) - at(ship_of(sides), mirrored) * [1, -1, -1]
     np.testing.assert_allclose(alike, 0.0, atol=1e-15)
     for x in (0.05, 0.4, 1.0, 1.5):
         assert mmg.power_law(x, -0.7) == pytest.approx(x**-0.7, rel=1e-11)
-    assert mmg.power_law(0.01, 1.0) == pytest.approx(0.01, rel=5e-10)  # from here to 4 times service speed
+    assert mmg.power_law(0.01, 1.0) == pytest.approx(
+        0.01, rel=5e-10
+    )  # from here to 4 times service speed
     assert mmg.power_law(4.0, 1.0) == pytest.approx(4.0, rel=1e-14)
     assert mmg.power_law(0.0, 1.0) == mmg.power_law(0.01, 1.0)
     assert mmg.power_law(9.0, 1.0) == mmg.power_law(4.0, 1.0)
@@ -107,14 +135,34 @@ def test_terms_beyond_the_standard_form_act_as_they_are_named() -> None:
 
 def test_twin_screws_and_rudders_count() -> None:
     one, two = (
-        dict(zip(("d", "V", "xG", "k", "D", "A", "eta", "N"), mmg.dimensions(p).values(), strict=True))
-        for p in (L7, replace(L7, propellers=2.0, rudders=2.0, rudder_area=2 * L7.require("rudder_area")))
+        dict(
+            zip(
+                ("d", "V", "xG", "k", "D", "A", "eta", "N"),
+                mmg.dimensions(p).values(),
+                strict=True,
+            )
+        )
+        for p in (
+            L7,
+            replace(
+                L7,
+                propellers=2.0,
+                rudders=2.0,
+                rudder_area=2 * L7.require("rudder_area"),
+            ),
+        )
     )
-    assert (one["eta"], two["eta"]) == pytest.approx((0.216 / 0.345,) * 2)  # each in a race of its own
+    assert (one["eta"], two["eta"]) == pytest.approx(
+        (0.216 / 0.345,) * 2
+    )  # each in a race of its own
     assert (one["N"], two["N"]) == (1.0, 2.0)
-    assert mmg.dimensions(replace(L7, propellers=2.0))["eta"] == 0.0  # one rudder between the races
+    assert (
+        mmg.dimensions(replace(L7, propellers=2.0))["eta"] == 0.0
+    )  # one rudder between the races
     ahead = Motion(0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 11.85)
-    surge = [at(ship_of({}, replace(L7, propellers=n)), ahead)[0] for n in (1.0, 2.0, 3.0)]
+    surge = [
+        at(ship_of({}, replace(L7, propellers=n)), ahead)[0] for n in (1.0, 2.0, 3.0)
+    ]
     assert surge[1] - surge[0] == pytest.approx(surge[2] - surge[1])
     assert surge[1] > surge[0]
 
@@ -124,10 +172,16 @@ def test_a_model_of_the_form_scales_and_its_file_is_checked(tmp_path: Path) -> N
     large = scale_model(model, 320.0)
     for motion in motions(20):
         fast, size = large.particulars["speed"] / 1.179, 320.0 / 7.0
-        same = motion._replace(u=fast * motion.u, v=fast * motion.v, r=fast / size * motion.r,
-                               n=fast / size * motion.n)  # fmt: skip
+        same = motion._replace(
+            u=fast * motion.u,
+            v=fast * motion.v,
+            r=fast / size * motion.r,
+            n=fast / size * motion.n,
+        )
         ours, theirs = at(model, motion), at(large, same)
-        np.testing.assert_allclose(theirs * [1, 1, size] * (size / fast**2), ours, rtol=1e-9)
+        np.testing.assert_allclose(
+            theirs * [1, 1, size] * (size / fast**2), ours, rtol=1e-9
+        )
     model.save(tmp_path / "mmg.json")
     again = shipgym.load_model(tmp_path / "mmg.json")
     assert (again.structure, again.coefficients) == ("mmg", model.coefficients)
@@ -147,7 +201,8 @@ def test_formulas_give_about_what_was_measured_of_kvlcc2() -> None:
     """Zhou's added mass is that of the published set; the hull's derivatives are near her measured ones."""
     estimated = frozenset(ADDED_MASSES)
     prior = mmg_prior(
-        "yoshimura", replace(L7, rudder_area=None, rudder_aspect_ratio=None, estimated=estimated)
+        "yoshimura",
+        replace(L7, rudder_area=None, rudder_aspect_ratio=None, estimated=estimated),
     )
     mean, own = prior.mean, ship_of({}).coefficients
     assert [round(mean[name], 3) for name in ("my", "Jz")] == [own["my"], own["Jz"]]
@@ -169,12 +224,20 @@ def test_formulas_give_about_what_was_measured_of_kvlcc2() -> None:
     ).mean  # given, not estimated
     assert (heavy["my"], heavy["mx"]) == pytest.approx((0.02 * 7.0 / 0.46, mean["mx"]))
     kijima = formula_coefficients("kijima", prior.ship)
-    assert kijima["N_vrr"] == pytest.approx(0.097, abs=0.003)  # -(0.5 d Cb / B - 0.05) for beta
+    assert kijima["N_vrr"] == pytest.approx(
+        0.097, abs=0.003
+    )  # -(0.5 d Cb / B - 0.05) for beta
     assert kijima["X_vv"] == mean["X_vv"]
     ahead = Motion(0.0, 0.0, 0.0, 1.179, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 11.85159)
-    for source in ("yoshimura", "kijima", "kvlcc2-l7"):  # at service speed thrust balances resistance
+    for source in (
+        "yoshimura",
+        "kijima",
+        "kvlcc2-l7",
+    ):  # at service speed thrust balances resistance
         found = mmg_prior(source, L7)
-        assert at(ship_of(found.mean, found.ship), ahead)[0] == pytest.approx(0.0, abs=1e-12)
+        assert at(ship_of(found.mean, found.ship), ahead)[0] == pytest.approx(
+            0.0, abs=1e-12
+        )
 
 
 @pytest.mark.parametrize("hull", HULL_FORMULAS)
@@ -182,67 +245,123 @@ def test_formulas_claim_no_more_than_published_ships_bear_out(hull: str) -> None
     """The prior's deviation is at least the root mean square of published coefficients less the formula's."""
     ships = [load_model("kvlcc2-l7"), *map(mmg_ship, MMG_SHIPS)]
     forms = [(ship.particulars, reference_coefficients(ship)) for ship in ships]
-    s175 = load_model("container")  # by rho L^2 / 2; her rudder straightens the flow by another law
-    own, by_draught = s175.coefficients, s175.particulars.length / s175.particulars.require("draught")
-    hull_terms = {name for name in own if name in mmg.IDENTIFIED and (name[1] == "_" or name[0] in "mJ")}
+    s175 = load_model(
+        "container"
+    )  # by rho L^2 / 2; her rudder straightens the flow by another law
+    own, by_draught = (
+        s175.coefficients,
+        s175.particulars.length / s175.particulars.require("draught"),
+    )
+    hull_terms = {
+        name
+        for name in own
+        if name in mmg.IDENTIFIED and (name[1] == "_" or name[0] in "mJ")
+    }
     rudder_terms = {"a_H", "x_H", "epsilon", "kappa"}
     form = {name: by_draught * own[name] for name in hull_terms - rudder_terms}
     form |= {name: own[name] for name in rudder_terms}
-    form |= {"R_0": -by_draught * own["X_uu"], "w_P0": own["wp"], "t_R": 1.0 - own["c_RX"]}
+    form |= {
+        "R_0": -by_draught * own["X_uu"],
+        "w_P0": own["wp"],
+        "t_R": 1.0 - own["c_RX"],
+    }
     form["f_alpha"] = 6.13 * container.ASPECT_RATIO / (2.25 + container.ASPECT_RATIO)
     forms.append((s175.particulars, form))
-    priors = [mmg_prior(hull, replace(ship, **dict.fromkeys(ADDED_MASSES))) for ship, _ in forms]
+    priors = [
+        mmg_prior(hull, replace(ship, **dict.fromkeys(ADDED_MASSES)))
+        for ship, _ in forms
+    ]
     for k, name in enumerate(mmg.IDENTIFIED):
-        apart = [form[name] - prior.mean[name]
-                 for (_, form), prior in zip(forms, priors, strict=True) if name in form]  # fmt: skip
+        apart = [
+            form[name] - prior.mean[name]
+            for (_, form), prior in zip(forms, priors, strict=True)
+            if name in form
+        ]
         assert np.sqrt(np.mean(np.square(apart))) <= priors[0].deviation[k], name
 
 
-def test_main_dimensions_outside_the_range_are_said_and_an_unlike_reference_refused() -> None:
+def test_main_dimensions_outside_the_range_are_said_and_an_unlike_reference_refused() -> (
+    None
+):
     slim = Particulars(
-        length=100.0, beam=10.0, draught=5.0, block_coefficient=0.45, speed=10.0, rudder_area=8.0
+        length=100.0,
+        beam=10.0,
+        draught=5.0,
+        block_coefficient=0.45,
+        speed=10.0,
+        rudder_area=8.0,
     )
     remarks = mmg_prior("yoshimura", slim).remarks
     assert any(
-        "block coefficient 0.45 is outside the range of the regression formulas, 0.5 to" in r for r in remarks
+        "block coefficient 0.45 is outside the range of the regression formulas, 0.5 to"
+        in r
+        for r in remarks
     )
     assert any(r.startswith("L/B 10 is outside") for r in remarks)
     with pytest.raises(
-        InputError, match=r"none is like this ship; the best is 'kvlcc2' with a similarity of -"
+        InputError,
+        match=r"none is like this ship; the best is 'kvlcc2' with a similarity of -",
     ):
         mmg_prior("auto", slim)
     named = mmg_prior("kvlcc2", slim)
     assert named.source == "kvlcc2"
-    assert named.remarks[0].startswith("reference ship 'kvlcc2' is not like this one: similarity -")
-    with pytest.raises(InputError, match="'tanker' found, which is not written in the MMG form"):
+    assert named.remarks[0].startswith(
+        "reference ship 'kvlcc2' is not like this one: similarity -"
+    )
+    with pytest.raises(
+        InputError, match="'tanker' found, which is not written in the MMG form"
+    ):
         mmg_prior("tanker", L7)
     assert mmg_prior("auto", L7).source == "kvlcc2-l7"
 
 
 TRUTH = {
-    "Y_v": -0.33, "N_r": -0.046, "N_v": -0.125, "thrust": 0.9, "c_R": 0.6, "delta_0": 0.01, "kappa": 0.55,
-    "R_0": 0.02, "speed_power": 0.3, "N_vvr": -0.33, "l_R": -0.75, "gamma_R": 0.55,
-}  # fmt: skip
+    "Y_v": -0.33,
+    "N_r": -0.046,
+    "N_v": -0.125,
+    "thrust": 0.9,
+    "c_R": 0.6,
+    "delta_0": 0.01,
+    "kappa": 0.55,
+    "R_0": 0.02,
+    "speed_power": 0.3,
+    "N_vvr": -0.33,
+    "l_R": -0.75,
+    "gamma_R": 0.55,
+}
 
 
 def sailed(ship: ShipModel, rudder_deg: float, leg_s: float, seed: int) -> Trial:
     """Rudder reversed at intervals, as in a zigzag, with noise of a model basin."""
     steps = np.arange(1000)
-    order = np.radians(rudder_deg) * np.where(steps // round(leg_s / 0.15) % 2 == 0, 1.0, -1.0)
+    order = np.radians(rudder_deg) * np.where(
+        steps // round(leg_s / 0.15) % 2 == 0, 1.0, -1.0
+    )
     order[:20] = 0.0
-    run = ship.simulate(np.column_stack([order, np.full(len(steps), ship.service_shaft_speed)]), 0.15)
+    run = ship.simulate(
+        np.column_stack([order, np.full(len(steps), ship.service_shaft_speed)]), 0.15
+    )
     random = np.random.default_rng(seed)
     noise = {"u": 0.003, "v": 0.003, "r": 3e-4, "psi": 1e-3, "delta": 0.0, "n": 0.0}
-    channels = {c: run[c] + s * random.standard_normal(len(run)) for c, s in noise.items()}
+    channels = {
+        c: run[c] + s * random.standard_normal(len(run)) for c, s in noise.items()
+    }
     return Trial(run.t, channels, name=f"rudder {rudder_deg:g}")
 
 
 @pytest.fixture(scope="module")
 def fitted() -> tuple[ShipModel, IdentificationResult]:
     ship = ship_of(TRUTH)
-    trials = [sailed(ship, *run, seed) for seed, run in enumerate([(10, 12), (20, 9), (30, 8)])]
+    trials = [
+        sailed(ship, *run, seed)
+        for seed, run in enumerate([(10, 12), (20, 9), (30, 8)])
+    ]
     turn = sailed(ship, 35.0, 1000.0, 9).with_(name="turn", use="validate")
-    arguments: dict[str, Any] = {"particulars": L7, "steering": ship.steering, "reference_model": "kvlcc2-l7"}
+    arguments: dict[str, Any] = {
+        "particulars": L7,
+        "steering": ship.steering,
+        "reference_model": "kvlcc2-l7",
+    }
     return ship, identify([*trials, turn], "mmg", **arguments)
 
 
@@ -251,16 +370,29 @@ def test_coefficients_are_recovered_within_their_errors(
 ) -> None:
     ship, found = fitted
     errors = found.standard_errors
-    off = np.array([(found.coefficients[c] - ship.coefficients[c]) / errors[c] for c in mmg.IDENTIFIED])
+    off = np.array(
+        [
+            (found.coefficients[c] - ship.coefficients[c]) / errors[c]
+            for c in mmg.IDENTIFIED
+        ]
+    )
     assert np.mean(np.abs(off) < 1.96) > 0.9
     assert np.abs(off).max() < 3.0
-    for name in ("thrust", "R_0", "kappa"):  # what the trials tell better than the prior
+    for name in (
+        "thrust",
+        "R_0",
+        "kappa",
+    ):  # what the trials tell better than the prior
         assert abs(found.coefficients[name] - TRUTH[name]) < 0.6 * abs(
             mmg.SHIP.coefficients[name] - TRUTH[name]
         )
-    assert np.degrees(found.metrics["trials"]["turn"]["rmse"]["psi"]) < 6.0  # of 600 deg
+    assert (
+        np.degrees(found.metrics["trials"]["turn"]["rmse"]["psi"]) < 6.0
+    )  # of 600 deg
     assert found.stable
-    assert min(found.diagnostics[q].r_squared for q in "vr") > 0.9  # of accelerations from noisy velocities
+    assert (
+        min(found.diagnostics[q].r_squared for q in "vr") > 0.9
+    )  # of accelerations from noisy velocities
     assert [errors[name] for name in mmg.KNOWN] == [0.0] * len(mmg.KNOWN)
     provenance = found.model.provenance or {}
     assert (provenance["method"], provenance["prior"]) == ("map", "kvlcc2-l7")
@@ -271,7 +403,9 @@ def test_models_drawn_hold_the_turn_that_no_trial_shows(
     fitted: tuple[ShipModel, IdentificationResult],
 ) -> None:
     ship, found = fitted
-    truth, *drawn = (turn_lengths(model) for model in (ship, *found.model.sample(40, 0)))
+    truth, *drawn = (
+        turn_lengths(model) for model in (ship, *found.model.sample(40, 0))
+    )
     low, high = np.percentile(drawn, [2.5, 97.5], axis=0)
     assert np.all((low < truth) & (truth < high))
     assert np.all((high - low) / truth < 0.25)  # and say something
@@ -280,7 +414,9 @@ def test_models_drawn_hold_the_turn_that_no_trial_shows(
 def turn_lengths(model: ShipModel) -> tuple[float, float]:
     """Advance and tactical diameter of a 35 deg turn, ship lengths."""
     travel = model.particulars.length / model.particulars["speed"]
-    found = turning_indices(turning_circle(model, 35.0, duration=20 * travel, dt=0.05 * travel), 7.0)
+    found = turning_indices(
+        turning_circle(model, 35.0, duration=20 * travel, dt=0.05 * travel), 7.0
+    )
     assert found.advance_lengths is not None
     assert found.tactical_diameter_lengths is not None
     return found.advance_lengths, found.tactical_diameter_lengths
@@ -294,14 +430,17 @@ def test_its_result_is_saved_and_loaded_like_any_other(
     found.save(tmp_path)
     again = shipgym.load_model(tmp_path / "model.json")
     state, command = [0, 0, 0, 1.0, -0.1, 0.05, 0.2], [0.2, 11.0]
-    np.testing.assert_array_equal(again.derivatives(state, command), found.model.derivatives(state, command))
+    np.testing.assert_array_equal(
+        again.derivatives(state, command), found.model.derivatives(state, command)
+    )
     np.testing.assert_array_equal(again.covariance, found.model.covariance)
     drawn = again.sample(2, 0)
     assert drawn[0].coefficients["N_r"] != drawn[1].coefficients["N_r"]
     assert drawn[0].coefficients["k_0"] == drawn[1].coefficients["k_0"]
     assert "outside the range" not in (tmp_path / "report.html").read_text()
     remarked = replace(
-        found.model, provenance=(found.model.provenance or {}) | {"prior_remarks": ["L/B 10 is"]}
+        found.model,
+        provenance=(found.model.provenance or {}) | {"prior_remarks": ["L/B 10 is"]},
     )
     assert "L/B 10 is" in model_warnings(replace(found, model=remarked))
 
@@ -310,14 +449,23 @@ def test_its_result_is_saved_and_loaded_like_any_other(
     ("options", "message"),
     [
         ({"method": "ls"}, r"method: 'ls' found with structure 'mmg'"),
-        ({"uncertainty": "bootstrap"}, r"settings: uncertainty found, which structure 'mmg' does not know"),
+        (
+            {"uncertainty": "bootstrap"},
+            r"settings: uncertainty found, which structure 'mmg' does not know",
+        ),
         ({"rank": 3}, r"settings: rank found, which structure 'mmg' does not know"),
         (
             {"prior": "kijima", "reference_model": "auto"},
             r"reference_model: 'auto' found together with prior 'kijima'",
         ),
-        ({"reference_model": "mariner"}, r"'mariner' found, which is not written in the MMG form"),
-        ({"prior": "clarke"}, r"prior: 'clarke' found with structure 'mmg', expected 'yoshimura'"),
+        (
+            {"reference_model": "mariner"},
+            r"'mariner' found, which is not written in the MMG form",
+        ),
+        (
+            {"prior": "clarke"},
+            r"prior: 'clarke' found with structure 'mmg', expected 'yoshimura'",
+        ),
         ({"prior_strength": 0.0}, r"prior_strength: 0"),
     ],
 )
@@ -329,11 +477,19 @@ def test_options_it_does_not_have(options: dict[str, Any], message: str) -> None
 
 def test_a_trial_without_shaft_speed_or_with_a_still_rudder_is_refused() -> None:
     trial = sailed(ship_of({}), 20.0, 9.0, 0)
-    idle = Trial(trial.t, {**trial.channels, "delta": np.zeros(len(trial))}, name="idle")
-    with pytest.raises(InputError, match=r"'idle': the rudder stays at 0\.00 deg throughout"):
+    idle = Trial(
+        trial.t, {**trial.channels, "delta": np.zeros(len(trial))}, name="idle"
+    )
+    with pytest.raises(
+        InputError, match=r"'idle': the rudder stays at 0\.00 deg throughout"
+    ):
         identify([idle], "mmg", particulars=L7)
-    without = Trial(trial.t, {c: v for c, v in trial.channels.items() if c != "n"}, name="still")
-    with pytest.raises(InputError, match="'still': channel 'n' is missing, structure 'mmg' needs"):
+    without = Trial(
+        trial.t, {c: v for c, v in trial.channels.items() if c != "n"}, name="still"
+    )
+    with pytest.raises(
+        InputError, match="'still': channel 'n' is missing, structure 'mmg' needs"
+    ):
         identify([without], "mmg", particulars=L7)
 
 
@@ -349,14 +505,17 @@ class Constant(_Problem):
 
     def rows(self, z: Any, which: Any, scales: Any, strength: float) -> tuple[Any, Any]:
         errors = (z[0] - np.take(self.segments, which)) / scales[0]
-        return np.append(errors, strength * z), np.append(np.ones(len(which)) / scales[0], strength)[:, None]
+        return (
+            np.append(errors, strength * z),
+            np.append(np.ones(len(which)) / scales[0], strength)[:, None],
+        )
 
 
 def test_standard_errors_grow_by_what_is_held_out_beyond_what_is_expected() -> None:
     """Of 9, 9 from 0, 0 and the reverse: (9 + 9) / 2^2 / (2 / 2^2 + 2^2) = 1 from the former, 0.
 
-    In scales of 2 their squares are 2 (9 / 2)^2 and 2 (1 / 2)^2, one each but for the variance of the fit, of
-    1 / (2 / 2^2 + 1) with the prior as it is.
+    In scales of 2 their squares are 2 (9 / 2)^2 and 2 (1 / 2)^2, one each but for the
+    variance of the fit, of 1 / (2 / 2^2 + 1) with the prior as it is.
     """
     fit = Estimate(np.array([3.0]), np.array([2.0]), 2.0, np.eye(1), 1)
     error, factor = Constant(9.0).held_out(fit, np.array([1.0]))
@@ -366,7 +525,8 @@ def test_standard_errors_grow_by_what_is_held_out_beyond_what_is_expected() -> N
 
 
 @pytest.mark.parametrize(
-    ("held_out", "strength"), [((1.0, 1.09, 1.2), 2.0), ((1.0, 1.11, 1.09), 3.0), ((1.0, 1.11, 1.12), 1.0)]
+    ("held_out", "strength"),
+    [((1.0, 1.09, 1.2), 2.0), ((1.0, 1.11, 1.09), 3.0), ((1.0, 1.11, 1.12), 1.0)],
 )
 def test_the_strongest_prior_within_a_tenth_of_the_least_error_is_taken(
     held_out: tuple[float, ...], strength: float, monkeypatch: pytest.MonkeyPatch
@@ -379,7 +539,13 @@ def test_the_strongest_prior_within_a_tenth_of_the_least_error_is_taken(
 
         def solve(self, start: Any, strength: float) -> Estimate:
             begun.append(start[0])
-            return Estimate(np.full(41, 0.1 * strength), np.ones(4), strength, strength**2 * np.eye(41), 5)
+            return Estimate(
+                np.full(41, 0.1 * strength),
+                np.ones(4),
+                strength,
+                strength**2 * np.eye(41),
+                5,
+            )
 
         def held_out(self, whole: Estimate, scales: Any) -> tuple[float, float]:
             return held_out[round(whole.strength) - 1], 1.5
@@ -390,14 +556,24 @@ def test_the_strongest_prior_within_a_tenth_of_the_least_error_is_taken(
     monkeypatch.setattr(maximum_a_posteriori, "cut", lambda *_, **more: [])
     monkeypatch.setattr(maximum_a_posteriori, "_groups", lambda _: None)
     problem: Any = SimpleNamespace(blank=ship_of({}), used=())
-    model, report = maximum_a_posteriori.fit_mmg(problem, Options(reference_model="kvlcc2-l7"))
+    model, report = maximum_a_posteriori.fit_mmg(
+        problem, Options(reference_model="kvlcc2-l7")
+    )
     assert begun == [0.0, 0.1, 0.2]
-    assert (report["prior_strength"], report["evaluations"], report["segments"]) == (strength, 15, 0)
+    assert (report["prior_strength"], report["evaluations"], report["segments"]) == (
+        strength,
+        15,
+        0,
+    )
     assert report["errors_held_out"] == dict(zip("123", held_out, strict=True))
     k = mmg.IDENTIFIED.index("N_r")
-    assert model.coefficients["N_r"] == pytest.approx(prior.mean["N_r"] + 0.1 * strength * prior.deviation[k])
+    assert model.coefficients["N_r"] == pytest.approx(
+        prior.mean["N_r"] + 0.1 * strength * prior.deviation[k]
+    )
     assert model.covariance is not None
-    errors = dict(zip(model.coefficients, np.sqrt(np.diag(model.covariance)), strict=True))
+    errors = dict(
+        zip(model.coefficients, np.sqrt(np.diag(model.covariance)), strict=True)
+    )
     assert errors["N_r"] == pytest.approx(1.5 * strength * prior.deviation[k])
 
 
@@ -408,12 +584,16 @@ def exact() -> _Problem:
     ship = replace(ship_of({}, prior.ship), coefficients=dict(prior.mean))
     steps = np.arange(1000)
     order = np.radians(20.0) * np.where(steps // 90 % 2 == 0, 1.0, -1.0)
-    run = ship.simulate(np.column_stack([order, np.full(1000, ship.service_shaft_speed)]), 0.1)
+    run = ship.simulate(
+        np.column_stack([order, np.full(1000, ship.service_shaft_speed)]), 0.1
+    )
     channels = {name: run[name] for name in ("u", "v", "r", "psi", "delta", "n")}
     return _Problem(ship, [Trial(run.t, channels)], prior)
 
 
-def test_errors_are_those_of_the_segments_and_their_slopes_are_derivatives(exact: _Problem) -> None:
+def test_errors_are_those_of_the_segments_and_their_slopes_are_derivatives(
+    exact: _Problem,
+) -> None:
     """Segments of 1.7 ship lengths, samples 0.067 ship lengths apart at least: here 3 steps."""
     everything, zero = np.arange(len(exact.segments)), np.zeros(len(mmg.IDENTIFIED))
     travel = 7.0 / 1.179
@@ -426,13 +606,18 @@ def test_errors_are_those_of_the_segments_and_their_slopes_are_derivatives(exact
     for name in ("N_v", "Y_r", "thrust"):
         k = mmg.IDENTIFIED.index(name)
         ahead, behind = (
-            exact.simulated(zero + h * (np.arange(41) == k), everything)[0] for h in (size, -size)
+            exact.simulated(zero + h * (np.arange(41) == k), everything)[0]
+            for h in (size, -size)
         )
         scale = np.abs(slopes[:, :, k]).max()
-        np.testing.assert_allclose(slopes[:, :, k], (ahead - behind) / (2 * size), atol=0.02 * scale)
+        np.testing.assert_allclose(
+            slopes[:, :, k], (ahead - behind) / (2 * size), atol=0.02 * scale
+        )
 
 
-def test_errors_over_one_ship_length_are_one_error_and_no_scale_is_below_its_floor(exact: _Problem) -> None:
+def test_errors_over_one_ship_length_are_one_error_and_no_scale_is_below_its_floor(
+    exact: _Problem,
+) -> None:
     everything, zero = np.arange(len(exact.segments)), np.zeros(len(mmg.IDENTIFIED))
     speed, length = 1.179, 7.0
     floors = [0.0017 * speed, 0.0017 * speed, 0.0021 * speed / length, np.radians(0.1)]
@@ -442,8 +627,12 @@ def test_errors_over_one_ship_length_are_one_error_and_no_scale_is_below_its_flo
     shifted.segments = [replace(s, measured=s.measured + off) for s in segments]
     errors, _ = shifted.simulated(zero, everything)
     weights = [(s.inputs[-1, 0] - s.inputs[0, 0]) * speed / length for s in segments]
-    np.testing.assert_allclose(np.sum(errors**2, axis=0), off**2 * sum(weights), rtol=1e-2)
-    np.testing.assert_allclose(shifted.scales(errors, everything), np.maximum(off, exact.floors), rtol=1e-2)
+    np.testing.assert_allclose(
+        np.sum(errors**2, axis=0), off**2 * sum(weights), rtol=1e-2
+    )
+    np.testing.assert_allclose(
+        shifted.scales(errors, everything), np.maximum(off, exact.floors), rtol=1e-2
+    )
     z = 0.1 * np.arange(41.0)
     shifted.kept = {}
     rows, slopes = shifted.rows(z, everything, 1e-9 * exact.floors, 2.0)
@@ -469,7 +658,11 @@ class Linear(_Problem):
     """Measured numbers of one channel, each a ship length of one segment, all to be met by one."""
 
     def __init__(self, measured: list[float], floor: float = 1e-3) -> None:
-        self.measured, self.floors, self.kept = np.array(measured), np.array([floor]), {}
+        self.measured, self.floors, self.kept = (
+            np.array(measured),
+            np.array([floor]),
+            {},
+        )
         self.segments, self.renewed, self.sailed = [None] * len(measured), 0, 0
 
     def _weight(self, segment: Any) -> float:
@@ -484,7 +677,9 @@ class Linear(_Problem):
         return super().scales(errors, which)
 
 
-def test_the_most_probable_number_is_that_of_the_data_and_the_prior_by_their_scatter() -> None:
+def test_the_most_probable_number_is_that_of_the_data_and_the_prior_by_their_scatter() -> (
+    None
+):
     """The prior counts by its strength squared, for the uncertainty by one; scales are renewed in between."""
     problem = Linear([3.0, 5.0, 4.0])
     found = problem.solve(np.zeros(1), 2.0)
@@ -495,8 +690,12 @@ def test_the_most_probable_number_is_that_of_the_data_and_the_prior_by_their_sca
     again = Linear([3.0, 5.0, 4.0])
     near = again.solve(found.z, 2.0)
     assert again.renewed == 2  # from an earlier fit
-    assert near.scales == pytest.approx(np.sqrt(np.mean((found.z - [3.0, 5.0, 4.0]) ** 2)), rel=0.05)
-    assert Linear([4.0, 4.0]).solve(np.zeros(1), 0.01).scales == pytest.approx([1e-3])  # of the floor
+    assert near.scales == pytest.approx(
+        np.sqrt(np.mean((found.z - [3.0, 5.0, 4.0]) ** 2)), rel=0.05
+    )
+    assert Linear([4.0, 4.0]).solve(np.zeros(1), 0.01).scales == pytest.approx(
+        [1e-3]
+    )  # of the floor
 
 
 def test_what_was_just_simulated_is_not_simulated_again() -> None:
@@ -518,10 +717,15 @@ def test_ships_that_run_away_have_large_errors_and_no_slopes() -> None:
     assert rows.tolist() == [1e3, 1e3, -1e3, 3.0, 1.5]
     assert slopes.ravel().tolist() == [0.0, 0.0, 0.0, 2.0, 3.0]
     errors, _ = problem.simulated(np.zeros(1), np.arange(4))
-    assert problem.scales(errors, np.arange(4)).tolist() == [1.0]  # a hundred times the floor
+    assert problem.scales(errors, np.arange(4)).tolist() == [
+        1.0
+    ]  # a hundred times the floor
 
 
 def test_the_method_of_the_mmg_form_is_map_whether_it_was_named_or_not() -> None:
-    assert [checked_mmg(one).method for one in (Options(), Options(method="map"))] == ["map", "map"]
+    assert [checked_mmg(one).method for one in (Options(), Options(method="map"))] == [
+        "map",
+        "map",
+    ]
     for prior in ({"prior": "kijima"}, {"reference_model": "auto"}):
         assert checked_mmg(Options(**prior)).method == "map"  # type: ignore[arg-type]

@@ -27,7 +27,9 @@ def test_thrust_balances_resistance_at_service_speed() -> None:
     for make in OPENED_ONCE.values():
         ship = make()
         ahead = ship.simulate(np.full((400, 2), [0.0, ship.service_shaft_speed]), 2.0)
-        assert ahead["u"][-1] == pytest.approx(ship.particulars["speed"], rel=0.005)  # less the rudders' drag
+        assert ahead["u"][-1] == pytest.approx(
+            ship.particulars["speed"], rel=0.005
+        )  # less the rudders' drag
 
 
 def test_the_naval_vessel_rolls_with_the_period_of_her_metacentric_height() -> None:
@@ -36,16 +38,22 @@ def test_the_naval_vessel_rolls_with_the_period_of_her_metacentric_height() -> N
     start[ship.state_names.index("u")], start[ship.state_names.index("phi")] = 0.1, 0.05
     heel = ship.simulate(np.zeros((1000, 2)), 0.01, start)["phi"]
     zeros = np.flatnonzero(np.diff(np.sign(heel)))
-    period = 2.0 * pi * sqrt((I_XX - PUBLISHED.K_pdot) / (DENSITY * GRAVITY * VOLUME * GM))
+    period = (
+        2.0 * pi * sqrt((I_XX - PUBLISHED.K_pdot) / (DENSITY * GRAVITY * VOLUME * GM))
+    )
     assert 0.02 * (zeros[1] - zeros[0]) == pytest.approx(period, rel=0.1)
 
 
 def test_strips_make_up_the_integral_of_the_cross_flow() -> None:
     assert cross_flow(2.0, 0.0, 100.0) == pytest.approx((400.0, 0.0))
-    assert cross_flow(0.0, -0.1, 100.0) == pytest.approx((0.0, -0.01 * 100.0**4 / 32.0), rel=0.01)
+    assert cross_flow(0.0, -0.1, 100.0) == pytest.approx(
+        (0.0, -0.01 * 100.0**4 / 32.0), rel=0.01
+    )
 
 
-@pytest.mark.parametrize(("v", "delta"), [(-1.2, 0.6), (1.2, 0.6), (-0.5, 0.1), (1.2, -0.3)])
+@pytest.mark.parametrize(
+    ("v", "delta"), [(-1.2, 0.6), (1.2, 0.6), (-0.5, 0.1), (1.2, -0.3)]
+)
 def test_lift_is_at_right_angles_to_the_inflow(v: float, delta: float) -> None:
     """So that a fixed rudder takes out as much power as its drag in an inflow straight from ahead does."""
     rudder = SimpleNamespace(aspect=1.5, rudder=12.0)

@@ -12,7 +12,12 @@ import pytest
 import shipgym
 from identification import LSSVM, ArtificialBeeColony, IdentificationResult, identify
 from identification.options import Options, name_of, provenance_settings
-from identification.regression.problem import _at_constant_speed, _shaft_speed, _ship, _table
+from identification.regression.problem import (
+    _at_constant_speed,
+    _shaft_speed,
+    _ship,
+    _table,
+)
 from shipgym import InputError, ShipModel, SteeringGear, Trial
 from shipgym.manoeuvres import turning_circle, turning_indices, zigzag, zigzag_indices
 from shipgym.ships import get_structure
@@ -39,7 +44,9 @@ def test_all_derivatives_of_cao_2015_come_out_within_one_per_cent(
     assert cao_fit.model.provenance["ranks"] == {"u": 10, "v": 15, "r": 15}
 
 
-def test_euler_samples_fail_as_in_cao_2015(cao_zigzag: Trial, mariner: ShipModel) -> None:
+def test_euler_samples_fail_as_in_cao_2015(
+    cao_zigzag: Trial, mariner: ShipModel
+) -> None:
     fit = identify([cao_zigzag], samples="euler", particulars=mariner.particulars)
     errors = errors_percent(fit, mariner)
     assert within_one_per_cent(fit, mariner) == 2
@@ -53,18 +60,34 @@ def test_integral_samples_are_in_between(cao_zigzag: Trial, mariner: ShipModel) 
     assert 100.0 < max(errors_percent(fit, mariner).values()) < 1000.0
 
 
-def test_switch_on_the_step_and_rounded_files_are_as_good(mariner: ShipModel, record: Any) -> None:
-    run = record(zigzag(mariner, 15, 15, duration=500, dt=0.1, switch="step"), every=5, name="step")
-    rounded = Trial(
-        run.t, {c: [float(f"{x:.8g}") for x in v] for c, v in run.channels.items()}, kind="zigzag"
+def test_switch_on_the_step_and_rounded_files_are_as_good(
+    mariner: ShipModel, record: Any
+) -> None:
+    run = record(
+        zigzag(mariner, 15, 15, duration=500, dt=0.1, switch="step"),
+        every=5,
+        name="step",
     )
-    assert within_one_per_cent(identify([rounded], particulars=mariner.particulars), mariner) == 40
+    rounded = Trial(
+        run.t,
+        {c: [float(f"{x:.8g}") for x in v] for c, v in run.channels.items()},
+        kind="zigzag",
+    )
+    assert (
+        within_one_per_cent(
+            identify([rounded], particulars=mariner.particulars), mariner
+        )
+        == 40
+    )
 
 
 def test_manoeuvres_not_seen_are_predicted_to_a_thousandth(
     cao_fit: IdentificationResult, mariner: ShipModel
 ) -> None:
-    for truth in (zigzag(mariner, 25, 25, duration=600), turning_circle(mariner, 30, duration=900)):
+    for truth in (
+        zigzag(mariner, 25, 25, duration=600),
+        turning_circle(mariner, 30, duration=900),
+    ):
         predicted = open_loop(cao_fit.model, truth)
         span = max(np.ptp(truth["x"]), np.ptp(truth["y"]))
         away = np.hypot(predicted["x"] - truth["x"], predicted["y"] - truth["y"])
@@ -76,8 +99,12 @@ def test_noisy_trials_give_a_model_that_manoeuvres_like_the_ship(
 ) -> None:
     assert noisy_fit.stable
     for side in (35.0, -35.0):
-        expected = turning_indices(turning_circle(mariner, side)).tactical_diameter_lengths
-        found = turning_indices(turning_circle(noisy_fit.model, side)).tactical_diameter_lengths
+        expected = turning_indices(
+            turning_circle(mariner, side)
+        ).tactical_diameter_lengths
+        found = turning_indices(
+            turning_circle(noisy_fit.model, side)
+        ).tactical_diameter_lengths
         assert found == pytest.approx(expected, rel=0.05)
     validation = noisy_fit.metrics["trials"]["zigzag_15_15"]
     assert np.degrees(validation["rmse"]["r"]) < 0.02
@@ -86,16 +113,23 @@ def test_noisy_trials_give_a_model_that_manoeuvres_like_the_ship(
 def test_trials_to_validate_influence_nothing(
     noisy_trials: list[Trial], noisy_fit: IdentificationResult, mariner: ShipModel
 ) -> None:
-    alone = identify(noisy_trials[:3], particulars=mariner.particulars, steering=mariner.steering)
+    alone = identify(
+        noisy_trials[:3], particulars=mariner.particulars, steering=mariner.steering
+    )
     assert alone.coefficients == noisy_fit.coefficients
     np.testing.assert_array_equal(alone.model.covariance, noisy_fit.model.covariance)
     assert alone.model.provenance == noisy_fit.model.provenance
-    np.testing.assert_array_equal(alone.model.envelope.high, noisy_fit.model.envelope.high)  # type: ignore[union-attr]
+    np.testing.assert_array_equal(
+        alone.model.envelope.high, noisy_fit.model.envelope.high
+    )  # type: ignore[union-attr]
 
 
-def test_identification_is_repeatable_to_the_bit(noisy_trials: list[Trial], mariner: ShipModel) -> None:
+def test_identification_is_repeatable_to_the_bit(
+    noisy_trials: list[Trial], mariner: ShipModel
+) -> None:
     first, second = (
-        identify(noisy_trials[:1], particulars=mariner.particulars, samples="integral") for _ in range(2)
+        identify(noisy_trials[:1], particulars=mariner.particulars, samples="integral")
+        for _ in range(2)
     )
     assert first.coefficients == second.coefficients
 
@@ -123,32 +157,61 @@ def test_a_model_without_covariance_has_coefficients_of_unknown_error(
     np.testing.assert_allclose(variances, np.diag(noisy_fit.model.covariance))  # type: ignore[arg-type]
 
 
-def test_metrics_have_the_promised_form(noisy_fit: IdentificationResult, mariner: ShipModel) -> None:
+def test_metrics_have_the_promised_form(
+    noisy_fit: IdentificationResult, mariner: ShipModel
+) -> None:
     metrics = noisy_fit.metrics["trials"]["zigzag_15_15"]
     assert set(metrics) == {
-        "use", "diverged", "rmse", "overshoot_1_deg", "overshoot_2_deg",
-        "advance_lengths", "transfer_lengths", "tactical_diameter_lengths",
-    }  # fmt: skip
+        "use",
+        "diverged",
+        "rmse",
+        "overshoot_1_deg",
+        "overshoot_2_deg",
+        "advance_lengths",
+        "transfer_lengths",
+        "tactical_diameter_lengths",
+    }
     assert metrics["use"] == "validate"
     assert metrics["diverged"] is False
     assert set(metrics["rmse"]) == {"u", "v", "r", "psi"}
     assert metrics["advance_lengths"] is None
     overshoot = metrics["overshoot_1_deg"]
-    truth = zigzag_indices(zigzag(mariner, 15, 15, port_first=True, duration=400)).overshoot_1_deg
+    truth = zigzag_indices(
+        zigzag(mariner, 15, 15, port_first=True, duration=400)
+    ).overshoot_1_deg
     assert overshoot["measured"] == pytest.approx(truth, abs=0.15)
     assert overshoot["predicted"] == pytest.approx(overshoot["measured"], abs=1.5)
 
 
-def test_turning_circles_have_their_own_indices(mariner: ShipModel, cao_zigzag: Trial, record: Any) -> None:
-    circle = record(turning_circle(mariner, 35, duration=600), every=5, name="circle", use="validate")
-    metrics = identify([cao_zigzag, circle], particulars=mariner.particulars).metrics["trials"]["circle"]
+def test_turning_circles_have_their_own_indices(
+    mariner: ShipModel, cao_zigzag: Trial, record: Any
+) -> None:
+    circle = record(
+        turning_circle(mariner, 35, duration=600),
+        every=5,
+        name="circle",
+        use="validate",
+    )
+    metrics = identify([cao_zigzag, circle], particulars=mariner.particulars).metrics[
+        "trials"
+    ]["circle"]
     assert metrics["overshoot_1_deg"] is None
     for index in ("advance_lengths", "transfer_lengths", "tactical_diameter_lengths"):
-        assert metrics[index]["predicted"] == pytest.approx(metrics[index]["measured"], rel=1e-3)
+        assert metrics[index]["predicted"] == pytest.approx(
+            metrics[index]["measured"], rel=1e-3
+        )
 
 
-def test_summary_is_a_table_with_errors_and_marks_estimates(noisy_trials: list[Trial]) -> None:
-    particulars = {"name": "M", "length": 160.93, "beam": 23.17, "draught": 8.23, "block_coefficient": 0.6}
+def test_summary_is_a_table_with_errors_and_marks_estimates(
+    noisy_trials: list[Trial],
+) -> None:
+    particulars = {
+        "name": "M",
+        "length": 160.93,
+        "beam": 23.17,
+        "draught": 8.23,
+        "block_coefficient": 0.6,
+    }
     result = identify(noisy_trials[:2], particulars=particulars)
     lines = result.summary().splitlines()
     row = next(line for line in lines if "N_r " in line)
@@ -159,14 +222,19 @@ def test_summary_is_a_table_with_errors_and_marks_estimates(noisy_trials: list[T
     assert result.model.steering.rudder_rate_deg_s == pytest.approx(5.0, rel=0.2)
 
 
-def test_result_is_saved_whole_and_read_back(noisy_fit: IdentificationResult, tmp_path: Path) -> None:
+def test_result_is_saved_whole_and_read_back(
+    noisy_fit: IdentificationResult, tmp_path: Path
+) -> None:
     noisy_fit.save(tmp_path / "ship")
     names = ["metrics.json", "model.json", "report.html", "settings.json"]
     assert sorted(path.name for path in (tmp_path / "ship").iterdir()) == names
     loaded = ShipModel.load(tmp_path / "ship" / "model.json")
     assert loaded.coefficients == noisy_fit.coefficients
     assert loaded.provenance == noisy_fit.model.provenance
-    assert json.loads((tmp_path / "ship" / "metrics.json").read_text()) == noisy_fit.metrics
+    assert (
+        json.loads((tmp_path / "ship" / "metrics.json").read_text())
+        == noisy_fit.metrics
+    )
 
 
 def test_without_plotly_an_earlier_report_does_not_stay(
@@ -178,10 +246,16 @@ def test_without_plotly_an_earlier_report_does_not_stay(
     with pytest.warns(UserWarning, match=told) as warned:
         noisy_fit.save(tmp_path)
     assert warned[0].filename == __file__  # where it was asked for
-    assert {path.name for path in tmp_path.iterdir()} == {"metrics.json", "model.json", "settings.json"}
+    assert {path.name for path in tmp_path.iterdir()} == {
+        "metrics.json",
+        "model.json",
+        "settings.json",
+    }
 
 
-def test_folder_that_cannot_be_written_is_named(noisy_fit: IdentificationResult, tmp_path: Path) -> None:
+def test_folder_that_cannot_be_written_is_named(
+    noisy_fit: IdentificationResult, tmp_path: Path
+) -> None:
     (tmp_path / "file").write_text("in the way")
     with pytest.raises(InputError, match="file"):
         noisy_fit.save(tmp_path / "file")
@@ -201,21 +275,39 @@ def constant_rudder(angle_deg: float) -> Trial:
 
 
 def test_constant_rudder_is_refused(mariner: ShipModel) -> None:
-    with pytest.raises(InputError, match=r"straight\.csv.*stays at 10\.00 deg.*cannot be identified.*zigzag"):
+    with pytest.raises(
+        InputError,
+        match=r"straight\.csv.*stays at 10\.00 deg.*cannot be identified.*zigzag",
+    ):
         identify([constant_rudder(10.0)], particulars=mariner.particulars)
 
 
-def test_fewer_samples_than_coefficients_are_refused(mariner: ShipModel, cao_zigzag: Trial) -> None:
+def test_fewer_samples_than_coefficients_are_refused(
+    mariner: ShipModel, cao_zigzag: Trial
+) -> None:
     rows = slice(0, 14)
-    short = Trial(cao_zigzag.t[rows], {c: v[rows] for c, v in cao_zigzag.channels.items()}, name="short.csv")
-    with pytest.raises(InputError, match=r"short\.csv.*14 samples.*13 rows for 15.*add trials"):
+    short = Trial(
+        cao_zigzag.t[rows],
+        {c: v[rows] for c, v in cao_zigzag.channels.items()},
+        name="short.csv",
+    )
+    with pytest.raises(
+        InputError, match=r"short\.csv.*14 samples.*13 rows for 15.*add trials"
+    ):
         identify([short], particulars=mariner.particulars)
 
 
-def test_missing_channel_is_named_with_the_remedy(mariner: ShipModel, cao_zigzag: Trial) -> None:
+def test_missing_channel_is_named_with_the_remedy(
+    mariner: ShipModel, cao_zigzag: Trial
+) -> None:
     channels = {c: v for c, v in cao_zigzag.channels.items() if c != "v"}
-    with pytest.raises(InputError, match=r"lacking\.csv.*'v' is missing.*name its column"):
-        identify([Trial(cao_zigzag.t, channels, name="lacking.csv")], particulars=mariner.particulars)
+    with pytest.raises(
+        InputError, match=r"lacking\.csv.*'v' is missing.*name its column"
+    ):
+        identify(
+            [Trial(cao_zigzag.t, channels, name="lacking.csv")],
+            particulars=mariner.particulars,
+        )
 
 
 @pytest.mark.parametrize(
@@ -223,10 +315,16 @@ def test_missing_channel_is_named_with_the_remedy(mariner: ShipModel, cao_zigzag
     [
         ({"particulars": None}, "particulars: None found, expected .*length"),
         ({"structure": "abkowits"}, "abkowitz"),
-        ({"method": "svm"}, r"method: 'svm' found, expected one of .*'tls-svm'.*Did you mean"),
+        (
+            {"method": "svm"},
+            r"method: 'svm' found, expected one of .*'tls-svm'.*Did you mean",
+        ),
         ({"samples": "cubic"}, "samples: 'cubic'"),
         ({"tank": 4}, "tank"),
-        ({"hold_out": ["turn"]}, "hold_out: 'turn' found, expected one of 'zigzag_15_15'"),
+        (
+            {"hold_out": ["turn"]},
+            "hold_out: 'turn' found, expected one of 'zigzag_15_15'",
+        ),
         (
             {"reference_model": "kvlcc2"},
             "reference_model: 'kvlcc2' found with structure 'abkowitz', expected",
@@ -243,11 +341,17 @@ def test_wrong_arguments_are_named(
 def begun(name: str, **starts: float) -> Trial:
     """A trial that begins with some speeds, and goes on with others."""
     t = np.arange(9.0)
-    return Trial(t, {channel: start + t for channel, start in starts.items()}, name=name)
+    return Trial(
+        t, {channel: start + t for channel, start in starts.items()}, name=name
+    )
 
 
-def test_service_speeds_that_are_not_given_are_the_median_of_those_at_the_start() -> None:
-    nomoto, surge, abkowitz = (get_structure(name) for name in ("nomoto", "surge", "abkowitz"))
+def test_service_speeds_that_are_not_given_are_the_median_of_those_at_the_start() -> (
+    None
+):
+    nomoto, surge, abkowitz = (
+        get_structure(name) for name in ("nomoto", "surge", "abkowitz")
+    )
     trials = [
         begun("a", u=6.0, v=8.0, n=1.0),
         begun("b", u=3.0, v=-4.0, n=3.0),
@@ -257,37 +361,60 @@ def test_service_speeds_that_are_not_given_are_the_median_of_those_at_the_start(
     assert (ship.speed, ship.estimated, ship.mass) == (5.0, {"speed"}, None)
     assert _ship({"length": 7.0, "speed": 4.0}, trials, nomoto).speed == 4.0
     sizes = {"length": 7.0, "beam": 1.27, "draught": 0.455, "block_coefficient": 0.81}
-    assert {"speed", "mass"} <= _ship(sizes, trials, abkowitz).estimated  # of forces by the mass, too
+    assert {"speed", "mass"} <= _ship(
+        sizes, trials, abkowitz
+    ).estimated  # of forces by the mass, too
     assert _shaft_speed(None, trials, surge) == 2.0
-    assert (_shaft_speed(3.5, trials, surge), _shaft_speed(3.5, trials, nomoto)) == (3.5, 0.0)
+    assert (_shaft_speed(3.5, trials, surge), _shaft_speed(3.5, trials, nomoto)) == (
+        3.5,
+        0.0,
+    )
     slow = [begun("slow", u=0.05, v=0.0, n=0.05)]
-    assert (_ship({"length": 0.5}, slow, nomoto).speed, _shaft_speed(None, slow, surge)) == (0.05, 0.05)
+    assert (
+        _ship({"length": 0.5}, slow, nomoto).speed,
+        _shaft_speed(None, slow, surge),
+    ) == (0.05, 0.05)
     assert _shaft_speed(0.05, trials, surge) == 0.05
     rest = [begun("rest", u=0.0, v=0.0, n=0.0)]
     with pytest.raises(
-        InputError, match=r"trial 'rest': starts at rest, expected way .* service speed in the"
+        InputError,
+        match=r"trial 'rest': starts at rest, expected way .* service speed in the",
     ):
         _ship({"length": 7.0}, rest, nomoto)
     with pytest.raises(
-        InputError, match=r"'rest': starts with a shaft speed of 0 1/s, .* give service_shaft"
+        InputError,
+        match=r"'rest': starts with a shaft speed of 0 1/s, .* give service_shaft",
     ):
         _shaft_speed(None, rest, surge)
-    with pytest.raises(InputError, match="service_shaft_speed: 0 found, expected a number > 0"):
+    with pytest.raises(
+        InputError, match="service_shaft_speed: 0 found, expected a number > 0"
+    ):
         _shaft_speed(0.0, trials, surge)
 
 
-def test_a_trial_of_heading_and_rudder_alone_is_one_at_service_speed_for_a_form_of_the_yaw_rate() -> None:
+def test_a_trial_of_heading_and_rudder_alone_is_one_at_service_speed_for_a_form_of_the_yaw_rate() -> (
+    None
+):
     turn, moving = begun("a", r=0.0, delta=0.0), begun("b", r=0.0, delta=0.0, u=5.0)
-    nomoto, steering, speed = get_structure("nomoto"), get_structure("linear-steering"), {"speed": 4.0}
+    nomoto, steering, speed = (
+        get_structure("nomoto"),
+        get_structure("linear-steering"),
+        {"speed": 4.0},
+    )
     constant = _at_constant_speed(turn, nomoto, speed)
     assert (set(constant["u"]), set(constant["v"])) == ({4.0}, {0.0})
     for trial, table, ship in (
-        (moving, nomoto, speed), (turn, steering, speed), (turn, nomoto, {}), (turn, nomoto, None),
-    ):  # fmt: skip
+        (moving, nomoto, speed),
+        (turn, steering, speed),
+        (turn, nomoto, {}),
+        (turn, nomoto, None),
+    ):
         assert _at_constant_speed(trial, table, ship) is trial
 
 
-def test_no_trial_to_fit_and_two_of_one_name_are_refused(cao_zigzag: Trial, mariner: ShipModel) -> None:
+def test_no_trial_to_fit_and_two_of_one_name_are_refused(
+    cao_zigzag: Trial, mariner: ShipModel
+) -> None:
     with pytest.raises(InputError, match='none is marked use = "fit"'):
         identify([cao_zigzag.with_(use="validate")], particulars=mariner.particulars)
     with pytest.raises(InputError, match="two of them named 'zigzag_15_15'"):
@@ -308,33 +435,59 @@ def test_least_squares_and_ls_svm_agree_where_there_is_no_noise(
     cao_zigzag: Trial, mariner: ShipModel, method: str
 ) -> None:
     settings = {"C": 1e12} if method == "ls-svm" else {}
-    fit = identify([cao_zigzag], method=method, particulars=mariner.particulars, **settings)
+    fit = identify(
+        [cao_zigzag], method=method, particulars=mariner.particulars, **settings
+    )
     assert within_one_per_cent(fit, mariner) == 40
 
 
 def test_settings_are_recorded_as_json_knows_them(mariner: ShipModel) -> None:
     """Infinity as null, arrays as lists, models and trials by name, estimators with their settings."""
-    options = Options.of({"structure": "abkowitz", "method": "ls", "samples": "spline", "window": 3})
+    options = Options.of(
+        {"structure": "abkowitz", "method": "ls", "samples": "spline", "window": 3}
+    )
     given = {
-        "infinite": np.inf, "array": np.arange(3), "number": np.float64(2.5), "model": mariner,
-        "nested": {"a": (1, np.nan)}, "method": LSSVM(C=7.0), "search": ArtificialBeeColony(rounds=9),
-        "ship": SteeringGear(30.0, 2.0, 1.0), "none": None, "flag": True,
-    }  # fmt: skip
+        "infinite": np.inf,
+        "array": np.arange(3),
+        "number": np.float64(2.5),
+        "model": mariner,
+        "nested": {"a": (1, np.nan)},
+        "method": LSSVM(C=7.0),
+        "search": ArtificialBeeColony(rounds=9),
+        "ship": SteeringGear(30.0, 2.0, 1.0),
+        "none": None,
+        "flag": True,
+    }
     found = provenance_settings(options, given)
     assert found["window"] == 3
     assert (found["smooth"], found["guarded"]) == (options.smooth, options.guarded)
     assert "preprocessing" not in found
-    assert (found["infinite"], found["array"], found["number"]) == (None, [0, 1, 2], 2.5)
+    assert (found["infinite"], found["array"], found["number"]) == (
+        None,
+        [0, 1, 2],
+        2.5,
+    )
     assert (found["model"], found["nested"]) == ("mariner", {"a": [1, None]})
     assert found["method"]["kind"] == "LSSVM"
     assert found["method"]["C"] == 7.0
-    assert found["search"] == {"kind": "ArtificialBeeColony", "sources": 20, "rounds": 9, "limit": 20}
+    assert found["search"] == {
+        "kind": "ArtificialBeeColony",
+        "sources": 20,
+        "rounds": 9,
+        "limit": 20,
+    }
     assert found["ship"] == SteeringGear(30.0, 2.0, 1.0).to_dict()
     assert (found["none"], found["flag"]) == (None, True)
     json.dumps(found, allow_nan=False)
-    cleaned = Options.of({"structure": "abkowitz", "method": "ls", "preprocessing": "median"})
+    cleaned = Options.of(
+        {"structure": "abkowitz", "method": "ls", "preprocessing": "median"}
+    )
     assert provenance_settings(cleaned, {})["preprocessing"] == "median"
-    assert [name_of(one) for one in ("ls", mariner, LSSVM())] == ["ls", "mariner", "LSSVM"]
+    assert [name_of(one) for one in ("ls", mariner, LSSVM())] == [
+        "ls",
+        "mariner",
+        "LSSVM",
+    ]
 
 
 def test_provenance_says_whether_the_steering_gear_was_given(
@@ -343,17 +496,29 @@ def test_provenance_says_whether_the_steering_gear_was_given(
     assert cao_fit.model.provenance is not None
     assert cao_fit.model.provenance["steering"] == "estimated"
     assert "uncertainty" not in cao_fit.model.provenance
-    fit = identify([cao_zigzag], "nomoto", "ls", particulars=mariner.particulars, steering=mariner.steering)
+    fit = identify(
+        [cao_zigzag],
+        "nomoto",
+        "ls",
+        particulars=mariner.particulars,
+        steering=mariner.steering,
+    )
     assert fit.model.provenance is not None
     assert fit.model.provenance["steering"] == "given"
     (trial,) = fit.model.provenance["trials"]
     derived = sorted(cao_zigzag.derived)
-    assert trial == {"name": cao_zigzag.name, "sha256": cao_zigzag.sha256, "derived": derived}
+    assert trial == {
+        "name": cao_zigzag.name,
+        "sha256": cao_zigzag.sha256,
+        "derived": derived,
+    }
     assert fit.model.provenance["ranks"] == {"r": 2}
     assert "search" not in fit.model.provenance
 
 
 def test_a_grey_box_needs_the_channels_of_steering() -> None:
-    run = Trial(np.arange(3.0), {c: np.ones(3) for c in ("v", "r", "delta")}, name="deaf")
+    run = Trial(
+        np.arange(3.0), {c: np.ones(3) for c in ("v", "r", "delta")}, name="deaf"
+    )
     with pytest.raises(InputError, match="trial 'deaf': channel 'u' is missing"):
         _table("grey-box", "mariner", {"length": 7.0}, [run])

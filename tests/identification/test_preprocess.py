@@ -55,7 +55,9 @@ def test_smoothing_takes_away_more_than_half_of_the_noise() -> None:
 def test_smoothing_spline_is_that_of_scipy() -> None:
     t, _, values = signal(0.05)
     np.testing.assert_allclose(
-        Reinsch(t).smoothed(values, 30.0), make_smoothing_spline(t, values, lam=30.0)(t), atol=1e-9
+        Reinsch(t).smoothed(values, 30.0),
+        make_smoothing_spline(t, values, lam=30.0)(t),
+        atol=1e-9,
     )
 
 
@@ -77,13 +79,19 @@ def test_savitzky_golay_keeps_cubics() -> None:
     np.testing.assert_allclose(savitzky_golay(t, t**3 - t, 11), t**3 - t, atol=1e-12)
 
 
-def test_outliers_and_short_dropouts_are_repaired_and_told(noisy_trials: list[Trial]) -> None:
+def test_outliers_and_short_dropouts_are_repaired_and_told(
+    noisy_trials: list[Trial],
+) -> None:
     trial = noisy_trials[0]
     u = trial["u"].copy()
     u[[50, 200]] += 3.0
     kept = np.ones(len(trial), dtype=bool)
     kept[100:103] = False
-    wrong = Trial(trial.t[kept], {c: v[kept] for c, v in (dict(trial.channels) | {"u": u}).items()}, name="w")
+    wrong = Trial(
+        trial.t[kept],
+        {c: v[kept] for c, v in (dict(trial.channels) | {"u": u}).items()},
+        name="w",
+    )
     mended = repaired(wrong)
     assert mended.raw is wrong
     assert mended.repaired["u"] >= 5
@@ -103,8 +111,16 @@ def test_the_first_and_the_last_sample_may_be_outliers() -> None:
     for inside in (1, -2):
         spiked = np.sin(0.05 * t)
         spiked[inside] += 0.5
-        assert np.flatnonzero(outliers(t, spiked, may_step=False)).tolist() == [inside % 200]
-    for clean in (0.1 * t, np.sin(0.05 * t), np.abs(t - 196.0), np.minimum(t, 5.0), np.exp(-0.3 * t)):
+        assert np.flatnonzero(outliers(t, spiked, may_step=False)).tolist() == [
+            inside % 200
+        ]
+    for clean in (
+        0.1 * t,
+        np.sin(0.05 * t),
+        np.abs(t - 196.0),
+        np.minimum(t, 5.0),
+        np.exp(-0.3 * t),
+    ):
         assert not outliers(t, clean, may_step=False).any()
     gap = np.append(t[:-40], t[-1])
     assert not outliers(gap, 0.1 * gap, may_step=False).any()
@@ -114,7 +130,10 @@ def test_a_rudder_put_over_at_the_first_or_the_last_sample_is_no_outlier() -> No
     t = np.arange(0.0, 600.0, 10.0)
     for angles in ([0.0, 23.0, *[35.0] * 58], [*[10.0] * 59, 20.0]):
         delta = np.radians(angles)
-        assert repaired(Trial(t, {"delta": delta}, name="rudder"))["delta"].tolist() == delta.tolist()
+        assert (
+            repaired(Trial(t, {"delta": delta}, name="rudder"))["delta"].tolist()
+            == delta.tolist()
+        )
 
 
 def test_clean_trials_are_left_alone(cao_zigzag: Trial) -> None:
@@ -130,7 +149,9 @@ def test_kalman_smoother_makes_velocities_better_and_keeps_the_record(
     smoothed = smooth_kinematics(noisy)
     assert smoothed.raw is noisy
     for channel in ("psi", "r", "u", "v"):
-        before, after = (np.std(trial[channel] - truth[channel]) for trial in (noisy, smoothed))
+        before, after = (
+            np.std(trial[channel] - truth[channel]) for trial in (noisy, smoothed)
+        )
         assert after < 0.7 * before
 
 
@@ -143,7 +164,10 @@ def test_kalman_smoother_takes_a_heading_or_a_yaw_rate_alone(
         Trial(one.t, {channel: one[channel], "delta": one["delta"]}, name="alone")
         for one in (record(run, 10), record(run, 10, 1.0, 5))
     )
-    before, after = (np.std(one[channel] - truth[channel]) for one in (noisy, smooth_kinematics(noisy)))
+    before, after = (
+        np.std(one[channel] - truth[channel])
+        for one in (noisy, smooth_kinematics(noisy))
+    )
     assert after < 0.7 * before
 
 
@@ -153,16 +177,24 @@ def test_kalman_smoother_takes_positions_or_sway_alone(
 ) -> None:
     run = zigzag(mariner, 20, 20, duration=200, dt=0.1)
     truth, noisy = (
-        Trial(one.t, {name: one[name] for name in (*channels, "psi", "r", "delta")}, name="some")
+        Trial(
+            one.t,
+            {name: one[name] for name in (*channels, "psi", "r", "delta")},
+            name="some",
+        )
         for one in (record(run, 10), record(run, 10, 1.0, 5))
     )
     smoothed = smooth_kinematics(noisy)
     for channel in channels:
-        before, after = (np.std(trial[channel] - truth[channel]) for trial in (noisy, smoothed))
+        before, after = (
+            np.std(trial[channel] - truth[channel]) for trial in (noisy, smoothed)
+        )
         assert after < 0.7 * before
 
 
-def test_preprocessing_that_does_not_exist_is_refused(mariner: ShipModel, cao_zigzag: Trial) -> None:
+def test_preprocessing_that_does_not_exist_is_refused(
+    mariner: ShipModel, cao_zigzag: Trial
+) -> None:
     with pytest.raises(InputError, match="preprocessing: 'fourier'"):
         identify([cao_zigzag], preprocessing="fourier", particulars=mariner.particulars)
 
@@ -173,7 +205,9 @@ def test_noise_is_told_by_the_change_over_a_window() -> None:
     values = 0.5 * t + 0.1 * np.random.default_rng(0).standard_normal(len(t))
     for window in (1, 10):
         change = np.hypot(0.5 * window, np.sqrt(2.0) * 0.1)
-        assert noise_ratio(t, values, window) == pytest.approx(np.sqrt(2.0) * 0.1 / change, rel=0.03)
+        assert noise_ratio(t, values, window) == pytest.approx(
+            np.sqrt(2.0) * 0.1 / change, rel=0.03
+        )
     assert noise_ratio(t, np.ones(len(t))) == 0.0
     assert noise_ratio(t[:1], values[:1]) == 0.0
     assert is_noisy(t, [t, values])
@@ -194,7 +228,9 @@ def test_dropouts_of_up_to_ten_steps_are_filled() -> None:
             assert len(found) == kept.sum()
 
 
-def test_an_outlier_is_six_times_the_noise_away(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_outlier_is_six_times_the_noise_away(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     monkeypatch.setattr(repair, "noise_level", lambda t, values: 0.1)
     for size, found in ((0.59, []), (0.61, [20]), (-0.61, [20])):
         values = np.where(np.arange(50) == 20, size, 0.0)
@@ -207,18 +243,28 @@ def test_a_tenth_of_a_channel_may_be_outliers(monkeypatch: pytest.MonkeyPatch) -
         monkeypatch.setattr(repair, "outliers", lambda *_, n=count, **more: t < n)
         if count == 20:
             assert repaired(Trial(t, {"u": t})).repaired == {"u": 20}
-    with pytest.raises(InputError, match="21 of 200 samples of u would be outliers, expected at most a"):
+    with pytest.raises(
+        InputError, match="21 of 200 samples of u would be outliers, expected at most a"
+    ):
         repaired(Trial(t, {"u": t}))
 
 
 def test_a_channel_of_outliers_is_refused() -> None:
     t = np.arange(400.0)
     clean = np.sin(0.05 * t) + 1e-3 * np.random.default_rng(0).standard_normal(400)
-    for every, refused in ((35, False), (25, True)):  # three beside each other, 9 and 12 % of all
-        spiked = clean + np.where((t % every >= 10.0) & (t % every < 13.0) & (t < 390.0), 5.0, 0.0)
+    for every, refused in (
+        (35, False),
+        (25, True),
+    ):  # three beside each other, 9 and 12 % of all
+        spiked = clean + np.where(
+            (t % every >= 10.0) & (t % every < 13.0) & (t < 390.0), 5.0, 0.0
+        )
         trial = Trial(t, {"u": spiked}, name="spiked")
         if refused:
-            with pytest.raises(InputError, match=r"samples of u would be outliers, expected at most a tenth"):
+            with pytest.raises(
+                InputError,
+                match=r"samples of u would be outliers, expected at most a tenth",
+            ):
                 repaired(trial)
         else:
             found = repaired(trial)
@@ -228,13 +274,23 @@ def test_a_channel_of_outliers_is_refused() -> None:
 
 def test_channels_are_smoothed_as_named_but_for_the_rudder() -> None:
     t, _, values = signal(0.05)
-    trial = Trial(t, {"u": 5.0 + values, "delta": np.where(t % 100.0 < 50.0, 0.1, -0.1)}, name="noisy")
-    for name, one in (("spline", smooth), ("savgol", savitzky_golay), ("median", median)):
+    trial = Trial(
+        t,
+        {"u": 5.0 + values, "delta": np.where(t % 100.0 < 50.0, 0.1, -0.1)},
+        name="noisy",
+    )
+    for name, one in (
+        ("spline", smooth),
+        ("savgol", savitzky_golay),
+        ("median", median),
+    ):
         found = smoothed_channels(trial, ["u", "delta"], name)
         np.testing.assert_array_equal(found["u"], one(t, trial["u"]))
         assert not np.array_equal(found["u"], trial["u"])
         np.testing.assert_array_equal(found["delta"], trial["delta"])
-    np.testing.assert_array_equal(smoothed_channels(trial, ["u"], "none")["u"], trial["u"])
+    np.testing.assert_array_equal(
+        smoothed_channels(trial, ["u"], "none")["u"], trial["u"]
+    )
     with pytest.raises(InputError, match="preprocessing: 'splines' found"):
         smoothed_channels(trial, ["u"], "splines")
 
@@ -243,7 +299,14 @@ def test_channels_are_smoothed_as_named_but_for_the_rudder() -> None:
 def test_steps_of_more_than_one_and_a_half_usual_ones_are_dropouts(step: float) -> None:
     """Up to ten usual ones and a half, whatever the unit of time."""
     usual = np.arange(60.0)
-    for hole, missing in ((1.0, 0), (1.45, 0), (1.55, 1), (2.0, 1), (10.45, 9), (10.52, 0)):
+    for hole, missing in (
+        (1.0, 0),
+        (1.45, 0),
+        (1.55, 1),
+        (2.0, 1),
+        (10.45, 9),
+        (10.52, 0),
+    ):
         t = step * np.concatenate([usual, usual + usual[-1] + hole])
         filled = repair._filled_times(t)
         assert len(filled) == len(t) + missing, hole
@@ -258,7 +321,9 @@ def test_what_is_sound_stays_to_the_bit_beside_what_is_repaired() -> None:
     spiked = truth.copy()
     spiked[[50, 120]] += 9.0
     kept = np.arange(200) != 80
-    found = repaired(Trial(t[kept], {"u": spiked[kept], "wind_speed": truth[kept]}, name="spiked"))
+    found = repaired(
+        Trial(t[kept], {"u": spiked[kept], "wind_speed": truth[kept]}, name="spiked")
+    )
     sound = np.flatnonzero(kept & ~np.isin(np.arange(200), [50, 120]))
     at = np.searchsorted(found.t, t[sound])
     assert len(found) == 200
@@ -268,14 +333,21 @@ def test_what_is_sound_stays_to_the_bit_beside_what_is_repaired() -> None:
     for phase in range(12):  # the last sample too, where a polynomial ends
         wave = 3.0 + np.sin(t / 7.0 + phase)
         assert repaired(Trial(t[kept], {"u": wave[kept]}))["u"][-1] == wave[-1]
-    gusts = repaired(Trial(t, {"u": truth, "wind_speed": spiked}, name="gusts"))  # of the wind none is one
+    gusts = repaired(
+        Trial(t, {"u": truth, "wind_speed": spiked}, name="gusts")
+    )  # of the wind none is one
     np.testing.assert_array_equal(gusts["wind_speed"], spiked)
 
 
 def test_rounding_is_no_outlier_on_a_channel_without_noise() -> None:
     """Up to a thousand-millionth of what the channel changes by."""
     t = np.arange(100.0)
-    for off, found in ((0.95e-9, []), (1.05e-9, [70]), (-0.95e-9, []), (-1.05e-9, [70])):
+    for off, found in (
+        (0.95e-9, []),
+        (1.05e-9, [70]),
+        (-0.95e-9, []),
+        (-1.05e-9, [70]),
+    ):
         values = np.minimum(t, 40.0)
         values[70] += 40.0 * off
         assert np.flatnonzero(outliers(t, values)).tolist() == found
@@ -294,12 +366,18 @@ def test_a_sample_may_be_away_by_what_the_channel_moves_in_half_the_median_s_wid
 
 
 @pytest.mark.parametrize("end", [0, -1])
-def test_an_end_is_an_outlier_beyond_seven_times_the_largest_step_inside(end: int) -> None:
+def test_an_end_is_an_outlier_beyond_seven_times_the_largest_step_inside(
+    end: int,
+) -> None:
     """Where the step in time to it is longer, so much more; where it is shorter, not less."""
     for wait, size, found in (
-        (1.0, 0.68, False), (1.0, 0.72, True), (3.0, 2.05, False), (3.0, 2.15, True), (0.5, 0.68, False),
+        (1.0, 0.68, False),
+        (1.0, 0.72, True),
+        (3.0, 2.05, False),
+        (3.0, 2.15, True),
+        (0.5, 0.68, False),
         (0.5, 0.72, True),
-    ):  # fmt: skip
+    ):
         t = np.arange(40.0)
         t[end] = t[1] - wait if end == 0 else t[-2] + wait
         values = 0.1 * np.arange(40.0)
@@ -317,16 +395,25 @@ def test_ends_are_compared_in_records_of_21_samples_and_a_median_takes_seven(
     for count, found in ((20, []), (21, [0])):
         values = 0.01 * np.arange(count) ** 2 / count
         values[0] += 5.0
-        assert np.flatnonzero(outliers(np.arange(float(count)), values, may_step=False)).tolist() == found
+        assert (
+            np.flatnonzero(
+                outliers(np.arange(float(count)), values, may_step=False)
+            ).tolist()
+            == found
+        )
     for count, found in ((6, []), (7, [3])):
         spike = np.where(np.arange(count) == 3, 5.0, 0.0)
-        assert np.flatnonzero(outliers(np.arange(float(count)), spike)).tolist() == found
+        assert (
+            np.flatnonzero(outliers(np.arange(float(count)), spike)).tolist() == found
+        )
 
 
 def test_five_samples_tell_noise_and_four_do_not() -> None:
     """One of the five off by 1: 1 / sqrt(70 / 36) of its own and the cubic's spread, by a median."""
     spike = np.array([0.0, 0.0, 1.0, 0.0, 0.0])
-    assert noise_level(np.arange(5.0), spike) == pytest.approx(6.0 / np.sqrt(70.0) / 0.6745)
+    assert noise_level(np.arange(5.0), spike) == pytest.approx(
+        6.0 / np.sqrt(70.0) / 0.6745
+    )
     assert noise_level(np.arange(4.0), spike[:4]) == 0.0
     assert noise_ratio(np.arange(4.0), spike[:4]) == 0.0
     zigzag = np.array([0.0, 1.0, -1.0, 1.0, 0.0])
@@ -349,7 +436,10 @@ def test_steps_alike_to_a_thousandth_are_even(unevenness: float, even: bool) -> 
     steps[40] += 0.5 * unevenness
     t = np.concatenate([[0.0], np.cumsum(steps)])
     values = np.random.default_rng(0).standard_normal(100)
-    assert np.array_equal(savitzky_golay(t, values, 9), savgol_filter(values, 9, 3)) == even
+    assert (
+        np.array_equal(savitzky_golay(t, values, 9), savgol_filter(values, 9, 3))
+        == even
+    )
 
 
 def states(trial: Trial, monkeypatch: pytest.MonkeyPatch) -> list[tuple[int, Any]]:
@@ -380,7 +470,9 @@ def test_the_roughness_of_the_motion_is_found_on_the_first_500_samples(
     decades = [np.log10(given[1][0, 2, 2] / unit / guess) for _, given in asked]
     assert min(decades) >= -4.0
     assert max(decades) <= 4.0
-    assert decades[0] == pytest.approx(-4.0 + 8.0 * 0.381966, abs=1e-5)  # golden section
+    assert decades[0] == pytest.approx(
+        -4.0 + 8.0 * 0.381966, abs=1e-5
+    )  # golden section
     *_, observation, variances, _, start, start_variances, _ = asked[-1][1]
     np.testing.assert_array_equal(observation, [[0.0, 1.0, 0.0]])
     np.testing.assert_allclose(variances, [noise_level(t, r) ** 2])
@@ -394,14 +486,22 @@ def test_positions_begin_uncertain_and_accelerations_within_a_metre_per_second_s
     """On a clean heading; what was not recorded begins at 0, and the roughness follows the way sailed."""
     t, rng = 1.0 * np.arange(81.0), np.random.default_rng(0)
     x, y = (5.0 * t + rng.standard_normal(81), 3.0 + rng.standard_normal(81))
-    asked = states(Trial(t, {"psi": 0.01 * t, "x": x, "y": y}, name="track"), monkeypatch)
-    _, process, observation, variances, measured, start, start_variances, _ = asked[-1][1]
+    asked = states(
+        Trial(t, {"psi": 0.01 * t, "x": x, "y": y}, name="track"), monkeypatch
+    )
+    _, process, observation, variances, measured, start, start_variances, _ = asked[-1][
+        1
+    ]
     np.testing.assert_array_equal(observation, np.eye(6)[:2])
     np.testing.assert_array_equal(start, [x[0], y[0], 0.0, 0.0, 0.0, 0.0])
     np.testing.assert_array_equal(start_variances, [1e4, 1e4, 1e2, 1e2, 1.0, 1.0])
     np.testing.assert_array_equal(measured, np.column_stack([x, y]))
-    np.testing.assert_allclose(variances, [noise_level(t, x) ** 2, noise_level(t, y) ** 2])
-    of_one = process[0] / process[0, 4, 4]  # speeds and accelerations, ahead and aside alike
+    np.testing.assert_allclose(
+        variances, [noise_level(t, x) ** 2, noise_level(t, y) ** 2]
+    )
+    of_one = (
+        process[0] / process[0, 4, 4]
+    )  # speeds and accelerations, ahead and aside alike
     expected = np.zeros((6, 6))
     expected[2:, 2:] = np.kron([[1.0 / 3.0, 0.5], [0.5, 1.0]], np.eye(2))
     np.testing.assert_allclose(of_one, expected)
@@ -409,13 +509,17 @@ def test_positions_begin_uncertain_and_accelerations_within_a_metre_per_second_s
     assert decade == pytest.approx(-4.0 + 8.0 * 0.381966, abs=1e-5)
 
 
-def test_a_channel_has_the_noise_of_its_resolution_at_least(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_channel_has_the_noise_of_its_resolution_at_least(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     """A ten-thousandth of its range, and a thousand-millionth where it does not change."""
     t = np.arange(60.0)
     r = 0.01 * np.random.default_rng(0).standard_normal(60)
     given = states(Trial(t, {"psi": t, "r": r}, name="ramp"), monkeypatch)[-1][1]
     np.testing.assert_allclose(given[3], [(1e-4 * 59.0) ** 2, noise_level(t, r) ** 2])
-    still = states(Trial(t, {"psi": np.sin(7.0 * t), "r": 0.0 * t}, name="still"), monkeypatch)[-1][1]
+    still = states(
+        Trial(t, {"psi": np.sin(7.0 * t), "r": 0.0 * t}, name="still"), monkeypatch
+    )[-1][1]
     assert still[3][1] == pytest.approx(1e-18)
 
 
@@ -423,7 +527,9 @@ def test_a_clean_yaw_rate_alone_gives_the_heading_that_it_turns_through() -> Non
     t = np.arange(0.0, 60.0, 0.5)
     r = 0.02 * np.sin(t / 8.0)
     heading = kinematics._smooth_heading(Trial(t, {"r": r}, name="gyro"))
-    np.testing.assert_allclose(heading["psi"], 0.16 * (1.0 - np.cos(t / 8.0)), atol=2e-4)
+    np.testing.assert_allclose(
+        heading["psi"], 0.16 * (1.0 - np.cos(t / 8.0)), atol=2e-4
+    )
     np.testing.assert_allclose(heading["r"], r, atol=2e-5)
 
 
@@ -432,10 +538,17 @@ def test_a_ship_of_constant_acceleration_goes_where_mechanics_say() -> None:
     h, psi = np.array([2.0]), np.radians([30.0, 30.0])
     ahead = kinematics._plane_transitions(h, psi)[0] @ [1.0, 2.0, 3.0, -0.5, 0.2, 0.4]
     cosine, sine = np.cos(psi[0]), np.sin(psi[0])
-    far = np.array([3.0 * 2.0 + 0.5 * 0.2 * 4.0, -0.5 * 2.0 + 0.5 * 0.4 * 4.0])  # ahead and to starboard
-    place = [1.0 + far[0] * cosine - far[1] * sine, 2.0 + far[0] * sine + far[1] * cosine]
+    far = np.array(
+        [3.0 * 2.0 + 0.5 * 0.2 * 4.0, -0.5 * 2.0 + 0.5 * 0.4 * 4.0]
+    )  # ahead and to starboard
+    place = [
+        1.0 + far[0] * cosine - far[1] * sine,
+        2.0 + far[0] * sine + far[1] * cosine,
+    ]
     np.testing.assert_allclose(ahead, [*place, 3.4, 0.3, 0.2, 0.4])
-    np.testing.assert_allclose(kinematics._integrators(h)[0] @ [1.0, 3.0, 0.2], [7.4, 3.4, 0.2])
+    np.testing.assert_allclose(
+        kinematics._integrators(h)[0] @ [1.0, 3.0, 0.2], [7.4, 3.4, 0.2]
+    )
     later = np.linspace(0.0, 2.0, 20_001)
     kernel = np.stack([0.5 * later**2, later, np.ones_like(later)])
     expected = np.trapezoid(kernel[:, None] * kernel, later)

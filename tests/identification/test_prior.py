@@ -19,7 +19,11 @@ from identification.simulation_error.formulas import (
     formula_coefficients,
     kijima_derivatives,
 )
-from identification.simulation_error.prior import Pulled, reference_prior, virtual_trials
+from identification.simulation_error.prior import (
+    Pulled,
+    reference_prior,
+    virtual_trials,
+)
 from shipgym import Particulars, ShipModel, Trial
 from shipgym.errors import InputError
 from shipgym.manoeuvres import turning_circle, turning_indices, zigzag
@@ -27,7 +31,13 @@ from shipgym.ships.linear import steering_state_space
 from shipgym.ships.structures import get_structure
 
 Floats = np.ndarray[Any, np.dtype[Any]]
-NOISE = {"psi": np.radians(0.1), "u": 0.01, "v": 0.01, "r": np.radians(0.1), "delta": np.radians(0.1)}
+NOISE = {
+    "psi": np.radians(0.1),
+    "u": 0.01,
+    "v": 0.01,
+    "r": np.radians(0.1),
+    "delta": np.radians(0.1),
+}
 
 
 @pytest.fixture(scope="module")
@@ -35,7 +45,9 @@ def target() -> ShipModel:
     return shipgym.load_model("kvlcc2-l7")
 
 
-def recorded(run: Trial, ship: ShipModel, noise: float, seed: int, name: str, use: str = "fit") -> Trial:
+def recorded(
+    run: Trial, ship: ShipModel, noise: float, seed: int, name: str, use: str = "fit"
+) -> Trial:
     rng = np.random.default_rng(seed)
     t = run.t[::4]
     channels = {
@@ -43,21 +55,33 @@ def recorded(run: Trial, ship: ShipModel, noise: float, seed: int, name: str, us
         for c in ("x", "y", "psi", "u", "v", "r", "delta")
     }
     channels["n"] = np.full(len(t), ship.service_shaft_speed)
-    return Trial(t, channels, name=name, kind=run.kind, use=use, length=ship.particulars.length)
+    return Trial(
+        t, channels, name=name, kind=run.kind, use=use, length=ship.particulars.length
+    )
 
 
 @pytest.fixture(scope="module")
 def short_trials(target: ShipModel) -> list[Trial]:
     """Two short noisy 20/20 zigzags."""
     return [
-        recorded(zigzag(target, 20, 20, duration=50, dt=0.05, port_first=port), target, 1.0, i, f"zigzag-{i}")
+        recorded(
+            zigzag(target, 20, 20, duration=50, dt=0.05, port_first=port),
+            target,
+            1.0,
+            i,
+            f"zigzag-{i}",
+        )
         for i, port in enumerate((False, True))
     ]
 
 
-def fit(target: ShipModel, trials: list[Trial], **settings: Any) -> IdentificationResult:
+def fit(
+    target: ShipModel, trials: list[Trial], **settings: Any
+) -> IdentificationResult:
     settings = {"structure": "abkowitz", "method": "ls"} | settings
-    return identify(trials, particulars=target.particulars, steering=target.steering, **settings)
+    return identify(
+        trials, particulars=target.particulars, steering=target.steering, **settings
+    )
 
 
 def values(result: IdentificationResult) -> list[float]:
@@ -70,7 +94,9 @@ def test_a_strength_of_zero_is_no_prior(
     target: ShipModel, short_trials: list[Trial], prior: str, method: str
 ) -> None:
     free = fit(target, short_trials, method=method)
-    assert values(fit(target, short_trials, method=method, prior=prior, prior_strength=0.0)) == values(free)
+    assert values(
+        fit(target, short_trials, method=method, prior=prior, prior_strength=0.0)
+    ) == values(free)
 
 
 def test_an_infinite_strength_is_the_prior_whatever_the_data(
@@ -89,29 +115,40 @@ def test_an_infinite_strength_of_formulas_is_what_they_say(
     target: ShipModel, short_trials: list[Trial]
 ) -> None:
     ship = target.particulars.completed()
-    result = fit(target, short_trials, prior="clarke", prior_strength=np.inf, guarded=False)
+    result = fit(
+        target, short_trials, prior="clarke", prior_strength=np.inf, guarded=False
+    )
     clarke = clarke_derivatives(ship)
     assert result.coefficients["Y_v"] == pytest.approx(clarke["Y_v"], rel=1e-9)
     assert result.coefficients["N_v"] == pytest.approx(clarke["N_v"], rel=1e-9)
-    assert result.coefficients["Y_r"] == pytest.approx(clarke["Y_r"] - ship.mass_prime, rel=1e-9)
+    assert result.coefficients["Y_r"] == pytest.approx(
+        clarke["Y_r"] - ship.mass_prime, rel=1e-9
+    )
     assert result.coefficients["N_d"] == pytest.approx(clarke["N_delta"], rel=1e-9)
 
 
 @pytest.mark.parametrize("structure", ["linear-steering", "steering7", "abkowitz"])
-def test_formulas_mean_the_same_ship_in_every_structure(target: ShipModel, structure: str) -> None:
+def test_formulas_mean_the_same_ship_in_every_structure(
+    target: ShipModel, structure: str
+) -> None:
     """Linearised about service speed, whatever the units and the powers of the speed."""
     table, ship = get_structure(structure), target.particulars.completed()
     found = formula_coefficients("clarke", table, ship)
     theta = np.concatenate([coefficients for coefficients, _ in found.values()])
     values = np.linalg.solve(table.acceleration_matrix(ship), theta)
     model = ShipModel(
-        "formulas", structure, ship, target.steering,
+        "formulas",
+        structure,
+        ship,
+        target.steering,
         dict(zip(table.coefficient_names, values.tolist(), strict=True)),
-    )  # fmt: skip
+    )
     at = np.array([0.0, 0.0, 0.0, ship["speed"], 0.0, 0.0, 0.0])
     step = np.diag([1e-6, 1e-6, 1e-6])
     changed = at + np.column_stack([np.zeros((3, 4)), step[:, :2], step[:, 2]])
-    slopes = (model.derivatives(changed, [0.0]) - model.derivatives(at, [0.0]))[:, 4:6].T / 1e-6
+    slopes = (model.derivatives(changed, [0.0]) - model.derivatives(at, [0.0]))[
+        :, 4:6
+    ].T / 1e-6
     linear = formula_coefficients("clarke", get_structure("linear-steering"), ship)
     U = ship["speed"]
     expected = np.array([linear[q][0] * [U, U, U**2] for q in ("v", "r")])
@@ -122,7 +159,9 @@ def test_formulas_are_near_the_mmg_model_of_kvlcc2(target: ShipModel) -> None:
     """To a third, which is what such regressions are worth; signs and units follow from it."""
     A, _ = steering_state_space(target)
     for formula in ("clarke", "kijima"):
-        found = formula_coefficients(formula, get_structure("steering7"), target.particulars)
+        found = formula_coefficients(
+            formula, get_structure("steering7"), target.particulars
+        )
         sway, yaw = found["v"][0], found["r"][0]
         assert [sway[0], sway[3], yaw[0], yaw[3]] == pytest.approx(A.ravel(), rel=0.33)
 
@@ -144,7 +183,9 @@ def test_the_prior_holds_the_hard_turn_that_no_zigzag_has(
     ours = turning_indices(turning_circle(result.model, 35, duration=140, dt=0.05), 7.0)
     assert result.stable
     assert ours.advance_lengths == pytest.approx(truth.advance_lengths, rel=0.08)
-    assert ours.tactical_diameter_lengths == pytest.approx(truth.tactical_diameter_lengths, rel=0.08)
+    assert ours.tactical_diameter_lengths == pytest.approx(
+        truth.tactical_diameter_lengths, rel=0.08
+    )
 
 
 def test_noise_calls_for_the_prior_and_the_true_ship_as_prior_recovers_it() -> None:
@@ -153,27 +194,43 @@ def test_noise_calls_for_the_prior_and_the_true_ship_as_prior_recovers_it() -> N
     truth = np.array(list(ship.coefficients.values()))
     run = zigzag(ship, 10, 10, duration=150, dt=0.1)
     noisy = recorded(run, ship, 3.0, 0, "short")
-    settings = {"particulars": ship.particulars, "steering": ship.steering, "method": "ls"}
+    settings = {
+        "particulars": ship.particulars,
+        "steering": ship.steering,
+        "method": "ls",
+    }
     free = identify([noisy], **settings, guarded=False)
     held = identify([noisy], **settings, prior="mariner", guarded=False)
     size = np.maximum(np.abs(truth), 1e-5)
-    errors = [float(np.median(np.abs(np.array(values(r)) - truth) / size)) for r in (free, held)]
+    errors = [
+        float(np.median(np.abs(np.array(values(r)) - truth) / size))
+        for r in (free, held)
+    ]
     assert errors[1] < 0.05 < 1.0 < errors[0]
 
 
 def test_the_strength_may_be_judged_by_the_largest_rudder(target: ShipModel) -> None:
     """The score of the prior by itself is its error on the 20/20 alone, whatever the 10/10 shows."""
     small, large = (
-        recorded(zigzag(target, angle, angle, duration=50, dt=0.05), target, 1.0, angle, f"zigzag-{angle}")
+        recorded(
+            zigzag(target, angle, angle, duration=50, dt=0.05),
+            target,
+            1.0,
+            angle,
+            f"zigzag-{angle}",
+        )
         for angle in (10, 20)
     )
     result = fit(target, [small, large], prior="tanker", prior_folds="largest-rudder")
     provenance = result.model.provenance or {}
     prior = reference_prior("tanker", result.model)
     held = build_samples(
-        [large], result.model.table, target.particulars, window=provenance["steps_per_window"],
+        [large],
+        result.model.table,
+        target.particulars,
+        window=provenance["steps_per_window"],
         gear=target.steering,
-    )  # fmt: skip
+    )
     errors = [
         np.mean((y - held.features[q] @ prior.centre[q]) ** 2) / np.mean(y**2)
         for q, y in held.targets.items()
@@ -188,12 +245,20 @@ class Errors(Pulled):
         return strength
 
 
-def pulled(monkeypatch: pytest.MonkeyPatch, table: dict[float, list[float]], steady_from: float = 0.0) -> Any:
+def pulled(
+    monkeypatch: pytest.MonkeyPatch,
+    table: dict[float, list[float]],
+    steady_from: float = 0.0,
+) -> Any:
     monkeypatch.setattr(prior, "STRENGTHS", tuple(table))
-    monkeypatch.setattr(prior, "_folds", lambda *_: [(None, k) for k in range(len(table[0.0]))])
+    monkeypatch.setattr(
+        prior, "_folds", lambda *_: [(None, k) for k in range(len(table[0.0]))]
+    )
     monkeypatch.setattr(prior, "_error", lambda strength, held: table[strength][held])
     monkeypatch.setattr(prior, "with_coefficients", lambda _, strength: strength)
-    monkeypatch.setattr(prior, "reasons_unstable", lambda strength, _: strength < steady_from)
+    monkeypatch.setattr(
+        prior, "reasons_unstable", lambda strength, _: strength < steady_from
+    )
     given: Any = SimpleNamespace(blank=None, trials=(), name="hers")
     return Errors(given, given, given, given)
 
@@ -202,7 +267,12 @@ def test_the_strongest_pull_within_a_standard_error_of_the_best_is_chosen(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """Worse by 0.10 and 0.12 on average, where the standard error of both is 0.2 / root(4 - 1) = 0.115."""
-    table = {0.0: [2.0] * 4, 1.0: [1.0] * 4, 3.0: [1.3, 0.9, 1.3, 0.9], np.inf: [1.32, 0.92, 1.32, 0.92]}
+    table = {
+        0.0: [2.0] * 4,
+        1.0: [1.0] * 4,
+        3.0: [1.3, 0.9, 1.3, 0.9],
+        np.inf: [1.32, 0.92, 1.32, 0.92],
+    }
     best, scores = pulled(monkeypatch, table).chosen_strength()
     assert best == 3.0
     assert scores == pytest.approx({"0": 2.0, "1": 1.0, "3": 1.1, "inf": 1.12})
@@ -214,7 +284,13 @@ def test_the_strongest_pull_within_a_standard_error_of_the_best_is_chosen(
 def test_a_strength_is_raised_until_the_ship_does_not_run_away_if_that_helps(
     steady_from: float, found: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    table = {0.0: [2.0] * 4, 1.0: [1.0] * 4, 2.0: [2.0] * 4, 3.0: [2.0] * 4, 4.0: [2.0] * 4}
+    table = {
+        0.0: [2.0] * 4,
+        1.0: [1.0] * 4,
+        2.0: [2.0] * 4,
+        3.0: [2.0] * 4,
+        4.0: [2.0] * 4,
+    }
     assert pulled(monkeypatch, table, steady_from).steady_strength(1.0) == found
 
 
@@ -234,7 +310,13 @@ def test_held_out_are_trials_or_fifths_of_a_single_one() -> None:
     found = [(list(fit), list(held)) for fit, held in prior._folds(task, "trials")]
     assert found == [([2, 3], [0, 1]), ([0, 1, 2], [3]), ([0, 1, 3], [2])]
     task = SimpleNamespace(samples=Rows([3] * 7))
-    assert [held for _, held in prior._folds(task, "trials")] == [[0, 1], [2], [3, 4], [5], [6]]
+    assert [held for _, held in prior._folds(task, "trials")] == [
+        [0, 1],
+        [2],
+        [3, 4],
+        [5],
+        [6],
+    ]
 
 
 def test_a_pull_is_that_of_generalised_ridge_regression() -> None:
@@ -246,32 +328,50 @@ def test_a_pull_is_that_of_generalised_ridge_regression() -> None:
         np.array([[2.0, 0.5], [0.0, 1.0]]),
     )
     centre = np.array([0.7, -0.4])
-    pull = prior.Prior("hers", {"r": centre}, {"r": root}, {"r": np.ones(2, dtype=bool)})
-    samples: Any = SimpleNamespace(features={"r": X}, targets={"r": y}, duration=np.full(30, 0.5))
+    pull = prior.Prior(
+        "hers", {"r": centre}, {"r": root}, {"r": np.ones(2, dtype=bool)}
+    )
+    samples: Any = SimpleNamespace(
+        features={"r": X}, targets={"r": y}, duration=np.full(30, 0.5)
+    )
     S = 0.3**2 * 30 * 0.5**2 * root.T @ root
     full = TruncatedLSSVM(selection="full", fit_intercept=False)
     found = prior._toward(full, samples, "r", pull, 0.3)
-    np.testing.assert_allclose(found.coef_, np.linalg.solve(X.T @ X + S, X.T @ y + S @ centre), rtol=1e-9)
+    np.testing.assert_allclose(
+        found.coef_, np.linalg.solve(X.T @ X + S, X.T @ y + S @ centre), rtol=1e-9
+    )
     left = np.mean((y - X @ found.coef_) ** 2) / np.mean(y**2)
-    both: Any = SimpleNamespace(features={"r": X, "v": X}, targets={"r": y, "v": X @ found.coef_})
+    both: Any = SimpleNamespace(
+        features={"r": X, "v": X}, targets={"r": y, "v": X @ found.coef_}
+    )
     assert prior._error({"r": found}, samples) == pytest.approx(left)
     assert prior._error({"r": found, "v": found}, both) == pytest.approx(0.5 * left)
 
 
-def test_virtual_trials_are_of_both_sides_and_twenty_ship_lengths(target: ShipModel) -> None:
+def test_virtual_trials_are_of_both_sides_and_twenty_ship_lengths(
+    target: ShipModel,
+) -> None:
     trials, travel = virtual_trials(target), 7.0 / 1.179
     for trial in trials:
         np.testing.assert_allclose(trial.t, 0.05 * travel * np.arange(401))
         np.testing.assert_array_equal(trial["n"], target.service_shaft_speed)
     hardest = [np.degrees(np.abs(trial["delta"]).max()) for trial in trials]
-    assert hardest == pytest.approx([10.0, 20.0, 35.0, 35.0, 35.0, 15.0, 15.0], abs=0.01)
+    assert hardest == pytest.approx(
+        [10.0, 20.0, 35.0, 35.0, 35.0, 15.0, 15.0], abs=0.01
+    )
     assert [np.sign(trial["delta"][5]) for trial in trials] == [1, -1, 1, 1, -1, 1, -1]
     slow = replace(target, steering=replace(target.steering, rudder_limit_deg=18.0))
-    hardest = [np.degrees(np.abs(trial["delta"]).max()) for trial in virtual_trials(slow)]
-    assert hardest == pytest.approx([10.0, 18.0, 18.0, 18.0, 18.0, 15.0, 15.0], abs=0.01)
+    hardest = [
+        np.degrees(np.abs(trial["delta"]).max()) for trial in virtual_trials(slow)
+    ]
+    assert hardest == pytest.approx(
+        [10.0, 18.0, 18.0, 18.0, 18.0, 15.0, 15.0], abs=0.01
+    )
 
 
-def test_auto_takes_the_ship_most_alike(target: ShipModel, short_trials: list[Trial]) -> None:
+def test_auto_takes_the_ship_most_alike(
+    target: ShipModel, short_trials: list[Trial]
+) -> None:
     result = fit(target, short_trials, prior="auto", prior_strength=1.0)
     provenance = result.model.provenance or {}
     assert (provenance["prior"], provenance["prior_source"]) == ("auto", "kvlcc2-l7")
@@ -281,8 +381,14 @@ def test_auto_takes_the_ship_most_alike(target: ShipModel, short_trials: list[Tr
 @pytest.mark.parametrize(
     ("settings", "message"),
     [
-        ({"structure": "cubic", "prior": "clarke"}, r"prior: 'clarke' found with structure 'cubic'"),
-        ({"structure": "nomoto", "prior": "kijima"}, r"prior: 'kijima' found with structure 'nomoto'"),
+        (
+            {"structure": "cubic", "prior": "clarke"},
+            r"prior: 'clarke' found with structure 'cubic'",
+        ),
+        (
+            {"structure": "nomoto", "prior": "kijima"},
+            r"prior: 'kijima' found with structure 'nomoto'",
+        ),
         (
             {"structure": "grey-box", "reference_model": "tanker", "prior": "kvlcc2"},
             r"prior: 'kvlcc2' found with structure 'grey-box'",
@@ -290,9 +396,15 @@ def test_auto_takes_the_ship_most_alike(target: ShipModel, short_trials: list[Tr
         ({"prior": "titanic"}, r"titanic"),
         ({"prior": "tanker", "prior_strength": -1.0}, r"prior_strength: -1"),
         ({"prior_strength": 1.0}, r"prior_strength: 1.0 found without a prior"),
-        ({"prior_folds": "largest-rudder"}, r"prior_folds: 'largest-rudder' found without a prior"),
+        (
+            {"prior_folds": "largest-rudder"},
+            r"prior_folds: 'largest-rudder' found without a prior",
+        ),
         ({"prior": "tanker", "prior_folds": "luck"}, r"prior_folds: 'luck' found"),
-        ({"prior": "tanker", "prior_folds": "largest-rudder"}, r"all trials to fit \(2\) reach 20"),
+        (
+            {"prior": "tanker", "prior_folds": "largest-rudder"},
+            r"all trials to fit \(2\) reach 20",
+        ),
     ],
 )
 def test_what_does_not_fit_is_refused(
@@ -302,7 +414,9 @@ def test_what_does_not_fit_is_refused(
         fit(target, short_trials, **settings)
 
 
-def test_formulas_need_the_rudder_area(target: ShipModel, short_trials: list[Trial]) -> None:
+def test_formulas_need_the_rudder_area(
+    target: ShipModel, short_trials: list[Trial]
+) -> None:
     bare = replace(target, particulars=replace(target.particulars, rudder_area=None))
     with pytest.raises(InputError, match="rudder_area is needed"):
         fit(bare, short_trials, prior="clarke")
@@ -311,29 +425,49 @@ def test_formulas_need_the_rudder_area(target: ShipModel, short_trials: list[Tri
 def test_formulas_are_those_printed() -> None:
     """B/L 0.15, B/T 3, CB 0.7, T/L 0.05: Clarke et al. 1983 and Kijima et al. 1990, worked out."""
     ship = Particulars(
-        length=100.0, beam=15.0, draught=5.0, block_coefficient=0.7, rudder_area=10.0, xg=0.0, speed=6.0
+        length=100.0,
+        beam=15.0,
+        draught=5.0,
+        block_coefficient=0.7,
+        rudder_area=10.0,
+        xg=0.0,
+        speed=6.0,
     ).completed()
     scale = -np.pi * 0.05**2
     rudder = {"Y_delta": -0.003, "N_delta": 0.0015}
-    clarke = {"Y_v": 1.84 * scale, "Y_r": -0.41 * scale, "N_v": 0.62 * scale, "N_r": 0.283 * scale}
+    clarke = {
+        "Y_v": 1.84 * scale,
+        "Y_r": -0.41 * scale,
+        "N_v": 0.62 * scale,
+        "N_r": 0.283 * scale,
+    }
     assert clarke_derivatives(ship) == pytest.approx(clarke | rudder)
     mass = ship.mass_prime - ship.require("X_udot")
     kijima = {
-        "Y_v": -0.05 * (np.pi / 2 * 0.1 + 1.4 * 0.105), "Y_r": -0.05 * 1.5 * 0.105 + mass,
-        "N_v": -0.05 * 0.1, "N_r": -0.05 * (0.54 * 0.1 - 0.1**2),
-    }  # fmt: skip
+        "Y_v": -0.05 * (np.pi / 2 * 0.1 + 1.4 * 0.105),
+        "Y_r": -0.05 * 1.5 * 0.105 + mass,
+        "N_v": -0.05 * 0.1,
+        "N_r": -0.05 * (0.54 * 0.1 - 0.1**2),
+    }
     assert kijima_derivatives(ship) == pytest.approx(kijima | rudder)
 
 
 @pytest.mark.parametrize(("steady", "told"), [(1.0, None), (3.0, 1.0), (np.inf, 1.0)])
-def test_a_strength_that_had_to_be_raised_is_told(steady: float, told: float | None) -> None:
+def test_a_strength_that_had_to_be_raised_is_told(
+    steady: float, told: float | None
+) -> None:
     """Infinity, which JSON does not know, as none."""
 
     class Chosen(Errors):
         def at(self, strength: float, samples: Any = None) -> Any:
-            return {"r": SimpleNamespace(strength=strength), "v": SimpleNamespace(strength=strength)}
+            return {
+                "r": SimpleNamespace(strength=strength),
+                "v": SimpleNamespace(strength=strength),
+            }
 
-        def chosen_strength(self, folds: str = "trials") -> tuple[float, dict[str, float]]:
+        def chosen_strength(
+            self, folds: str = "trials"
+        ) -> tuple[float, dict[str, float]]:
             return 1.0, {folds: 0.5}
 
         def steady_strength(self, least: float) -> float:
@@ -353,7 +487,10 @@ def test_a_strength_that_had_to_be_raised_is_told(steady: float, told: float | N
 def test_turns_of_a_reference_ship_are_every_second_sample_of_her_virtual_ones(
     target: ShipModel, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    runs = [Trial(np.arange(5.0), {"u": np.full(5, float(k))}, name=f"virtual-{k}") for k in range(7)]
+    runs = [
+        Trial(np.arange(5.0), {"u": np.full(5, float(k))}, name=f"virtual-{k}")
+        for k in range(7)
+    ]
     monkeypatch.setattr(prior, "_at_target", lambda *_: target)
     monkeypatch.setattr(prior, "virtual_trials", lambda _: runs)
     turns = prior.reference_turns("tanker", target)
@@ -365,13 +502,19 @@ def test_the_prior_itself_leaves_only_what_it_does_not_know_to_the_data() -> Non
     """Known: 2 of the first term. The second is fitted to what it leaves, and alone is uncertain."""
     X = np.array([[1.0, 1.0], [2.0, 0.0], [0.0, 1.0], [1.0, -1.0]])
     y = X @ [2.0, 3.0] + [0.1, 9.0, -0.1, 0.0]
-    pull = prior.Prior("hers", {"r": np.array([2.0, 0.0])}, {}, {"r": np.array([True, False])})
-    samples: Any = SimpleNamespace(features={"r": X}, targets={"r": y}, duration=np.ones(4))
+    pull = prior.Prior(
+        "hers", {"r": np.array([2.0, 0.0])}, {}, {"r": np.array([True, False])}
+    )
+    samples: Any = SimpleNamespace(
+        features={"r": X}, targets={"r": y}, duration=np.ones(4)
+    )
     full = TruncatedLSSVM(selection="full", fit_intercept=False)
     found = prior._toward(full, samples, "r", pull, np.inf)
     assert found.coef_ == pytest.approx([2.0, 3.0])
     np.testing.assert_allclose(found.inverse_moment_, [[0.0, 0.0], [0.0, 1.0 / 3.0]])
-    np.testing.assert_allclose(found.covariance_, [[0.0, 0.0], [0.0, (0.02 + 81.0) / 3.0 / 3.0]])
+    np.testing.assert_allclose(
+        found.covariance_, [[0.0, 0.0], [0.0, (0.02 + 81.0) / 3.0 / 3.0]]
+    )
     assert found.predict(X) == pytest.approx(X @ [2.0, 3.0])
     known = replace(pull, known={"r": np.ones(2, dtype=bool)})
     held = prior._toward(full, samples, "r", known, np.inf)

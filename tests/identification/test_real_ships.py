@@ -81,9 +81,11 @@ def test_a_model_keeps_its_turn_when_it_is_taken_to_full_scale(data: Data) -> No
     from identification import identify
 
     model = identify(
-        [hsva.runs["Z_20_05"], hsva.runs["Z_30_05"]], "steering5", particulars=hsva.particulars,
+        [hsva.runs["Z_20_05"], hsva.runs["Z_30_05"]],
+        "steering5",
+        particulars=hsva.particulars,
         steering=hsva.steering,
-    ).model  # fmt: skip
+    ).model
     at_full_scale = full_scale(model, marin)
     small, large = turns(model)[0], turns(at_full_scale)[0]
     assert small is not None
@@ -92,14 +94,20 @@ def test_a_model_keeps_its_turn_when_it_is_taken_to_full_scale(data: Data) -> No
 
 
 @measured
-def test_the_mmg_form_of_three_zigzags_predicts_the_others_and_the_circle(data: Data) -> None:
+def test_the_mmg_form_of_three_zigzags_predicts_the_others_and_the_circle(
+    data: Data,
+) -> None:
     """Aims of 0.095 deg/s, 4.3 deg of heading, 4 % of tactical diameter and 1.5 deg of drift to starboard."""
     hsva = data.ship(SHIP, 4)
     model = fitted(hsva, reference_model="kvlcc2-l7", prior_strength=2.0)
-    yaw_rate, heading, *_ = mean_errors(zigzag_errors(model, hsva.runs[name]) for name in OTHERS)
+    yaw_rate, heading, *_ = mean_errors(
+        zigzag_errors(model, hsva.runs[name]) for name in OTHERS
+    )
     assert yaw_rate < 0.095
     assert heading < 4.3
-    _, diameter, drift, _ = circle(full_scale(model, data.ship("kvlcc2_marin", 10)), 1.0)
+    _, diameter, drift, _ = circle(
+        full_scale(model, data.ship("kvlcc2_marin", 10)), 1.0
+    )
     assert diameter == pytest.approx(CIRCLES[0][1], rel=0.04)
     assert drift == pytest.approx(CIRCLES[0][2], abs=1.5)
 
@@ -122,7 +130,9 @@ def test_captive_forces_reduce_to_few_terms_that_predict_drift_with_rudder() -> 
         assert found.held_out["tls-svm, reduced"] > expected[force][0]
         assert combined(tests, force, found.reduction.terms) > expected[force][1]
     yaw = study(tests, "N'").reduction.coefficients
-    assert yaw["vn"] < 0.0 < yaw["dn"]  # Munk's moment; a rudder to starboard turns to starboard
+    assert (
+        yaw["vn"] < 0.0 < yaw["dn"]
+    )  # Munk's moment; a rudder to starboard turns to starboard
 
 
 def test_missing_captive_tests_are_told(tmp_path: Path) -> None:

@@ -12,7 +12,10 @@ from sklearn.utils.estimator_checks import check_estimator
 
 from identification import identify
 from identification.estimators import recursive_kernels as kernels
-from identification.estimators.coefficient_history import CoefficientHistory, coefficient_history
+from identification.estimators.coefficient_history import (
+    CoefficientHistory,
+    coefficient_history,
+)
 from identification.estimators.recursive import (
     MultiInnovationLeastSquares,
     RecursiveLeastSquares,
@@ -26,7 +29,9 @@ Floats = np.ndarray[Any, np.dtype[np.float64]]
 TRUTH = np.array([3.0, -0.02, 500.0, 1.0])
 
 
-def regression(n: int = 400, noise: float = 0.01, seed: int = 0) -> tuple[Floats, Floats]:
+def regression(
+    n: int = 400, noise: float = 0.01, seed: int = 0
+) -> tuple[Floats, Floats]:
     """Correlated regressors of sizes from 1e-3 to 1e2."""
     rng = np.random.default_rng(seed)
     X = rng.standard_normal((n, 4)) @ (np.eye(4) + 0.3 * rng.standard_normal((4, 4)))
@@ -47,7 +52,11 @@ def regression(n: int = 400, noise: float = 0.01, seed: int = 0) -> tuple[Floats
 )
 def test_estimators_pass_the_battery_of_scikit_learn(estimator: Any) -> None:
     checks = check_estimator(estimator, on_skip=None, on_fail=None)
-    failed = [(check["check_name"], check["exception"]) for check in checks if check["status"] == "failed"]
+    failed = [
+        (check["check_name"], check["exception"])
+        for check in checks
+        if check["status"] == "failed"
+    ]
     assert failed == []
     assert sum(check["status"] == "passed" for check in checks) > 40
 
@@ -59,10 +68,14 @@ def test_without_forgetting_rls_is_ridge_regression() -> None:
     scaled = X / estimator.scale_
     moment = scaled.T @ scaled + np.eye(4) / C
     np.testing.assert_allclose(
-        estimator.theta, np.linalg.solve(moment, scaled.T @ y) / estimator.scale_, rtol=1e-9
+        estimator.theta,
+        np.linalg.solve(moment, scaled.T @ y) / estimator.scale_,
+        rtol=1e-9,
     )
     inverse = np.linalg.inv(moment) / np.outer(estimator.scale_, estimator.scale_)
-    np.testing.assert_allclose(estimator.covariance, inverse, rtol=1e-8, atol=1e-12 * np.abs(inverse).max())
+    np.testing.assert_allclose(
+        estimator.covariance, inverse, rtol=1e-8, atol=1e-12 * np.abs(inverse).max()
+    )
 
 
 def test_with_forgetting_rls_is_exponentially_weighted_least_squares() -> None:
@@ -71,7 +84,9 @@ def test_with_forgetting_rls_is_exponentially_weighted_least_squares() -> None:
     root = np.sqrt(0.97 ** np.arange(399.0, -1.0, -1.0))
     weighted = np.linalg.lstsq(X * root[:, None], y * root, rcond=None)[0]
     np.testing.assert_allclose(estimator.coef_, weighted, rtol=1e-5)
-    np.testing.assert_allclose(estimator.inverse_moment_, estimator.covariance, rtol=1e-4, atol=1e-9)
+    np.testing.assert_allclose(
+        estimator.inverse_moment_, estimator.covariance, rtol=1e-4, atol=1e-9
+    )
 
 
 @pytest.mark.parametrize("forgetting", [1.0, 0.98])
@@ -86,7 +101,9 @@ def test_tmils_is_mils_without_the_inverse(innovations: int, forgetting: float) 
     )
     np.testing.assert_allclose(without[10:], with_inverse[10:], rtol=1e-6)
     if innovations == 1:
-        np.testing.assert_array_equal(without, RecursiveLeastSquares(forgetting).fit_history(X, y))
+        np.testing.assert_array_equal(
+            without, RecursiveLeastSquares(forgetting).fit_history(X, y)
+        )
 
 
 def test_samples_one_by_one_are_samples_at_once() -> None:
@@ -95,7 +112,11 @@ def test_samples_one_by_one_are_samples_at_once() -> None:
         MultiInnovationLeastSquares(innovations=4, omega=0.5),
         StochasticGradient(0.98, omega=0.5),
     ):
-        at_once = type(estimator)(**estimator.get_params()).update(X[:50], y[:50]).update(X[50:], y[50:])
+        at_once = (
+            type(estimator)(**estimator.get_params())
+            .update(X[:50], y[:50])
+            .update(X[50:], y[50:])
+        )
         estimator.update(X[:50], y[:50])
         for phi, target in zip(X[50:], y[50:], strict=True):
             estimator.update(phi, target)
@@ -128,7 +149,11 @@ def test_a_nonlinear_innovation_bounds_what_an_outlier_does() -> None:
     X, y = regression(600)
     y[500] += 50.0 * np.std(y)
     linear, bounded = (
-        np.abs(MultiInnovationLeastSquares(innovations=3, omega=omega).fit(X, y).coef_ / TRUTH - 1.0).max()
+        np.abs(
+            MultiInnovationLeastSquares(innovations=3, omega=omega).fit(X, y).coef_
+            / TRUTH
+            - 1.0
+        ).max()
         for omega in (0.0, 1.0)
     )
     assert bounded < 0.2 * linear
@@ -142,7 +167,9 @@ def test_the_start_is_ls_svr_and_the_end_is_least_squares() -> None:
     early = np.linalg.lstsq(X[:600:3], y[:600:3], rcond=None)[0]
     np.testing.assert_allclose(course[599], early, rtol=1e-6)
     used = np.r_[0:600:3, 600:1000]
-    np.testing.assert_allclose(estimator.coef_, np.linalg.lstsq(X[used], y[used], rcond=None)[0], rtol=1e-6)
+    np.testing.assert_allclose(
+        estimator.coef_, np.linalg.lstsq(X[used], y[used], rcond=None)[0], rtol=1e-6
+    )
     assert estimator.weights_.sum() == 600
 
 
@@ -163,7 +190,9 @@ def test_nothing_winds_up_while_the_ship_sails_straight() -> None:
     before = estimator.theta.copy()
     estimator.update(np.zeros((20_000, 4)), np.zeros(20_000))
     assert estimator.covariance is not None
-    assert np.all(np.diag(estimator.covariance) * estimator.scale_**2 <= 100.0 * (1 + 1e-9))
+    assert np.all(
+        np.diag(estimator.covariance) * estimator.scale_**2 <= 100.0 * (1 + 1e-9)
+    )
     np.testing.assert_array_equal(estimator.theta, before)
     np.testing.assert_allclose(estimator.update(X, y).theta, TRUTH, rtol=0.02)
 
@@ -174,16 +203,23 @@ K, T, ALPHA, BETA = 0.15, 47.61, 13.27, 11087.2  # Hual Trooper, Song 2020, tabl
 
 
 def hual_trooper(structure: str, coefficients: dict[str, float]) -> Trial:
-    ship = ShipModel(structure, structure, PARTICULARS, SteeringGear(35.0, 3.0, 1.0), coefficients)
+    ship = ShipModel(
+        structure, structure, PARTICULARS, SteeringGear(35.0, 3.0, 1.0), coefficients
+    )
     run = zigzag(ship, 20, 20, duration=600, dt=0.1)
-    channels = {name: run[name][::5] for name in ("x", "y", "psi", "u", "v", "r", "delta")}
+    channels = {
+        name: run[name][::5] for name in ("x", "y", "psi", "u", "v", "r", "delta")
+    }
     return Trial(run.t[::5], channels, name="zigzag", kind="zigzag")
 
 
 @pytest.mark.parametrize("method", ["rls", "mils", "tmils"])
 def test_k_and_t_of_hual_trooper_within_one_per_cent(method: str) -> None:
     course = coefficient_history(
-        hual_trooper("nomoto", {"c_r": -1 / T, "c_d": K / T}), "nomoto", PARTICULARS, method
+        hual_trooper("nomoto", {"c_r": -1 / T, "c_d": K / T}),
+        "nomoto",
+        PARTICULARS,
+        method,
     )
     found = course.last
     assert -1.0 / found["c_r"] == pytest.approx(T, rel=0.01)
@@ -194,24 +230,39 @@ def test_k_and_t_of_hual_trooper_within_one_per_cent(method: str) -> None:
 def test_coefficients_of_a_grey_box_are_those_beside_the_reference_ship() -> None:
     mariner = load_model("mariner")
     blank = converted_model("mariner", mariner.particulars, mariner.steering)
-    ship = replace(blank, coefficients=blank.coefficients | {"b_v": -0.1, "c_r": -0.2, "c_d": 0.1})
+    ship = replace(
+        blank, coefficients=blank.coefficients | {"b_v": -0.1, "c_r": -0.2, "c_d": 0.1}
+    )
     run = zigzag(ship, 20, 20, duration=600, dt=0.5)
-    trial = Trial(run.t, {name: run[name] for name in ("x", "y", "psi", "u", "v", "r", "delta")})
+    trial = Trial(
+        run.t, {name: run[name] for name in ("x", "y", "psi", "u", "v", "r", "delta")}
+    )
     found = coefficient_history(trial, ship.table, mariner.particulars).last
     assert found == pytest.approx(ship.coefficients, abs=2e-3)
 
 
 def test_coefficients_of_a_ship_with_a_memory_of_yaw() -> None:
     T1, T2, T3 = 60.0, 8.0, 15.0
-    truth = {"c_r": -1 / T1 - 1 / T2, "c_d": K * T3 / (T1 * T2), "e_r": -1 / (T1 * T2), "e_d": K / (T1 * T2)}
-    found = coefficient_history(hual_trooper("nomoto2", truth), "nomoto2", PARTICULARS).last
+    truth = {
+        "c_r": -1 / T1 - 1 / T2,
+        "c_d": K * T3 / (T1 * T2),
+        "e_r": -1 / (T1 * T2),
+        "e_d": K / (T1 * T2),
+    }
+    found = coefficient_history(
+        hual_trooper("nomoto2", truth), "nomoto2", PARTICULARS
+    ).last
     assert found == pytest.approx(truth, rel=0.02)
 
 
 @pytest.mark.parametrize("method", ["rls", "tmils"])
-def test_the_nonlinear_coefficients_of_hual_trooper_within_one_per_cent(method: str) -> None:
+def test_the_nonlinear_coefficients_of_hual_trooper_within_one_per_cent(
+    method: str,
+) -> None:
     truth = {"c_r": -ALPHA * K / T, "c_r3": -BETA * K / T, "c_d": K / T}
-    found = coefficient_history(hual_trooper("norrbin", truth), "norrbin", PARTICULARS, method).last
+    found = coefficient_history(
+        hual_trooper("norrbin", truth), "norrbin", PARTICULARS, method
+    ).last
     for name, value in truth.items():
         assert found[name] == pytest.approx(value, rel=0.01), name
 
@@ -219,7 +270,9 @@ def test_the_nonlinear_coefficients_of_hual_trooper_within_one_per_cent(method: 
 @pytest.mark.parametrize("method", ["rls", "mils", "tmils"])
 def test_identify_knows_the_recursive_methods(method: str) -> None:
     truth = {"c_r": -ALPHA * K / T, "c_r3": -BETA * K / T, "c_d": K / T}
-    fit = identify([hual_trooper("norrbin", truth)], "norrbin", method, particulars=PARTICULARS)
+    fit = identify(
+        [hual_trooper("norrbin", truth)], "norrbin", method, particulars=PARTICULARS
+    )
     assert fit.stable
     assert fit.coefficients["c_d"] == pytest.approx(truth["c_d"], rel=0.01)
     assert all(np.isfinite(error) for error in fit.standard_errors.values())
@@ -244,13 +297,18 @@ def test_settings_out_of_range_are_named(estimator: Any, message: str) -> None:
 def test_samples_that_do_not_fit_are_named() -> None:
     X, y = regression()
     estimator = RecursiveLeastSquares().update(X, y)
-    with pytest.raises(InputError, match="1 signals of 3 regressors found, expected 1 of 4"):
+    with pytest.raises(
+        InputError, match="1 signals of 3 regressors found, expected 1 of 4"
+    ):
         estimator.update(X[0, :3], 1.0)
     with pytest.raises(InputError, match="not finite"):
         estimator.update(X[0], np.nan)
     with pytest.raises(InputError, match="expected a recursive one"):
         coefficient_history(
-            hual_trooper("nomoto", {"c_r": -1 / T, "c_d": K / T}), "nomoto", PARTICULARS, "ls"
+            hual_trooper("nomoto", {"c_r": -1 / T, "c_d": K / T}),
+            "nomoto",
+            PARTICULARS,
+            "ls",
         )
 
 
@@ -259,19 +317,37 @@ def test_samples_that_do_not_fit_are_named() -> None:
     [
         (np.zeros((5, 2)), np.zeros(4), r"shapes \(5, 2\) and \(4,\) found"),
         (np.zeros((5, 3, 2)), np.zeros((5, 2)), "3 signals found, expected 2 as in y"),
-        (np.zeros((5, 2, 2, 2)), np.zeros(5), "found, expected \\(n_samples, n_features\\)"),
+        (
+            np.zeros((5, 2, 2, 2)),
+            np.zeros(5),
+            "found, expected \\(n_samples, n_features\\)",
+        ),
         (np.full((5, 2), np.inf), np.zeros(5), "not finite"),
     ],
 )
-def test_samples_that_do_not_belong_together_are_refused(phi: Any, y: Any, message: str) -> None:
+def test_samples_that_do_not_belong_together_are_refused(
+    phi: Any, y: Any, message: str
+) -> None:
     with pytest.raises(InputError, match=message):
         RecursiveLeastSquares().update(phi, y)
 
 
 def test_settings_reach_to_their_bounds() -> None:
-    for least in ({"start_samples": 0}, {"start_interval": 1}, {"forgetting": 1.0}, {"C": 1e-9}):
-        assert np.isfinite(RecursiveLeastSquares(**least).fit(*regression()).coef_).all()
-    for wrong in ({"start_interval": 0}, {"forgetting": 0.0}, {"C": 0.0}, {"start_C": 0.0}):
+    for least in (
+        {"start_samples": 0},
+        {"start_interval": 1},
+        {"forgetting": 1.0},
+        {"C": 1e-9},
+    ):
+        assert np.isfinite(
+            RecursiveLeastSquares(**least).fit(*regression()).coef_
+        ).all()
+    for wrong in (
+        {"start_interval": 0},
+        {"forgetting": 0.0},
+        {"C": 0.0},
+        {"start_C": 0.0},
+    ):
         with pytest.raises(InputError, match=f"{next(iter(wrong))}: 0 found"):
             RecursiveLeastSquares(**wrong).fit(*regression())
 
@@ -279,7 +355,9 @@ def test_settings_reach_to_their_bounds() -> None:
 def test_what_has_seen_no_sample_has_no_estimate() -> None:
     for estimator in (RecursiveLeastSquares(), StochasticGradient()):
         for name in ("theta", "covariance"):
-            with pytest.raises(NotFittedError, match=f"This {type(estimator).__name__} instance is not"):
+            with pytest.raises(
+                NotFittedError, match=f"This {type(estimator).__name__} instance is not"
+            ):
                 getattr(estimator, name)
 
 
@@ -291,7 +369,9 @@ def test_what_has_seen_no_sample_has_no_estimate() -> None:
         ({"C": 0.0}, "C: 0 found"),
     ],
 )
-def test_settings_are_checked_sample_by_sample_too(settings: dict[str, Any], message: str) -> None:
+def test_settings_are_checked_sample_by_sample_too(
+    settings: dict[str, Any], message: str
+) -> None:
     with pytest.raises(InputError, match=message):
         RecursiveLeastSquares(**settings).update([[1.0, 2.0]], [3.0])
 
@@ -309,8 +389,12 @@ def test_one_sample_of_one_regressor_by_hand() -> None:
 
 
 def test_an_innovation_is_bounded_by_one_over_omega_and_odd() -> None:
-    bounded = [kernels.innovation(error, 2.0) for error in (-50.0, -1e-6, 0.0, 1e-6, 0.3, 50.0)]
-    assert bounded == pytest.approx([-0.5, -1e-6, 0.0, 1e-6, np.tanh(0.6) / 2.0, 0.5], abs=1e-15)
+    bounded = [
+        kernels.innovation(error, 2.0) for error in (-50.0, -1e-6, 0.0, 1e-6, 0.3, 50.0)
+    ]
+    assert bounded == pytest.approx(
+        [-0.5, -1e-6, 0.0, 1e-6, np.tanh(0.6) / 2.0, 0.5], abs=1e-15
+    )
     assert kernels.innovation(7.0, 0.0) == 7.0
 
 
@@ -324,7 +408,9 @@ def test_an_innovation_is_bounded_by_one_over_omega_and_odd() -> None:
         ([0.0, 0.95], [0.0, 1.0]),
     ],
 )
-def test_a_covariance_forgets_up_to_where_it_began(variances: list[float], expected: list[float]) -> None:
+def test_a_covariance_forgets_up_to_where_it_began(
+    variances: list[float], expected: list[float]
+) -> None:
     """By 0.9, from ceilings of 1; rows and columns alike, so that the correlation stays."""
     cross = 0.5 * np.sqrt(np.prod(variances))
     P = np.array([[variances[0], cross], [cross, variances[1]]])
@@ -335,11 +421,17 @@ def test_a_covariance_forgets_up_to_where_it_began(variances: list[float], expec
 
 def test_a_history_ends_with_the_estimate_and_knows_its_coefficients() -> None:
     found = CoefficientHistory(
-        ("a", "b"), np.array([1.0, 2.0]), np.zeros(2, dtype=np.int64), np.array([[1.0, 5.0], [2.0, 7.0]])
+        ("a", "b"),
+        np.array([1.0, 2.0]),
+        np.zeros(2, dtype=np.int64),
+        np.array([[1.0, 5.0], [2.0, 7.0]]),
     )
     assert found.last == {"a": 2.0, "b": 7.0}
     assert found["b"].tolist() == [5.0, 7.0]
-    with pytest.raises(InputError, match="coefficient history: no coefficient 'c', expected one of a, b"):
+    with pytest.raises(
+        InputError,
+        match="coefficient history: no coefficient 'c', expected one of a, b",
+    ):
         found["c"]
 
 
@@ -347,7 +439,9 @@ def test_samples_count_by_how_often_and_how_long_ago_they_were_used() -> None:
     """With three innovations the last sample once, the one before twice; forgetting 0.5 a step."""
     X, y = regression(6)
     found = MultiInnovationLeastSquares(forgetting=0.5, innovations=3).fit(X, y)
-    np.testing.assert_allclose(found.weights_, np.array([3, 3, 3, 3, 2, 1]) * 0.5 ** np.arange(5.0, -1.0, -1))
+    np.testing.assert_allclose(
+        found.weights_, np.array([3, 3, 3, 3, 2, 1]) * 0.5 ** np.arange(5.0, -1.0, -1)
+    )
     every = RecursiveLeastSquares(start_samples=2, start_interval=2).fit(X, y)
     np.testing.assert_array_equal(every.weights_, [1.0, 0.0, 1.0, 0.0, 1.0, 1.0])
 

@@ -23,17 +23,23 @@ def test_the_reduced_model_predicts_with_fewer_terms(
 ) -> None:
     few, many = len(found.reduced.coefficients), len(found.full.coefficients)
     assert few < many == 40
-    kept = {name for q in found.structure.equations for name in found.structure.names(q)}
+    kept = {
+        name for q in found.structure.equations for name in found.structure.names(q)
+    }
     assert set(found.reduced.coefficients) == kept < set(found.full.coefficients)
     held = noisy_trials[-1].name
-    errors = [r.metrics["trials"][held]["rmse"]["r"] for r in (found.full, found.reduced)]
+    errors = [
+        r.metrics["trials"][held]["rmse"]["r"] for r in (found.full, found.reduced)
+    ]
     assert errors[1] < 1.2 * errors[0]
     told = found.to_dict()
     assert told["terms"] == {"full": 40, "reduced": few}
     assert told["equations"]["r"]["path"][0]["changed"] == ""
 
 
-def test_the_model_carries_its_table(found: ReducedIdentification, tmp_path: Path) -> None:
+def test_the_model_carries_its_table(
+    found: ReducedIdentification, tmp_path: Path
+) -> None:
     found.reduced.model.save(tmp_path / "model.json")
     loaded = ShipModel.load(tmp_path / "model.json")
     assert loaded.own_table == found.structure == get_structure(found.structure.name)
@@ -43,12 +49,24 @@ def test_the_model_carries_its_table(found: ReducedIdentification, tmp_path: Pat
 
 
 def test_a_grey_box_is_refused(noisy_trials: list[Trial], mariner: ShipModel) -> None:
-    options = {"particulars": mariner.particulars, "structure": "grey-box", "reference_model": "mariner"}
-    with pytest.raises(InputError, match="structure: 'grey-box' found, whose table adds to a reference ship"):
+    options = {
+        "particulars": mariner.particulars,
+        "structure": "grey-box",
+        "reference_model": "mariner",
+    }
+    with pytest.raises(
+        InputError,
+        match="structure: 'grey-box' found, whose table adds to a reference ship",
+    ):
         identify_reduced(noisy_trials, **options)
 
 
-def test_a_structure_with_a_memory_of_yaw_is_refused(noisy_trials: list[Trial], mariner: ShipModel) -> None:
+def test_a_structure_with_a_memory_of_yaw_is_refused(
+    noisy_trials: list[Trial], mariner: ShipModel
+) -> None:
     options = {"particulars": mariner.particulars, "structure": "nomoto2"}
-    with pytest.raises(InputError, match="structure: 'nomoto2' found, whose memory of yaw has no regression"):
+    with pytest.raises(
+        InputError,
+        match="structure: 'nomoto2' found, whose memory of yaw has no regression",
+    ):
         identify_reduced(noisy_trials, **options)

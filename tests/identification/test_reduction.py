@@ -18,7 +18,14 @@ from identification.design.reduction import (
     reduced_structure,
     sensitivity,
 )
-from shipgym import InputError, Particulars, ShipModel, SteeringGear, Trial, UnstableModelError
+from shipgym import (
+    InputError,
+    Particulars,
+    ShipModel,
+    SteeringGear,
+    Trial,
+    UnstableModelError,
+)
 from shipgym.manoeuvres import turning_circle, zigzag
 from shipgym.ships import get_structure
 
@@ -30,7 +37,9 @@ def orthogonal(noise: float = 0.05) -> tuple[Floats, Floats]:
     """Eight orthogonal regressors of which a, c and f count."""
     rng = np.random.default_rng(3)
     X = np.sqrt(600.0) * np.linalg.qr(rng.standard_normal((600, 8)))[0]
-    return X, X @ np.array([3.0, 0.0, -1.0, 0.0, 0.0, 0.5, 0.0, 0.0]) + noise * rng.standard_normal(600)
+    return X, X @ np.array(
+        [3.0, 0.0, -1.0, 0.0, 0.0, 0.5, 0.0, 0.0]
+    ) + noise * rng.standard_normal(600)
 
 
 @pytest.mark.parametrize("run", [backward_elimination, forward_selection])
@@ -67,12 +76,16 @@ def test_of_collinear_terms_one_is_dropped() -> None:
 
 
 @pytest.mark.parametrize(("share", "found"), [(0.975, False), (0.985, True)])
-def test_collinear_is_what_one_other_or_all_others_make_up_to_98_per_cent(share: float, found: bool) -> None:
+def test_collinear_is_what_one_other_or_all_others_make_up_to_98_per_cent(
+    share: float, found: bool
+) -> None:
     X, _ = orthogonal()
     rest = np.sqrt(1.0 - share**2) * X[:, 4]
     of_one = np.column_stack([X[:, :2], rest - share * X[:, 1]])
     assert _collinear(5.0 * of_one, [0, 1, 2]) == ({1, 2} if found else set())
-    of_three = np.column_stack([X[:, :4], rest + share * X[:, 1:4].sum(axis=1) / np.sqrt(3.0)])
+    of_three = np.column_stack(
+        [X[:, :4], rest + share * X[:, 1:4].sum(axis=1) / np.sqrt(3.0)]
+    )
     assert _collinear(of_three, [0, 1, 2, 3, 4]) == ({4} if found else set())
     assert _collinear(of_three, [0, 1, 2, 4]) == set()
 
@@ -81,7 +94,9 @@ def test_collinear_is_what_one_other_or_all_others_make_up_to_98_per_cent(share:
 def test_of_terms_that_say_the_same_the_preferred_one_stays(preferred: str) -> None:
     X, y = orthogonal()
     doubled = np.column_stack([X[:, [0, 2, 5]], X[:, 0]])
-    found = backward_elimination(doubled, y, ("a", "c", "f", "copy"), prefer=[preferred])
+    found = backward_elimination(
+        doubled, y, ("a", "c", "f", "copy"), prefer=[preferred]
+    )
     assert set(found.terms) == {preferred, "c", "f"}
 
 
@@ -93,9 +108,15 @@ def test_a_term_that_matters_is_not_dropped_however_uncertain() -> None:
 
 PARTICULARS = Particulars(length=160.93, speed=7.7175)
 TRUE = {
-    "b_v": -0.06, "b_r": -2.3, "b_|v|r": -0.9, "b_d": -0.08,
-    "c_v": -1e-3, "c_r": -0.104, "c_|v|r": -0.03, "c_d": 3.7e-3,
-}  # fmt: skip
+    "b_v": -0.06,
+    "b_r": -2.3,
+    "b_|v|r": -0.9,
+    "b_d": -0.08,
+    "c_v": -1e-3,
+    "c_r": -0.104,
+    "c_|v|r": -0.03,
+    "c_d": 3.7e-3,
+}
 
 
 def virtual_ship(name: str = "steering5") -> ShipModel:
@@ -110,8 +131,13 @@ def test_the_terms_of_a_virtual_ship_are_found_among_more(direction: str) -> Non
     """A ship of four terms an equation, looked at with seven."""
     table = get_structure("steering7")
     rng = np.random.default_rng(0)
-    trials = [zigzag(virtual_ship(), a, a, duration=600, dt=0.5).with_(name=f"{a}") for a in (10, 20, 35)]
-    samples = build_samples(trials, table, PARTICULARS, "integral", window=20, smooth=False)
+    trials = [
+        zigzag(virtual_ship(), a, a, duration=600, dt=0.5).with_(name=f"{a}")
+        for a in (10, 20, 35)
+    ]
+    samples = build_samples(
+        trials, table, PARTICULARS, "integral", window=20, smooth=False
+    )
     for target in samples.targets.values():
         target += 2e-4 * np.std(target) * rng.standard_normal(len(target))
     found = reduce(samples, table, direction, tolerance=1e-6)
@@ -126,7 +152,9 @@ def test_the_terms_of_a_virtual_ship_are_found_among_more(direction: str) -> Non
 def test_the_sensitivity_to_nomoto_s_gain_is_the_motion_itself() -> None:
     """Yaw rate and heading are proportional to the coefficient of the rudder."""
     own = {"c_r": -1 / 30.0, "c_d": 0.05 / 30.0}
-    ship = ShipModel("virtual", "nomoto", PARTICULARS, SteeringGear(35.0, 5.0, 1.0), own)
+    ship = ShipModel(
+        "virtual", "nomoto", PARTICULARS, SteeringGear(35.0, 5.0, 1.0), own
+    )
     turn = partial(turning_circle, rudder_deg=20.0, duration=300.0, dt=0.5)
     effects, base = sensitivity(ship, turn), turn(ship)
     squares = [np.mean(base[c] ** 2) / np.ptp(base[c]) ** 2 for c in ("r", "psi")]
@@ -134,7 +162,9 @@ def test_the_sensitivity_to_nomoto_s_gain_is_the_motion_itself() -> None:
 
 
 def test_a_coefficient_of_zero_has_no_effect_and_the_strongest_stands_first() -> None:
-    effects = sensitivity(virtual_ship("steering7"), partial(turning_circle, duration=300.0, dt=0.5))
+    effects = sensitivity(
+        virtual_ship("steering7"), partial(turning_circle, duration=300.0, dt=0.5)
+    )
     assert effects["b_|r|r"] == 0.0
     assert effects["c_d"] > effects["b_d"] > 0.0
     assert list(effects.values()) == sorted(effects.values(), reverse=True)
@@ -166,7 +196,9 @@ def test_each_step_says_how_much_is_explained_and_of_what_is_held_out() -> None:
     first, second = found.path[0], found.path[1]
     assert (first.changed, second.changed) == ("a", "c")
     assert (first.r_squared, second.r_squared) == pytest.approx((0.8, 1.0), abs=1e-9)
-    assert (first.error_reduction, second.error_reduction) == pytest.approx((0.8, 0.2), abs=1e-9)
+    assert (first.error_reduction, second.error_reduction) == pytest.approx(
+        (0.8, 0.2), abs=1e-9
+    )
     assert second.coefficients == pytest.approx({"a": 2.0, "c": 1.0})
     assert second.held_out == pytest.approx(1.0)
     assert first.held_out == pytest.approx(0.8, abs=0.02)
@@ -187,7 +219,9 @@ def test_numbers_beyond_their_bounds_are_refused() -> None:
 def signs(count: int) -> Floats:
     """Columns of -1 and 1, orthogonal within every fifth of 400 rows too."""
     rows = np.arange(400)
-    return np.column_stack([np.where(rows // 2**k % 2, 1.0, -1.0) for k in range(count)])
+    return np.column_stack(
+        [np.where(rows // 2**k % 2, 1.0, -1.0) for k in range(count)]
+    )
 
 
 @pytest.mark.parametrize(("share", "terms"), [(0.96e-3, ("a",)), (1.04e-3, ("a", "b"))])
@@ -202,7 +236,11 @@ def test_by_default_a_term_that_explains_less_than_a_thousandth_is_left_out(
     nomoto: Any = SimpleNamespace(equations={"r": ()}, names=lambda q: ["a", "b"])
     assert reduce(samples, nomoto, "forward")["r"].terms == terms
     other = 0.13  # of the targets, by what is no term
-    noisy = np.sqrt(1.0 - other**2 - share) * X[:, 0] + np.sqrt(share) * X[:, 1] + other * X[:, 2]
+    noisy = (
+        np.sqrt(1.0 - other**2 - share) * X[:, 0]
+        + np.sqrt(share) * X[:, 1]
+        + other * X[:, 2]
+    )
     assert backward_elimination(X[:, :2], noisy, ["a", "b"]).terms == terms
 
 
@@ -221,21 +259,35 @@ def test_by_default_a_term_is_uncertain_beyond_a_tenth_of_its_size(
 def test_terms_are_selected_whatever_the_unit_of_the_targets(unit: float) -> None:
     """Also beside one that says the same as another, which adds nothing and is left out."""
     X, y = orthogonal()
-    found = forward_selection(np.column_stack([X, 2.0 * X[:, 2]]), unit * y, (*NAMES, "copy"))
-    assert [step.changed for step in found.path][:3] in (["a", "c", "f"], ["a", "copy", "f"])
+    found = forward_selection(
+        np.column_stack([X, 2.0 * X[:, 2]]), unit * y, (*NAMES, "copy")
+    )
+    assert [step.changed for step in found.path][:3] in (
+        ["a", "c", "f"],
+        ["a", "copy", "f"],
+    )
     assert len({step.changed for step in found.path}) == len(found.path) == 8
 
 
 def test_one_term_stays_and_is_enough_for_ten_samples() -> None:
     X, y = orthogonal()
-    assert len(backward_elimination(X, y, NAMES, tolerance=9.0, threshold=0.0).terms) == 1
+    assert (
+        len(backward_elimination(X, y, NAMES, tolerance=9.0, threshold=0.0).terms) == 1
+    )
     few = np.linspace(1.0, 2.0, 10)[:, None]
-    assert forward_selection(few, 3.0 * few[:, 0], ["a"]).coefficients["a"] == pytest.approx(3.0)
-    with pytest.raises(InputError, match="9 samples found for 1 terms, expected at least 5 times as many"):
+    assert forward_selection(few, 3.0 * few[:, 0], ["a"]).coefficients[
+        "a"
+    ] == pytest.approx(3.0)
+    with pytest.raises(
+        InputError,
+        match="9 samples found for 1 terms, expected at least 5 times as many",
+    ):
         forward_selection(few[:9], few[:9, 0], ["a"])
 
 
-def test_a_coefficient_with_which_the_ship_runs_away_has_no_bound_and_stands_first() -> None:
+def test_a_coefficient_with_which_the_ship_runs_away_has_no_bound_and_stands_first() -> (
+    None
+):
     ship = virtual_ship()
 
     def sail(model: ShipModel) -> Trial:

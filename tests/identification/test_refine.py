@@ -32,7 +32,9 @@ from shipgym.ships.simulate import LONGEST_STEP
 
 
 def parameters(model: ShipModel) -> np.ndarray:
-    return model.table.acceleration_matrix(model.particulars) @ np.array(list(model.coefficients.values()))
+    return model.table.acceleration_matrix(model.particulars) @ np.array(
+        list(model.coefficients.values())
+    )
 
 
 @pytest.fixture(scope="module")
@@ -41,10 +43,17 @@ def shooter(mariner: ShipModel, cao_zigzag: Trial) -> Shooter:
     return Shooter(mariner, channels, np.abs(parameters(mariner)), free=False)
 
 
-def test_heading_is_compared_where_all_trials_have_it(mariner: ShipModel, cao_zigzag: Trial) -> None:
+def test_heading_is_compared_where_all_trials_have_it(
+    mariner: ShipModel, cao_zigzag: Trial
+) -> None:
     channels = {name: cao_zigzag[name] for name in cao_zigzag.channels if name != "psi"}
     bare = Trial(cao_zigzag.t, channels)
-    assert compared_channels(mariner, [cao_zigzag, cao_zigzag]) == ("u", "v", "r", "psi")
+    assert compared_channels(mariner, [cao_zigzag, cao_zigzag]) == (
+        "u",
+        "v",
+        "r",
+        "psi",
+    )
     assert compared_channels(mariner, [cao_zigzag, bare]) == ("u", "v", "r")
 
 
@@ -55,24 +64,35 @@ def test_the_ship_itself_sails_every_segment_as_recorded(
     truth = np.append(np.sign(parameters(mariner)), 0.0)
     shooting = shooter.shoot(truth, segments, shooter.units)
     assert np.median(np.abs(shooting.residuals)) < 1e-8
-    assert np.abs(shooting.residuals).max() < 3e-4  # a corner of the rudder inside a sampling step
+    assert (
+        np.abs(shooting.residuals).max() < 3e-4
+    )  # a corner of the rudder inside a sampling step
 
 
 def test_segments_cover_a_trial_and_the_second_set_begins_half_a_segment_later(
     mariner: ShipModel, cao_zigzag: Trial
 ) -> None:
     travel = mariner.particulars["length"] / mariner.particulars["speed"]
-    assert len(cut([cao_zigzag], mariner, ("u", "v", "r"), 1e6, True)) == 1  # the whole trial
+    assert (
+        len(cut([cao_zigzag], mariner, ("u", "v", "r"), 1e6, True)) == 1
+    )  # the whole trial
     segments = cut([cao_zigzag], mariner, ("u", "v", "r"), 4.0, True)
     starts = [segment.times[0] for segment in segments]
     assert starts[0] == 0.0
     half = starts[starts.index(0.0) + 1 :].index(min(starts[1:])) + 1
     assert min(starts[1:]) == pytest.approx(2.0 * travel, abs=0.5)
-    assert all(segment.inputs[-1, 0] == cao_zigzag.t[-1] for segment in (segments[half - 1], segments[-1]))
+    assert all(
+        segment.inputs[-1, 0] == cao_zigzag.t[-1]
+        for segment in (segments[half - 1], segments[-1])
+    )
     assert sum(len(s.measured) for s in segments[:half]) == len(cao_zigzag) + half - 1
-    block = int(0.05 * travel / np.diff(cao_zigzag.t)[0])  # residuals are averaged over 5 % of a ship length
+    block = int(
+        0.05 * travel / np.diff(cao_zigzag.t)[0]
+    )  # residuals are averaged over 5 % of a ship length
     assert block > 1
-    assert segments[0].blocks.tolist() == list(range(0, len(segments[0].measured), block))
+    assert segments[0].blocks.tolist() == list(
+        range(0, len(segments[0].measured), block)
+    )
 
 
 def test_edges_divide_a_trial_alike() -> None:
@@ -80,7 +100,11 @@ def test_edges_divide_a_trial_alike() -> None:
     t = np.arange(100.0)
     assert _edges(t, 33.0, 0.0).tolist() == [0, 33, 66, 99]
     assert _edges(t, 38.0, 0.0).tolist() == [0, 33, 66, 99]  # 2.6 of them
-    assert _edges(t, 33.0, 0.5).tolist() == [17, 58, 99]  # 2.5 of them: the last are longer
+    assert _edges(t, 33.0, 0.5).tolist() == [
+        17,
+        58,
+        99,
+    ]  # 2.5 of them: the last are longer
     assert _edges(t, 500.0, 0.0).tolist() == [0, 99]
     assert _edges(t, 500.0, 0.5).tolist() == []
     assert _edges(t, 4.0, 0.0).tolist() == [0, 99]  # none of fewer than five samples
@@ -116,23 +140,38 @@ def test_jacobian_is_that_of_central_differences(
     mariner: ShipModel, cao_zigzag: Trial, shooter: Shooter
 ) -> None:
     two = [cao_zigzag, cao_zigzag]
-    segments = cut(two, mariner, shooter.channels, 4.0, False)[1:8:6]  # one of each trial
+    segments = cut(two, mariner, shooter.channels, 4.0, False)[
+        1:8:6
+    ]  # one of each trial
     at = np.append(1.01 * np.sign(parameters(mariner)), [0.002, -0.001])
     jacobian = shooter.shoot(at, segments, shooter.units).jacobian
     for k in (3, 12, 38, len(at) - 1):
         step = 1e-4 * np.eye(len(at))[k]
-        ahead, behind = (shooter.shoot(at + s, segments, shooter.units).residuals for s in (step, -step))
+        ahead, behind = (
+            shooter.shoot(at + s, segments, shooter.units).residuals
+            for s in (step, -step)
+        )
         slope = (ahead - behind) / 2e-4
-        np.testing.assert_allclose(jacobian[:, k], slope, atol=2e-4 * np.abs(slope).max())
+        np.testing.assert_allclose(
+            jacobian[:, k], slope, atol=2e-4 * np.abs(slope).max()
+        )
 
 
-def test_without_noise_the_refinement_finds_the_ship(mariner: ShipModel, cao_zigzag: Trial) -> None:
+def test_without_noise_the_refinement_finds_the_ship(
+    mariner: ShipModel, cao_zigzag: Trial
+) -> None:
     samples = build_samples([cao_zigzag], mariner.table, mariner.particulars)
-    start = guarded_fit(get_method("tls-svm"), {}, FitTask(samples, mariner, [cao_zigzag]))
+    start = guarded_fit(
+        get_method("tls-svm"), {}, FitTask(samples, mariner, [cao_zigzag])
+    )
     for q, estimator in start.estimators.items():
         start.estimators[q] = estimator
-        estimator.coef_ = estimator.coef_ * (1.0 + 0.03 * np.cos(np.arange(len(estimator.coef_))))
-    refined = refine(start, FitTask(samples, mariner, [cao_zigzag]), Refinement(pull=0.0), 20.0)
+        estimator.coef_ = estimator.coef_ * (
+            1.0 + 0.03 * np.cos(np.arange(len(estimator.coef_)))
+        )
+    refined = refine(
+        start, FitTask(samples, mariner, [cao_zigzag]), Refinement(pull=0.0), 20.0
+    )
     truth = np.array(list(mariner.coefficients.values()))
     found = np.array(list(refined.fit.model.coefficients.values()))
     assert np.median(np.abs(found / truth - 1.0)) < 5e-3
@@ -140,7 +179,9 @@ def test_without_noise_the_refinement_finds_the_ship(mariner: ShipModel, cao_zig
 
 
 @pytest.fixture(scope="module")
-def refined_fits(mariner: ShipModel, record: Callable[..., Trial]) -> dict[str, list[IdentificationResult]]:
+def refined_fits(
+    mariner: ShipModel, record: Callable[..., Trial]
+) -> dict[str, list[IdentificationResult]]:
     """Three repetitions of noisy trials, by regression and refined."""
     runs = [
         zigzag(mariner, a, b, duration=400, dt=0.1, port_first=a == 20)
@@ -148,10 +189,18 @@ def refined_fits(mariner: ShipModel, record: Callable[..., Trial]) -> dict[str, 
     ]
     fits: dict[str, list[IdentificationResult]] = {"ls": [], "output-error": []}
     for seed in range(3):
-        trials = [record(run, 10, 1.0, 10 * seed + i, name=f"zz{i}") for i, run in enumerate(runs)]
+        trials = [
+            record(run, 10, 1.0, 10 * seed + i, name=f"zz{i}")
+            for i, run in enumerate(runs)
+        ]
         for method, found in fits.items():
             found.append(
-                identify(trials, method=method, particulars=mariner.particulars, steering=mariner.steering)
+                identify(
+                    trials,
+                    method=method,
+                    particulars=mariner.particulars,
+                    steering=mariner.steering,
+                )
             )
     return fits
 
@@ -161,10 +210,14 @@ def test_refined_coefficients_are_nearer_to_the_truth(
 ) -> None:
     truth = np.array(list(mariner.coefficients.values()))
     errors = {
-        method: np.array([list(fit.coefficients.values()) for fit in fits]) / truth - 1.0
+        method: (
+            np.array([list(fit.coefficients.values()) for fit in fits]) / truth - 1.0
+        )
         for method, fits in refined_fits.items()
     }
-    size = {method: np.sqrt(np.mean(error**2, axis=0)) for method, error in errors.items()}
+    size = {
+        method: np.sqrt(np.mean(error**2, axis=0)) for method, error in errors.items()
+    }
     assert np.median(size["output-error"] / size["ls"]) < 0.8
 
 
@@ -195,30 +248,49 @@ def test_residuals_are_those_of_the_sensors_and_the_provenance_tells(
 def test_turns_given_to_the_refinement_alone_hold_the_turn(
     mariner: ShipModel, record: Callable[..., Trial]
 ) -> None:
-    zigzags = [record(zigzag(mariner, 10, 10, duration=400, dt=0.1), 10, 1.0, 3, name="zz")]
+    zigzags = [
+        record(zigzag(mariner, 10, 10, duration=400, dt=0.1), 10, 1.0, 3, name="zz")
+    ]
     turns = [
-        record(turning_circle(mariner, side, duration=400), 10, name=f"turn{side}") for side in (35.0, -35.0)
+        record(turning_circle(mariner, side, duration=400), 10, name=f"turn{side}")
+        for side in (35.0, -35.0)
     ]
     ship = {"particulars": mariner.particulars, "steering": mariner.steering}
     free = identify(zigzags, method="output-error", **ship)  # type: ignore[arg-type]
     held = identify(zigzags, method="output-error", extra_trials=turns, **ship)  # type: ignore[arg-type]
     expected = turning_indices(turning_circle(mariner, 35)).tactical_diameter_lengths
-    found = [turning_indices(turning_circle(fit.model, 35)).tactical_diameter_lengths for fit in (free, held)]
-    errors = [np.inf if diameter is None else abs(diameter / expected - 1.0) for diameter in found]
+    found = [
+        turning_indices(turning_circle(fit.model, 35)).tactical_diameter_lengths
+        for fit in (free, held)
+    ]
+    errors = [
+        np.inf if diameter is None else abs(diameter / expected - 1.0)
+        for diameter in found
+    ]
     assert errors[1] < 0.02
     assert errors[1] < errors[0]
     report = (held.model.provenance or {})["refinement"]
-    assert [trial["name"] for trial in report["extra_trials"]] == ["turn35.0", "turn-35.0"]
+    assert [trial["name"] for trial in report["extra_trials"]] == [
+        "turn35.0",
+        "turn-35.0",
+    ]
 
 
 def test_an_anchor_holds_the_turn_of_the_reference_ship(
     mariner: ShipModel, record: Callable[..., Trial]
 ) -> None:
-    zigzags = [record(zigzag(mariner, 10, 10, duration=400, dt=0.1), 10, 1.0, 3, name="zz")]
+    zigzags = [
+        record(zigzag(mariner, 10, 10, duration=400, dt=0.1), 10, 1.0, 3, name="zz")
+    ]
     fit = identify(
-        zigzags, method="output-error", particulars=mariner.particulars, steering=mariner.steering,
-        anchor=mariner, anchor_weight=1.0, rudder_offsets=True,
-    )  # fmt: skip
+        zigzags,
+        method="output-error",
+        particulars=mariner.particulars,
+        steering=mariner.steering,
+        anchor=mariner,
+        anchor_weight=1.0,
+        rudder_offsets=True,
+    )
     turn = turning_indices(turning_circle(fit.model, 35)).tactical_diameter_lengths
     assert turn == pytest.approx(
         turning_indices(turning_circle(mariner, 35)).tactical_diameter_lengths, rel=0.02
@@ -226,10 +298,13 @@ def test_an_anchor_holds_the_turn_of_the_reference_ship(
     assert (fit.model.provenance or {})["refinement"]["anchor"] == mariner.name
 
 
-def test_a_start_that_runs_away_is_kept_and_told(mariner: ShipModel, cao_zigzag: Trial) -> None:
+def test_a_start_that_runs_away_is_kept_and_told(
+    mariner: ShipModel, cao_zigzag: Trial
+) -> None:
     samples = build_samples([cao_zigzag], mariner.table, mariner.particulars)
     start = replace(
-        guarded_fit(get_method("tls-svm"), {}, FitTask(samples, mariner, [cao_zigzag])), stable=False
+        guarded_fit(get_method("tls-svm"), {}, FitTask(samples, mariner, [cao_zigzag])),
+        stable=False,
     )
     kept = refine(start, FitTask(samples, mariner, [cao_zigzag]), Refinement(), 20.0)
     assert kept.fit is start
@@ -253,10 +328,21 @@ def test_wrong_settings_are_refused(settings: dict[str, object], message: str) -
         Refinement(**settings)  # type: ignore[arg-type]
 
 
-def test_extra_trials_need_the_channels_of_the_structure(mariner: ShipModel, cao_zigzag: Trial) -> None:
-    lacking = Trial(cao_zigzag.t, {c: cao_zigzag[c] for c in ("u", "r", "delta")}, name="lacking")
-    with pytest.raises(InputError, match="extra trial 'lacking': channel 'v' is missing"):
-        identify([cao_zigzag], method="output-error", particulars=mariner.particulars, extra_trials=[lacking])
+def test_extra_trials_need_the_channels_of_the_structure(
+    mariner: ShipModel, cao_zigzag: Trial
+) -> None:
+    lacking = Trial(
+        cao_zigzag.t, {c: cao_zigzag[c] for c in ("u", "r", "delta")}, name="lacking"
+    )
+    with pytest.raises(
+        InputError, match="extra trial 'lacking': channel 'v' is missing"
+    ):
+        identify(
+            [cao_zigzag],
+            method="output-error",
+            particulars=mariner.particulars,
+            extra_trials=[lacking],
+        )
 
 
 @pytest.mark.parametrize(
@@ -274,7 +360,9 @@ def test_refinements_that_cannot_be_are_refused(name: str, value: Any) -> None:
         Refinement(**{name: value})
 
 
-@pytest.mark.parametrize(("pull", "tried"), [(1e-3, [1e-3, 1e-2, 0.1, 1.0]), (0.0, [0.0, 1e-9, 1e-8, 1e-7])])
+@pytest.mark.parametrize(
+    ("pull", "tried"), [(1e-3, [1e-3, 1e-2, 0.1, 1.0]), (0.0, [0.0, 1e-9, 1e-8, 1e-7])]
+)
 def test_a_refined_model_that_runs_away_is_pulled_ten_times_harder_three_times(
     pull: float, tried: list[float], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -286,9 +374,14 @@ def test_a_refined_model_that_runs_away_is_pulled_ten_times_harder_three_times(
         return SimpleNamespace(parameters=strength)
 
     problem = SimpleNamespace(
-        scales=np.ones(3), solve=solve, model=lambda strength: strength, estimators=lambda _: {}, width=2.5,
-        covariance=lambda *given: (given, []), report=lambda _: {"segments": 7},
-    )  # fmt: skip
+        scales=np.ones(3),
+        solve=solve,
+        model=lambda strength: strength,
+        estimators=lambda _: {},
+        width=2.5,
+        covariance=lambda *given: (given, []),
+        report=lambda _: {"segments": 7},
+    )
     monkeypatch.setattr(refinement, "_Problem", lambda *_: problem)
     monkeypatch.setattr(refinement, "reasons_unstable", lambda *_: ["it spins"])
     given: Any = "start"
@@ -301,7 +394,9 @@ def test_a_refined_model_that_runs_away_is_pulled_ten_times_harder_three_times(
     assert [one["pull"] for one in kept.report["rejected"]] == asked
     assert [one["reasons"] for one in kept.report["rejected"]] == [["it spins"]] * 4
     monkeypatch.setattr(
-        refinement, "reasons_unstable", lambda strength, _: ["it spins"] * (strength < tried[2])
+        refinement,
+        "reasons_unstable",
+        lambda strength, _: ["it spins"] * (strength < tried[2]),
     )
     refined = refine(start, task, Refinement(pull=pull), 20.0)  # type: ignore[arg-type]
     assert (refined.fit.model, refined.report["pull"]) == (pytest.approx(tried[2]),) * 2
@@ -327,7 +422,9 @@ def test_a_pull_counts_by_all_that_is_compared_and_an_offset_by_a_degree() -> No
 def test_scales_are_root_mean_squares_by_sample_of_the_trials_to_fit() -> None:
     """Blocks stand for more samples than one, here two for eight; extra trials do not count."""
     segments = [SimpleNamespace(measured=np.zeros((8, 2)))]
-    problem = given_problem(own=segments, rows=4, shooter=SimpleNamespace(units=np.array([5.0, 0.1])))
+    problem = given_problem(
+        own=segments, rows=4, shooter=SimpleNamespace(units=np.array([5.0, 0.1]))
+    )
     shooting = SimpleNamespace(residuals=np.array([1.0, 0.0, 3.0, 0.0, 99.0, 99.0]))
     found = problem._scales(shooting, np.array([2.0, 0.3]))
     np.testing.assert_allclose(found, [np.sqrt((2.0**2 + 6.0**2) / 8.0), 1e-10])
@@ -335,9 +432,13 @@ def test_scales_are_root_mean_squares_by_sample_of_the_trials_to_fit() -> None:
 
 def test_a_term_of_size_one_makes_up_the_whole_change() -> None:
     X = np.array([[1.0, 0.0, 2.0], [-1.0, 0.0, 4.0]])
-    samples: Any = SimpleNamespace(features={"r": X}, targets={"r": np.array([6.0, 8.0])})
+    samples: Any = SimpleNamespace(
+        features={"r": X}, targets={"r": np.array([6.0, 8.0])}
+    )
     sizes = refinement._term_sizes(samples, "r")
-    np.testing.assert_allclose(sizes, np.sqrt(50.0) / np.array([1.0, np.inf, np.sqrt(10.0)]), atol=1e-300)
+    np.testing.assert_allclose(
+        sizes, np.sqrt(50.0) / np.array([1.0, np.inf, np.sqrt(10.0)]), atol=1e-300
+    )
     assert sizes[1] > 0.0  # what is not seen is divided by all the same
 
 
@@ -356,17 +457,37 @@ def test_scores_of_the_same_time_are_added_up_by_trial() -> None:
 
 def test_a_memory_of_yaw_cannot_be_refined() -> None:
     blank: Any = SimpleNamespace(table=get_structure("nomoto2"), structure="nomoto2")
-    with pytest.raises(InputError, match="structure 'nomoto2' with a memory of yaw found, whose state no"):
+    with pytest.raises(
+        InputError,
+        match="structure 'nomoto2' with a memory of yaw found, whose state no",
+    ):
         refinement._check_refinable(blank, ())
 
 
 def test_settings_of_a_refinement_reach_to_their_bounds_and_stand_apart() -> None:
-    for least in ({"segment_lengths": 0.1}, {"segment_lengths": 1e6}, {"pull": 0.0}, {"extra_weight": 1e-12}):
-        assert Refinement(**least).plain()[next(iter(least))] == next(iter(least.values()))  # type: ignore[arg-type]
+    for least in (
+        {"segment_lengths": 0.1},
+        {"segment_lengths": 1e6},
+        {"pull": 0.0},
+        {"extra_weight": 1e-12},
+    ):
+        assert Refinement(**least).plain()[next(iter(least))] == next(
+            iter(least.values())
+        )  # type: ignore[arg-type]
     own, rest = split_settings({"pull": 0.5, "rank": 3, "staggered": False}, True)
     assert own is not None
-    assert (own.pull, own.staggered, own.segment_lengths, own.segment_start) == (0.5, False, 3.4, "free")
-    assert (own.extra_weight, own.anchor_weight, own.rudder_offsets, own.anchor) == (1.0, 1e-3, False, None)
+    assert (own.pull, own.staggered, own.segment_lengths, own.segment_start) == (
+        0.5,
+        False,
+        3.4,
+        "free",
+    )
+    assert (own.extra_weight, own.anchor_weight, own.rudder_offsets, own.anchor) == (
+        1.0,
+        1e-3,
+        False,
+        None,
+    )
     assert rest == {"rank": 3}
     assert split_settings({"pull": 0.5}, False) == (None, {"pull": 0.5})
 
@@ -397,21 +518,38 @@ def test_compared_samples_are_an_interval_apart_and_the_grid_no_coarser_than_the
     """Steps of twice the longest are halved, and an interval of three of them is met to rounding."""
     longest = LONGEST_STEP * mariner.travel_time
     t = 2.0 * longest * np.arange(61.0)
-    channels = {name: np.full(61, 0.1 * k) for k, name in enumerate(("psi", "r", "v", "u"))}
-    trial = Trial(t, {**channels, "delta": 0.01 * np.sin(t), "wind_vdot": 1e-3 * t}, name="even")
+    channels = {
+        name: np.full(61, 0.1 * k) for k, name in enumerate(("psi", "r", "v", "u"))
+    }
+    trial = Trial(
+        t, {**channels, "delta": 0.01 * np.sin(t), "wind_vdot": 1e-3 * t}, name="even"
+    )
     travel = mariner.travel_time
     every = cut([trial], mariner, ("u", "r"), 1e3, False)[0]
     np.testing.assert_allclose(np.diff(every.inputs[:, 0]), longest)
     assert every.samples.tolist() == [k // 2 if k % 2 == 0 else -1 for k in range(121)]
     assert every.weight == 1.0
     for factor in (1.0 - 1e-12, 1.0, 1.0 + 1e-12):
-        (third,) = cut([trial], mariner, ("u", "r"), 1e3, False, interval=factor * 6.0 * longest / travel)
+        (third,) = cut(
+            [trial],
+            mariner,
+            ("u", "r"),
+            1e3,
+            False,
+            interval=factor * 6.0 * longest / travel,
+        )
         np.testing.assert_allclose(third.measured, np.full((21, 2), [0.3, 0.1]))
         np.testing.assert_allclose(third.inputs[:, 0], every.inputs[:, 0])
         np.testing.assert_allclose(
-            third.inputs[:, 1], np.interp(third.inputs[:, 0], t, trial["delta"]), atol=1e-3
+            third.inputs[:, 1],
+            np.interp(third.inputs[:, 0], t, trial["delta"]),
+            atol=1e-3,
         )
-        assert not third.inputs[:, [2, 3, 5]].any()  # no shaft speed, no wind ahead or in yaw
+        assert not third.inputs[
+            :, [2, 3, 5]
+        ].any()  # no shaft speed, no wind ahead or in yaw
         np.testing.assert_allclose(third.inputs[:, 4], 1e-3 * third.inputs[:, 0])
-        np.testing.assert_allclose(third.start, [0.0, 0.0, 0.0, 0.3, 0.2, 0.1, 0.0], atol=1e-12)
+        np.testing.assert_allclose(
+            third.start, [0.0, 0.0, 0.0, 0.3, 0.2, 0.1, 0.0], atol=1e-12
+        )
         assert third.times[0] == 0.0

@@ -32,7 +32,9 @@ def test_every_test_that_is_named_is_there():
         assert one.tests
         for test in one.tests:
             file, name = test.split("::")
-            assert re.search(rf"^def {name}\(", (ROOT / file).read_text(), re.MULTILINE), test
+            assert re.search(
+                rf"^def {name}\(", (ROOT / file).read_text(), re.MULTILINE
+            ), test
 
 
 def test_every_term_of_the_chosen_models_has_a_meaning(rows):
@@ -44,7 +46,9 @@ def test_every_term_of_the_chosen_models_has_a_meaning(rows):
 
 def test_thrust_that_falls_with_the_advance_is_the_container_ship_s_surge(rows):
     """Resistance goes by u^2 and K_T falls linearly with J: nothing is left for a third order."""
-    surge = next(row for row in rows if row.case == "R4" and "predicted u" in row.quantity)
+    surge = next(
+        row for row in rows if row.case == "R4" and "predicted u" in row.quantity
+    )
     assert surge.best < 1e-6 < surge.as_paper < 0.1289
 
 

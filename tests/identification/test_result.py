@@ -28,7 +28,14 @@ from identification.report.figures import truncated as with_a_rank
 from identification.report.page import report_page
 from identification.report.predictions import overview_figure, prediction_figure
 from identification.report.summary import _coefficients as coefficients_table
-from identification.report.view import WORDS, _coefficients, _heading, _trial, fit_view, short_names
+from identification.report.view import (
+    WORDS,
+    _coefficients,
+    _heading,
+    _trial,
+    fit_view,
+    short_names,
+)
 from identification.result import FILES
 from identification.search import SearchResult
 from identification.search.search import BAND, LOG_C
@@ -54,13 +61,18 @@ identify(
 @pytest.fixture(scope="module")
 def searched(noisy_trials: list[Trial], mariner: ShipModel) -> IdentificationResult:
     return identify(
-        noisy_trials, method="abc-lssvr", particulars=mariner.particulars, steering=mariner.steering
+        noisy_trials,
+        method="abc-lssvr",
+        particulars=mariner.particulars,
+        steering=mariner.steering,
     )
 
 
 @pytest.fixture(scope="module")
 def truncated(noisy_trials: list[Trial], mariner: ShipModel) -> IdentificationResult:
-    return identify(noisy_trials, particulars=mariner.particulars, steering=mariner.steering)
+    return identify(
+        noisy_trials, particulars=mariner.particulars, steering=mariner.steering
+    )
 
 
 def test_the_same_call_on_the_same_data_writes_the_same_bytes(tmp_path: Path) -> None:
@@ -69,24 +81,43 @@ def test_the_same_call_on_the_same_data_writes_the_same_bytes(tmp_path: Path) ->
     environment = os.environ | {"PYTHONHASHSEED": "1", "PYTHONPATH": str(ROOT)}
     subprocess.run(command, cwd=ROOT, env=environment, check=True)
     ship = ShipFile.load(ROOT / "examples" / "mariner" / "ship.toml")
-    settings = {"method": "abc-lssvr", "hold_out": ["zigzag_10_10.csv"], "uncertainty": "bootstrap"}
-    result = identify(ship.trials(), particulars=ship.particulars, steering=ship.steering, **settings)
+    settings = {
+        "method": "abc-lssvr",
+        "hold_out": ["zigzag_10_10.csv"],
+        "uncertainty": "bootstrap",
+    }
+    result = identify(
+        ship.trials(), particulars=ship.particulars, steering=ship.steering, **settings
+    )
     result.save(tmp_path / "here")
     for name in FILES:
-        assert (tmp_path / "here" / name).read_bytes() == (tmp_path / "there" / name).read_bytes()
+        assert (tmp_path / "here" / name).read_bytes() == (
+            tmp_path / "there" / name
+        ).read_bytes()
 
 
-def test_settings_hold_the_whole_call(truncated: IdentificationResult, tmp_path: Path) -> None:
+def test_settings_hold_the_whole_call(
+    truncated: IdentificationResult, tmp_path: Path
+) -> None:
     truncated.save(tmp_path)
     settings = json.loads((tmp_path / "settings.json").read_text())
     assert (settings["structure"], settings["method"], settings["samples"]) == (
-        "abkowitz", "tls-svm", "spline"
-    )  # fmt: skip
+        "abkowitz",
+        "tls-svm",
+        "spline",
+    )
     assert settings["steering"]["rudder_rate_deg_s"] == 5.0
-    assert [trial["use"] for trial in settings["trials"]] == ["fit", "fit", "fit", "validate"]
+    assert [trial["use"] for trial in settings["trials"]] == [
+        "fit",
+        "fit",
+        "fit",
+        "validate",
+    ]
 
 
-def test_figures_by_name(truncated: IdentificationResult, searched: IdentificationResult) -> None:
+def test_figures_by_name(
+    truncated: IdentificationResult, searched: IdentificationResult
+) -> None:
     held = f"prediction: {truncated.trials[-1].name}"
     common = {"fit", "residuals", "coefficients", "trials", held}
     assert truncated.plots().keys() == common | {"l-curve"}
@@ -98,20 +129,30 @@ def test_the_fit_is_drawn_from_the_regression(truncated: IdentificationResult) -
     seen = np.asarray(traces[0].y, dtype=float)
     seen = seen[np.isfinite(seen)]
     samples = truncated.samples
-    np.testing.assert_allclose(seen, samples.targets["u"] / samples.duration, atol=1e-7, rtol=1e-4)
+    np.testing.assert_allclose(
+        seen, samples.targets["u"] / samples.duration, atol=1e-7, rtol=1e-4
+    )
 
 
-def test_residuals_come_with_bounds_of_white_noise(truncated: IdentificationResult) -> None:
+def test_residuals_come_with_bounds_of_white_noise(
+    truncated: IdentificationResult,
+) -> None:
     traces = truncated.plots()["residuals"].data
     bars, bound = traces[0], max(traces[2].y)
     autocorrelation = truncated.diagnostics["u"].residual_autocorrelation
-    np.testing.assert_allclose(bars.y[: len(autocorrelation)], autocorrelation, atol=1e-6)
-    step = int(np.ceil(truncated.samples.window / max(truncated.samples.window // 2, 1)))
+    np.testing.assert_allclose(
+        bars.y[: len(autocorrelation)], autocorrelation, atol=1e-6
+    )
+    step = int(
+        np.ceil(truncated.samples.window / max(truncated.samples.window // 2, 1))
+    )
     rows = -(-len(truncated.samples) // step)
     assert bound == pytest.approx(1.96 / np.sqrt(rows), rel=1e-6)
 
 
-def test_the_rank_chosen_is_marked_on_the_l_curve(truncated: IdentificationResult) -> None:
+def test_the_rank_chosen_is_marked_on_the_l_curve(
+    truncated: IdentificationResult,
+) -> None:
     figure = truncated.plots()["l-curve"]
     curve = truncated.estimators["u"].l_curve_  # type: ignore[attr-defined]
     marked = next(trace for trace in figure.data if trace.name == "chosen")
@@ -120,7 +161,9 @@ def test_the_rank_chosen_is_marked_on_the_l_curve(truncated: IdentificationResul
     assert marked.y[0] == pytest.approx(curve.solution_norm[rank - 1], rel=1e-6)
 
 
-def test_the_search_is_drawn_to_the_c_that_it_found(searched: IdentificationResult) -> None:
+def test_the_search_is_drawn_to_the_c_that_it_found(
+    searched: IdentificationResult,
+) -> None:
     traces = searched.plots()["search"].data
     assert traces[0].y[-1] == pytest.approx(1.0)
     assert np.all(np.diff(traces[0].y) <= 0.0)
@@ -130,22 +173,41 @@ def test_the_search_is_drawn_to_the_c_that_it_found(searched: IdentificationResu
 
 @pytest.mark.parametrize(("epsilon", "figures"), [(None, {"search"}), (0.1, set())])
 def test_a_grey_box_tells_of_its_search_where_it_searched(
-    noisy_trials: list[Trial], mariner: ShipModel, tmp_path: Path, epsilon: float | None, figures: set[str]
+    noisy_trials: list[Trial],
+    mariner: ShipModel,
+    tmp_path: Path,
+    epsilon: float | None,
+    figures: set[str],
 ) -> None:
-    options = {"particulars": mariner.particulars, "structure": "grey-box", "reference_model": "tanker"}
+    options = {
+        "particulars": mariner.particulars,
+        "structure": "grey-box",
+        "reference_model": "tanker",
+    }
     result = identify(noisy_trials, method="rm-svm", epsilon=epsilon, **options)
     assert result.plots().keys() & {"search", "l-curve"} == figures
     if epsilon is None:
         panels = [trace.xaxis for trace in result.plots()["search"].data]
-        assert sorted(panels) == ["x", "x2", "x2", "x2"]  # one search, a band for each equation
+        assert sorted(panels) == [
+            "x",
+            "x2",
+            "x2",
+            "x2",
+        ]  # one search, a band for each equation
     result.save(tmp_path)
     assert "Mariner" in (tmp_path / "report.html").read_text(encoding="utf-8")
-    assert "beside the bare reference ship 'tanker" in " ".join(result.summary().split())
+    assert "beside the bare reference ship 'tanker" in " ".join(
+        result.summary().split()
+    )
 
 
-def test_a_channel_that_never_moves_is_no_trouble(mariner: ShipModel, cao_zigzag: Trial) -> None:
+def test_a_channel_that_never_moves_is_no_trouble(
+    mariner: ShipModel, cao_zigzag: Trial
+) -> None:
     """A term of constant shaft speed is 0 throughout; least squares leaves it out without a word."""
-    steady = cao_zigzag.with_channels({**cao_zigzag.channels, "n": np.full_like(cao_zigzag.t, 1.2)})
+    steady = cao_zigzag.with_channels(
+        {**cao_zigzag.channels, "n": np.full_like(cao_zigzag.t, 1.2)}
+    )
     result = identify([steady], "surge-perturbed", particulars=mariner.particulars)
     assert np.all(np.isfinite(list(result.coefficients.values())))
 
@@ -153,12 +215,20 @@ def test_a_channel_that_never_moves_is_no_trouble(mariner: ShipModel, cao_zigzag
 def test_intervals_of_coefficients_are_theirs(truncated: IdentificationResult) -> None:
     """In per cent of the estimate, 1.96 standard errors to either side."""
     trace = truncated.plots()["coefficients"].data[0]
-    drawn = dict(zip((text.split(":")[0] for text in trace.text), trace.error_x.array, strict=True))
+    drawn = dict(
+        zip(
+            (text.split(":")[0] for text in trace.text),
+            trace.error_x.array,
+            strict=True,
+        )
+    )
     value, error = truncated.coefficients["X_u"], truncated.standard_errors["X_u"]
     assert drawn["X_u"] == pytest.approx(100.0 * 1.96 * error / abs(value), rel=1e-5)
 
 
-def test_the_rudder_is_that_of_the_middle_of_each_window(truncated: IdentificationResult) -> None:
+def test_the_rudder_is_that_of_the_middle_of_each_window(
+    truncated: IdentificationResult,
+) -> None:
     samples, angles = truncated.samples, rudder_at_windows(truncated)
     assert angles is not None
     row, trial = 40, truncated.trials[0]
@@ -177,54 +247,85 @@ def test_cross_correlation_finds_the_delay() -> None:
     assert not cross_correlation(noise, np.ones(4000), lags).any()
 
 
-def test_the_report_and_the_summary_are_the_golden_ones(truncated: IdentificationResult) -> None:
+def test_the_report_and_the_summary_are_the_golden_ones(
+    truncated: IdentificationResult,
+) -> None:
     assert same_page("identification", report_page(truncated))
     assert same_text("identification summary", truncated.summary())
 
 
-def test_the_summary_prints_each_coefficient_with_its_error(truncated: IdentificationResult) -> None:
+def test_the_summary_prints_each_coefficient_with_its_error(
+    truncated: IdentificationResult,
+) -> None:
     rows = {
         cells[0]: cells[1:]
         for line in truncated.summary().splitlines()
-        if len(cells := [cell.strip() for cell in line.replace("┃", "│").split("│")[1:-1]]) == 4
+        if len(
+            cells := [cell.strip() for cell in line.replace("┃", "│").split("│")[1:-1]]
+        )
+        == 4
     }
     for name, error in truncated.standard_errors.items():
         value = truncated.coefficients[name]
-        assert rows[name] == [f"{1e5 * value:.2f}", f"{1e5 * error:.2g}", f"{value / error:.1f}"]
+        assert rows[name] == [
+            f"{1e5 * value:.2f}",
+            f"{1e5 * error:.2g}",
+            f"{value / error:.1f}",
+        ]
     gear = truncated.model.steering
     assert rows["rudder limit"][:2] == [f"{gear.rudder_limit_deg:.4g}", "deg"]
     assert rows["rudder rate"] == [f"{gear.rudder_rate_deg_s:.4g}", "deg/s", "given"]
-    assert rows["Y_vdot"][:2] == [f"{1e5 * truncated.model.particulars['Y_vdot']:.6g}", "1e-5"]
+    assert rows["Y_vdot"][:2] == [
+        f"{1e5 * truncated.model.particulars['Y_vdot']:.6g}",
+        "1e-5",
+    ]
 
 
 def section(macro: str, **data: Any) -> str:
     """What a macro of the sections on a fit shows."""
-    imported = '{% import "identification.report/sections.html" as sections with context %}'
-    return environment().from_string(f"{imported}{{{{ sections.{macro} }}}}").render(contents=[], **data)
+    imported = (
+        '{% import "identification.report/sections.html" as sections with context %}'
+    )
+    return (
+        environment()
+        .from_string(f"{imported}{{{{ sections.{macro} }}}}")
+        .render(contents=[], **data)
+    )
 
 
-def test_the_page_shows_trials_in_degrees_and_knots(truncated: IdentificationResult) -> None:
+def test_the_page_shows_trials_in_degrees_and_knots(
+    truncated: IdentificationResult,
+) -> None:
     view = fit_view(truncated)
     for row, trial in zip(view["trials"], truncated.trials, strict=True):
         assert row["rudder"] == pytest.approx(np.degrees(np.abs(trial["delta"]).max()))
-        assert row["speeds"][1] == pytest.approx(np.hypot(trial["u"], trial["v"]).max() / 0.514444, rel=1e-5)
+        assert row["speeds"][1] == pytest.approx(
+            np.hypot(trial["u"], trial["v"]).max() / 0.514444, rel=1e-5
+        )
         assert (row["samples"], row["duration"]) == (len(trial), trial.duration)
-        assert row["interval"] == pytest.approx(trial.duration / (len(trial) - 1), rel=1e-6)
+        assert row["interval"] == pytest.approx(
+            trial.duration / (len(trial) - 1), rel=1e-6
+        )
     ship, tables = truncated.model.particulars, section("ship_tables(fit)", fit=view)
     for text, told in (
-        ("length between perpendiculars", f"{ship['length']:.5g} m"), ("mass", f"{ship['mass'] / 1e3:.5g} t"),
+        ("length between perpendiculars", f"{ship['length']:.5g} m"),
+        ("mass", f"{ship['mass'] / 1e3:.5g} t"),
         ("N_rdot", fixed(1e5 * ship["N_rdot"], 1)),
-    ):  # fmt: skip
+    ):
         assert re.search(f"<td>{text}</td>.*<td>{re.escape(told)}</td>", tables)
     trials = truncated.metrics["trials"].values()
-    unseen = [metrics["rmse"]["psi"] for metrics in trials if metrics["use"] == "validate"]
+    unseen = [
+        metrics["rmse"]["psi"] for metrics in trials if metrics["use"] == "validate"
+    ]
     errors = np.degrees(unseen)
     assert view["heading"]["unseen"]
     assert view["heading"]["largest"] == pytest.approx(errors.max())
     assert view["heading"]["median"] == pytest.approx(np.median(errors))
     for rows in view["coefficients"].values():
         for row in rows:
-            assert row["value"] == pytest.approx(1e5 * truncated.coefficients[row["name"]])
+            assert row["value"] == pytest.approx(
+                1e5 * truncated.coefficients[row["name"]]
+            )
             assert row["significant"] == (abs(row["t"]) >= 2.0)
     assert set(view["added_masses"]) == {n for n in ADDED_MASSES if ship[n] is not None}
     assert view["derivatives"]
@@ -236,8 +337,14 @@ def test_short_names_are_those_without_folders_where_they_differ() -> None:
     def named(*names: str) -> dict[str, str]:
         return short_names([Trial(t, {"u": t}, name=name) for name in names])
 
-    assert named("a/one.csv", "b/two.csv") == {"a/one.csv": "one.csv", "b/two.csv": "two.csv"}
-    assert named("a/one.csv", "b/one.csv") == {"a/one.csv": "a/one.csv", "b/one.csv": "b/one.csv"}
+    assert named("a/one.csv", "b/two.csv") == {
+        "a/one.csv": "one.csv",
+        "b/two.csv": "two.csv",
+    }
+    assert named("a/one.csv", "b/one.csv") == {
+        "a/one.csv": "a/one.csv",
+        "b/one.csv": "b/one.csv",
+    }
 
 
 def regression(rows: int, error: Any, equations: str = "r", **more: Any) -> Any:
@@ -245,9 +352,13 @@ def regression(rows: int, error: Any, equations: str = "r", **more: Any) -> Any:
     targets = np.linspace(0.0, 2.0, rows)
     time, half = 2.0 * np.arange(rows), np.arange(rows) * 2 // rows
     samples = Samples(
-        dict.fromkeys(equations, targets[:, None]), dict.fromkeys(equations, targets + error), time,
-        np.full(rows, 2.0), half, 1,
-    )  # fmt: skip
+        dict.fromkeys(equations, targets[:, None]),
+        dict.fromkeys(equations, targets + error),
+        time,
+        np.full(rows, 2.0),
+        half,
+        1,
+    )
     estimators = dict.fromkeys(equations, SimpleNamespace(predict=lambda X: X[:, 0]))
     return SimpleNamespace(samples=samples, estimators=estimators, **more)
 
@@ -261,13 +372,19 @@ def test_of_many_windows_so_few_are_drawn_that_a_page_stays_small() -> None:
     assert np.flatnonzero(np.isnan(sway.y)).tolist() == [1300]
     expected = np.linspace(0.0, 2.0, 5200)[::2] + 0.1
     np.testing.assert_allclose(np.delete(sway.y, 1300), expected / 2.0, rtol=1e-5)
-    np.testing.assert_allclose(np.delete(yaw.y, 1300), np.degrees(expected / 2.0), rtol=1e-5)
+    np.testing.assert_allclose(
+        np.delete(yaw.y, 1300), np.degrees(expected / 2.0), rtol=1e-5
+    )
     assert len(fit_figure(regression(4900, 0.1)).data[0].y) == 4901
     equal = next(trace for trace in figure.data if trace.name == "equal")
-    np.testing.assert_allclose(equal.x, [0.0, 1.05], rtol=1e-3)  # from the least to the largest of both
+    np.testing.assert_allclose(
+        equal.x, [0.0, 1.05], rtol=1e-3
+    )  # from the least to the largest of both
 
 
-@pytest.mark.parametrize(("alike", "reach"), [(0.0, 3.0 * 1.96 / 20.0), (0.6, 0.66), (0.99, 1.05)])
+@pytest.mark.parametrize(
+    ("alike", "reach"), [(0.0, 3.0 * 1.96 / 20.0), (0.6, 0.66), (0.99, 1.05)]
+)
 def test_residuals_of_a_trial_without_a_rudder_are_drawn_with_themselves_alone(
     alike: float, reach: float
 ) -> None:
@@ -277,18 +394,24 @@ def test_residuals_of_a_trial_without_a_rudder_are_drawn_with_themselves_alone(
     for k in range(1, 400):
         error[k] = error[k - 1] if rng.random() < alike else error[k]
     t = np.arange(9.0)
-    figure = residual_figure(regression(400, error, trials=[Trial(t, {"r": t}, use="fit")]))
+    figure = residual_figure(
+        regression(400, error, trials=[Trial(t, {"r": t}, use="fit")])
+    )
     bars, *bounds = figure.data
     assert (len(bars.x), bars.x[0], len(bounds)) == (24, 1, 2)
     assert sorted(bound.y[0] for bound in bounds) == pytest.approx([-0.098, 0.098])
     assert list(bounds[0].x) == [0.5, 24.5]
     low, high = figure.layout.yaxis.range
     assert (low, high) == (-high, pytest.approx(reach, rel=0.15))
-    assert high == pytest.approx(min(max(1.1 * np.abs(bars.y).max(), 3.0 * 0.098), 1.05))
+    assert high == pytest.approx(
+        min(max(1.1 * np.abs(bars.y).max(), 3.0 * 0.098), 1.05)
+    )
 
 
 def intervals(**given: tuple[float, float]) -> Any:
-    coefficients, errors = ({name: pair[k] for name, pair in given.items()} for k in (0, 1))
+    coefficients, errors = (
+        {name: pair[k] for name, pair in given.items()} for k in (0, 1)
+    )
     fit: Any = SimpleNamespace(coefficients=coefficients, standard_errors=errors)
     return coefficients_figure(fit)
 
@@ -296,7 +419,11 @@ def intervals(**given: tuple[float, float]) -> Any:
 def test_what_may_be_zero_is_not_significant_and_long_intervals_are_cut() -> None:
     """Per cent of the estimate, of one that is 0 of 1; from -150 to 350 is shown."""
     figure = intervals(
-        sure=(2.0, 0.5), unsure=(-1.0, 1.0), none=(0.0, 0.3), unknown=(4.0, np.nan), wild=(1.0, 9.0)
+        sure=(2.0, 0.5),
+        unsure=(-1.0, 1.0),
+        none=(0.0, 0.3),
+        unknown=(4.0, np.nan),
+        wild=(1.0, 9.0),
     )
     significant, other = figure.data
     assert [text.partition(":")[0] for text in significant.text] == ["sure", "unknown"]
@@ -310,34 +437,50 @@ def test_what_may_be_zero_is_not_significant_and_long_intervals_are_cut() -> Non
     assert list(other.y) == [1.0, 2.0, 4.0]
 
 
-@pytest.mark.parametrize(("count", "columns", "height"), [(11, 1, 330), (12, 2, 230), (13, 2, 250)])
-def test_twelve_coefficients_stand_in_two_columns(count: int, columns: int, height: int) -> None:
+@pytest.mark.parametrize(
+    ("count", "columns", "height"), [(11, 1, 330), (12, 2, 230), (13, 2, 250)]
+)
+def test_twelve_coefficients_stand_in_two_columns(
+    count: int, columns: int, height: int
+) -> None:
     figure = intervals(**{f"c{k}": (1.0, 0.1) for k in range(count)})
     axes = list(figure.select_yaxes())
-    assert [name for axis in axes for name in axis.ticktext] == [f"c{k}" for k in range(count)]
+    assert [name for axis in axes for name in axis.ticktext] == [
+        f"c{k}" for k in range(count)
+    ]
     assert (len(axes), figure.layout.height) == (columns, height)
 
 
 def test_an_l_curve_is_drawn_where_a_rank_was_chosen_or_given() -> None:
     fit: Any = SimpleNamespace(
         estimators={
-            "u": TruncatedLSSVM(selection="full"), "v": TruncatedLSSVM(selection="full", rank=2),
-            "r": TruncatedLSSVM(), "p": SimpleNamespace(selection="gcv", rank=2),
+            "u": TruncatedLSSVM(selection="full"),
+            "v": TruncatedLSSVM(selection="full", rank=2),
+            "r": TruncatedLSSVM(),
+            "p": SimpleNamespace(selection="gcv", rank=2),
         }
-    )  # fmt: skip
+    )
     assert list(with_a_rank(fit)) == ["v", "r"]
-    curve = SimpleNamespace(residual_norm=np.array([3.0, 2.0, 1.0]), solution_norm=np.array([1.0, 40.0, 5e3]))
+    curve = SimpleNamespace(
+        residual_norm=np.array([3.0, 2.0, 1.0]),
+        solution_norm=np.array([1.0, 40.0, 5e3]),
+    )
     for name in ("v", "r"):
         vars(fit.estimators[name]).update(l_curve_=curve, rank_=2)
     figure = l_curve_figure(fit)
-    assert [note.text for note in figure.layout.annotations] == ["sway: rank 2 of 3", "yaw: rank 2 of 3"]
+    assert [note.text for note in figure.layout.annotations] == [
+        "sway: rank 2 of 3",
+        "yaw: rank 2 of 3",
+    ]
     line, chosen = figure.data[:2]
     assert (list(chosen.x), list(chosen.y)) == ([2.0], [40.0])
     assert list(line.text) == ["1", "2", "3"]
 
 
 @pytest.mark.parametrize(("largest", "step"), [(99.0, "D2"), (101.0, 1)])
-def test_less_than_two_decades_are_drawn_in_steps_of_1_2_and_5(largest: float, step: object) -> None:
+def test_less_than_two_decades_are_drawn_in_steps_of_1_2_and_5(
+    largest: float, step: object
+) -> None:
     found = _logarithmic("norm", np.array([1.0, 7.0, largest], dtype=np.float32))
     assert (found["dtick"], found["type"]) == (step, "log")
     assert _logarithmic("norm", np.array([0.0, 1.0], dtype=np.float32))["dtick"] == 1
@@ -346,13 +489,20 @@ def test_less_than_two_decades_are_drawn_in_steps_of_1_2_and_5(largest: float, s
 def test_a_search_that_leaves_nothing_is_drawn_as_it_is() -> None:
     """And a band between 0 and 1; objectives relative to the final one, weights as powers of ten."""
 
-    def search(value: float, history: list[float], variable: str, course: list[float]) -> SearchResult:
+    def search(
+        value: float, history: list[float], variable: str, course: list[float]
+    ) -> SearchResult:
         rounds = np.array(course)[:, None]
         return SearchResult(rounds[-1], value, np.array(history), rounds, 9, variable)
 
-    both = {"v": search(0.0, [2.0, 0.0], BAND, [0.5, 0.2]), "r": search(2.0, [8.0, 2.0], BAND, [0.9, 0.1])}
+    both = {
+        "v": search(0.0, [2.0, 0.0], BAND, [0.5, 0.2]),
+        "r": search(2.0, [8.0, 2.0], BAND, [0.9, 0.1]),
+    }
     figure = search_figure(SimpleNamespace(searches=both))  # type: ignore[arg-type]
-    for trace, values in zip(figure.data, ([2.0, 0.0], [4.0, 1.0], [0.5, 0.2], [0.9, 0.1]), strict=True):
+    for trace, values in zip(
+        figure.data, ([2.0, 0.0], [4.0, 1.0], [0.5, 0.2], [0.9, 0.1]), strict=True
+    ):
         assert list(trace.y) == pytest.approx(values)
     assert figure.layout.yaxis2.range == (0.0, 1.0)
     one = {"v": search(2.0, [8.0, 2.0], LOG_C, [1.0, 3.0])}
@@ -375,7 +525,9 @@ def test_a_turn_is_drawn_to_scale_and_seen_from_its_first_course() -> None:
     turn = Trial(t, channels, kind="turning-circle")
     predicted = turn.with_channels({"x": 5.0 - 2.0 * t})
     *lines, measured, ours = prediction_figure(turn, predicted).data
-    assert [line.name for line in lines] == ["measured", "predicted"] * 2 + ["measured"]  # u, v are not known
+    assert [line.name for line in lines] == ["measured", "predicted"] * 2 + [
+        "measured"
+    ]  # u, v are not known
     np.testing.assert_allclose(lines[-1].y, np.degrees(0.2 * t), rtol=1e-6)
     np.testing.assert_allclose([measured.x, measured.y], [t, t**2], atol=1e-5)
     np.testing.assert_allclose([ours.x, ours.y], [2.0 * t, t**2], atol=1e-5)
@@ -386,7 +538,9 @@ def test_a_turn_is_drawn_to_scale_and_seen_from_its_first_course() -> None:
     )
     assert (layout.yaxis6.scaleanchor, layout.yaxis6.scaleratio) == ("x6", 1)
     straight = prediction_figure(Trial(t, channels, kind="zigzag"), None)
-    np.testing.assert_allclose([straight.data[-1].x, straight.data[-1].y], [t**2, t], atol=1e-5)
+    np.testing.assert_allclose(
+        [straight.data[-1].x, straight.data[-1].y], [t**2, t], atol=1e-5
+    )
     assert straight.layout.yaxis6.autorange == "reversed"
     assert {line.name for line in straight.data} == {"measured"}
     assert [straight.layout[f"xaxis{k}"].title.text for k in (1, 2, 3, 4, 5)] == [
@@ -401,7 +555,9 @@ def test_a_turn_is_drawn_to_scale_and_seen_from_its_first_course() -> None:
 def test_trials_are_shown_together_where_all_have_heading_and_rudder() -> None:
     t = np.arange(4.0)
     whole = Trial(t, {"psi": 1.0 + 0.1 * t, "delta": 0.2 * t}, name="runs/a.csv")
-    figure = overview_figure([whole] * 3, {"runs/a.csv": Trial(t, {"psi": 1.0 + 0.3 * t})})
+    figure = overview_figure(
+        [whole] * 3, {"runs/a.csv": Trial(t, {"psi": 1.0 + 0.3 * t})}
+    )
     assert figure is not None
     assert figure.layout.height == 540
     assert [note.text for note in figure.layout.annotations] == ["a.csv"] * 3
@@ -420,11 +576,24 @@ def test_settings_are_told_in_words() -> None:
 def test_what_a_trial_did_not_record_is_left_out() -> None:
     t = np.arange(5.0)
     speed = 0.514444 * np.array([6.0, 8.0, 7.0, 6.5, 7.5])
-    heading = Trial(2.0 * t, {"psi": t, "u": speed}, kind="turning-circle", use="validate", derived=["u"])
+    heading = Trial(
+        2.0 * t,
+        {"psi": t, "u": speed},
+        kind="turning-circle",
+        use="validate",
+        derived=["u"],
+    )
     row = _trial(heading, "short")
-    assert (row["rudder"], row["speeds"], row["kind"], row["derived"]) == (None, None, "turning circle", "u")
+    assert (row["rudder"], row["speeds"], row["kind"], row["derived"]) == (
+        None,
+        None,
+        "turning circle",
+        "u",
+    )
     assert (row["samples"], row["duration"], row["interval"]) == (5, 8.0, 2.0)
-    whole = _trial(Trial(t, {"u": 0.6 * speed, "v": -0.8 * speed, "delta": -0.1 * t}), "whole")
+    whole = _trial(
+        Trial(t, {"u": 0.6 * speed, "v": -0.8 * speed, "delta": -0.1 * t}), "whole"
+    )
     assert whole["speeds"] == pytest.approx((6.0, 8.0), rel=1e-5)
     assert (whole["kind"], whole["derived"], whole["use"]) == (None, "none", "fit")
     assert whole["rudder"] == pytest.approx(np.degrees(0.4))
@@ -445,7 +614,11 @@ def test_headings_of_trials_that_were_fitted_are_told_where_none_is_held_out() -
     assert (found["unseen"], found["trial"]) == (False, "b.csv")
     assert (found["median"], found["largest"]) == pytest.approx((2.0, 4.0))
     found = heading(a=("fit", 9.0), b=("validate", 3.0))
-    assert (found["unseen"], found["trial"], found["largest"]) == (True, "b.csv", pytest.approx(3.0))
+    assert (found["unseen"], found["trial"], found["largest"]) == (
+        True,
+        "b.csv",
+        pytest.approx(3.0),
+    )
     assert heading(a=("fit", 9.0), b=("validate", None)) is None
 
 
@@ -461,7 +634,10 @@ def test_an_index_is_told_where_the_trial_has_it() -> None:
 
 
 def test_a_bare_reference_ship_stands_beside_the_fit_by_the_names_of_trials() -> None:
-    errors = {name: {"trial": f"a/{name}", "rmse": {"psi": np.pi / 36.0}} for name in ("one", "two")}
+    errors = {
+        name: {"trial": f"a/{name}", "rmse": {"psi": np.pi / 36.0}}
+        for name in ("one", "two")
+    }
     bare = {"a/one": {"rmse": {"psi": np.pi / 18.0}}, "a/two": {"rmse": {"psi": None}}}
     view = {"errors": errors, "reference": {"name": "tanker", "trials": bare}}
     told = section("reference_table(fit)", fit=view)
@@ -472,17 +648,25 @@ def test_a_bare_reference_ship_stands_beside_the_fit_by_the_names_of_trials() ->
 def test_coefficients_without_errors_are_significant_unless_they_are_zero() -> None:
     """Accelerations in their own units; with an error it is two of these that make them so."""
     dynamics = SimpleNamespace(normalisation="si", quantity="acceleration")
-    given = {"b_v": (3.0, 0.0), "b_r": (0.0, 0.0), "c_v": (-1.99, 1.0), "c_r": (-2.0, 1.0)}
+    given = {
+        "b_v": (3.0, 0.0),
+        "b_r": (0.0, 0.0),
+        "c_v": (-1.99, 1.0),
+        "c_r": (-2.0, 1.0),
+    }
     fit: Any = SimpleNamespace(
         model=SimpleNamespace(dynamics=dynamics),
         coefficients={name: pair[0] for name, pair in given.items()},
         standard_errors={name: pair[1] for name, pair in given.items()},
-    )  # fmt: skip
+    )
     ((title, rows),) = _coefficients(fit).items()
     assert title == "coefficient"
     assert [(row["value"], row["t"], row["significant"]) for row in rows] == [
-        (3.0, None, True), (0.0, None, False), (-1.99, -1.99, False), (-2.0, -2.0, True)
-    ]  # fmt: skip
+        (3.0, None, True),
+        (0.0, None, False),
+        (-1.99, -1.99, False),
+        (-2.0, -2.0, True),
+    ]
     table = coefficients_table(fit)
     assert table.title == "Coefficients of accelerations, si units"
     assert list(table.columns[1].cells) == ["3", "0", "-1.99", "-2"]

@@ -15,7 +15,9 @@ def fine_and_coarse(model: ShipModel, rate: float, lag: float) -> tuple[Trial, T
     """A 15/15 zigzag with some steering gear, every 0.02 s and every 0.5 s of it."""
     geared = replace(model, steering=SteeringGear(40.0, rate, lag))
     fine = zigzag(geared, 15, 15, duration=300, dt=0.02)
-    return fine, Trial(fine.t[::25], {name: fine[name][::25] for name in ("u", "v", "r", "delta")})
+    return fine, Trial(
+        fine.t[::25], {name: fine[name][::25] for name in ("u", "v", "r", "delta")}
+    )
 
 
 GEARS = [(2.5, 0.0), (5.0, 0.0), (5.0, 0.4), (5.0, 1.0), (2.5, 2.5)]
@@ -45,7 +47,9 @@ def test_rudder_between_samples_is_known_to_a_thousandth_of_a_degree(
     assert np.degrees(straight.max()) > 0.1
 
 
-def test_corners_are_at_the_switches_and_at_the_ends_of_the_ramps(mariner: ShipModel) -> None:
+def test_corners_are_at_the_switches_and_at_the_ends_of_the_ramps(
+    mariner: ShipModel,
+) -> None:
     fine, coarse = fine_and_coarse(mariner, 5.0, 1.0)
     switches = np.flatnonzero(np.diff(fine["delta_command"])) + 1
     rebuilt = rebuild(coarse.t, coarse["delta"])
@@ -56,7 +60,9 @@ def test_corners_are_at_the_switches_and_at_the_ends_of_the_ramps(mariner: ShipM
     assert np.all(np.abs(ends[-len(jumps) :] - jumps - 5.0) < 0.01)
 
 
-def test_given_gear_that_contradicts_the_samples_is_not_believed(mariner: ShipModel) -> None:
+def test_given_gear_that_contradicts_the_samples_is_not_believed(
+    mariner: ShipModel,
+) -> None:
     _, coarse = fine_and_coarse(mariner, 5.0, 1.0)
     rebuilt = rebuild(coarse.t, coarse["delta"], SteeringGear(35.0, 2.5, 0.0))
     assert np.degrees(rebuilt.rate) == pytest.approx(5.0, rel=1e-6)
@@ -77,10 +83,17 @@ def test_a_gear_explains_85_per_cent_of_the_intervals(
 ) -> None:
     t = np.arange(200.0)
     monkeypatch.setattr(rudder, "_explained", lambda *_: share)
-    assert rebuild(t, np.radians(np.interp(t, [50, 60, 120, 140], [0, 10, 10, -10]))).follows_gear == follows
+    assert (
+        rebuild(
+            t, np.radians(np.interp(t, [50, 60, 120, 140], [0, 10, 10, -10]))
+        ).follows_gear
+        == follows
+    )
 
 
-def test_a_gear_needs_eight_samples_for_each_change_of_order(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_gear_needs_eight_samples_for_each_change_of_order(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     monkeypatch.setattr(rudder, "_explained", lambda *_: 1.0)
     t = np.arange(16.0)
     delta = np.radians(np.interp(t, [3, 5, 8, 10], [0, 2, 2, 0]))
@@ -92,7 +105,9 @@ def test_limit_of_an_estimated_gear_is_the_largest_recorded_angle() -> None:
     t = np.linspace(0.0, 40.0, 81)
     delta = np.radians(np.clip(4.0 * t, 0.0, 42.0))
     still = np.zeros_like(t)
-    gear = estimated_gear([Trial(t, {"u": still + 5.0, "v": still, "r": still, "delta": delta})])
+    gear = estimated_gear(
+        [Trial(t, {"u": still + 5.0, "v": still, "r": still, "delta": delta})]
+    )
     assert gear.rudder_limit_deg == pytest.approx(42.0)
     assert gear.rudder_rate_deg_s == pytest.approx(4.0)
 
@@ -101,7 +116,13 @@ def test_a_rudder_taken_straight_has_no_gear_and_no_corners() -> None:
     t = np.arange(5.0, 9.0)
     found = straight(t, np.array([0.0, 0.1, 0.3, 0.2]))
     assert (found.rate, found.time_constant, found.follows_gear) == (0.0, 0.0, False)
-    for row in (found.before, found.after, found.switch, found.corners, found.smoothness):
+    for row in (
+        found.before,
+        found.after,
+        found.switch,
+        found.corners,
+        found.smoothness,
+    ):
         assert row.shape == (0,)
     assert found.smoothness.dtype == np.int64
     np.testing.assert_allclose(found([5.5, 6.25, 8.0]), [0.05, 0.15, 0.2])
@@ -110,7 +131,9 @@ def test_a_rudder_taken_straight_has_no_gear_and_no_corners() -> None:
 def test_four_samples_are_the_fewest_that_a_gear_explains() -> None:
     """A ramp goes on; a rudder that never moved has no gear."""
     ramp = 0.1 * np.arange(5.0)
-    shares = [rudder._explained(np.arange(float(n)), ramp[:n], 0.1, 0.0) for n in (3, 4, 5)]
+    shares = [
+        rudder._explained(np.arange(float(n)), ramp[:n], 0.1, 0.0) for n in (3, 4, 5)
+    ]
     assert shares == [0.0, 1.0, 1.0]
     assert rudder._explained(np.arange(5.0), ramp, 0.0, 0.0) == 0.0
 
@@ -143,7 +166,9 @@ def test_an_order_changes_when_the_rudder_then_ends_where_it_was_seen() -> None:
     time = rudder._switch_time(0.0, 0.14, np.inf, -np.inf, 2.0, 0.1, 0.0)
     assert time == pytest.approx(1.7)
     assert rudder._switch_time(0.0, 0.25, np.inf, -np.inf, 2.0, 0.1, 0.0) is None
-    assert rudder._switch_time(0.3, 0.3, 0.3, np.inf, 2.0, 0.1, 0.0) == pytest.approx(2.0)
+    assert rudder._switch_time(0.3, 0.3, 0.3, np.inf, 2.0, 0.1, 0.0) == pytest.approx(
+        2.0
+    )
 
 
 @pytest.mark.parametrize(("lag", "begin", "smoothness"), [(0.0, 3.0, 0), (0.4, 2.6, 1)])
@@ -155,19 +180,39 @@ def test_a_ramp_ends_at_its_order_or_where_the_lag_takes_over(
     one = (t, np.array([0.0, 0.3]), np.array([0.3]), np.array([0.3]), none, 0.1, lag)
     ((time, kind),) = rudder._ramp_ends(*one)
     assert (time, kind) == (pytest.approx(10.0 + begin), smoothness)
-    turned = (t, np.array([0.0, 0.2]), np.array([np.inf]), np.array([0.2]), np.array([5.0]), 0.1, lag)
+    turned = (
+        t,
+        np.array([0.0, 0.2]),
+        np.array([np.inf]),
+        np.array([0.2]),
+        np.array([5.0]),
+        0.1,
+        lag,
+    )
     ((time, kind),) = rudder._ramp_ends(*turned)
     assert (time, kind) == (pytest.approx(15.0 + begin), smoothness)
     early = begin - 0.1  # the order is taken back before the ramp has ended
-    back = (t, np.zeros(2), np.array([0.3]), np.array([0.0]), np.array([early]), 0.1, lag)
-    assert [time for time, _ in rudder._ramp_ends(*back)] == [pytest.approx(10.0 + 2.0 * early - lag)]
+    back = (
+        t,
+        np.zeros(2),
+        np.array([0.3]),
+        np.array([0.0]),
+        np.array([early]),
+        0.1,
+        lag,
+    )
+    assert [time for time, _ in rudder._ramp_ends(*back)] == [
+        pytest.approx(10.0 + 2.0 * early - lag)
+    ]
 
 
 def test_a_gear_of_rate_and_lag_ramps_and_then_creeps() -> None:
     """0.1 rad/s and 2 s: from 0 to an order of 0.5 it ramps to 0.3, what is left falls by exp(-t / 2)."""
     angles = rudder._flow(0.0, 0.5, np.array([1.0, 3.0, 5.0]), 0.1, 2.0)
     np.testing.assert_allclose(angles, [0.1, 0.3, 0.5 - 0.2 * np.exp(-1.0)])
-    np.testing.assert_allclose(rudder._flow(0.0, -np.inf, np.array([1.0, 9.0]), 0.1, 2.0), [-0.1, -0.9])
+    np.testing.assert_allclose(
+        rudder._flow(0.0, -np.inf, np.array([1.0, 9.0]), 0.1, 2.0), [-0.1, -0.9]
+    )
     np.testing.assert_allclose(rudder._flow(0.2, 0.2, np.array([4.0]), 0.1, 0.0), [0.2])
     t = np.array([0.0, 1.0, 3.0, 5.0])
     orders = rudder._orders(t, rudder._flow(0.0, 0.5, t, 0.1, 2.0), 0.1, 2.0)
@@ -177,5 +222,7 @@ def test_a_gear_of_rate_and_lag_ramps_and_then_creeps() -> None:
 def test_no_rudder_goes_beyond_a_right_angle() -> None:
     t = np.linspace(0.0, 40.0, 81)
     still, delta = np.zeros_like(t), np.radians(np.clip(4.0 * t, 0.0, 110.0))
-    gear = estimated_gear([Trial(t, {"u": still + 5.0, "v": still, "r": still, "delta": delta})])
+    gear = estimated_gear(
+        [Trial(t, {"u": still + 5.0, "v": still, "r": still, "delta": delta})]
+    )
     assert gear.rudder_limit_deg == 90.0

@@ -7,9 +7,17 @@ import numpy as np
 import pytest
 
 from identification import IdentificationResult, Samples, build_samples, identify
-from identification.regression.integrals import broken_spline, step_integrals, twice_integrated
+from identification.regression.integrals import (
+    broken_spline,
+    step_integrals,
+    twice_integrated,
+)
 from identification.regression.rudder import straight
-from identification.regression.samples import between_gaps, default_window, without_memory
+from identification.regression.samples import (
+    between_gaps,
+    default_window,
+    without_memory,
+)
 from shipgym import InputError, Particulars, ShipModel, Trial
 from shipgym.manoeuvres import zigzag
 from shipgym.ships.simulate import open_loop
@@ -18,7 +26,9 @@ from shipgym.ships.simulate import open_loop
 def mismatch(model: ShipModel, samples: Samples) -> float:
     """Largest violation of the regression by the true coefficients, relative to the largest change."""
     table = model.table
-    theta = table.acceleration_matrix(model.particulars) @ np.array(list(model.coefficients.values()))
+    theta = table.acceleration_matrix(model.particulars) @ np.array(
+        list(model.coefficients.values())
+    )
     worst, first = 0.0, 0
     for q in table.equations:
         size = samples.features[q].shape[1]
@@ -28,7 +38,9 @@ def mismatch(model: ShipModel, samples: Samples) -> float:
     return worst
 
 
-@pytest.mark.parametrize(("structure", "bound"), [("euler", 1e-1), ("integral", 2e-2), ("spline", 3e-5)])
+@pytest.mark.parametrize(
+    ("structure", "bound"), [("euler", 1e-1), ("integral", 2e-2), ("spline", 3e-5)]
+)
 def test_true_coefficients_satisfy_the_regression(
     mariner: ShipModel, cao_zigzag: Trial, structure: str, bound: float
 ) -> None:
@@ -42,9 +54,13 @@ def test_irregular_samples_and_windows_satisfy_it_too(
 ) -> None:
     fine = record(zigzag(mariner, 15, 15, duration=300, dt=0.1), name="fine")
     rows = np.sort(np.random.default_rng(0).choice(len(fine), 900, replace=False))
-    sparse = Trial(fine.t[rows], {name: values[rows] for name, values in fine.channels.items()})
+    sparse = Trial(
+        fine.t[rows], {name: values[rows] for name, values in fine.channels.items()}
+    )
     for window in (1, 7):
-        samples = build_samples([sparse], mariner.table, mariner.particulars, window=window)
+        samples = build_samples(
+            [sparse], mariner.table, mariner.particulars, window=window
+        )
         assert mismatch(mariner, samples) < 1e-4
         assert samples.window == window
 
@@ -60,7 +76,9 @@ def test_trials_are_stacked_with_their_own_steps_and_never_across(
     assert mismatch(mariner, samples) < 1e-4
 
 
-def test_window_follows_the_noise(mariner: ShipModel, cao_zigzag: Trial, noisy_trials: list[Trial]) -> None:
+def test_window_follows_the_noise(
+    mariner: ShipModel, cao_zigzag: Trial, noisy_trials: list[Trial]
+) -> None:
     p = mariner.particulars
     clean = build_samples([cao_zigzag], mariner.table, p)
     noisy = build_samples(noisy_trials[:1], mariner.table, p)
@@ -72,23 +90,38 @@ def test_wrong_arguments_are_named(mariner: ShipModel, cao_zigzag: Trial) -> Non
     def build(**arguments: object) -> None:
         build_samples([cao_zigzag], mariner.table, mariner.particulars, **arguments)  # type: ignore[arg-type]
 
-    with pytest.raises(InputError, match="samples: 'cubic' found, expected one of euler, integral, spline"):
+    with pytest.raises(
+        InputError,
+        match="samples: 'cubic' found, expected one of euler, integral, spline",
+    ):
         build(samples="cubic")
     with pytest.raises(InputError, match="window: 0"):
         build(window=0)
-    with pytest.raises(InputError, match="'zigzag_15_15': 1001 samples found, expected more than the window"):
+    with pytest.raises(
+        InputError,
+        match="'zigzag_15_15': 1001 samples found, expected more than the window",
+    ):
         build(window=1001)
 
 
 def without(trial: Trial, *holes: tuple[float, float]) -> Trial:
     """The trial without its samples in some intervals of time."""
-    kept = np.all([(trial.t < start) | (trial.t >= end) for start, end in holes], axis=0)
-    return Trial(trial.t[kept], {c: v[kept] for c, v in trial.channels.items()}, name="holes.csv")
+    kept = np.all(
+        [(trial.t < start) | (trial.t >= end) for start, end in holes], axis=0
+    )
+    return Trial(
+        trial.t[kept], {c: v[kept] for c, v in trial.channels.items()}, name="holes.csv"
+    )
 
 
-@pytest.mark.parametrize("hole", [(100.0, 150.0), (203.0, 253.0), (120.3, 220.0), (496.0, 499.9)])
+@pytest.mark.parametrize(
+    "hole", [(100.0, 150.0), (203.0, 253.0), (120.3, 220.0), (496.0, 499.9)]
+)
 def test_a_hole_in_the_record_spoils_nothing(
-    mariner: ShipModel, cao_zigzag: Trial, cao_fit: IdentificationResult, hole: tuple[float, float]
+    mariner: ShipModel,
+    cao_zigzag: Trial,
+    cao_fit: IdentificationResult,
+    hole: tuple[float, float],
 ) -> None:
     broken = without(cao_zigzag, hole)
     fit = identify([broken], particulars=mariner.particulars)
@@ -101,42 +134,65 @@ def test_a_hole_in_the_record_spoils_nothing(
 
 @pytest.mark.parametrize("structure", ["euler", "integral", "spline"])
 @pytest.mark.parametrize("window", [1, 4])
-def test_no_row_spans_a_gap(mariner: ShipModel, cao_zigzag: Trial, structure: str, window: int) -> None:
+def test_no_row_spans_a_gap(
+    mariner: ShipModel, cao_zigzag: Trial, structure: str, window: int
+) -> None:
     p = mariner.particulars
     broken = without(cao_zigzag, (100.0, 104.0), (105.0, 150.0), (300.0, 302.0))
     samples = build_samples([broken], mariner.table, p, structure, window=window)
     assert samples.duration.max() <= (window - 1) * 0.5 + 2.5 + 1e-9  # 2 s are no gap
     for start, end in ((100.0, 104.0), (105.0, 150.0)):
-        assert not np.any((samples.start < start) & (samples.start + samples.duration > end))
-    assert not np.any((samples.start > 99.9) & (samples.start < 150.0))  # too few samples to tell
+        assert not np.any(
+            (samples.start < start) & (samples.start + samples.duration > end)
+        )
+    assert not np.any(
+        (samples.start > 99.9) & (samples.start < 150.0)
+    )  # too few samples to tell
 
 
-def test_noisy_pieces_are_smoothed_each_by_itself(mariner: ShipModel, record: Callable[..., Trial]) -> None:
-    run = record(zigzag(mariner, 20, 20, duration=500, dt=0.1), every=5, noise=1.0, name="noisy")
+def test_noisy_pieces_are_smoothed_each_by_itself(
+    mariner: ShipModel, record: Callable[..., Trial]
+) -> None:
+    run = record(
+        zigzag(mariner, 20, 20, duration=500, dt=0.1), every=5, noise=1.0, name="noisy"
+    )
     fit = identify([without(run, (150.0, 250.0))], particulars=mariner.particulars)
     truth = zigzag(mariner, 20, 20, duration=400)
     error = open_loop(fit.model, truth)["psi"] - truth["psi"]
     assert np.sqrt(np.mean(error**2)) < np.radians(1.0)
 
 
-def test_a_change_of_the_time_step_is_no_gap(mariner: ShipModel, record: Callable[..., Trial]) -> None:
+def test_a_change_of_the_time_step_is_no_gap(
+    mariner: ShipModel, record: Callable[..., Trial]
+) -> None:
     fine = record(zigzag(mariner, 15, 15, duration=300, dt=0.1), name="fine")
     rows = np.concatenate([np.arange(2000), np.arange(2000, 3000, 20)])
     mixed = Trial(fine.t[rows], {c: v[rows] for c, v in fine.channels.items()})
-    assert len(build_samples([mixed], mariner.table, mariner.particulars)) == len(mixed) - 1
+    assert (
+        len(build_samples([mixed], mariner.table, mariner.particulars))
+        == len(mixed) - 1
+    )
 
 
-def test_irregular_samples_lose_next_to_nothing(mariner: ShipModel, cao_zigzag: Trial) -> None:
+def test_irregular_samples_lose_next_to_nothing(
+    mariner: ShipModel, cao_zigzag: Trial
+) -> None:
     rows = np.random.default_rng(1).random(len(cao_zigzag)) < 0.6
-    sparse = Trial(cao_zigzag.t[rows], {c: v[rows] for c, v in cao_zigzag.channels.items()})
+    sparse = Trial(
+        cao_zigzag.t[rows], {c: v[rows] for c, v in cao_zigzag.channels.items()}
+    )
     samples = build_samples([sparse], mariner.table, mariner.particulars)
     assert len(samples) > 0.97 * len(sparse)
     assert mismatch(mariner, samples) < 2e-3
 
 
-def test_a_record_of_nothing_but_gaps_is_refused(mariner: ShipModel, cao_zigzag: Trial) -> None:
+def test_a_record_of_nothing_but_gaps_is_refused(
+    mariner: ShipModel, cao_zigzag: Trial
+) -> None:
     holes = [(start + 4.0, start + 20.0) for start in np.arange(0.0, 500.0, 20.0)]
-    message = r"holes\.csv': 2[45] gaps in time found \(the longest from .*nowhere 10 samples"
+    message = (
+        r"holes\.csv': 2[45] gaps in time found \(the longest from .*nowhere 10 samples"
+    )
     with pytest.raises(InputError, match=message):
         build_samples([without(cao_zigzag, *holes)], mariner.table, mariner.particulars)
 
@@ -148,7 +204,9 @@ def test_a_gap_is_a_step_of_more_than_five_usual_ones() -> None:
     def pieces(step: float, pause: float, first: int = 30) -> list[int]:
         t = step * np.arange(60.0)
         t[first:] += pause - step
-        return [len(piece) for piece in between_gaps(Trial(t, {"u": np.ones(60)}), ship)]
+        return [
+            len(piece) for piece in between_gaps(Trial(t, {"u": np.ones(60)}), ship)
+        ]
 
     assert pieces(0.5, 2.5) == [60]  # five usual steps
     assert pieces(0.5, 2.6) == [30, 30]
@@ -166,20 +224,29 @@ def test_six_long_steps_on_end_are_another_rate_and_five_are_gaps() -> None:
         steps = np.full(99, 0.5)
         steps[list(long)] = 3.0
         t = np.concatenate([[0.0], np.cumsum(steps)])
-        return [len(piece) for piece in between_gaps(Trial(t, {"u": np.ones(100)}), ship)]
+        return [
+            len(piece) for piece in between_gaps(Trial(t, {"u": np.ones(100)}), ship)
+        ]
 
     assert pieces(*range(40, 46)) == [100]
     assert pieces(*range(40, 45)) == [41, 55]
-    assert pieces(34, *range(40, 45)) == [35, 55]  # the sixth is not among the eleven around the fifth
+    assert pieces(34, *range(40, 45)) == [
+        35,
+        55,
+    ]  # the sixth is not among the eleven around the fifth
 
 
 def test_euler_takes_the_start_of_each_step_and_the_trapezoid_rule_its_mean() -> None:
     """Steps of 1 and 3 s; a moment is the integral times half the step that is left on average."""
     t, channels = np.array([0.0, 1.0, 4.0]), {"u": np.array([2.0, 4.0, 10.0])}
     for euler, expected in ((True, [2.0, 12.0]), (False, [3.0, 21.0])):
-        integrals, moments = step_integrals(t, channels, ["u"], lambda _, c: c["u"][:, None], euler)
+        integrals, moments = step_integrals(
+            t, channels, ["u"], lambda _, c: c["u"][:, None], euler
+        )
         np.testing.assert_allclose(integrals["u"][:, 0], expected)
-        np.testing.assert_allclose(moments["u"][:, 0], np.multiply(expected, [0.5, 1.5]))
+        np.testing.assert_allclose(
+            moments["u"][:, 0], np.multiply(expected, [0.5, 1.5])
+        )
 
 
 def test_an_integral_is_integrated_again_from_the_first_sample() -> None:
@@ -187,18 +254,26 @@ def test_an_integral_is_integrated_again_from_the_first_sample() -> None:
     t = np.array([0.0, 1.0, 3.0, 4.0])
     integrals = np.diff(3.0 * t**2)[:, None]
     moments = (np.diff(t**3) - 3.0 * t[:-1] ** 2 * np.diff(t))[:, None]
-    np.testing.assert_allclose(twice_integrated(t, integrals, moments)[:, 0], [1.0, 26.0, 37.0])
+    np.testing.assert_allclose(
+        twice_integrated(t, integrals, moments)[:, 0], [1.0, 26.0, 37.0]
+    )
 
 
 def test_a_spline_through_few_samples_is_cubic_from_four_on() -> None:
     t, fine = np.arange(4.0), np.linspace(0.0, 3.0, 31)
     no_corners = straight(t, np.zeros(4))
-    np.testing.assert_allclose(broken_spline(t, t**3, no_corners)(fine), fine**3, atol=1e-12)
+    np.testing.assert_allclose(
+        broken_spline(t, t**3, no_corners)(fine), fine**3, atol=1e-12
+    )
     three = broken_spline(t[:3], t[:3] ** 3, no_corners)(fine[:21])
-    np.testing.assert_allclose(three, np.interp(fine[:21], t[:3], t[:3] ** 3), atol=1e-12)
+    np.testing.assert_allclose(
+        three, np.interp(fine[:21], t[:3], t[:3] ** 3), atol=1e-12
+    )
 
 
-def test_a_window_is_a_third_of_a_ship_length_or_a_twentieth_of_a_trial_at_most() -> None:
+def test_a_window_is_a_third_of_a_ship_length_or_a_twentieth_of_a_trial_at_most() -> (
+    None
+):
     """Of noise alone; a ship of 30 m at 3 m/s sails a third of her length in 3.3 s."""
     ship, rng = Particulars(length=30.0, speed=3.0), np.random.default_rng(0)
 
@@ -215,28 +290,49 @@ def test_a_window_is_a_third_of_a_ship_length_or_a_twentieth_of_a_trial_at_most(
 def test_the_memory_of_a_trial_falls_out_of_one_window_less_the_next() -> None:
     """Mean accelerations of windows of 1 and 3 s, times the mean of both: 2 s."""
     samples = Samples(
-        {"r": np.array([[1.0], [6.0], [4.0]])}, {"r": np.array([2.0, 9.0, 1.0])}, np.array([0.0, 1.0, 4.0]),
-        np.array([1.0, 3.0, 1.0]), np.zeros(3, dtype=np.int64), 1,
-    )  # fmt: skip
+        {"r": np.array([[1.0], [6.0], [4.0]])},
+        {"r": np.array([2.0, 9.0, 1.0])},
+        np.array([0.0, 1.0, 4.0]),
+        np.array([1.0, 3.0, 1.0]),
+        np.zeros(3, dtype=np.int64),
+        1,
+    )
     found = without_memory(samples)
-    np.testing.assert_allclose(found.features["r"][:, 0], [2.0 * (2.0 - 1.0), 2.0 * (4.0 - 2.0)])
-    np.testing.assert_allclose(found.targets["r"], [2.0 * (3.0 - 2.0), 2.0 * (1.0 - 3.0)])
+    np.testing.assert_allclose(
+        found.features["r"][:, 0], [2.0 * (2.0 - 1.0), 2.0 * (4.0 - 2.0)]
+    )
+    np.testing.assert_allclose(
+        found.targets["r"], [2.0 * (3.0 - 2.0), 2.0 * (1.0 - 3.0)]
+    )
     np.testing.assert_array_equal(found.start, [0.0, 1.0])
-    with pytest.raises(InputError, match="window: a trial of 1 windows found, expected at least two"):
+    with pytest.raises(
+        InputError, match="window: a trial of 1 windows found, expected at least two"
+    ):
         without_memory(samples.select(np.arange(3) == 2))
 
 
-@pytest.mark.parametrize(("corner", "smoothness"), [(5.3, 0), (5.3, 1), (9.8, 0), (1.4, 0), (7.0, 0)])
+@pytest.mark.parametrize(
+    ("corner", "smoothness"), [(5.3, 0), (5.3, 1), (9.8, 0), (1.4, 0), (7.0, 0)]
+)
 def test_a_spline_breaks_where_the_rudder_does(corner: float, smoothness: int) -> None:
     """Beyond a jump of the rudder's rate a square grows, of its acceleration a cube: both are met exactly."""
     t, fine = np.arange(13.0), np.linspace(0.0, 12.0, 241)
 
     def motion(times: np.ndarray) -> np.ndarray:
-        return 2.0 - 0.3 * times + 0.01 * times**3 + np.maximum(times - corner, 0.0) ** (2 + smoothness)
+        return (
+            2.0
+            - 0.3 * times
+            + 0.01 * times**3
+            + np.maximum(times - corner, 0.0) ** (2 + smoothness)
+        )
 
     smooth = straight(t, np.zeros(13))
-    broken = replace(smooth, corners=np.array([corner]), smoothness=np.array([smoothness]))
-    np.testing.assert_allclose(broken_spline(t, motion(t), broken)(fine), motion(fine), atol=1e-9)
+    broken = replace(
+        smooth, corners=np.array([corner]), smoothness=np.array([smoothness])
+    )
+    np.testing.assert_allclose(
+        broken_spline(t, motion(t), broken)(fine), motion(fine), atol=1e-9
+    )
     assert np.abs(broken_spline(t, motion(t), smooth)(fine) - motion(fine)).max() > 1e-3
 
 
@@ -245,7 +341,9 @@ def test_corners_that_leave_too_few_samples_for_a_spline_are_passed_over() -> No
     t, values = np.arange(9.0), np.random.default_rng(0).standard_normal(9)
     for corners in ([0.02], [7.98], [4.1, 4.3, 4.6], [4.1, 4.3, 4.6, 4.8]):
         rudder = replace(
-            straight(t, np.zeros(9)), corners=np.array(corners), smoothness=np.zeros(len(corners), dtype=int)
+            straight(t, np.zeros(9)),
+            corners=np.array(corners),
+            smoothness=np.zeros(len(corners), dtype=int),
         )
         spline = broken_spline(t, values, rudder)
         np.testing.assert_allclose(spline(t), values, atol=1e-9)

@@ -20,17 +20,27 @@ from shipgym.manoeuvres import zigzag
 Auto = Callable[..., IdentificationResult]
 
 
-def standing(structure: str, coefficients: int, *errors: float, method: str = "tls-svm") -> Standing:
+def standing(
+    structure: str, coefficients: int, *errors: float, method: str = "tls-svm"
+) -> Standing:
     by_trial = {str(k): error for k, error in enumerate(errors)}
     mean = sum(errors) / len(errors)
-    return Standing(structure, method, coefficients, True, 0, mean, None, None, by_trial)
+    return Standing(
+        structure, method, coefficients, True, 0, mean, None, None, by_trial
+    )
 
 
 @pytest.fixture(scope="module")
 def trials(mariner: ShipModel, record: Callable[..., Trial]) -> list[Trial]:
     runs = [(10, False), (20, False), (20, True)]
     return [
-        record(zigzag(mariner, angle, angle, port, 300, 0.25), 4, 1.0, 5 + k, name=f"zigzag {k}")
+        record(
+            zigzag(mariner, angle, angle, port, 300, 0.25),
+            4,
+            1.0,
+            5 + k,
+            name=f"zigzag {k}",
+        )
         for k, (angle, port) in enumerate(runs)
     ]
 
@@ -43,7 +53,9 @@ def auto(mariner: ShipModel, monkeypatch: pytest.MonkeyPatch) -> Auto:
 
     def run(trials: list[Trial], **options: object) -> IdentificationResult:
         particulars, steering = mariner.particulars, mariner.steering
-        return identify(trials, "auto", particulars=particulars, steering=steering, **options)
+        return identify(
+            trials, "auto", particulars=particulars, steering=steering, **options
+        )
 
     return run
 
@@ -64,7 +76,10 @@ def test_the_structure_that_predicts_best_is_taken_and_the_ranking_told(
     # a trial that is not to fit has no part in it
     assert auto(trials[:2]).metrics["selection"] == told
     alone = identify(
-        [*trials[:2], turned], "abkowitz", particulars=mariner.particulars, steering=mariner.steering
+        [*trials[:2], turned],
+        "abkowitz",
+        particulars=mariner.particulars,
+        steering=mariner.steering,
     )
     assert alone.coefficients == result.coefficients
 
@@ -79,19 +94,30 @@ def test_a_single_trial_is_cut_into_thirds(auto: Auto, trials: list[Trial]) -> N
     result = auto(trials[1:2])
     told = result.metrics["selection"]
     assert told["held_out"] == "each third of the only trial"
-    assert list(told["ranking"][0]["errors"]) == [f"zigzag 1, part {k}" for k in (1, 2, 3)]
+    assert list(told["ranking"][0]["errors"]) == [
+        f"zigzag 1, part {k}" for k in (1, 2, 3)
+    ]
     assert result.trials == (trials[1],)
 
 
-def test_a_method_or_setting_that_is_named_is_kept(auto: Auto, trials: list[Trial]) -> None:
+def test_a_method_or_setting_that_is_named_is_kept(
+    auto: Auto, trials: list[Trial]
+) -> None:
     result = auto(trials[:2], method="ls-svm", C=1e6)
-    assert {row["method"] for row in result.metrics["selection"]["ranking"]} == {"ls-svm"}
+    assert {row["method"] for row in result.metrics["selection"]["ranking"]} == {
+        "ls-svm"
+    }
     assert result.model.provenance["method"] == "ls-svm"
-    with pytest.raises(InputError, match="settings: epsilon found, which method 'tls-svm' does not know"):
+    with pytest.raises(
+        InputError,
+        match="settings: epsilon found, which method 'tls-svm' does not know",
+    ):
         auto(trials[:2], epsilon=0.1)
 
 
-@pytest.mark.parametrize(("count", "sizes"), [(7, [2, 1, 2, 1, 1]), (2, [1, 1]), (10, [2] * 5)])
+@pytest.mark.parametrize(
+    ("count", "sizes"), [(7, [2, 1, 2, 1, 1]), (2, [1, 1]), (10, [2] * 5)]
+)
 def test_trials_are_held_out_in_no_more_than_five_groups(
     count: int, sizes: list[int], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -101,15 +127,21 @@ def test_trials_are_held_out_in_no_more_than_five_groups(
 
     def identified(parts: list[Trial], options: Options) -> Any:
         held.append(options.hold_out)
-        model = SimpleNamespace(provenance={"structure": options.structure, "method": options.method})
+        model = SimpleNamespace(
+            provenance={"structure": options.structure, "method": options.method}
+        )
         told = {"trials": {trial.name: metrics for trial in parts}}
-        return SimpleNamespace(model=model, metrics=told, stable=True, coefficients={"c_r": 1.0})
+        return SimpleNamespace(
+            model=model, metrics=told, stable=True, coefficients={"c_r": 1.0}
+        )
 
     monkeypatch.setattr(selection, "STRUCTURES", ("nomoto",))
     monkeypatch.setattr(selection, "OTHERS", ())
     _, told = select(identified, trials, Options(structure="auto"))
     assert [len(names) for names in held] == sizes
-    assert [name for names in held for name in names] == [trial.name for trial in trials]
+    assert [name for names in held for name in names] == [
+        trial.name for trial in trials
+    ]
     assert told["held_out"] == "each trial in turn"
     assert told["ranking"][0]["error"] == pytest.approx(0.1 / np.std(np.sin(t)))
     assert told["ranking"][0]["heading_deg"] == pytest.approx(np.degrees(0.1))
@@ -121,11 +153,22 @@ def test_nothing_to_fit_is_refused(auto: Auto, trials: list[Trial]) -> None:
 
 
 def test_the_fewest_coefficients_among_errors_that_differ_by_chance() -> None:
-    best, small = standing("abkowitz", 40, 0.10, 0.12, 0.11), standing("grey-box", 15, 0.10, 0.10, 0.14)
+    best, small = (
+        standing("abkowitz", 40, 0.10, 0.12, 0.11),
+        standing("grey-box", 15, 0.10, 0.10, 0.14),
+    )
     assert _simplest([best, small]) is small  # 0.003 +- 0.013
-    assert _simplest([best, standing("nomoto", 2, 0.13, 0.14, 0.15)]) is best  # 0.027 +- 0.003
-    assert _simplest([best, standing("cubic", 27, 0.102, 0.122, 0.112)]).structure == "cubic"  # 1.8 %
-    first, even = standing("abkowitz", 40, 0.14, 0.10, 0.10), standing("nomoto", 2, 0.136, 0.11, 0.11)
+    assert (
+        _simplest([best, standing("nomoto", 2, 0.13, 0.14, 0.15)]) is best
+    )  # 0.027 +- 0.003
+    assert (
+        _simplest([best, standing("cubic", 27, 0.102, 0.122, 0.112)]).structure
+        == "cubic"
+    )  # 1.8 %
+    first, even = (
+        standing("abkowitz", 40, 0.14, 0.10, 0.10),
+        standing("nomoto", 2, 0.136, 0.11, 0.11),
+    )
     assert _simplest([first, even]) is first  # 0.0053 +- 0.0047
     exact = standing("abkowitz", 40, 0.0, 0.0)
     assert _simplest([exact, standing("nomoto", 2, 0.001, 0.001)]) is exact

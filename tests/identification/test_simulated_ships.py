@@ -30,7 +30,10 @@ def test_she_is_sound_and_manoeuvres_like_a_ship(name: str) -> None:
     assert found.problems == found.remarks == ()
     duration, dt = standard_time(ship)
     turn = turning_indices(turning_circle(ship, 35.0, duration, dt))
-    first = [zigzag_indices(zigzag(ship, a, a, False, duration, dt)).overshoot_1_deg for a in (10.0, 20.0)]
+    first = [
+        zigzag_indices(zigzag(ship, a, a, False, duration, dt)).overshoot_1_deg
+        for a in (10.0, 20.0)
+    ]
     assert 3.0 < turn.tactical_diameter_lengths < 5.5
     assert turn.advance_lengths < 4.5  # MSC.137(76)
     assert 3.0 < first[0] < 12.0
@@ -43,8 +46,18 @@ def test_she_is_sound_and_manoeuvres_like_a_ship(name: str) -> None:
 def test_port_is_the_mirror_image_of_starboard(name: str) -> None:
     ship = SHIPS[name]()
     assert check_ship_model(ship).asymmetry < 1e-12
-    starboard, port = (zigzag(ship, 20.0, 20.0, first, 300.0, 0.5) for first in (False, True))
-    for channel, sign in {"x": 1, "y": -1, "psi": -1, "u": 1, "v": -1, "r": -1, "delta": -1}.items():
+    starboard, port = (
+        zigzag(ship, 20.0, 20.0, first, 300.0, 0.5) for first in (False, True)
+    )
+    for channel, sign in {
+        "x": 1,
+        "y": -1,
+        "psi": -1,
+        "u": 1,
+        "v": -1,
+        "r": -1,
+        "delta": -1,
+    }.items():
         np.testing.assert_allclose(port[channel], sign * starboard[channel], atol=1e-8)
 
 
@@ -66,7 +79,9 @@ def test_forces_have_the_signs_of_a_ship(name: str) -> None:
     still, drifting, turning = rates(ship), rates(ship, v=1.0), rates(ship, r=yaw)
     steered, together = rates(ship, delta=0.3), rates(ship, v=-1.0, r=yaw)
     assert (still["v"], still["r"]) == (0.0, 0.0)
-    assert drifting["v"] < 0.0 < steered["r"]  # damped in sway; turned to starboard by starboard rudder
+    assert (
+        drifting["v"] < 0.0 < steered["r"]
+    )  # damped in sway; turned to starboard by starboard rudder
     assert drifting["r"] < 0.0  # the bow turns away from where she drifts
     assert turning["r"] < 0.0
     assert turning["v"] < 0.0  # thrown out of the turn
@@ -81,7 +96,9 @@ def test_hull_coefficients_are_those_of_the_formulas_by_hand() -> None:
     assert ferry["N_r"] == pytest.approx(-0.044640 + 0.006834, abs=1e-6)
     assert ferry["N_rar"] == pytest.approx(-0.0805 + 0.080448 - 0.033405, abs=1e-6)
     assert ferry["Y_vav"] == pytest.approx(0.048265 - 6.293 * 0.104160, abs=1e-6)
-    assert tanker["N_vvr"] == pytest.approx(-6.0856 + 18.437622 - 18.518432 + 5.984338, abs=1e-5)
+    assert tanker["N_vvr"] == pytest.approx(
+        -6.0856 + 18.437622 - 18.518432 + 5.984338, abs=1e-5
+    )
     assert tanker["N_vrr"] == pytest.approx(-0.0635 + 0.04414 * 0.308772, abs=1e-6)
 
 
@@ -92,13 +109,21 @@ def test_hull_forces_in_a_turn_are_the_sum_of_their_terms_in_si_units() -> None:
     p, c, L, m = FERRY, hull(FERRY), 150.0, 1025.0 * 150.0 * 25.0 * 6.2 * 0.58
     u, v, r = 8.0, -1.0, 0.012
     U = float(np.hypot(u, v))
-    Y = U * (c["Y_v"] * v + c["Y_r"] * L * r) - c["Y_vav"] + (c["Y_var"] * v * r + c["Y_rar"] * L * r**2) * L
+    Y = (
+        U * (c["Y_v"] * v + c["Y_r"] * L * r)
+        - c["Y_vav"]
+        + (c["Y_var"] * v * r + c["Y_rar"] * L * r**2) * L
+    )
     N = U * (c["N_v"] * v + c["N_r"] * L * r) + c["N_rar"] * (L * r) ** 2
     N += (c["N_vvr"] * L * r - c["N_vrr"] * (L * r) ** 2) / U
     force, added = 0.5 * 1025.0 * L * 6.2, 0.5 * 1025.0 * L**3
     found = rates(bare, u=u, v=v, r=r)
     vdot, rdot = found["v"], found["r"]
-    sway = (m - added * p["Y_vdot"]) * vdot - 2.0 * m * rdot + (m - added * p["X_udot"]) * u * r
+    sway = (
+        (m - added * p["Y_vdot"]) * vdot
+        - 2.0 * m * rdot
+        + (m - added * p["X_udot"]) * u * r
+    )
     inertia = m * ((0.25 * L) ** 2 + 2.0**2) - added * L**2 * p["N_rdot"]
     assert sway == pytest.approx(force * Y)
     assert inertia * rdot - 2.0 * m * (vdot + u * r) == pytest.approx(force * L * N)
@@ -132,10 +157,19 @@ def test_accelerations_with_square_drag_by_hand() -> None:
 def test_variants_differ_in_stability_and_in_the_weight_of_the_squares() -> None:
     ships = {name: make() for name, make in SQUARE_DRAG.items()}
     slowest = {
-        name: max(straight_line_stability(ship).eigenvalues["starboard"]) for name, ship in ships.items()
+        name: max(straight_line_stability(ship).eigenvalues["starboard"])
+        for name, ship in ships.items()
     }
-    assert max(slowest["stable-light"], slowest["stable-heavy"]) < 3.0 * slowest["lively-light"] < 0.0
+    assert (
+        max(slowest["stable-light"], slowest["stable-heavy"])
+        < 3.0 * slowest["lively-light"]
+        < 0.0
+    )
     for kind in ("stable", "lively"):
-        assert slowest[f"{kind}-light"] == pytest.approx(slowest[f"{kind}-heavy"], rel=0.01)
-        light, heavy = (rates(ships[f"{kind}-{weight}"], r=0.03) for weight in ("light", "heavy"))
+        assert slowest[f"{kind}-light"] == pytest.approx(
+            slowest[f"{kind}-heavy"], rel=0.01
+        )
+        light, heavy = (
+            rates(ships[f"{kind}-{weight}"], r=0.03) for weight in ("light", "heavy")
+        )
         assert heavy["r"] < light["r"] < 0.0

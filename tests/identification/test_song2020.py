@@ -1,7 +1,13 @@
 import numpy as np
 import pytest
 from papers import get_paper, song2020, song2020_container
-from papers.song2020_container import HULL, PROPULSION, inertia_matrix, recorded, regressors
+from papers.song2020_container import (
+    HULL,
+    PROPULSION,
+    inertia_matrix,
+    recorded,
+    regressors,
+)
 
 from shipgym.ships import container as own
 from shipgym.ships import load_model
@@ -29,12 +35,18 @@ def test_nomoto_s_coefficients_come_within_a_thousandth(rows):
 
 
 def test_the_printed_means_are_those_of_the_printed_errors(rows):
-    means = {row.quantity: row.printed for row in rows if row.quantity.startswith("mean by")}
+    means = {
+        row.quantity: row.printed for row in rows if row.quantity.startswith("mean by")
+    }
     assert means == {
         "mean by SG: error, %": pytest.approx(4.05),
         "mean by NISG: error, %": pytest.approx(1.02),
     }
-    linear = [row.printed for row in rows if row.case == "Table 3-3" and row.quantity.startswith("mean")]
+    linear = [
+        row.printed
+        for row in rows
+        if row.case == "Table 3-3" and row.quantity.startswith("mean")
+    ]
     assert linear == pytest.approx([52.0, 18.8])
 
 
@@ -58,7 +70,9 @@ def test_the_printed_gradient_is_the_one_of_the_package_on_scaled_columns():
 
     X, y = song2020.regression("norrbin")
     ours, _ = song2020.gradient(X[:500], y[:500])
-    np.testing.assert_allclose(StochasticGradient().fit(X[:500], y[:500]).coef_, ours, rtol=1e-9)
+    np.testing.assert_allclose(
+        StochasticGradient().fit(X[:500], y[:500]).coef_, ours, rtol=1e-9
+    )
 
 
 def test_the_printed_innovation_only_shortens_the_steps():
@@ -78,7 +92,8 @@ def test_the_regressors_are_those_of_the_structure_of_the_package():
         ours = {
             term.powers
             for term in get_structure("mmg4dof").terms(equation)
-            if not {"n", "delta"} & {symbol for symbol, _ in term.powers} and term.name not in known[equation]
+            if not {"n", "delta"} & {symbol for symbol, _ in term.powers}
+            and term.name not in known[equation]
         }
         assert theirs == ours, equation
 
@@ -92,11 +107,41 @@ def test_thrust_rudder_and_known_forces_are_the_container_ship_s():
     index = [ship.state_names.index(name) for name in "uvrp"]
     expected = ship.derivatives(state, command)[index]
     speed, L = np.hypot(motion["u"], motion["v"]), own.LENGTH
-    u, v, r, p, f = *(motion[c] / speed for c in "uv"), *(motion[c] * L / speed for c in "rp"), motion["phi"]
-    basis = np.array(
-        [v, r, p, f, v**3, r**3, v * v * r, v * r * r, v * v * f, v * f * f, r * r * f, r * f * f]
+    u, v, r, p, f = (
+        *(motion[c] / speed for c in "uv"),
+        *(motion[c] * L / speed for c in "rp"),
+        motion["phi"],
     )
-    labels = ("v", "r", "p", "f", "vvv", "rrr", "vvr", "vrr", "vvf", "vff", "rrf", "rff")
+    basis = np.array(
+        [
+            v,
+            r,
+            p,
+            f,
+            v**3,
+            r**3,
+            v * v * r,
+            v * r * r,
+            v * v * f,
+            v * f * f,
+            r * r * f,
+            r * f * f,
+        ]
+    )
+    labels = (
+        "v",
+        "r",
+        "p",
+        "f",
+        "vvv",
+        "rrr",
+        "vvr",
+        "vrr",
+        "vvf",
+        "vff",
+        "rrf",
+        "rff",
+    )
     columns, known = regressors(motion), song2020_container.known_forces(motion)
     numbers = {equation: [] for equation in HULL}
     for equation, _, true in PROPULSION.values():
@@ -112,11 +157,15 @@ def test_thrust_rudder_and_known_forces_are_the_container_ship_s():
                 + own.PUBLISHED.X_ff * f * f
             )
         else:
-            hull = basis @ [getattr(own.PUBLISHED, f"{letter}_{label}") for label in labels]
+            hull = basis @ [
+                getattr(own.PUBLISHED, f"{letter}_{label}") for label in labels
+            ]
         pushed = np.dot(columns[equation][-len(numbers[equation]) :], numbers[equation])
         forces.append(hull + pushed + known[equation])
     scale = speed**2 / L / np.array([1.0, 1.0, L, L])
-    np.testing.assert_allclose(np.linalg.solve(inertia_matrix(), forces) * scale, expected, rtol=1e-9)
+    np.testing.assert_allclose(
+        np.linalg.solve(inertia_matrix(), forces) * scale, expected, rtol=1e-9
+    )
 
 
 def test_propeller_and_rudder_come_out_near_the_container_ship_s(rows):

@@ -12,7 +12,9 @@ from shipgym.manoeuvres import turning_circle, zigzag
 
 def as_derived(run, spoiled, drop=()):
     """The run as a log with positions and heading only has it: the first velocities wrong."""
-    channels = {name: values for name, values in run.channels.items() if name not in drop}
+    channels = {
+        name: values for name, values in run.channels.items() if name not in drop
+    }
     for name, error in spoiled.items():
         channels[name] = np.append(run[name][0] + error, run[name][1:])
     return Trial(run.t, channels, derived=frozenset("uvr"), length=run.length)
@@ -49,7 +51,11 @@ def test_measured_velocities_and_short_records_stay():
     run = zigzag(ship, duration=300.0, dt=1.0)
     assert with_start(ship, run) is run
     turn = turning_circle(ship, 20.0, 300.0, 1.0)
-    rare = Trial(turn.t[::20], {name: turn[name][::20] for name in turn.channels}, length=turn.length)
+    rare = Trial(
+        turn.t[::20],
+        {name: turn[name][::20] for name in turn.channels},
+        length=turn.length,
+    )
     short = as_derived(rare, {"v": 0.5})
     assert with_start(ship, short) is short
 
@@ -59,7 +65,11 @@ def test_three_samples_within_one_and_a_half_ship_lengths_tell_a_start():
     ship = load_model("mariner")
     turn = turning_circle(ship, 20.0, 300.0, 1.0)
     for step, found in ((15, True), (16, False)):
-        rare = Trial(turn.t[::step], {name: turn[name][::step] for name in turn.channels}, length=turn.length)
+        rare = Trial(
+            turn.t[::step],
+            {name: turn[name][::step] for name in turn.channels},
+            length=turn.length,
+        )
         log = as_derived(rare, {"r": 0.008})
         assert (with_start(ship, log) is not log) == found
 

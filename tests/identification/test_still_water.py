@@ -36,7 +36,8 @@ def log(run: Trial, seed: int = 0) -> Trial:
     rng, every = np.random.default_rng(seed), slice(None, None, 2)
     noise = {"x": 0.3, "y": 0.3, "psi": np.radians(0.1), "delta": np.radians(0.1)}
     channels = {
-        name: run[name][every] + size * rng.standard_normal(len(run.t[every])) for name, size in noise.items()
+        name: run[name][every] + size * rng.standard_normal(len(run.t[every]))
+        for name, size in noise.items()
     }
     recorded = Log(run.t[every], channels, "log", [])
     to_project_conventions(recorded, Conventions())
@@ -48,7 +49,10 @@ def log(run: Trial, seed: int = 0) -> Trial:
 def logs(mariner: ShipModel) -> list[Trial]:
     """A turn to fit, a zigzag to fit and one held out, in a current."""
     runs = [turning_circle(mariner, 35.0, 700.0, 0.5, weather=CURRENT)]
-    runs += [zigzag(mariner, 20, 20, port, 500.0, 0.5, weather=CURRENT) for port in (False, True)]
+    runs += [
+        zigzag(mariner, 20, 20, port, 500.0, 0.5, weather=CURRENT)
+        for port in (False, True)
+    ]
     names, uses = ("turn", "zigzag", "held out"), ("fit", "fit", "validate")
     return [
         log(run.with_(name=name, use=use), k)
@@ -56,7 +60,9 @@ def logs(mariner: ShipModel) -> list[Trial]:
     ]
 
 
-def test_a_current_is_found_and_taken_out(mariner: ShipModel, logs: list[Trial]) -> None:
+def test_a_current_is_found_and_taken_out(
+    mariner: ShipModel, logs: list[Trial]
+) -> None:
     """To centimetres per second, of the trial held out too; velocities and track follow."""
     found, report = in_still_water(logs, Options(), mariner.particulars)
     row = report["currents"]["held out"]
@@ -90,12 +96,18 @@ def test_a_current_is_found_and_taken_out(mariner: ShipModel, logs: list[Trial])
     assert told.endswith("which differs from zero; removed")
 
 
-def test_each_trial_may_have_a_current_of_its_own(mariner: ShipModel, logs: list[Trial]) -> None:
+def test_each_trial_may_have_a_current_of_its_own(
+    mariner: ShipModel, logs: list[Trial]
+) -> None:
     """Trials that contradict one current have two; that of a trial held out follows from these."""
-    other = turning_circle(mariner, -35.0, 700.0, 0.5, weather=Weather(Current(0.8, 90.0)))
+    other = turning_circle(
+        mariner, -35.0, 700.0, 0.5, weather=Weather(Current(0.8, 90.0))
+    )
     trials = [logs[0], log(other, 5).with_(name="other"), logs[2]]
     _, report = in_still_water(trials, Options(), mariner.particulars)
-    rows = {name: (row["north"], row["east"]) for name, row in report["currents"].items()}
+    rows = {
+        name: (row["north"], row["east"]) for name, row in report["currents"].items()
+    }
     np.testing.assert_allclose(rows["turn"], (NORTH, EAST), atol=0.05)
     np.testing.assert_allclose(rows["other"], (0.0, 0.8), atol=0.05)
     np.testing.assert_allclose(rows["held out"], (NORTH, EAST), atol=0.2)
@@ -138,7 +150,13 @@ def test_a_given_current_and_a_logged_speed(mariner: ShipModel) -> None:
 def straight(psi_deg: float) -> Trial:
     """A trial of 100 s over ground, half of it on one heading and half on its mirror image."""
     psi = np.radians(np.repeat([psi_deg, -psi_deg], 50))
-    channels = {"u": np.full(100, 2.0), "v": np.zeros(100), "r": np.zeros(100), "psi": psi, "delta": psi}
+    channels = {
+        "u": np.full(100, 2.0),
+        "v": np.zeros(100),
+        "r": np.zeros(100),
+        "psi": psi,
+        "delta": psi,
+    }
     return Trial(np.arange(100.0), channels, name="run", over_ground=True)
 
 
@@ -153,8 +171,14 @@ def straight(psi_deg: float) -> Trial:
 def test_a_current_is_known_to_five_per_cent_of_the_speed_by_several_headings(
     psi_deg: float, error: float, doubt: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    trial, mean, covariance = straight(psi_deg), np.array([1.0, 0.0]), np.diag([error**2, 1e-6])
-    monkeypatch.setattr(still_water, "_currents", lambda *_: [(trial, mean, covariance, "all trials")])
+    trial, mean, covariance = (
+        straight(psi_deg),
+        np.array([1.0, 0.0]),
+        np.diag([error**2, 1e-6]),
+    )
+    monkeypatch.setattr(
+        still_water, "_currents", lambda *_: [(trial, mean, covariance, "all trials")]
+    )
     remarks: list[str] = []
     rows = still_water._take_out_current({"run": trial}, 7.0, 2.0, "auto", remarks)
     assert rows["run"]["taken_out"] == (not doubt)
@@ -168,10 +192,16 @@ def test_a_current_is_estimated_from_trials_of_five_ship_lengths() -> None:
         assert (len(found) == 1) == known
 
 
-def test_a_current_in_columns_and_one_that_is_given_agree_to_a_decimetre_per_second() -> None:
-    logged = straight(40.0).with_channels({"current_north": np.full(100, 0.2), "current_east": np.zeros(100)})
+def test_a_current_in_columns_and_one_that_is_given_agree_to_a_decimetre_per_second() -> (
+    None
+):
+    logged = straight(40.0).with_channels(
+        {"current_north": np.full(100, 0.2), "current_east": np.zeros(100)}
+    )
     still_water._known(logged, {"north": 0.2, "east": 0.099})
-    with pytest.raises(InputError, match=r"have means of 0\.20 and 0\.00 m/s, current = .* was given"):
+    with pytest.raises(
+        InputError, match=r"have means of 0\.20 and 0\.00 m/s, current = .* was given"
+    ):
         still_water._known(logged, {"north": 0.2, "east": 0.101})
 
 
@@ -180,18 +210,32 @@ def test_a_current_in_columns_and_one_that_is_given_agree_to_a_decimetre_per_sec
     [
         ("slack", [0], "expected one of 'auto', 'shared', 'trial', 'none'"),
         ({"north": 1.0}, [0], "east"),
-        ({"north": 9.0, "east": 0.0}, [0], "9 m/s found, expected less than the ship's speed"),
+        (
+            {"north": 9.0, "east": 0.0},
+            [0],
+            "9 m/s found, expected less than the ship's speed",
+        ),
         ("shared", [1], "the trials keep to one heading; add a turn of a whole circle"),
     ],
 )
-def test_currents_that_cannot_be(mariner: ShipModel, logs: list[Trial], option, which, said) -> None:
+def test_currents_that_cannot_be(
+    mariner: ShipModel, logs: list[Trial], option, which, said
+) -> None:
     with pytest.raises(InputError, match=said):
-        in_still_water([logs[k] for k in which], Options(current=option), mariner.particulars)
+        in_still_water(
+            [logs[k] for k in which], Options(current=option), mariner.particulars
+        )
 
 
-def test_columns_that_contradict_a_given_current(mariner: ShipModel, logs: list[Trial]) -> None:
-    columns = {name: np.full(len(logs[0]), 0.5) for name in ("current_north", "current_east")}
-    with pytest.raises(InputError, match=r"have means of 0\.50 and 0\.50 m/s, current = { north = 0\.1"):
+def test_columns_that_contradict_a_given_current(
+    mariner: ShipModel, logs: list[Trial]
+) -> None:
+    columns = {
+        name: np.full(len(logs[0]), 0.5) for name in ("current_north", "current_east")
+    }
+    with pytest.raises(
+        InputError, match=r"have means of 0\.50 and 0\.50 m/s, current = { north = 0\.1"
+    ):
         in_still_water(
             [logs[0].with_channels(columns)],
             Options(current={"north": 0.1, "east": 0.0}),
@@ -199,67 +243,115 @@ def test_columns_that_contradict_a_given_current(mariner: ShipModel, logs: list[
         )
 
 
-def test_one_heading_is_left_as_it_is_with_a_word(mariner: ShipModel, logs: list[Trial]) -> None:
+def test_one_heading_is_left_as_it_is_with_a_word(
+    mariner: ShipModel, logs: list[Trial]
+) -> None:
     (found,), report = in_still_water([logs[1]], Options(), mariner.particulars)
     assert found is logs[1]
     assert "zigzag: no current is removed: the trials keep" in report["sea_remarks"][0]
     (row,) = report["currents"].values()
     assert not {"standard_errors", "probability"} & row.keys()
     assert (
-        "a guess without an interval, as the trials keep to one heading; left in" in sea_sentences(report)[0]
+        "a guess without an interval, as the trials keep to one heading; left in"
+        in sea_sentences(report)[0]
     )
 
 
 def test_measured_wind_is_taken_out(mariner: ShipModel) -> None:
     """The run in wind is the run of her equations with that force: predicted with it, not without."""
-    run = zigzag(mariner, 10, 10, duration=300.0, dt=0.5, weather=Weather(wind=Wind(12.0, 60.0, gust=False)))
+    run = zigzag(
+        mariner,
+        10,
+        10,
+        duration=300.0,
+        dt=0.5,
+        weather=Weather(wind=Wind(12.0, 60.0, gust=False)),
+    )
     (windy,), report = in_still_water([run], Options(), mariner.particulars)
     assert report["wind"]["mean_speeds"][run.name] == pytest.approx(12.0)
     ahead = windy["u"] + 12.0 * np.cos(run["wind_from"] - run["psi"])
     aside = windy["v"] + 12.0 * np.sin(run["wind_from"] - run["psi"])
     curves = wind_curves(mariner.particulars)
-    pressure, angle = 0.5 * AIR_DENSITY * (ahead**2 + aside**2), np.arctan2(aside, ahead)
+    pressure, angle = (
+        0.5 * AIR_DENSITY * (ahead**2 + aside**2),
+        np.arctan2(aside, ahead),
+    )
     surge = pressure * np.interp(angle, curves.angle, curves.X, period=2.0 * np.pi)
     surge -= 0.5 * AIR_DENSITY * curves.X[0] * windy["u"] ** 2
-    np.testing.assert_allclose(windy["wind_udot"], mobility_matrix(mariner)[0, 0] * surge, rtol=1e-9)
+    np.testing.assert_allclose(
+        windy["wind_udot"], mobility_matrix(mariner)[0, 0] * surge, rtol=1e-9
+    )
     with_wind = open_loop(mariner, windy)["psi"] - run["psi"]
     without = open_loop(mariner, run)["psi"] - run["psi"]
     assert np.abs(with_wind).max() < 0.1 * np.abs(without).max()
-    fit = {"particulars": mariner.particulars, "steering": mariner.steering, "model_error": False}
-    found, left_in = (identify([run], wind=wind, **fit).coefficients for wind in ("auto", "none"))
+    fit = {
+        "particulars": mariner.particulars,
+        "steering": mariner.steering,
+        "model_error": False,
+    }
+    found, left_in = (
+        identify([run], wind=wind, **fit).coefficients for wind in ("auto", "none")
+    )
     names = ("Y_v", "Y_r", "Y_d", "N_v", "N_r", "N_d")
     far, near = (
-        sum(abs(one[name] / mariner.coefficients[name] - 1.0) for name in names) for one in (left_in, found)
+        sum(abs(one[name] / mariner.coefficients[name] - 1.0) for name in names)
+        for one in (left_in, found)
     )
     assert near < 0.2 * far
 
 
 def test_a_constant_wind_of_each_trial(mariner: ShipModel) -> None:
     """A yaw acceleration of one of two trials is what the fit finds between them."""
-    runs = [zigzag(mariner, 15, 15, port, 300.0, 0.5).with_(name=str(port)) for port in (False, True)]
-    pushed = open_loop(mariner, runs[0].with_channels({"wind_rdot": np.full(len(runs[0]), 2e-6)}))
+    runs = [
+        zigzag(mariner, 15, 15, port, 300.0, 0.5).with_(name=str(port))
+        for port in (False, True)
+    ]
+    pushed = open_loop(
+        mariner, runs[0].with_channels({"wind_rdot": np.full(len(runs[0]), 2e-6)})
+    )
     fit = identify(
-        [pushed, runs[1]], wind="constant", particulars=mariner.particulars, steering=mariner.steering,
+        [pushed, runs[1]],
+        wind="constant",
+        particulars=mariner.particulars,
+        steering=mariner.steering,
         model_error=False,
-    )  # fmt: skip
+    )
     found = fit.model.provenance["wind"]["accelerations"]
-    assert found["False"]["wind_rdot"] - found["True"]["wind_rdot"] == pytest.approx(2e-6, rel=0.1)
-    assert "False: constant acceleration removed, vdot" in " ".join(sea_sentences(fit.model.provenance))
+    assert found["False"]["wind_rdot"] - found["True"]["wind_rdot"] == pytest.approx(
+        2e-6, rel=0.1
+    )
+    assert "False: constant acceleration removed, vdot" in " ".join(
+        sea_sentences(fit.model.provenance)
+    )
 
 
 def test_wind_without_what_it_needs(mariner: ShipModel) -> None:
-    run = zigzag(mariner, 10, 10, duration=200.0, dt=1.0, weather=Weather(wind=Wind(9.0, 60.0)))
+    run = zigzag(
+        mariner, 10, 10, duration=200.0, dt=1.0, weather=Weather(wind=Wind(9.0, 60.0))
+    )
     bare = replace(mariner.particulars, beam=None)
-    with pytest.raises(InputError, match="weather without the particulars it needs: beam"):
+    with pytest.raises(
+        InputError, match="weather without the particulars it needs: beam"
+    ):
         in_still_water([run], Options(wind="isherwood"), bare)
     (found,), report = in_still_water([run], Options(), bare)
     assert "wind_udot" not in found
-    assert report["sea_remarks"][0].startswith("the logged wind is not removed: weather without")
-    with pytest.raises(InputError, match="no trial has the columns wind_speed and wind_from"):
-        in_still_water([zigzag(mariner, 10, 10, duration=200.0, dt=1.0)], Options(wind="isherwood"), bare)
+    assert report["sea_remarks"][0].startswith(
+        "the logged wind is not removed: weather without"
+    )
+    with pytest.raises(
+        InputError, match="no trial has the columns wind_speed and wind_from"
+    ):
+        in_still_water(
+            [zigzag(mariner, 10, 10, duration=200.0, dt=1.0)],
+            Options(wind="isherwood"),
+            bare,
+        )
 
 
-def test_the_wind_that_a_ship_feels_is_that_of_her_way_over_ground(mariner: ShipModel) -> None:
+def test_the_wind_that_a_ship_feels_is_that_of_her_way_over_ground(
+    mariner: ShipModel,
+) -> None:
     """In sway and yaw alike for velocities over ground and for those through a current in columns."""
     t = np.arange(0.0, 40.0, 0.5)
     psi, north, east = 0.05 * t, 0.8, -0.5
@@ -271,10 +363,17 @@ def test_the_wind_that_a_ship_feels_is_that_of_her_way_over_ground(mariner: Ship
         "wind_from": 1.0 + 0.0 * t,
     }
     drift = {"current_north": north + 0.0 * t, "current_east": east + 0.0 * t}
-    ahead, aside = north * np.cos(psi) + east * np.sin(psi), east * np.cos(psi) - north * np.sin(psi)
-    through = Trial(t, {**own, **drift, "u": 7.0 + 0.0 * t, "v": -0.3 + 0.0 * t}, over_ground=False)
+    ahead, aside = (
+        north * np.cos(psi) + east * np.sin(psi),
+        east * np.cos(psi) - north * np.sin(psi),
+    )
+    through = Trial(
+        t, {**own, **drift, "u": 7.0 + 0.0 * t, "v": -0.3 + 0.0 * t}, over_ground=False
+    )
     ground = Trial(t, {**own, "u": 7.0 + ahead, "v": aside - 0.3}, over_ground=True)
-    felt = [measured_wind(trial, mariner.particulars, "auto") for trial in (through, ground)]
+    felt = [
+        measured_wind(trial, mariner.particulars, "auto") for trial in (through, ground)
+    ]
     for name in ("wind_vdot", "wind_rdot"):
         np.testing.assert_allclose(felt[0][name], felt[1][name], rtol=1e-9)
         assert np.abs(felt[0][name]).max() > 0.0
@@ -288,15 +387,20 @@ def jackknifed(
     first = current.COEFFICIENTS
     columns = first + 2 * np.arange(trials)[:, None] * (not shared) + np.arange(2)
     unknowns = int(columns.max()) + 1
-    slopes, left = np.zeros((windows, 3, trials, unknowns)), np.zeros((windows, 3, trials))
+    slopes, left = (
+        np.zeros((windows, 3, trials, unknowns)),
+        np.zeros((windows, 3, trials)),
+    )
     for k in range(trials):
         slopes[:, [0, 1], k, columns[k]] = 1.0
     left[:, 0] = residuals
     weights = np.where(np.arange(unknowns) < first, 1.0, 0.0)
     runs = SimpleNamespace(
-        fitted=lambda: (np.full(unknowns, 0.5), slopes, left), weights=weights, columns=columns,
+        fitted=lambda: (np.full(unknowns, 0.5), slopes, left),
+        weights=weights,
+        columns=columns,
         seen=np.zeros((windows, 3, trials)),
-    )  # fmt: skip
+    )
     monkeypatch.setattr(current, "_Runs", lambda *_: runs)
     found = current.estimate_current([None] * trials, 7.0, 2.0, shared)  # type: ignore[list-item]
     np.testing.assert_allclose(found.mean, np.ones(2 * trials))  # by the speed of 2 m/s
@@ -304,7 +408,9 @@ def jackknifed(
     return found.covariance[::2, ::2]
 
 
-def test_of_three_trials_in_one_current_each_is_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_of_three_trials_in_one_current_each_is_left_out(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     """Of six windows with a sum of k the mean of the other twelve moves by k / 12."""
     residuals = np.outer(np.ones(6), [0.3, -0.1, -0.2])
     changes = residuals.sum(axis=0) / 12.0
@@ -312,7 +418,9 @@ def test_of_three_trials_in_one_current_each_is_left_out(monkeypatch: pytest.Mon
     np.testing.assert_allclose(jackknifed(3, True, residuals, monkeypatch), expected)
 
 
-@pytest.mark.parametrize(("trials", "shared"), [(1, True), (2, True), (2, False), (3, False)])
+@pytest.mark.parametrize(
+    ("trials", "shared"), [(1, True), (2, True), (2, False), (3, False)]
+)
 def test_of_fewer_trials_in_one_current_or_of_one_current_each_thirds_are_left_out(
     trials: int, shared: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -330,7 +438,8 @@ def test_of_fewer_trials_in_one_current_or_of_one_current_each_thirds_are_left_o
 
 
 @pytest.mark.parametrize(
-    ("measured", "scale"), [([2.0, 2.0, 2.0], 0.003), ([1.9, 2.0, 2.1], 0.1), ([2.0, 2.0, 2.006], 0.0034641)]
+    ("measured", "scale"),
+    [([2.0, 2.0, 2.0], 0.003), ([1.9, 2.0, 2.1], 0.1), ([2.0, 2.0, 2.006], 0.0034641)],
 )
 def test_a_residual_of_a_current_is_three_thousandths_of_the_speed_at_least(
     measured: list[float], scale: float
@@ -348,22 +457,35 @@ def test_a_residual_of_a_current_is_three_thousandths_of_the_speed_at_least(
     x, slopes, residuals = Mean().fitted()
     assert x == pytest.approx([np.mean(measured)], rel=1e-5)
     np.testing.assert_allclose(1.0 / slopes, scale, rtol=2e-3)
-    np.testing.assert_allclose(residuals.ravel() * scale, measured - np.mean(measured), atol=2e-5)
+    np.testing.assert_allclose(
+        residuals.ravel() * scale, measured - np.mean(measured), atol=2e-5
+    )
 
 
 def test_values_differ_from_zero_by_their_covariance() -> None:
     """Of two normal numbers the squared distance is exponential: exp(-d^2 / 2)."""
     assert still_water._probability(np.zeros(2), np.eye(2)) == 1.0
-    assert still_water._probability(np.array([0.3, 0.0]), 0.01 * np.eye(2)) == pytest.approx(np.exp(-4.5))
+    assert still_water._probability(
+        np.array([0.3, 0.0]), 0.01 * np.eye(2)
+    ) == pytest.approx(np.exp(-4.5))
     alike = np.array([[2.0, 1.0], [1.0, 2.0]])
-    assert still_water._probability(np.array([3.0, 3.0]), alike) == pytest.approx(np.exp(-3.0))
+    assert still_water._probability(np.array([3.0, 3.0]), alike) == pytest.approx(
+        np.exp(-3.0)
+    )
 
 
-def test_captive_trials_and_those_of_unknown_speed_keep_their_current(mariner: ShipModel) -> None:
+def test_captive_trials_and_those_of_unknown_speed_keep_their_current(
+    mariner: ShipModel,
+) -> None:
     t = np.arange(50.0)
     drift = {"current_north": np.full(50, 0.2), "current_east": np.zeros(50)}
     track = {"x": 5.0 * t, "y": 0.0 * t, "psi": 0.0 * t}
-    towed = Trial(t, {**track, **drift, "u": 5.0 + 0.0 * t, "v": 0.0 * t}, name="towed", kind="captive")
+    towed = Trial(
+        t,
+        {**track, **drift, "u": 5.0 + 0.0 * t, "v": 0.0 * t},
+        name="towed",
+        kind="captive",
+    )
     (found,), report = in_still_water([towed], Options(), mariner.particulars)
     assert found is towed
     assert report == {}
@@ -376,9 +498,15 @@ def test_captive_trials_and_those_of_unknown_speed_keep_their_current(mariner: S
     assert report["currents"]["slow"]["taken_out"]
 
 
-@pytest.mark.parametrize(("coefficient", "sign", "row", "left"), [
-    (0, 1.0, 0, 1.0 - 3.0), (0, -1.0, 0, 1.0 + 2.0), (8, 1.0, 1, -2.0), (8, -1.0, 1, 2.0),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ("coefficient", "sign", "row", "left"),
+    [
+        (0, 1.0, 0, 1.0 - 3.0),
+        (0, -1.0, 0, 1.0 + 2.0),
+        (8, 1.0, 1, -2.0),
+        (8, -1.0, 1, 2.0),
+    ],
+)
 def test_ships_tried_sail_no_faster_than_thrice_and_drift_or_go_astern_no_faster_than_twice_the_speed(
     coefficient: int, sign: float, row: int, left: float
 ) -> None:
@@ -390,11 +518,15 @@ def test_ships_tried_sail_no_faster_than_thrice_and_drift_or_go_astern_no_faster
     runs = current._Runs([steady], 10.0, 2.0, True, None)
     assert runs.windows == 8  # of one ship length, 5 s
     x = np.zeros(len(runs.weights))
-    wanted = sign * 1e3 * (np.arange(current.COEFFICIENTS) == coefficient)  # and none of the other forces
+    wanted = (
+        sign * 1e3 * (np.arange(current.COEFFICIENTS) == coefficient)
+    )  # and none of the other forces
     x[: current.COEFFICIENTS] = (wanted - current.PRIOR[0]) / current.PRIOR[1]
     residuals, _ = runs.at(x)
     np.testing.assert_allclose(residuals[1:, row, 0], left)
-    np.testing.assert_array_equal(residuals[:, 2], 0.0)  # no log of the speed through the water
+    np.testing.assert_array_equal(
+        residuals[:, 2], 0.0
+    )  # no log of the speed through the water
 
 
 def test_what_a_ship_of_the_prior_does_is_the_same_to_both_sides() -> None:
@@ -403,7 +535,9 @@ def test_what_a_ship_of_the_prior_does_is_the_same_to_both_sides() -> None:
     c[8] = 0.0
     measured = np.array([0.4, 0.3, 1.1, 0.02, 0.05])
     surge, sway = current._accelerations(0.9, 0.2, measured, c)
-    mirrored = current._accelerations(0.9, -0.2, measured * [-1.0, -1.0, 1.0, 1.0, -1.0], c)
+    mirrored = current._accelerations(
+        0.9, -0.2, measured * [-1.0, -1.0, 1.0, 1.0, -1.0], c
+    )
     assert mirrored == (pytest.approx(surge), pytest.approx(-sway))
     # at her speed ahead on a straight course only the propeller and the wind act
     steady = current._accelerations(1.1, 0.0, np.array([0.0, 0.0, 1.1, 0.02, 0.05]), c)
@@ -414,8 +548,16 @@ def test_what_a_ship_of_the_prior_does_is_the_same_to_both_sides() -> None:
     ("row", "said"),
     [
         (
-            {"source": "trial", "standard_errors": (0.01, 0.02), "probability": 0.009, "taken_out": True},
-            "its own, north 0.300 ± 0.020, east -0.400 ± 0.039 m/s (95 %), which differs from zero; removed",
+            {
+                "source": "trial",
+                "standard_errors": (0.01, 0.02),
+                "probability": 0.009,
+                "taken_out": True,
+            },
+            (
+                "its own, north 0.300 ± 0.020, east -0.400 ± 0.039 m/s (95 %), which"
+                " differs from zero; removed"
+            ),
         ),
         (
             {
@@ -424,12 +566,17 @@ def test_what_a_ship_of_the_prior_does_is_the_same_to_both_sides() -> None:
                 "probability": 0.0101,
                 "taken_out": False,
             },
-            "one for all, north 0.300 ± 0.196, east -0.400 ± 0.392 m/s (95 %), which does not differ from "
-            "zero; left in",
+            (
+                "one for all, north 0.300 ± 0.196, east -0.400 ± 0.392 m/s (95 %),"
+                " which does not differ from zero; left in"
+            ),
         ),
         (
             {"source": "all trials", "taken_out": False},
-            "one for all, a guess without an interval, as the trials keep to one heading; left in",
+            (
+                "one for all, a guess without an interval, as the trials keep to one"
+                " heading; left in"
+            ),
         ),
         ({"source": "given", "taken_out": True}, "as given; removed"),
         ({"source": "columns", "taken_out": True}, "from columns; removed"),

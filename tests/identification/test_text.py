@@ -10,7 +10,10 @@ def test_columns_are_aligned_as_their_headings_ask():
     title, *lines = as_text(table).splitlines()
     assert title.rstrip() == "Coefficients"
     row = next(line for line in lines if "N_r" in line)
-    assert [cell for cell in row.split("│") if cell] == [" N_r           ", "     -1.5 "]
+    assert [cell for cell in row.split("│") if cell] == [
+        " N_r           ",
+        "     -1.5 ",
+    ]
     assert any(" value " in line and ">" not in line for line in lines)
 
 

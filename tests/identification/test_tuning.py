@@ -47,7 +47,9 @@ def rastrigin(x: Floats) -> Floats:
     return values
 
 
-def regression(n: int = 400, m: int = 6, noise: float = 1.0, seed: int = 0) -> tuple[Floats, Floats]:
+def regression(
+    n: int = 400, m: int = 6, noise: float = 1.0, seed: int = 0
+) -> tuple[Floats, Floats]:
     rng = np.random.default_rng(seed)
     X = rng.standard_normal((n, m)) @ rng.standard_normal((m, m)) + 1.0
     return X, X @ rng.standard_normal(m) + 3.0 + noise * rng.standard_normal(n)
@@ -55,7 +57,9 @@ def regression(n: int = 400, m: int = 6, noise: float = 1.0, seed: int = 0) -> t
 
 @pytest.mark.parametrize("optimiser", OPTIMISERS, ids=lambda o: type(o).__name__)
 @pytest.mark.parametrize("objective", [sphere, rastrigin])
-def test_optimisers_find_the_global_minimum(optimiser: Optimiser, objective: Any) -> None:
+def test_optimisers_find_the_global_minimum(
+    optimiser: Optimiser, objective: Any
+) -> None:
     found = optimiser.minimise(objective, BOX, seed=3)
     np.testing.assert_allclose(found.x, [1.0, 1.0], atol=2e-3)
     assert found.value == objective(found.x[None])[0] == found.history[-1]
@@ -94,13 +98,17 @@ def test_bee_colony_of_zhu_is_20_sources_30_rounds_and_limit_20() -> None:
 
 
 def test_scouts_leave_a_barren_source() -> None:
-    flat = ArtificialBeeColony(sources=4, rounds=10, limit=3).minimise(lambda x: np.ones(len(x)), BOX)
+    flat = ArtificialBeeColony(sources=4, rounds=10, limit=3).minimise(
+        lambda x: np.ones(len(x)), BOX
+    )
     assert flat.evaluations > 4 + 10 * 8
 
 
 @pytest.mark.parametrize("optimiser", ["abc", DifferentialEvolution(rounds=9)])
 def test_values_that_are_not_numbers_are_never_the_best(optimiser: Any) -> None:
-    found = minimise(lambda x: np.where(x[:, 0] < 1.0, np.nan, sphere(x)), BOX, optimiser=optimiser)
+    found = minimise(
+        lambda x: np.where(x[:, 0] < 1.0, np.nan, sphere(x)), BOX, optimiser=optimiser
+    )
     assert found.x[0] >= 1.0
     assert np.isfinite(found.value)
 
@@ -118,7 +126,10 @@ def test_values_that_are_not_numbers_are_never_the_best(optimiser: Any) -> None:
         ({"objective": lambda x: x}, "one value for each row"),
         ({"optimiser": ArtificialBeeColony(limit=0)}, "limit: 0"),
         ({"optimiser": ParticleSwarm(particles=0)}, "particles: 0"),
-        ({"optimiser": ParticleSwarm(particles=2**62)}, "at least 1 and at most 100000"),
+        (
+            {"optimiser": ParticleSwarm(particles=2**62)},
+            "at least 1 and at most 100000",
+        ),
         ({"optimiser": GridSearch(points=2)}, "points: 2"),
         ({"optimiser": DifferentialEvolution(members=1)}, "members: 1"),
     ],
@@ -130,7 +141,9 @@ def test_wrong_searches_are_named(arguments: dict[str, Any], message: str) -> No
 
 @pytest.mark.parametrize("fit_intercept", [True, False])
 @pytest.mark.parametrize("scale", [True, False])
-def test_held_out_error_is_that_of_fits_one_by_one(fit_intercept: bool, scale: bool) -> None:
+def test_held_out_error_is_that_of_fits_one_by_one(
+    fit_intercept: bool, scale: bool
+) -> None:
     X, y = regression()
     blocks = time_blocks(len(y), 5)
     error = held_out_error(X, y, scale, fit_intercept, blocks)
@@ -138,20 +151,28 @@ def test_held_out_error_is_that_of_fits_one_by_one(fit_intercept: bool, scale: b
         squares = []
         for k in range(5):
             away = blocks == k
-            estimator = LSSVM(C=C, scale=scale, fit_intercept=fit_intercept).fit(X[~away], y[~away])
+            estimator = LSSVM(C=C, scale=scale, fit_intercept=fit_intercept).fit(
+                X[~away], y[~away]
+            )
             squares.extend((y[away] - estimator.predict(X[away])) ** 2)
             if not scale:
                 oracle = Ridge(alpha=1.0 / C, fit_intercept=fit_intercept, solver="svd")
-                np.testing.assert_allclose(estimator.coef_, oracle.fit(X[~away], y[~away]).coef_, rtol=1e-7)
+                np.testing.assert_allclose(
+                    estimator.coef_, oracle.fit(X[~away], y[~away]).coef_, rtol=1e-7
+                )
         assert error(np.log10([[C]]))[0] == pytest.approx(np.mean(squares), rel=1e-9)
 
 
-def test_training_error_falls_with_the_weight_so_that_its_optimum_is_the_upper_bound() -> None:
+def test_training_error_falls_with_the_weight_so_that_its_optimum_is_the_upper_bound() -> (
+    None
+):
     X, y = regression(noise=0.01)
     error = training_error(X, y, True, True)(np.linspace(-2.0, 4.0, 40)[:, None])
     assert np.all(np.diff(error) < 0.0)
     for optimiser in ("abc", "pso", "grid", "de"):
-        estimator = TunedLSSVM(optimiser=optimiser, objective="training", bounds=(1e-2, 1e4)).fit(X, y)
+        estimator = TunedLSSVM(
+            optimiser=optimiser, objective="training", bounds=(1e-2, 1e4)
+        ).fit(X, y)
         assert pytest.approx(1e4, rel=0.1) == estimator.C_
 
 
@@ -162,9 +183,13 @@ def test_held_out_optimum_is_inside_and_predicts_better_where_data_are_few() -> 
         X = rng.standard_normal((30, 10)) @ (np.eye(10) + 2.0)
         truth = rng.standard_normal(10)
         y = X @ truth + 10.0 * rng.standard_normal(30)
-        tuned = TunedLSSVM(optimiser="grid", bounds=(1e-5, 1e6), fit_intercept=False).fit(X, y)
+        tuned = TunedLSSVM(
+            optimiser="grid", bounds=(1e-5, 1e6), fit_intercept=False
+        ).fit(X, y)
         plain = LSSVM(C=np.inf, fit_intercept=False).fit(X, y)
-        gains.append(np.linalg.norm(plain.coef_ - truth) / np.linalg.norm(tuned.coef_ - truth))
+        gains.append(
+            np.linalg.norm(plain.coef_ - truth) / np.linalg.norm(tuned.coef_ - truth)
+        )
     assert np.median(gains) > 1.5
 
 
@@ -180,7 +205,9 @@ def test_search_costs_the_same_for_any_number_of_samples() -> None:
 
 
 @given(n=st.integers(2, 300), folds=st.integers(2, 12))
-def test_blocks_follow_each_other_in_time_and_are_equally_long(n: int, folds: int) -> None:
+def test_blocks_follow_each_other_in_time_and_are_equally_long(
+    n: int, folds: int
+) -> None:
     folds = min(folds, n)
     blocks = time_blocks(n, folds)
     assert np.all(np.diff(blocks) >= 0)
@@ -188,7 +215,9 @@ def test_blocks_follow_each_other_in_time_and_are_equally_long(n: int, folds: in
 
 
 def test_each_trial_may_be_a_block() -> None:
-    np.testing.assert_array_equal(time_blocks(5, "trials", [3, 3, 7, 9, 9]), [0, 0, 1, 2, 2])
+    np.testing.assert_array_equal(
+        time_blocks(5, "trials", [3, 3, 7, 9, 9]), [0, 0, 1, 2, 2]
+    )
     with pytest.raises(InputError, match="with 1 trials, expected at least 2"):
         time_blocks(5, "trials", [3] * 5)
 
@@ -214,7 +243,9 @@ def test_pattern_search_goes_downhill_on_a_mesh_that_it_halves() -> None:
         seen.append(tuple(x.tolist()))
         return float((x[0] - 1.0) ** 2 + 3.0 * (x[1] - 2.0) ** 2)
 
-    found = pattern_search(bowl, [4.0, 8.0], [0.0, 0.0], [4.0, 8.0], mesh=0.25, finest=1 / 64)
+    found = pattern_search(
+        bowl, [4.0, 8.0], [0.0, 0.0], [4.0, 8.0], mesh=0.25, finest=1 / 64
+    )
     np.testing.assert_allclose(found.x, [1.0, 2.0])
     assert found.value == 0.0 == found.history[-1]
     assert found.evaluations == len(seen) == len(set(seen))
@@ -236,7 +267,9 @@ def test_pattern_search_goes_downhill_on_a_mesh_that_it_halves() -> None:
         (DifferentialEvolution, {"members": 5, "rounds": 1}),
     ],
 )
-def test_searches_may_be_as_small_as_they_say(optimiser: Any, least: dict[str, int]) -> None:
+def test_searches_may_be_as_small_as_they_say(
+    optimiser: Any, least: dict[str, int]
+) -> None:
     found = optimiser(**least).minimise(sphere, BOX)
     assert np.isfinite(found.value)
     for name, value in least.items():
@@ -253,12 +286,15 @@ def test_a_seed_is_a_whole_number_from_0(seed: Any) -> None:
 def test_bees_choose_good_sources_more_often() -> None:
     """Fitness 1 / (1 + f), or 1 - f below zero (Karaboga 2005); of costs without a sum all alike, in turn."""
     np.testing.assert_allclose(
-        _chances(np.array([0.0, 1.0, 3.0, -1.0])), np.array([1.0, 1.5, 1.75, 3.75]) / 3.75
+        _chances(np.array([0.0, 1.0, 3.0, -1.0])),
+        np.array([1.0, 1.5, 1.75, 3.75]) / 3.75,
     )
     np.testing.assert_allclose(_chances(np.full(4, np.inf)), [0.25, 0.5, 0.75, 1.0])
 
 
-def test_a_bee_moves_in_one_dimension_by_a_share_of_the_way_between_two_sources() -> None:
+def test_a_bee_moves_in_one_dimension_by_a_share_of_the_way_between_two_sources() -> (
+    None
+):
     rng = np.random.default_rng(0)
     sources = rng.random((5, 3))
     chosen = rng.integers(0, 5, 4000)
@@ -274,10 +310,17 @@ def test_a_bee_moves_in_one_dimension_by_a_share_of_the_way_between_two_sources(
 
 
 def test_a_source_keeps_its_best_move_and_counts_tries_in_vain() -> None:
-    sources, values, idle = np.zeros((3, 1)), np.array([5.0, 5.0, 5.0]), np.array([2, 2, 2])
+    sources, values, idle = (
+        np.zeros((3, 1)),
+        np.array([5.0, 5.0, 5.0]),
+        np.array([2, 2, 2]),
+    )
     chosen, found = np.array([0, 0, 0, 1, 1]), np.array([4.0, 3.0, 6.0, 5.0, 7.0])
     _settle(sources, values, idle, chosen, np.arange(1.0, 6.0)[:, None], found)
-    assert (sources.ravel().tolist(), values.tolist()) == ([2.0, 0.0, 0.0], [3.0, 5.0, 5.0])
+    assert (sources.ravel().tolist(), values.tolist()) == (
+        [2.0, 0.0, 0.0],
+        [3.0, 5.0, 5.0],
+    )
     assert idle.tolist() == [0, 4, 2]
 
 
@@ -303,7 +346,8 @@ def test_a_particle_is_constricted_as_clerc_and_kennedy_say() -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "candidates", "rounds"), [("grid", 58, 2), ("pso", 1220, 61), ("de", 1220, 60)]
+    ("name", "candidates", "rounds"),
+    [("grid", 58, 2), ("pso", 1220, 61), ("de", 1220, 60)],
 )
 def test_a_search_costs_what_it_says(name: str, candidates: int, rounds: int) -> None:
     """Two grids of 29 points; 20 particles or members in each dimension, 60 times after the first draw."""
@@ -320,7 +364,9 @@ def test_a_grid_is_refined_between_the_neighbours_of_its_best_point() -> None:
 
     found = GridSearch(points=5, refinements=2).minimise(away, [(-1.0, 1.0)])
     np.testing.assert_allclose(seen[0], [-1.0, -0.5, 0.0, 0.5, 1.0])
-    np.testing.assert_allclose(seen[1], np.linspace(0.5, 1.0, 5))  # none outside the bounds
+    np.testing.assert_allclose(
+        seen[1], np.linspace(0.5, 1.0, 5)
+    )  # none outside the bounds
     np.testing.assert_allclose(seen[2], np.linspace(0.75, 1.0, 5))
     assert found.x == pytest.approx([0.875])
     np.testing.assert_allclose(found.history, [0.1, 0.025, 0.025])
@@ -352,7 +398,12 @@ def test_a_mesh_is_a_quarter_of_the_box_and_no_finer_than_a_64th() -> None:
     assert found.history.tolist() == [0.0] * 6
     wide = np.full(2, 1e9)
     endless = pattern_search(
-        lambda x: -float(np.sum(x)), 0.0 * wide, 0.0 * wide, wide, mesh=1e-4, finest=1e-9
+        lambda x: -float(np.sum(x)),
+        0.0 * wide,
+        0.0 * wide,
+        wide,
+        mesh=1e-4,
+        finest=1e-9,
     )
     assert 200 <= endless.evaluations <= 203
 
@@ -360,12 +411,20 @@ def test_a_mesh_is_a_quarter_of_the_box_and_no_finer_than_a_64th() -> None:
 @pytest.mark.parametrize(
     "setting",
     [
-        (ArtificialBeeColony, "sources"), (ArtificialBeeColony, "rounds"), (ArtificialBeeColony, "limit"),
-        (ParticleSwarm, "particles"), (ParticleSwarm, "rounds"), (GridSearch, "points"),
-        (GridSearch, "refinements"), (DifferentialEvolution, "members"), (DifferentialEvolution, "rounds"),
+        (ArtificialBeeColony, "sources"),
+        (ArtificialBeeColony, "rounds"),
+        (ArtificialBeeColony, "limit"),
+        (ParticleSwarm, "particles"),
+        (ParticleSwarm, "rounds"),
+        (GridSearch, "points"),
+        (GridSearch, "refinements"),
+        (DifferentialEvolution, "members"),
+        (DifferentialEvolution, "rounds"),
     ],
-)  # fmt: skip
-def test_a_search_of_more_than_a_hundred_thousand_is_refused(setting: tuple[Any, str]) -> None:
+)
+def test_a_search_of_more_than_a_hundred_thousand_is_refused(
+    setting: tuple[Any, str],
+) -> None:
     kind, name = setting
     with pytest.raises(InputError, match=f"{name}: 100001 found, .* at most 100000"):
         kind(**{name: 100_001}).minimise(sphere, BOX)

@@ -17,11 +17,17 @@ from shipgym import ShipModel, Trial
 
 
 def theta(model: ShipModel) -> np.ndarray:
-    return model.table.acceleration_matrix(model.particulars) @ np.array(list(model.coefficients.values()))
+    return model.table.acceleration_matrix(model.particulars) @ np.array(
+        list(model.coefficients.values())
+    )
 
 
 def draw(
-    exact: Samples, truth: np.ndarray, mixing: np.ndarray, rng: np.random.Generator, memory: int = 1
+    exact: Samples,
+    truth: np.ndarray,
+    mixing: np.ndarray,
+    rng: np.random.Generator,
+    memory: int = 1,
 ) -> Samples:
     """The regression with exact features and errors correlated between equations and over `memory` rows."""
     white = rng.standard_normal((len(exact) + memory - 1, 3))
@@ -54,12 +60,22 @@ def coverage(
     for _ in range(200):
         samples = draw(exact, truth, MIXING, rng, memory_rows)
         estimators = fit_all(ls.estimator, samples)
-        covariance = coefficient_covariance(joint_covariance(estimators, samples, memory_s), matrix)
-        estimate = np.linalg.solve(matrix, np.concatenate([m.coef_ for m in estimators.values()]))
-        hits.append(np.abs(estimate - true_coefficients) < 1.96 * np.sqrt(np.diag(covariance)))
+        covariance = coefficient_covariance(
+            joint_covariance(estimators, samples, memory_s), matrix
+        )
+        estimate = np.linalg.solve(
+            matrix, np.concatenate([m.coef_ for m in estimators.values()])
+        )
+        hits.append(
+            np.abs(estimate - true_coefficients) < 1.96 * np.sqrt(np.diag(covariance))
+        )
         estimates.append(estimate)
         covariances.append(covariance)
-    return float(np.mean(hits)), np.cov(np.array(estimates).T), np.mean(covariances, axis=0)
+    return (
+        float(np.mean(hits)),
+        np.cov(np.array(estimates).T),
+        np.mean(covariances, axis=0),
+    )
 
 
 def test_intervals_of_the_derivatives_cover_the_truth_in_95_per_cent(
@@ -83,14 +99,18 @@ def test_sway_and_yaw_coefficients_are_correlated_as_their_residuals_are(
     assert observed == pytest.approx(expected, abs=0.15)
 
 
-def test_memory_widens_the_intervals_where_errors_last(exact: Samples, mariner: ShipModel) -> None:
+def test_memory_widens_the_intervals_where_errors_last(
+    exact: Samples, mariner: ShipModel
+) -> None:
     blind, _, _ = coverage(exact, mariner, 10, 0.0)
     aware, _, _ = coverage(exact, mariner, 10, 20.0)
     assert blind < 0.55
     assert aware > 0.8
 
 
-def test_covariance_of_a_real_fit_is_positive_and_of_all_coefficients(noisy_fit) -> None:  # type: ignore[no-untyped-def]
+def test_covariance_of_a_real_fit_is_positive_and_of_all_coefficients(
+    noisy_fit,
+) -> None:  # type: ignore[no-untyped-def]
     covariance = noisy_fit.model.covariance
     assert covariance.shape == (40, 40)
     deviation = np.sqrt(np.diag(covariance))
@@ -103,7 +123,9 @@ def test_bartletts_weights_fall_linearly_to_zero_beyond_the_last_lag(lags: int) 
     scores = np.random.default_rng(0).standard_normal((8, 3))
     apart = np.abs(np.subtract.outer(np.arange(8), np.arange(8)))
     weight = np.maximum(1.0 - apart / (min(lags, 7) + 1.0), 0.0)
-    np.testing.assert_allclose(newey_west(scores, lags), scores.T @ weight @ scores, rtol=1e-12)
+    np.testing.assert_allclose(
+        newey_west(scores, lags), scores.T @ weight @ scores, rtol=1e-12
+    )
 
 
 def test_without_memory_the_covariance_is_that_of_the_textbook() -> None:
@@ -112,21 +134,31 @@ def test_without_memory_the_covariance_is_that_of_the_textbook() -> None:
     X = rng.standard_normal((40, 3))
     y = X @ [1.0, 2.0, 3.0] + rng.standard_normal(40)
     time = np.arange(40.0)
-    samples = Samples({"v": X}, {"v": y}, time, np.ones(40), np.repeat([0, 1], [30, 10]), 1)
+    samples = Samples(
+        {"v": X}, {"v": y}, time, np.ones(40), np.repeat([0, 1], [30, 10]), 1
+    )
     fitted = fit_all(get_method("ls").estimator, samples)
     errors, inverse = y - X @ np.linalg.lstsq(X, y)[0], np.linalg.inv(X.T @ X)
     assert effective_freedom(fitted["v"], X) == pytest.approx(37.0)
-    np.testing.assert_allclose(joint_covariance(fitted, samples), errors @ errors / 37.0 * inverse, rtol=1e-6)
+    np.testing.assert_allclose(
+        joint_covariance(fitted, samples), errors @ errors / 37.0 * inverse, rtol=1e-6
+    )
     # correlated over two rows within each of two trials
     scores = X * errors[:, None] * np.sqrt(40.0 / 37.0)
     meat = newey_west(scores[:30], 2) + newey_west(scores[30:], 2)
-    np.testing.assert_allclose(joint_covariance(fitted, samples, 2.0), inverse @ meat @ inverse, rtol=1e-6)
+    np.testing.assert_allclose(
+        joint_covariance(fitted, samples, 2.0), inverse @ meat @ inverse, rtol=1e-6
+    )
     matrix = np.triu(rng.standard_normal((3, 3))) + 3.0 * np.eye(3)
     back = np.linalg.inv(matrix)
-    np.testing.assert_allclose(coefficient_covariance(inverse, matrix), back @ inverse @ back.T, rtol=1e-9)
+    np.testing.assert_allclose(
+        coefficient_covariance(inverse, matrix), back @ inverse @ back.T, rtol=1e-9
+    )
 
 
-def test_memory_of_each_trial_is_counted_in_its_own_steps_and_a_short_one_is_no_memory_at_all() -> None:
+def test_memory_of_each_trial_is_counted_in_its_own_steps_and_a_short_one_is_no_memory_at_all() -> (
+    None
+):
     """Three trials in steps of 1 s, 1 s and 5 s, and one of a single row, correlated over 2 s."""
     rng = np.random.default_rng(2)
     X, y = rng.standard_normal((41, 2)), rng.standard_normal(41)
@@ -139,13 +171,22 @@ def test_memory_of_each_trial_is_counted_in_its_own_steps_and_a_short_one_is_no_
     for memory, lags in ((2.0, (2, 2, 0, 0)), (0.05, (0, 0, 0, 0))):
         meat = sum(newey_west(scores[trial == k], lag) for k, lag in enumerate(lags))
         np.testing.assert_allclose(
-            joint_covariance(fitted, samples, memory), inverse @ meat @ inverse, rtol=1e-6
+            joint_covariance(fitted, samples, memory),
+            inverse @ meat @ inverse,
+            rtol=1e-6,
         )
 
 
 def test_as_many_terms_as_samples_leave_one_degree_of_freedom() -> None:
     X = np.random.default_rng(3).standard_normal((3, 3))
     samples = Samples(
-        {"v": X}, {"v": X.sum(axis=1)}, np.arange(3.0), np.ones(3), np.zeros(3, dtype=np.int64), 1
+        {"v": X},
+        {"v": X.sum(axis=1)},
+        np.arange(3.0),
+        np.ones(3),
+        np.zeros(3, dtype=np.int64),
+        1,
     )
-    assert effective_freedom(fit_all(get_method("ls").estimator, samples)["v"], X) == 1.0
+    assert (
+        effective_freedom(fit_all(get_method("ls").estimator, samples)["v"], X) == 1.0
+    )

@@ -15,12 +15,21 @@ def moments():
 
 
 def test_the_steps_lead_from_the_full_model_to_the_printed_reduced_one():
-    printed = {name for step in xu2020_tank.STEPS if step.table in (4, 7, 10) for name in step.kept}
+    printed = {
+        name
+        for step in xu2020_tank.STEPS
+        if step.table in (4, 7, 10)
+        for name in step.kept
+    }
     assert printed == set(TABLE_11) == set(PMM18.coefficient_names)
-    assert {name for step in xu2020_tank.STEPS for name in step.terms} < set(PMM38.coefficient_names)
+    assert {name for step in xu2020_tank.STEPS for name in step.terms} < set(
+        PMM38.coefficient_names
+    )
 
 
-@pytest.mark.parametrize("step", xu2020_tank.STEPS, ids=lambda step: f"table {step.table}")
+@pytest.mark.parametrize(
+    "step", xu2020_tank.STEPS, ids=lambda step: f"table {step.table}"
+)
 def test_each_step_keeps_what_the_paper_keeps(fitted, step):
     """But for Y_r|r| of Table 6, which the paper drops later: the truth has none."""
     assert set(fitted.reductions[step.table].terms) == set(step.kept) - {"Y_r|r|"}
@@ -61,12 +70,19 @@ def test_intervals_hold_the_truth_as_often_as_they_say():
 def test_the_dense_dual_fits_by_its_own_multipliers_and_predicts_nothing(moments):
     """What it predicts is rounding, another number in each run; its coefficients are never the ship's.
 
-    y - alpha/C is y itself where C is huge; the fit w x + b fails on its own training set too.
+    y - alpha/C is y itself where C is huge; the fit w x + b fails on its own training
+    set too.
     """
     assert moments.training["multipliers"] > 0.99
     assert moments.training["classical"] < 0.99
     assert moments.validation["classical"] < 0.99 < moments.validation["primal"]
-    assert max(abs(value / TABLE_11[name] - 1.0) for name, value in moments.classical.items()) > 0.5
+    assert (
+        max(
+            abs(value / TABLE_11[name] - 1.0)
+            for name, value in moments.classical.items()
+        )
+        > 0.5
+    )
 
 
 def test_truncated_and_primal_estimators_predict(moments):

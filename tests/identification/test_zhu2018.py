@@ -56,7 +56,9 @@ def test_the_chosen_pair_reaches_its_aims_with_another_term_or_rudder_limit_and_
     rows = list(steering_forms.chosen_rows())
     assert [row.aim for row in rows] == ["below 0.02", "below 0.005"] * 3
     assert [row.met for row in rows] == [True, False, True, True, True, True]
-    assert [row.best for row in rows[:4]] == pytest.approx([0.0173, 0.0101, 0.0054, 0.0042], rel=0.02)
+    assert [row.best for row in rows[:4]] == pytest.approx(
+        [0.0173, 0.0101, 0.0054, 0.0042], rel=0.02
+    )
     assert all(row.as_paper > row.best for row in rows[:2])
 
 
@@ -68,7 +70,10 @@ def test_the_thesis_order_of_the_recursions_is_that_of_a_ship_integrated_by_eule
     )
     assert plain[a22] == pytest.approx(-31.3, abs=1.0)
     assert np.abs(started).max() < 0.1
-    accurate = [recursive_start.errors(recursive_start.as_printed(m))[a22] for m in ("RLS", "LSSVR-RLS")]
+    accurate = [
+        recursive_start.errors(recursive_start.as_printed(m))[a22]
+        for m in ("RLS", "LSSVR-RLS")
+    ]
     assert abs(accurate[0]) < abs(accurate[1])
 
 
@@ -85,7 +90,9 @@ def test_coefficients_of_the_chosen_yaw_model_come_out_as_printed():
 @pytest.mark.parametrize("equation", ["u", "v", "r"])
 def test_the_samples_that_suffice_the_thesis_suffice(equation):
     count = sample_counts.SUFFICE[equation]
-    assert sample_counts.learned_best(count)[equation] < sample_counts.WITH_ALL[equation]
+    assert (
+        sample_counts.learned_best(count)[equation] < sample_counts.WITH_ALL[equation]
+    )
 
 
 def test_settling_is_read_off_a_curve():
@@ -99,7 +106,9 @@ def test_settling_is_read_off_a_curve():
 
 def test_outliers_bias_least_squares_and_ls_svr_alike_and_the_weighted_form_little():
     errors = {
-        method: response_models.mean_error(response_models.fitted(method, "linear"), "K")
+        method: response_models.mean_error(
+            response_models.fitted(method, "linear"), "K"
+        )
         for method in ("LS", "LS-SVR", "best")
     }
     assert errors["LS"] == pytest.approx(errors["LS-SVR"], rel=0.1)
@@ -112,7 +121,9 @@ def test_a_clean_log_gives_the_stand_in_back():
     assert response_models.Form(0.2, 1.0, a=2.0).steady < 4.0
     truth = response_models.log(response_models.ASSESSED, 0)
     noise = np.hypot(response_models.NOISE["noise"], response_models.NOISE["drift"])
-    assert np.std(response_models.residuals(form, truth)) == pytest.approx(noise, rel=0.3)
+    assert np.std(response_models.residuals(form, truth)) == pytest.approx(
+        noise, rel=0.3
+    )
 
 
 def test_all_six_of_the_mariner_come_within_five_per_cent_and_the_printed_way_fails_where_printed():
@@ -120,7 +131,9 @@ def test_all_six_of_the_mariner_come_within_five_per_cent_and_the_printed_way_fa
     for method, printed in recursive_start.PRINTED.items():
         ours = recursive_start.errors(recursive_start.as_printed(method))
         assert ours[0] == pytest.approx(100.0 * printed[0], abs=15.0)  # a11
-        assert np.abs(ours[[2, 3, 5]]).max() < 6.0  # b11, a21, b21, which the thesis finds too
+        assert (
+            np.abs(ours[[2, 3, 5]]).max() < 6.0
+        )  # b11, a21, b21, which the thesis finds too
 
 
 def test_number_and_interval_of_samples_do_not_matter_at_best():

@@ -12,5 +12,7 @@ def table(name: str) -> np.ndarray:
     """Rows of a reference file; skips the test where the reference data is absent."""
     path = SHARED / "reference" / name
     if not path.is_file():
-        pytest.skip("the reference data lies beside the checkout of the developers only")
+        pytest.skip(
+            "the reference data lies beside the checkout of the developers only"
+        )
     return np.genfromtxt(path, delimiter=",", names=True)

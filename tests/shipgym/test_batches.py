@@ -19,7 +19,7 @@ from shipgym.engine.mathematics import (
     turn_sin_cos,
     two_to,
     wrap,
-)  # fmt: skip
+)
 from shipgym.engine.records import LANES
 
 SHIPS = ("mariner", "container", "tanker", "kvlcc2")
@@ -27,21 +27,31 @@ SHIPS = ("mariner", "container", "tanker", "kvlcc2")
 
 def loop(x, y, out):
     for i in range(x.size):
-        out[0, i], out[1, i], out[2, i] = exponential(x[i]), arctan(x[i]), arctan2(y[i], x[i])
+        out[0, i], out[1, i], out[2, i] = (
+            exponential(x[i]),
+            arctan(x[i]),
+            arctan2(y[i], x[i]),
+        )
 
 
 def over(x, y):
     """Our functions as loops compile them."""
     out = np.empty((3, x.size))
-    compiled(loop, "void(float64[::1], float64[::1], float64[:, ::1])", {}, "mathematics")(x, y, out)
+    compiled(
+        loop, "void(float64[::1], float64[::1], float64[:, ::1])", {}, "mathematics"
+    )(x, y, out)
     return out
 
 
 def test_the_exponential_is_exact_to_rounding_over_its_whole_range():
-    x = np.concatenate([np.linspace(-708.0, 709.7, 200_001), np.linspace(-1.0, 1.0, 20_001)])
+    x = np.concatenate(
+        [np.linspace(-708.0, 709.7, 200_001), np.linspace(-1.0, 1.0, 20_001)]
+    )
     np.testing.assert_allclose(over(x, x)[0], np.exp(x), rtol=5e-16)
     subnormal = np.linspace(-745.0, -708.0, 1001)
-    np.testing.assert_allclose(over(subnormal, subnormal)[0], np.exp(subnormal), rtol=5e-16, atol=1e-323)
+    np.testing.assert_allclose(
+        over(subnormal, subnormal)[0], np.exp(subnormal), rtol=5e-16, atol=1e-323
+    )
 
 
 def test_the_exponential_ends_as_numpy_s():
@@ -52,7 +62,9 @@ def test_the_exponential_ends_as_numpy_s():
 
 def test_the_arc_tangent_is_exact_to_rounding_over_its_whole_range():
     rng = np.random.default_rng(0)
-    x, y = rng.standard_normal((2, 100_000)) * 10.0 ** rng.uniform(-12.0, 12.0, (2, 100_000))
+    x, y = rng.standard_normal((2, 100_000)) * 10.0 ** rng.uniform(
+        -12.0, 12.0, (2, 100_000)
+    )
     _, single, double = over(x, y)
     np.testing.assert_allclose(single, np.arctan(x), rtol=5e-16)
     np.testing.assert_allclose(double, np.arctan2(y, x), rtol=5e-16)
@@ -72,21 +84,32 @@ def test_a_ship_in_a_batch_sails_as_it_does_alone(name, shared):
     """Every lane with a rudder of its own, against one simulation for three of them."""
     model = shipgym.load_model(name)
     n_state = len(model.state_names)
-    h, steps, tiles = 0.02 * model.particulars["length"] / model.particulars["speed"], 60, 2
+    h, steps, tiles = (
+        0.02 * model.particulars["length"] / model.particulars["speed"],
+        60,
+        2,
+    )
     rudders = np.radians(np.linspace(-30.0, 30.0, tiles * LANES))
     states = np.repeat(np.tile(model.service_state, (tiles, 1)), LANES, 1)
     commands = np.empty((tiles, 2, LANES))
-    commands[:, 0], commands[:, 1] = rudders.reshape(tiles, -1), model.service_shaft_speed
+    commands[:, 0], commands[:, 1] = (
+        rudders.reshape(tiles, -1),
+        model.service_shaft_speed,
+    )
     advance = ship_loop(model.vessel, "alike" if shared else "fleet")
     ships = np.repeat(model.ship_numbers(), 1 if shared else LANES)
     advance(states, commands.reshape(tiles, -1), h, steps, ships[None])
-    lanes = states.reshape(tiles, n_state, LANES).transpose(0, 2, 1).reshape(-1, n_state)
+    lanes = (
+        states.reshape(tiles, n_state, LANES).transpose(0, 2, 1).reshape(-1, n_state)
+    )
     for lane in (0, 40, 127):
         held = np.tile(model.service_command, (steps, 1))
         held[:, 0] = rudders[lane]
         alone = model.simulate(held, h)
         for channel, value in zip(model.state_names, lanes[lane], strict=True):
-            assert value == pytest.approx(alone[channel][-1], rel=1e-10, abs=1e-12), channel
+            assert value == pytest.approx(alone[channel][-1], rel=1e-10, abs=1e-12), (
+                channel
+            )
 
 
 def test_powers_of_two_are_exact_to_two_parts_in_a_hundred_million_million():
@@ -102,15 +125,27 @@ def test_the_nearest_whole_number_is_even_at_a_half():
     assert [nearest(one) for one in x] == np.round(x).tolist()
 
 
-@pytest.mark.parametrize(("largest", "error"), [(0.6, 2e-16), (np.pi / 4, 2e-14), (np.pi / 2, 1e-9)])
-def test_sine_and_cosine_of_a_turn_within_a_step_have_their_stated_error(largest, error):
+@pytest.mark.parametrize(
+    ("largest", "error"), [(0.6, 2e-16), (np.pi / 4, 2e-14), (np.pi / 2, 1e-9)]
+)
+def test_sine_and_cosine_of_a_turn_within_a_step_have_their_stated_error(
+    largest, error
+):
     x = np.linspace(-largest, largest, 1001)
     found = np.array([turn_sin_cos(angle) for angle in x])
-    np.testing.assert_allclose(found, np.stack([np.sin(x), np.cos(x)], axis=1), rtol=0.0, atol=error)
+    np.testing.assert_allclose(
+        found, np.stack([np.sin(x), np.cos(x)], axis=1), rtol=0.0, atol=error
+    )
 
 
 def test_a_number_is_clipped_to_its_bounds_and_one_of_two_is_picked():
-    assert [clip(one, -1.0, 2.0) for one in (-3.0, -1.0, 0.5, 2.0, 9.0)] == [-1.0, -1.0, 0.5, 2.0, 2.0]
+    assert [clip(one, -1.0, 2.0) for one in (-3.0, -1.0, 0.5, 2.0, 9.0)] == [
+        -1.0,
+        -1.0,
+        0.5,
+        2.0,
+        2.0,
+    ]
     assert (pick(True, 1.0, 2.0), pick(False, 1.0, 2.0)) == (1.0, 2.0)
 
 

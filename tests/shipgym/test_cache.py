@@ -85,12 +85,17 @@ print(json.dumps(found))
 def start(code, *arguments, cache, errors=None):
     return subprocess.Popen(
         [sys.executable, "-c", code, *arguments],
-        env={**os.environ, "SHIPGYM_CACHE": str(cache)}, stdout=subprocess.PIPE, stderr=errors, text=True,
-    )  # fmt: skip
+        env={**os.environ, "SHIPGYM_CACHE": str(cache)},
+        stdout=subprocess.PIPE,
+        stderr=errors,
+        text=True,
+    )
 
 
 def test_of_processes_that_start_at_once_one_compiles(tmp_path):
-    workers = [start(WORKER.format(while_compiling="pass"), cache=tmp_path) for _ in range(4)]
+    workers = [
+        start(WORKER.format(while_compiling="pass"), cache=tmp_path) for _ in range(4)
+    ]
     answers = [worker.communicate()[0].split() for worker in workers]
     assert sorted(answers) == [["compiles", "done"]] + [["done"]] * 3
     assert len(list(tmp_path.glob("*.loop"))) == 1
@@ -100,7 +105,8 @@ def test_of_processes_that_start_at_once_one_compiles(tmp_path):
 @pytest.mark.skipif(os.name == "nt", reason="there is no such signal")
 def test_a_process_that_is_killed_while_it_compiles_blocks_nobody(tmp_path):
     killed = start(
-        WORKER.format(while_compiling=f"os.kill(os.getpid(), {int(signal.SIGKILL)})"), cache=tmp_path
+        WORKER.format(while_compiling=f"os.kill(os.getpid(), {int(signal.SIGKILL)})"),
+        cache=tmp_path,
     )
     assert killed.communicate()[0].split() == ["compiles"]
     assert list(tmp_path.glob("*.lock"))
@@ -109,7 +115,8 @@ def test_a_process_that_is_killed_while_it_compiles_blocks_nobody(tmp_path):
 
 
 @pytest.mark.parametrize(
-    "damage", [lambda whole: b"", lambda whole: whole[:-100], lambda whole: whole[:-1] + b"?"]
+    "damage",
+    [lambda whole: b"", lambda whole: whole[:-100], lambda whole: whole[:-1] + b"?"],
 )
 def test_a_damaged_file_is_compiled_anew(tmp_path, damage):
     code = WORKER.format(while_compiling="pass")
@@ -119,18 +126,27 @@ def test_a_damaged_file_is_compiled_anew(tmp_path, damage):
     file.write_bytes(damage(whole))
     told, said = start(code, cache=tmp_path, errors=subprocess.PIPE).communicate()
     assert told.split() == ["compiles", "done"]
-    assert said.count(f"{tmp_path}: a compiled loop is damaged; it is compiled again") == 1
-    assert start(code, cache=tmp_path, errors=subprocess.PIPE).communicate() == ("done\n", "")
+    assert (
+        said.count(f"{tmp_path}: a compiled loop is damaged; it is compiled again") == 1
+    )
+    assert start(code, cache=tmp_path, errors=subprocess.PIPE).communicate() == (
+        "done\n",
+        "",
+    )
 
 
 @pytest.mark.skipif(os.name == "nt", reason="Windows has other permissions")
 def test_a_cache_of_another_user_is_read_and_closed_folders_are_said():
-    with tempfile.TemporaryDirectory() as home:  # pytest's own folders are closed to other users
+    with (
+        tempfile.TemporaryDirectory() as home
+    ):  # pytest's own folders are closed to other users
         Path(home).chmod(0o755)
         folder, closed = Path(home) / "cache", Path(home) / "closed"
         folder.mkdir()
         closed.mkdir()
-        found = json.loads(start(OTHER_USER, str(folder), str(closed), cache=folder).communicate()[0])
+        found = json.loads(
+            start(OTHER_USER, str(folder), str(closed), cache=folder).communicate()[0]
+        )
         folder.chmod(stat.S_IRWXU)
         closed.chmod(stat.S_IRWXU)
     assert found.pop("before") == [2.0, 1, []]
@@ -139,7 +155,10 @@ def test_a_cache_of_another_user_is_read_and_closed_folders_are_said():
     for factor, compilations, messages in found.values():
         assert factor in (2.0, 3.0)
         assert compilations == 1
-        assert re.search("cannot be written .* compiled again in each process. Set SHIPGYM_CACHE", *messages)
+        assert re.search(
+            "cannot be written .* compiled again in each process. Set SHIPGYM_CACHE",
+            *messages,
+        )
 
 
 @pytest.fixture
@@ -174,7 +193,8 @@ posix = pytest.mark.skipif(os.name == "nt", reason="Windows has other permission
 def test_a_folder_that_others_may_write_is_not_used(folder, mode):
     folder.chmod(mode)
     with pytest.warns(
-        UserWarning, match="cache may be written by other users; chmod go-w .*cache, or set"
+        UserWarning,
+        match="cache may be written by other users; chmod go-w .*cache, or set",
     ) as said:
         assert cache_folder.usable_folder() is None
     assert len(said) == 1
@@ -185,7 +205,10 @@ def test_a_folder_that_others_may_write_is_not_used(folder, mode):
 @posix
 def test_so_is_one_below_a_folder_that_others_may_write_but_for_sticky_ones(folder):
     folder.parent.chmod(0o777)
-    with pytest.raises(ValueError, match=r"above may be written by other users; chmod go-w .*above, or set"):
+    with pytest.raises(
+        ValueError,
+        match=r"above may be written by other users; chmod go-w .*above, or set",
+    ):
         cache_folder.open_folder()
     folder.parent.chmod(0o1777)  # as /tmp: others cannot rename what is not theirs
     assert cache_folder.open_folder() == folder
@@ -195,7 +218,8 @@ def test_so_is_one_below_a_folder_that_others_may_write_but_for_sticky_ones(fold
 def test_a_folder_of_another_user_is_not_used(folder, give):
     give(folder.parent)
     with pytest.raises(
-        ValueError, match=r"belongs to another user \(\d+\); set SHIPGYM_CACHE to a folder that"
+        ValueError,
+        match=r"belongs to another user \(\d+\); set SHIPGYM_CACHE to a folder that",
     ):
         cache_folder.open_folder()
     give(folder)
@@ -211,7 +235,9 @@ def test_folders_are_made_so_that_only_their_owner_may_write(folder, monkeypatch
         assert cache_folder.open_folder() == folder / "a" / "b"
     finally:
         os.umask(before)
-    assert [stat.S_IMODE(one.stat().st_mode) for one in (folder / "a", folder / "a" / "b")] == [0o755, 0o755]
+    assert [
+        stat.S_IMODE(one.stat().st_mode) for one in (folder / "a", folder / "a" / "b")
+    ] == [0o755, 0o755]
 
 
 @posix
@@ -231,7 +257,9 @@ class Planted:
 
 @posix
 @pytest.mark.parametrize("change", ["owner", "group", "others", "link"])
-def test_a_file_that_another_user_could_have_written_is_not_run(folder, give, monkeypatch, change):
+def test_a_file_that_another_user_could_have_written_is_not_run(
+    folder, give, monkeypatch, change
+):
     monkeypatch.chdir(folder)
     cache = DiskCache(folder, "tag", "void()")
     cache_folder.write_loop(pickle.dumps(Planted()), cache.path)
@@ -258,7 +286,10 @@ def test_what_cannot_be_loaded_is_said_and_compiled_anew(folder):
     cache = DiskCache(folder, "tag", "void()")
     cache_folder.write_loop(b"no pickle", cache.path)
     assert cache.ready()
-    with pytest.warns(UserWarning, match=r"cannot be loaded \(UnpicklingError: .*; it is compiled again"):
+    with pytest.warns(
+        UserWarning,
+        match=r"cannot be loaded \(UnpicklingError: .*; it is compiled again",
+    ):
         assert cache.load_overload(None, SimpleNamespace(refresh=lambda: None)) is None
 
 
@@ -268,7 +299,8 @@ def test_drafts_of_killed_processes_are_removed_by_the_next_one(folder):
     killed.wait()
     own = draft_name(loop).name
     dead, living = (
-        folder / own.replace(f"-{os.getpid()}.", f"-{process}.") for process in (killed.pid, os.getppid())
+        folder / own.replace(f"-{os.getpid()}.", f"-{process}.")
+        for process in (killed.pid, os.getppid())
     )
     dead.touch()
     living.touch()
@@ -281,10 +313,16 @@ def test_drafts_of_killed_processes_are_removed_by_the_next_one(folder):
 def test_a_full_disk_is_said_once_and_nothing_is_left(tmp_path):
     full = "import resource; resource.setrlimit(resource.RLIMIT_FSIZE, (500, 500))\n"
     told, said = start(
-        full + WORKER.format(while_compiling="pass"), cache=tmp_path, errors=subprocess.PIPE
+        full + WORKER.format(while_compiling="pass"),
+        cache=tmp_path,
+        errors=subprocess.PIPE,
     ).communicate()
     assert told.split() == ["compiles", "done"]
-    assert said.count("CacheWarning") == said.count("cannot be written (File too large)") == 1
+    assert (
+        said.count("CacheWarning")
+        == said.count("cannot be written (File too large)")
+        == 1
+    )
     assert not [path for path in tmp_path.iterdir() if path.suffix != ".lock"]
 
 
@@ -302,7 +340,13 @@ def test_who_waits_at_a_terminal_sees_one_line(tmp_path, monkeypatch, capsys):
     compiling._announce("CourseKeeping for 'mariner'", tmp_path)
     line = capsys.readouterr().err
     assert line.count("\n") == 1
-    for told in ("CourseKeeping for 'mariner'", "once", "about", str(tmp_path), "shipgym warm"):
+    for told in (
+        "CourseKeeping for 'mariner'",
+        "once",
+        "about",
+        str(tmp_path),
+        "shipgym warm",
+    ):
         assert told in line
     monkeypatch.setattr("sys.stderr.isatty", lambda: False)
     compiling._announce("it", tmp_path)
@@ -311,16 +355,27 @@ def test_who_waits_at_a_terminal_sees_one_line(tmp_path, monkeypatch, capsys):
 
 @pytest.mark.parametrize("task", ["PathFollowing", "PathFollowing-v1"])
 def test_loops_over_ships_are_vectorised(task, monkeypatch):
-    monkeypatch.setattr(compiling, "usable_folder", lambda: None)  # what comes from the cache tells no code
+    monkeypatch.setattr(
+        compiling, "usable_folder", lambda: None
+    )  # what comes from the cache tells no code
     vessel = shipgym.load_model("mariner-tls-svm").vessel
     sensors = shipped_sensors(False, False, False)
-    (code,) = Voyages(vessel, read_definition(task), sensors, False, True).run.inspect_llvm().values()
+    (code,) = (
+        Voyages(vessel, read_definition(task), sensors, False, True)
+        .run.inspect_llvm()
+        .values()
+    )
     counts = [
-        [len(re.findall(rf" = f(?:mul|add|sub) (?:contract )?{kind}", block)) for kind in (VECTOR, "double")]
+        [
+            len(re.findall(rf" = f(?:mul|add|sub) (?:contract )?{kind}", block))
+            for kind in (VECTOR, "double")
+        ]
         for block in re.split(r"\n\n|\n}\n", code)
     ]
     (sailing, alone), (concluding, alone_too), *_ = sorted(counts, reverse=True)
-    assert sailing > 300  # the Runge-Kutta step with the ship's 40 terms; on any processor, however wide
+    assert (
+        sailing > 300
+    )  # the Runge-Kutta step with the ship's 40 terms; on any processor, however wide
     assert concluding > 60  # reward and observations
     assert alone == alone_too == 0
 
@@ -355,7 +410,10 @@ def test_a_user_whom_the_list_of_users_lacks_has_no_home(monkeypatch):
     monkeypatch.delenv("SHIPGYM_CACHE", raising=False)
     monkeypatch.setattr(cache_folder, "user_cache_path", unknown)
     cache_folder.usable_folder.cache_clear()
-    with pytest.warns(cache_folder.CacheWarning, match="cannot be written .the user has no home., so ships"):
+    with pytest.warns(
+        cache_folder.CacheWarning,
+        match="cannot be written .the user has no home., so ships",
+    ):
         assert cache_folder.usable_folder() is None
     cache_folder.usable_folder.cache_clear()
 
@@ -372,7 +430,9 @@ def test_the_cache_is_where_the_user_says_or_where_caches_are(monkeypatch, tmp_p
     monkeypatch.setenv("SHIPGYM_CACHE", str(tmp_path))
     assert cache_folder.cache_folder() == tmp_path
     monkeypatch.setenv("HOME", str(tmp_path))
-    monkeypatch.setenv("SHIPGYM_CACHE", "~/ships")  # as a container's settings have it, without a shell
+    monkeypatch.setenv(
+        "SHIPGYM_CACHE", "~/ships"
+    )  # as a container's settings have it, without a shell
     assert cache_folder.cache_folder() == tmp_path / "ships"
     monkeypatch.undo()
     monkeypatch.setenv("SHIPGYM_CACHE", "")
@@ -380,11 +440,19 @@ def test_the_cache_is_where_the_user_says_or_where_caches_are(monkeypatch, tmp_p
 
 
 def test_what_is_wrong_with_a_loop_s_file_is_told_and_other_files_are_none(folder):
-    whole, damaged, other = folder / "whole.loop", folder / "damaged.loop", folder / "other.txt"
+    whole, damaged, other = (
+        folder / "whole.loop",
+        folder / "damaged.loop",
+        folder / "other.txt",
+    )
     cache_folder.write_loop(b"content", whole)
     damaged.write_bytes(whole.read_bytes()[:-1])
     other.write_bytes(b"anything")
-    assert [cache_folder.loop_fault(path) for path in (whole, damaged, other)] == ["", "is damaged", ""]
+    assert [cache_folder.loop_fault(path) for path in (whole, damaged, other)] == [
+        "",
+        "is damaged",
+        "",
+    ]
     assert "No such file" in cache_folder.loop_fault(folder / "none.loop")
 
 
@@ -401,10 +469,16 @@ def test_loops_may_be_read_by_others_whatever_the_user_s_habit(folder):
 def test_a_lock_is_held_while_a_loop_is_compiled_and_free_afterwards(folder):
     other = FileLock(folder / "hash.lock")
     waits = []
-    with cache_folder.locked(folder / "hash-signature.loop", lambda: waits.append(1)), pytest.raises(Timeout):
+    with (
+        cache_folder.locked(folder / "hash-signature.loop", lambda: waits.append(1)),
+        pytest.raises(Timeout),
+    ):
         other.acquire(timeout=0)
     assert waits == []
-    with other, cache_folder.locked(folder / "hash-signature.loop", other.release):  # who waits is told
+    with (
+        other,
+        cache_folder.locked(folder / "hash-signature.loop", other.release),
+    ):  # who waits is told
         assert not other.is_locked
     other.acquire(timeout=0)
     other.release()
@@ -423,19 +497,29 @@ def test_a_loop_is_given_once_and_only_while_its_file_is_there(folder):
 
 
 def test_arguments_of_another_kind_have_a_file_of_their_own(folder):
-    paths = {DiskCache(folder, tag, of).path for tag in ("one", "two") for of in ("void()", "void(int64)")}
+    paths = {
+        DiskCache(folder, tag, of).path
+        for tag in ("one", "two")
+        for of in ("void()", "void(int64)")
+    }
     assert len(paths) == 4
     assert all(path.parent == folder for path in paths)
-    assert all(re.fullmatch(r"(one|two)-[0-9a-f]{8}\.loop", path.name) for path in paths)
+    assert all(
+        re.fullmatch(r"(one|two)-[0-9a-f]{8}\.loop", path.name) for path in paths
+    )
 
 
 def test_code_that_names_places_of_this_process_is_not_kept(folder):
     cache = DiskCache(folder, "tag", "void()")
     library = SimpleNamespace(has_dynamic_globals=True)
-    cache.save_overload(None, SimpleNamespace(library=library, _reduce=lambda: ("code",)))
+    cache.save_overload(
+        None, SimpleNamespace(library=library, _reduce=lambda: ("code",))
+    )
     assert not cache.path.exists()
     library.has_dynamic_globals = False
-    cache.save_overload(None, SimpleNamespace(library=library, _reduce=lambda: ("code",)))
+    cache.save_overload(
+        None, SimpleNamespace(library=library, _reduce=lambda: ("code",))
+    )
     assert pickle.loads(cache_folder.read_loop(cache.path)) == ("code",)
 
 
@@ -446,17 +530,26 @@ def test_a_warning_of_the_cache_names_folder_reason_and_remedy(tmp_path):
         cache_folder.warn_of(tmp_path / "b", InputError("no place"))
         cache_folder.warn_of(tmp_path / "a", OSError(28, "No space left on device"))
     assert [str(one.message) for one in said] == [
-        f"{tmp_path}/{name}: cannot be written ({reason}), so ships are compiled again in each process. "
-        "Set SHIPGYM_CACHE to a folder that can."
+        f"{tmp_path}/{name}: cannot be written ({reason}), so ships are compiled again"
+        " in each process. Set SHIPGYM_CACHE to a folder that can."
         for name, reason in (("a", "No space left on device"), ("b", "no place"))
     ]
 
 
 @pytest.mark.parametrize(
-    ("folder", "kept"), [(Path("/c"), "kept in /c (beforehand: shipgym warm)"), (None, "kept in memory only")]
+    ("folder", "kept"),
+    [
+        (Path("/c"), "kept in /c (beforehand: shipgym warm)"),
+        (None, "kept in memory only"),
+    ],
 )
-def test_who_waits_in_a_notebook_sees_where_loops_are_kept(monkeypatch, capsys, folder, kept):
+def test_who_waits_in_a_notebook_sees_where_loops_are_kept(
+    monkeypatch, capsys, folder, kept
+):
     monkeypatch.setattr("sys.stderr.isatty", lambda: False)
     monkeypatch.setitem(sys.modules, "ipykernel", None)
     compiling._announce("a ship", folder)
-    assert capsys.readouterr().err == f"shipgym: compiling a ship, once, about 4 s; {kept}\n"
+    assert (
+        capsys.readouterr().err
+        == f"shipgym: compiling a ship, once, about 4 s; {kept}\n"
+    )

@@ -21,7 +21,14 @@ from numba.experimental import jitclass
 from numba.extending import intrinsic
 
 import shipgym
-from shipgym.engine import addresses, compiling, lean_numba, mathematics, places, specialise
+from shipgym.engine import (
+    addresses,
+    compiling,
+    lean_numba,
+    mathematics,
+    places,
+    specialise,
+)
 from shipgym.engine.loops import LOOPS, ship_loop
 from shipgym.engine.numba_errors import explanation
 from shipgym.engine.record_code import (
@@ -47,7 +54,10 @@ from shipgym.tasks.definition import read_definition
 from tests.shipgym.outer import outer
 
 sin_cos, wrap = outer(mathematics.sin_cos), outer(mathematics.wrap)
-small_sin_cos, small_cosine = outer(mathematics.small_sin_cos), outer(mathematics.small_cosine)
+small_sin_cos, small_cosine = (
+    outer(mathematics.small_sin_cos),
+    outer(mathematics.small_cosine),
+)
 
 SAIL = """
 import numpy as np, shipgym
@@ -96,7 +106,9 @@ print('"prefer-vector-width"="512"' in text, "<8 x double>" in text)
 def test_another_ship_or_an_edited_function_has_a_file_of_its_own(monkeypatch):
     loop = LOOPS["simulate"].function
     ships = [shipgym.load_model(name).vessel for name in ("mariner", "container")]
-    parts, other = ({**sea_parts(False, lanes=1), **vessel.parts(1)} for vessel in ships)
+    parts, other = (
+        {**sea_parts(False, lanes=1), **vessel.parts(1)} for vessel in ships
+    )
 
     def twice(motion, coefficients, ship):
         return 0.0, 0.0, 0.0, 0.0, 2.0
@@ -116,12 +128,16 @@ def test_another_ship_or_an_edited_function_has_a_file_of_its_own(monkeypatch):
 
 
 def test_each_coefficient_is_read_once_and_what_terms_share_is_taken_out():
-    accelerations = shipgym.load_model("mariner").vessel.functions["accelerations"].function
+    accelerations = (
+        shipgym.load_model("mariner").vessel.functions["accelerations"].function
+    )
     source = inspect.getsource(accelerations)
     for row in range(40):
         assert len(re.findall(rf"c\.c{row}\b", source)) == 1
     sums = "".join(line for line in source.splitlines() if "dot =" in line)
-    assert sums.count(" * ") < 80  # of 40 terms with 93 factors and as many coefficients
+    assert (
+        sums.count(" * ") < 80
+    )  # of 40 terms with 93 factors and as many coefficients
 
 
 def test_sine_and_cosine_to_the_last_digits():
@@ -139,8 +155,19 @@ def test_wrapped_angles_are_the_same_direction():
 
 
 def test_importing_shipgym_leaves_the_heavy_libraries_alone():
-    heavy = ("numba", "scipy", "control", "torch", "stable_baselines3", "plotly", "sklearn")
-    code = f"import shipgym, sys; print([name for name in {heavy!r} if name in sys.modules])"
+    heavy = (
+        "numba",
+        "scipy",
+        "control",
+        "torch",
+        "stable_baselines3",
+        "plotly",
+        "sklearn",
+    )
+    code = (
+        f"import shipgym, sys; print([name for name in {heavy!r} if name in"
+        " sys.modules])"
+    )
     assert run(code) == "[]"
 
 
@@ -153,8 +180,12 @@ def test_no_warnings_when_loops_are_loaded():
 def test_small_angles_have_the_sine_and_cosine_of_the_library():
     x = np.linspace(-np.pi / 2, np.pi / 2, 2001)
     found = np.array([small_sin_cos(angle) for angle in x])
-    np.testing.assert_allclose(found, np.stack([np.sin(x), np.cos(x)], axis=1), rtol=0.0, atol=4e-16)
-    np.testing.assert_allclose([small_cosine(angle) for angle in x], np.cos(x), rtol=0.0, atol=4e-16)
+    np.testing.assert_allclose(
+        found, np.stack([np.sin(x), np.cos(x)], axis=1), rtol=0.0, atol=4e-16
+    )
+    np.testing.assert_allclose(
+        [small_cosine(angle) for angle in x], np.cos(x), rtol=0.0, atol=4e-16
+    )
     assert small_sin_cos(np.pi) == pytest.approx((0.0, -1.0), abs=3e-9)
 
 
@@ -173,16 +204,26 @@ def test_the_form_of_a_ship_is_compiled_and_may_be_chosen():
 
 
 def test_no_text_of_a_file_becomes_part_of_a_program():
-    source = accelerations_source({"r": Sum((Term("import os", (("r", 1),)),), (0,), 2)})
+    source = accelerations_source(
+        {"r": Sum((Term("import os", (("r", 1),)),), (0,), 2)}
+    )
     assert "import" not in source
 
 
 def test_a_reason_that_numba_colours_is_the_same_reason():
-    plain = 'Failed in step\nUnknown attribute "_replace"\n\nFile "own.py", line 25:\ndef f(\nat own.py (25)'
-    coloured = plain.replace("Unknown", "\x1b[1m\x1b[31mUnknown").replace("Failed", "\x1b[1mFailed")
+    plain = (
+        'Failed in step\nUnknown attribute "_replace"\n\nFile "own.py", line 25:\ndef'
+        " f(\nat own.py (25)"
+    )
+    coloured = plain.replace("Unknown", "\x1b[1m\x1b[31mUnknown").replace(
+        "Failed", "\x1b[1mFailed"
+    )
     said = explanation(ValueError(plain), "own")
     assert said == explanation(ValueError(coloured), "own")
-    assert said == 'own: cannot be compiled in f (own.py, line 25): Unknown attribute "_replace"'
+    assert (
+        said == "own: cannot be compiled in f (own.py, line 25): Unknown attribute"
+        ' "_replace"'
+    )
 
 
 class Sounding(NamedTuple):
@@ -196,7 +237,11 @@ def test_a_table_in_a_record_is_the_lane_s_column_of_its_tile():
     depth, shares = loader(rows).function(tile, 5)
     assert depth == 64 * 4 + 5
     assert shares[:3].tolist() == [64 * 5 + 5, 64 * 6 + 5, 64 * 7 + 5]
-    assert loader(rows, 1).function(np.arange(8.0), 5).shares.tolist() == [5.0, 6.0, 7.0]
+    assert loader(rows, 1).function(np.arange(8.0), 5).shares.tolist() == [
+        5.0,
+        6.0,
+        7.0,
+    ]
 
 
 class Fix(NamedTuple):
@@ -230,25 +275,44 @@ def test_records_are_read_and_stored_where_their_rows_are(jit, monkeypatch):
     rows = Layout(before=Fix, found=Anchor)["found"]
     single = Layout(found=(Anchor, ("place.north", "place.east")))["found"]
     table = Layout(found=Sounding)["found"]
-    bounds = {"chain": (-9.0, 9.0), "place.north": (-9.0, 15.0), "place.east": (-6.0, 9.0)}
+    bounds = {
+        "chain": (-9.0, 9.0),
+        "place.north": (-9.0, 15.0),
+        "place.east": (-6.0, 9.0),
+    }
     parts = {
-        "load": loader(rows), "load_one": loader(single, 1), "store": storer(rows),
-        "store_one": storer(single, 1), "store_bounded": bounded_storer(rows, bounds),
-        "store_number": number_storer(3), "choose": chooser(Anchor), "none": zero(Anchor),
-        "total": summer(Anchor), "row_of": row_reader(), "load_table": loader(table),
-    }  # fmt: skip
+        "load": loader(rows),
+        "load_one": loader(single, 1),
+        "store": storer(rows),
+        "store_one": storer(single, 1),
+        "store_bounded": bounded_storer(rows, bounds),
+        "store_number": number_storer(3),
+        "choose": chooser(Anchor),
+        "none": zero(Anchor),
+        "total": summer(Anchor),
+        "row_of": row_reader(),
+        "load_table": loader(table),
+    }
     monkeypatch.setattr(compiling, "plain_python", lambda: not jit)
     given, out = np.zeros(5 * 64), np.full(5 * 64, np.nan)
     given[[2 * 64 + 5, 3 * 64 + 5, 4 * 64 + 5]] = 2.0, 3.0, -4.0
     given[[0, 1]] = 10.0, 2.0  # north and east in the vector
-    compiling.compiled(moved, "void(float64[::1], float64[::1])", parts, "records")(given, out)
+    compiling.compiled(moved, "void(float64[::1], float64[::1])", parts, "records")(
+        given, out
+    )
     found = {int(k): float(out[k]) for k in np.flatnonzero(np.isfinite(out))}
     tile = {2: 2.0, 3: 3.0, 4: -4.0}
     expected = {64 * row + 7: value for row, value in tile.items()}
     expected |= {0: 10.0, 1: 2.0}  # as the vector had it
-    expected |= {2 * 64 + 11: 0.0, 3 * 64 + 11: 15.0, 4 * 64 + 11: -6.0}  # products within their bounds
+    expected |= {
+        2 * 64 + 11: 0.0,
+        3 * 64 + 11: 15.0,
+        4 * 64 + 11: -6.0,
+    }  # products within their bounds
     expected |= {3 * 64 + 13: 1.0, 2 * 64 + 15: 0.0, 3 * 64 + 15: 0.0, 4 * 64 + 15: 0.0}
-    assert found == expected | {3 * 64 + 17: 2.0}  # of a table in rows 1 to 3 the second
+    assert found == expected | {
+        3 * 64 + 17: 2.0
+    }  # of a table in rows 1 to 3 the second
 
 
 NO_MATCH = """Failed in step (step: nopython frontend)
@@ -271,10 +335,15 @@ def drift(u, v):
     [
         (
             NO_MATCH,
-            " in drift (own.py, line 7): No implementation of function Function(<built-in function sub>): "
-            "sub(float64, none)",
+            (
+                " in drift (own.py, line 7): No implementation of function"
+                " Function(<built-in function sub>): sub(float64, none)"
+            ),
         ),
-        ("Failed in step\nUntyped name 'w'\nat own.py (25)", " (own.py, line 25): Untyped name 'w'"),
+        (
+            "Failed in step\nUntyped name 'w'\nat own.py (25)",
+            " (own.py, line 25): Untyped name 'w'",
+        ),
         (
             f"Cannot unify\n<function drift_{'0a' * 12} at 0x7f>\nat own.py (25)",
             " in drift: Cannot unify",  # the line is that of who calls
@@ -321,8 +390,9 @@ def test_a_function_within_another_is_refused_with_what_it_uses_of_it():
     within = around(3)
     with pytest.raises(InputError) as caught:
         fingerprint(within, {})
-    assert str(caught.value) == (
-        f"{__file__}, line {within.__code__.co_firstlineno}, in within: "
+    assert (
+        str(caught.value)
+        == f"{__file__}, line {within.__code__.co_firstlineno}, in within: "
         "uses variables of the function around it (inner), expected a function at the "
         "top of a file"
     )
@@ -335,7 +405,9 @@ def user_asks():
 def test_names_of_a_user_s_function_are_the_user_s():
     assert list(specialise.named_globals(asked, {"GROUP": 16})) == [("GROUP", 16)]
     assert list(specialise.named_globals(user_asks, {"GROUP": 16})) == []
-    assert [specialise.is_shipped(one) for one in (asked, user_asks, compiling.plain)] == [True, False, True]
+    assert [
+        specialise.is_shipped(one) for one in (asked, user_asks, compiling.plain)
+    ] == [True, False, True]
 
 
 def measured(k):
@@ -345,7 +417,9 @@ def measured(k):
 
 def test_all_that_machine_code_depends_on_is_in_its_name():
     def named(change, **parts):
-        copy = FunctionType(measured.__code__, measured.__globals__, "measured", measured.__defaults__)
+        copy = FunctionType(
+            measured.__code__, measured.__globals__, "measured", measured.__defaults__
+        )
         copy.__doc__, copy.__module__ = measured.__doc__, "shipgym"
         change(copy)
         return fingerprint(copy, {"SHARE": 0.5, **parts})
@@ -396,11 +470,15 @@ def times(factor):
 
 
 def typed_double(context, k):
-    return k(k), lambda context, builder, signature, values: builder.fadd(values[0], values[0])
+    return k(k), lambda context, builder, signature, values: builder.fadd(
+        values[0], values[0]
+    )
 
 
 def typed_triple(context, k):
-    return k(k), lambda context, builder, signature, values: builder.fmul(values[0], values[0])
+    return k(k), lambda context, builder, signature, values: builder.fmul(
+        values[0], values[0]
+    )
 
 
 class Doubler:
@@ -439,7 +517,13 @@ def test_tables_compiled_helpers_and_modules_of_a_user_are_in_the_name_too():
     def named(helper=doubles, shared=doubles, row=1000, **more):
         table, tools = np.zeros(2000), ModuleType("tools")
         table[row], tools.share = 1.0, shared
-        names = {"__name__": "my_ship", "TABLE": table, "helper": helper, "tools": tools, **more}
+        names = {
+            "__name__": "my_ship",
+            "TABLE": table,
+            "helper": helper,
+            "tools": tools,
+            **more,
+        }
         return fingerprint(FunctionType(looks_up.__code__, names), {})
 
     assert named() == named()
@@ -466,7 +550,9 @@ def test_tables_compiled_helpers_and_modules_of_a_user_are_in_the_name_too():
         "an intrinsic": named(intrinsic(typed_double)),
         "another intrinsic": named(intrinsic(typed_triple)),
         "a class that Numba compiles": named(jitclass([("k", types.int64)])(Doubler)),
-        "another class that Numba compiles": named(jitclass([("k", types.int64)])(Tripler)),
+        "another class that Numba compiles": named(
+            jitclass([("k", types.int64)])(Tripler)
+        ),
         "what a compiled helper has from around it": named(njit(times(2.0))),
         "what another has from around it": named(njit(times(3.0))),
     }
@@ -475,7 +561,9 @@ def test_tables_compiled_helpers_and_modules_of_a_user_are_in_the_name_too():
 
 def test_which_of_two_functions_a_name_means_is_in_the_name():
     def named(first, second):
-        inner = FunctionType(uses_both.__code__, {"__name__": "my_ship", "one": first, "other": second})
+        inner = FunctionType(
+            uses_both.__code__, {"__name__": "my_ship", "one": first, "other": second}
+        )
         names = {"__name__": "my_ship", "one": double, "other": triple, "inner": inner}
         return fingerprint(FunctionType(uses_all.__code__, names), {})
 
@@ -489,7 +577,10 @@ def test_what_a_module_within_a_module_holds_is_in_the_name():
     def named(height):
         harbour, tide = ModuleType("harbour"), ModuleType("harbour.tide")
         harbour.tide, harbour.self, tide.HEIGHT = tide, harbour, height
-        return fingerprint(FunctionType(reads.__code__, {"__name__": "my_ship", "harbour": harbour}), {})
+        return fingerprint(
+            FunctionType(reads.__code__, {"__name__": "my_ship", "harbour": harbour}),
+            {},
+        )
 
     assert named(1.0) == named(1.0) != named(2.0)
 
@@ -500,7 +591,11 @@ def test_what_comprehensions_name_is_in_the_name_and_compiled():
             numbers[0] = sum([WEIGHT * k for k in numbers])  # noqa: F821
 
     def copied(weight):
-        return FunctionType(summed.__code__, {"__name__": "my_ship", "WEIGHT": weight, "sum": sum}, "summed")
+        return FunctionType(
+            summed.__code__,
+            {"__name__": "my_ship", "WEIGHT": weight, "sum": sum},
+            "summed",
+        )
 
     assert fingerprint(copied(2.0), {}) != fingerprint(copied(3.0), {})
     numbers = np.array([1.0, 2.0])
@@ -519,7 +614,10 @@ def test_for_whom_numba_was_told_to_write_is_in_the_name(monkeypatch):
 
 
 def test_places_that_nobody_filled_say_who_does():
-    with pytest.raises(RuntimeError, match=r"^push is a place that the sea fill when a loop is compiled$"):
+    with pytest.raises(
+        RuntimeError,
+        match=r"^push is a place that the sea fill when a loop is compiled$",
+    ):
         places.push(1, 2, 3)
     assert places.measure.__name__ == "measure"
     with pytest.raises(AttributeError, match="has no attribute 'pull'"):
@@ -533,10 +631,18 @@ def test_arrays_are_found_again_by_address_and_shape():
         np.array([True, False]),
     )
     empty = np.zeros((0, 5))
-    world = np.array([99, *addresses.addresses([words, table, empty, flags])], dtype=np.int64)
+    world = np.array(
+        [99, *addresses.addresses([words, table, empty, flags])], dtype=np.int64
+    )
     assert world[[2, 3, 4, 6, 7, 9, 10, 12]].tolist() == [2, 3, 4, 3, 2, 0, 5, 2]
-    found = [addresses.words_at.function(world, 1), addresses.table_at.function(world, 5)]
-    found += [addresses.table_at.function(world, 8), addresses.flags_at.function(world, 11)]
+    found = [
+        addresses.words_at.function(world, 1),
+        addresses.table_at.function(world, 5),
+    ]
+    found += [
+        addresses.table_at.function(world, 8),
+        addresses.flags_at.function(world, 11),
+    ]
     for one, other in zip(found, (words, table, empty, flags), strict=True):
         assert one.dtype == other.dtype
         np.testing.assert_array_equal(one, other, strict=True)
@@ -554,7 +660,9 @@ def test_the_plan_of_a_lane_stands_behind_its_rows_and_is_written_in_place():
 
 def mixed(numbers):
     for k in range(1, len(numbers)):
-        numbers[0] += min(numbers[k] * k, 2) / (k + 1) - (k // 2) ** 2 * (numbers[k] < k)
+        numbers[0] += min(numbers[k] * k, 2) / (k + 1) - (k // 2) ** 2 * (
+            numbers[k] < k
+        )
 
 
 def test_operators_that_are_looked_up_once_make_the_same_machine_code(monkeypatch):
@@ -569,7 +677,9 @@ def test_operators_that_are_looked_up_once_make_the_same_machine_code(monkeypatc
     monkeypatch.setattr(lean_numba, "OPERATORS", {})
     first, known = code(), set(lean_numba.OPERATORS)
     assert any("mul" in str(asked) for asked in known)
-    assert not any("min" in str(asked) for asked in known)  # Numba writes it in Python, and compiles it
+    assert not any(
+        "min" in str(asked) for asked in known
+    )  # Numba writes it in Python, and compiles it
     assert code() == first
     assert set(lean_numba.OPERATORS) == known
     monkeypatch.setattr(lean_numba, "_look_up_operators", lambda replace: None)
@@ -597,9 +707,14 @@ class Library:
 
 
 def test_libraries_beneath_a_loop_are_linked_once_each_after_what_it_calls():
-    leaf, other = Library(f"leaf{specialise.CALLED}"), Library("was_called", [Library("far")])
+    leaf, other = (
+        Library(f"leaf{specialise.CALLED}"),
+        Library("was_called", [Library("far")]),
+    )
     first = Library(f"first{specialise.CALLED}", [leaf, other])
-    loop = Library("loop", [Library(f"second{specialise.CALLED}", [first, leaf]), first, other])
+    loop = Library(
+        "loop", [Library(f"second{specialise.CALLED}", [first, leaf]), first, other]
+    )
     found = list(lean_numba._beneath(loop, {}))
     assert found == [leaf, other, first, loop._linking_libraries[0]]
 
@@ -625,13 +740,17 @@ print(*(asked(*names.split("-"))(0.0) for names in sys.argv[1:]))
 """
 
 
-def test_loops_from_files_call_their_own_functions_whose_names_and_types_are_alike(tmp_path):
+def test_loops_from_files_call_their_own_functions_whose_names_and_types_are_alike(
+    tmp_path,
+):
     """Records of one name that differ in the order of fields only, compiled in processes of their own."""
 
     def answers(*orders):
         environment = {**os.environ, "SHIPGYM_CACHE": str(tmp_path)}
         command = [sys.executable, "-c", ALIKE, *orders]
-        done = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
+        done = subprocess.run(
+            command, env=environment, capture_output=True, text=True, check=True
+        )
         return done.stdout.split()
 
     assert answers("near-far") == ["1.0"]
@@ -643,7 +762,13 @@ def test_loops_from_files_call_their_own_functions_whose_names_and_types_are_ali
 def test_loops_of_two_tasks_share_the_step_of_a_ship_but_not_that_of_another_ship():
     def sailing(task, model):
         vessel = shipgym.load_model(model).vessel
-        made = Voyages(vessel, read_definition(task), shipped_sensors(False, False, False), False, True)
+        made = Voyages(
+            vessel,
+            read_definition(task),
+            shipped_sensors(False, False, False),
+            False,
+            True,
+        )
         loop = specialise.Specialisation(made.parts, "tag", compiling._lean_jit())
         return loop.inner(made.parts["sail_lanes"])
 

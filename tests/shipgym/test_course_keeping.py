@@ -23,7 +23,12 @@ from shipgym.ships import Envelope
 from shipgym.tasks import course_keeping
 from shipgym.tasks.contract import Interval, Random, Readings
 from shipgym.tasks.steering import Weights, extras, helm, integrated, steering_reward
-from shipgym.tasks.task import OBSERVATION_NAMES, control_interval, course_keeping_task, observation_scales
+from shipgym.tasks.task import (
+    OBSERVATION_NAMES,
+    control_interval,
+    course_keeping_task,
+    observation_scales,
+)
 
 ID = "shipgym/CourseKeeping-v0"
 
@@ -52,7 +57,9 @@ def steer(env, policy, seed=0):
 def pd(observation):
     """A plain proportional and differential autopilot."""
     error = np.arctan2(observation[0], observation[1])
-    return np.array([np.clip(1.5 * error - 0.7 * observation[2], -1.0, 1.0)], dtype=np.float32)
+    return np.array(
+        [np.clip(1.5 * error - 0.7 * observation[2], -1.0, 1.0)], dtype=np.float32
+    )
 
 
 @pytest.mark.parametrize("check", [gymnasium_check_env, sb3_check_env])
@@ -62,7 +69,11 @@ def test_conformance_without_a_warning(check):
         env = make().unwrapped
         check(env)
     assert env.spec.id == ID
-    assert (env.waypoints, env.corridor, env.turn_radius) == (None, None, None)  # it has no path
+    assert (env.waypoints, env.corridor, env.turn_radius) == (
+        None,
+        None,
+        None,
+    )  # it has no path
 
 
 def test_registered_by_import_for_worker_processes():
@@ -80,7 +91,12 @@ def test_observation_is_the_scaled_physical_state():
     assert env.observation_names == OBSERVATION_NAMES
     assert seen["heading_error_sin"] == pytest.approx(np.sin(error), abs=1e-6)
     assert seen["heading_error_cos"] == pytest.approx(np.cos(error), abs=1e-6)
-    for name, value in (("yaw_rate", "r"), ("sway", "v"), ("surge", "u"), ("rudder", "delta")):
+    for name, value in (
+        ("yaw_rate", "r"),
+        ("sway", "v"),
+        ("surge", "u"),
+        ("rudder", "delta"),
+    ):
         assert seen[name] == pytest.approx(state[value], rel=1e-5, abs=1e-9)
 
 
@@ -91,16 +107,23 @@ def test_the_ship_is_the_one_that_the_model_simulates(mariner):
     commands = np.sin(np.arange(100.0))[:, None] * 0.5
     for command in commands:
         env.step(command.astype(np.float32))
-    trial = mariner.simulate(commands.astype(np.float32) * mariner.steering.limit, env.dt, start)
+    trial = mariner.simulate(
+        commands.astype(np.float32) * mariner.steering.limit, env.dt, start
+    )
     for name in mariner.state_names:
-        assert env.physical_state()[name] == pytest.approx(trial[name][-1], rel=1e-5, abs=1e-7)
+        assert env.physical_state()[name] == pytest.approx(
+            trial[name][-1], rel=1e-5, abs=1e-7
+        )
 
 
 def test_one_step_a_control_interval_is_accurate_enough(mariner):
     """Against 20 steps an interval the heading stays within 0.1 deg over 100 s of wild steering."""
     commands = np.repeat(np.random.default_rng(0).uniform(-0.5, 0.5, 100), 1)[:, None]
     dt = control_interval(mariner)
-    coarse, fine = mariner.simulate(commands, dt), mariner.simulate(np.repeat(commands, 20, axis=0), dt / 20)
+    coarse, fine = (
+        mariner.simulate(commands, dt),
+        mariner.simulate(np.repeat(commands, 20, axis=0), dt / 20),
+    )
     assert np.degrees(np.abs(coarse["psi"] - fine["psi"][::20])).max() < 0.1
 
 
@@ -114,9 +137,15 @@ def test_the_reward_is_the_classical_cost_and_the_sum_of_its_parts(mariner):
         error = before["set_point"] - after["psi"]
         rate = (after["delta"] - before["delta"]) / env.dt * 160.93 / 7.7175
         unit = np.radians(30.0)
-        cost = (error / unit) ** 2 + 0.1 * (after["delta"] / unit) ** 2 + 0.01 * (rate / unit) ** 2
+        cost = (
+            (error / unit) ** 2
+            + 0.1 * (after["delta"] / unit) ** 2
+            + 0.01 * (rate / unit) ** 2
+        )
         assert reward == pytest.approx(-cost, rel=1e-9)
-        assert reward == pytest.approx(sum(info[name] for name in info if name.startswith("reward_")))
+        assert reward == pytest.approx(
+            sum(info[name] for name in info if name.startswith("reward_"))
+        )
 
 
 def test_set_points_change_during_an_episode_and_are_kept_with_zero_change():
@@ -161,14 +190,20 @@ def test_losing_control_ends_the_episode_and_never_pays():
     assert not truncated
     assert abs(infos[-1]["heading_error"]) > np.radians(90)
     assert infos[-1]["reward_end"] < 0.0
-    idle = steer(make(max_heading_error_deg=180.0), lambda _: np.zeros(1, dtype=np.float32))[0]
+    idle = steer(
+        make(max_heading_error_deg=180.0), lambda _: np.zeros(1, dtype=np.float32)
+    )[0]
     kept = steer(make(), pd)[0]
     assert lost.sum() < idle.sum() < kept.sum()
 
 
 def test_leaving_the_training_envelope_is_reported(mariner):
-    calm = Envelope.from_samples(*(np.random.default_rng(0).normal(m, s, 500) for m, s in
-                                   ((7.7, 0.05), (0.0, 0.02), (0.0, 2e-4), (0.0, 0.01))))  # fmt: skip
+    calm = Envelope.from_samples(
+        *(
+            np.random.default_rng(0).normal(m, s, 500)
+            for m, s in ((7.7, 0.05), (0.0, 0.02), (0.0, 2e-4), (0.0, 0.01))
+        )
+    )
     env = make(model=replace(mariner, envelope=calm), max_envelope_distance=1e6)
     _, infos, *_ = steer(env, pd)
     assert infos[-1]["extrapolating"] == (infos[-1]["envelope_distance"] > 1.0)
@@ -176,11 +211,16 @@ def test_leaving_the_training_envelope_is_reported(mariner):
     _, infos, terminated, _ = steer(make(model=replace(mariner, envelope=calm)), pd)
     assert terminated
     assert infos[-1]["envelope_distance"] > 5.0
-    assert not any(info["extrapolating"] for info in steer(make(), pd)[1])  # no envelope is known
+    assert not any(
+        info["extrapolating"] for info in steer(make(), pd)[1]
+    )  # no envelope is known
 
 
 @settings(max_examples=25, deadline=None)
-@given(st.integers(0, 2**31 - 1), st.lists(st.floats(-1.0, 1.0, width=32), min_size=1, max_size=40))
+@given(
+    st.integers(0, 2**31 - 1),
+    st.lists(st.floats(-1.0, 1.0, width=32), min_size=1, max_size=40),
+)
 def test_observations_stay_in_their_space_and_are_never_nan(seed, actions):
     env = make(max_heading_error_deg=180.0).unwrapped
     env.reset(seed=seed)
@@ -191,7 +231,10 @@ def test_observations_stay_in_their_space_and_are_never_nan(seed, actions):
 
 
 def test_a_model_that_runs_away_ends_the_episode_with_numbers(mariner):
-    wild = replace(mariner, coefficients={**mariner.coefficients, "N_r": 0.05, "N_vvr": 9.0, "N_v": 0.1})
+    wild = replace(
+        mariner,
+        coefficients={**mariner.coefficients, "N_r": 0.05, "N_vvr": 9.0, "N_v": 0.1},
+    )
     env = make(model=wild).unwrapped
     rewards, _, terminated, _ = steer(env, lambda _: np.ones(1, dtype=np.float32))
     assert terminated
@@ -214,7 +257,9 @@ def test_each_lane_of_a_batch_is_the_single_environment(mariner):
 
 def test_a_model_found_unstable_is_refused_unless_asked_for(mariner):
     marked = replace(mariner, provenance={"stable": False})
-    with pytest.raises(InputError, match=r"'mariner' was found unstable.*allow_unstable=True"):
+    with pytest.raises(
+        InputError, match=r"'mariner' was found unstable.*allow_unstable=True"
+    ):
         make(model=marked)
     with pytest.raises(InputError, match="was found unstable"):
         Engine([mariner, marked], 2)
@@ -322,15 +367,22 @@ def interval(**given):
 @given(small, small, small, st.booleans())
 def test_costs_of_steering_are_squares_by_their_scales(delta, before, heel, outside):
     """In 30 degrees of rudder, 30 degrees of it a ship length sailed (20 s), 15 degrees of heel."""
-    weights = Weights(rudder_weight=0.2, rudder_rate_weight=0.03, roll_weight=0.4, roll_scale_deg=15.0)
+    weights = Weights(
+        rudder_weight=0.2, rudder_rate_weight=0.03, roll_weight=0.4, roll_scale_deg=15.0
+    )
     weights = weights._replace(envelope_weight=0.7)
     motion = Motion(*[0.0] * 7, heel, 0.0, delta, 0.0)
     found = steering_reward(
-        motion, interval(rudder_before=before, extrapolating=float(outside)), SHIP, weights
+        motion,
+        interval(rudder_before=before, extrapolating=float(outside)),
+        SHIP,
+        weights,
     )
     scale = np.pi / 6
     assert found.rudder == pytest.approx(-0.2 * (delta / scale) ** 2)
-    assert found.rudder_rate == pytest.approx(-0.03 * ((delta - before) / 0.5 * 20.0 / scale) ** 2)
+    assert found.rudder_rate == pytest.approx(
+        -0.03 * ((delta - before) / 0.5 * 20.0 / scale) ** 2
+    )
     assert found.roll == pytest.approx(-0.4 * (heel / (np.pi / 12)) ** 2)
     assert found.envelope == (-0.7 if outside else 0.0)
 
@@ -339,14 +391,24 @@ def test_the_helmsman_sees_the_ship_against_her_course():
     readings = Readings(*np.arange(1.0, 1.0 + len(Readings._fields)))
     held = interval(rudder_command=0.5, shaft_command=0.25)
     seen = helm(1.2 + readings.psi, 7.0, readings, held, SHIP)._asdict()
-    assert (seen.pop("heading_error_sin"), seen.pop("heading_error_cos")) == pytest.approx(
-        (np.sin(1.2), np.cos(1.2))
-    )
+    assert (
+        seen.pop("heading_error_sin"),
+        seen.pop("heading_error_cos"),
+    ) == pytest.approx((np.sin(1.2), np.cos(1.2)))
     assert seen == {
-        "yaw_rate": readings.r, "sway": readings.v, "surge": readings.u, "rudder": readings.delta,
-        "last_command": 0.5 * 0.6, "heading_error_integral": 7.0,
-    }  # fmt: skip
-    assert extras(readings, held, SHIP) == (readings.phi, readings.p, readings.n, 0.25 * 1.5)
+        "yaw_rate": readings.r,
+        "sway": readings.v,
+        "surge": readings.u,
+        "rudder": readings.delta,
+        "last_command": 0.5 * 0.6,
+        "heading_error_integral": 7.0,
+    }
+    assert extras(readings, held, SHIP) == (
+        readings.phi,
+        readings.p,
+        readings.n,
+        0.25 * 1.5,
+    )
 
 
 @given(st.floats(-30.0, 30.0), st.floats(-1.0, 1.0))
@@ -364,7 +426,9 @@ def test_set_points_are_drawn_within_their_bounds_and_change_in_time():
     state = course_keeping.State(1.0, 0.0, 3.0, 0.25, 0.1)
     with np.errstate(over="ignore"):
         drawn = [
-            course_keeping.changed(state, 50.0, settings, Random(np.uint64(key), np.uint64(0)))
+            course_keeping.changed(
+                state, 50.0, settings, Random(np.uint64(key), np.uint64(0))
+            )
             for key in range(2000)
         ]
     changes = np.degrees([one.course - 1.0 for one in drawn])
@@ -372,19 +436,30 @@ def test_set_points_are_drawn_within_their_bounds_and_change_in_time():
     for values, low, high in ((changes, -30.0, 30.0), (waits, 100.0, 300.0)):
         assert low <= values.min() < low + 0.01 * (high - low)
         assert high - 0.01 * (high - low) < values.max() <= high
-        assert values.mean() == pytest.approx(0.5 * (low + high), abs=4.0 * (high - low) / np.sqrt(12 * 2000))
+        assert values.mean() == pytest.approx(
+            0.5 * (low + high), abs=4.0 * (high - low) / np.sqrt(12 * 2000)
+        )
     assert abs(np.corrcoef(changes, waits)[0, 1]) < 4.0 / np.sqrt(2000)
-    assert {(one.changes, one.integral, one.heading_error) for one in drawn} == {(4.0, 0.25, 0.1)}
+    assert {(one.changes, one.integral, one.heading_error) for one in drawn} == {
+        (4.0, 0.25, 0.1)
+    }
     listed = settings._replace(course_changes_deg=np.array([5.0, -7.0]))
     for number, degrees in ((0.0, 5.0), (1.0, -7.0), (2.0, 0.0)):
         with np.errstate(over="ignore"):
             found = course_keeping.changed(
-                state._replace(changes=number), 50.0, listed, Random(np.uint64(1), np.uint64(0))
+                state._replace(changes=number),
+                50.0,
+                listed,
+                Random(np.uint64(1), np.uint64(0)),
             )
         assert found.course == pytest.approx(1.0 + np.radians(degrees))
         assert found.next_change == 250.0
-    assert course_keeping.due(None, state._replace(next_change=9.0), interval(steps=9.0), SHIP, settings)
-    assert not course_keeping.due(None, state._replace(next_change=9.0), interval(steps=8.0), SHIP, settings)
+    assert course_keeping.due(
+        None, state._replace(next_change=9.0), interval(steps=9.0), SHIP, settings
+    )
+    assert not course_keeping.due(
+        None, state._replace(next_change=9.0), interval(steps=8.0), SHIP, settings
+    )
 
 
 def test_a_step_is_charged_for_its_error_and_control_is_lost_beyond_the_largest():
@@ -392,7 +467,9 @@ def test_a_step_is_charged_for_its_error_and_control_is_lost_beyond_the_largest(
     for error, lost in ((0.4, False), (-1.57, False), (1.58, True), (-1.58, True)):
         motion = Motion(0.0, 0.0, 0.3, 8.0, *[0.0] * 7)
         state = course_keeping.State(0.3 + error, 9.0, 1.0, 0.0, 0.0)
-        after, reward, failed, arrived = course_keeping.step(motion, state, interval(), SHIP, settings)
+        after, reward, failed, arrived = course_keeping.step(
+            motion, state, interval(), SHIP, settings
+        )
         assert after.heading_error == pytest.approx(error)
         assert reward.heading == pytest.approx(-((error / (np.pi / 6)) ** 2))
         assert (failed, arrived) == (lost, False)
@@ -400,12 +477,18 @@ def test_a_step_is_charged_for_its_error_and_control_is_lost_beyond_the_largest(
 
 
 def test_an_episode_begins_on_a_first_set_point_with_nothing_gathered():
-    settings = course_keeping.Settings(course_changes_deg=np.array([170.0, 30.0]), change_interval_steps=7)
+    settings = course_keeping.Settings(
+        course_changes_deg=np.array([170.0, 30.0]), change_interval_steps=7
+    )
     headings = []
     for key in range(60):
         with np.errstate(over="ignore"):
-            motion, state = course_keeping.begin(SHIP, settings, Random(np.uint64(key), np.uint64(3)), None)
-        assert motion == Motion(0.0, 0.0, motion.psi, 8.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.5)
+            motion, state = course_keeping.begin(
+                SHIP, settings, Random(np.uint64(key), np.uint64(3)), None
+            )
+        assert motion == Motion(
+            0.0, 0.0, motion.psi, 8.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.5
+        )
         assert state.course == pytest.approx(motion.psi + np.radians(170.0))
         assert (state.next_change, state.changes, state.integral) == (7.0, 1.0, 0.0)
         assert state.heading_error == pytest.approx(np.radians(170.0))
@@ -420,9 +503,13 @@ def test_set_points_change_at_most_every_step_and_begin_with_the_first_listed():
     listed = course_keeping.Settings(course_changes_deg=np.array([5.0, -7.0]))
     often = course_keeping.Settings(change_interval_steps=1)
     with np.errstate(over="ignore"):
-        found = course_keeping.changed(state, 50.0, listed, random)  # whatever a checkpoint holds
+        found = course_keeping.changed(
+            state, 50.0, listed, random
+        )  # whatever a checkpoint holds
         waits = {
-            course_keeping.changed(state._replace(changes=k), 50.0, often, random).next_change
+            course_keeping.changed(
+                state._replace(changes=k), 50.0, often, random
+            ).next_change
             for k in range(30)
         }
     assert found.course == pytest.approx(1.0 + np.radians(5.0))
@@ -443,9 +530,11 @@ def test_uniform_numbers_fill_their_range_and_differ_by_each_word():
         numbers = np.array(
             [
                 uniform(np.uint64(key), np.uint64(episode), np.uint64(draw), -3.0, 5.0)
-                for key in range(10) for episode in range(10) for draw in range(10)
+                for key in range(10)
+                for episode in range(10)
+                for draw in range(10)
             ]
-        )  # fmt: skip
+        )
     assert len(np.unique(numbers)) == 1000
     assert -3.0 <= numbers.min() < -2.95
     assert 4.95 < numbers.max() < 5.0
@@ -469,7 +558,9 @@ def test_orders_of_all_ships_are_looked_at(actions, finite):
 
 def test_the_envelope_of_a_model_is_given_row_by_row(mariner):
     rng = np.random.default_rng(0)
-    envelope = Envelope.from_samples(*(rng.normal(m, s, 300) for m, s in ((8, 1), (0, 2), (0, 3), (0, 4))))
+    envelope = Envelope.from_samples(
+        *(rng.normal(m, s, 300) for m, s in ((8, 1), (0, 2), (0, 3), (0, 4)))
+    )
     found = envelope_numbers(replace(mariner, envelope=envelope))
     low, high, centre, upper = found[:4], found[4:8], found[8:12], found[12:]
     assert (low < centre).all()

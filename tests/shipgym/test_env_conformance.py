@@ -24,25 +24,49 @@ COURSE, PATH = "shipgym/CourseKeeping-v0", "shipgym/PathFollowing-v0"
 IDS = list(environments())
 SEA = Weather(current=Current(0.5), wind=Wind(9.0))
 BY_KEYWORD = [
-    (COURSE, {"model": "mariner", "sea": "rough", "noise": 1.0, "measurement": "filtered"}),
-    (COURSE, {"model": "mariner", "course_changes_deg": [10.0, -5.0], "change_interval_steps": 20}),
-    (COURSE, {"model": "mariner", "speed_range": (0.5, 1.0), "loading_range": (0.8, 1.2)}),
+    (
+        COURSE,
+        {"model": "mariner", "sea": "rough", "noise": 1.0, "measurement": "filtered"},
+    ),
+    (
+        COURSE,
+        {
+            "model": "mariner",
+            "course_changes_deg": [10.0, -5.0],
+            "change_interval_steps": 20,
+        },
+    ),
+    (
+        COURSE,
+        {"model": "mariner", "speed_range": (0.5, 1.0), "loading_range": (0.8, 1.2)},
+    ),
     (
         PATH,
-        {"model": "mariner", "waypoints": [[0.0, 0.0], [2000.0, 500.0]], "sea": ["calm", SEA], "noise": 1.0},
+        {
+            "model": "mariner",
+            "waypoints": [[0.0, 0.0], [2000.0, 500.0]],
+            "sea": ["calm", SEA],
+            "noise": 1.0,
+        },
     ),
     (PATH, {"model": "kvlcc2", "action": "rudder-shaft", "noise": 0.5}),
 ]
 EVERY = [*((name, {}) for name in IDS), *BY_KEYWORD]
-NAMES = [f"{name.removeprefix('shipgym/')} {' '.join(options)}" for name, options in EVERY]
+NAMES = [
+    f"{name.removeprefix('shipgym/')} {' '.join(options)}" for name, options in EVERY
+]
 
 
 @pytest.mark.parametrize(("name", "options"), EVERY, ids=NAMES)
-@pytest.mark.parametrize("check", [gymnasium_check_env, sb3_check_env], ids=["gymnasium", "sb3"])
+@pytest.mark.parametrize(
+    "check", [gymnasium_check_env, sb3_check_env], ids=["gymnasium", "sb3"]
+)
 def test_every_id_and_variant_conforms_without_a_warning(check, name, options):
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        warnings.filterwarnings("ignore", ".*is out of date.*upgrading to version `v1`", DeprecationWarning)
+        warnings.filterwarnings(
+            "ignore", ".*is out of date.*upgrading to version `v1`", DeprecationWarning
+        )
         env = gymnasium.make(name, **options)
         check(env.unwrapped)
     assert env.spec.id == name
@@ -82,7 +106,9 @@ def test_episodes_are_replayed_exactly_from_their_seed(name, options):
 @pytest.mark.parametrize("context", ["spawn", "forkserver", "fork"])
 def test_workers_of_gymnasium(context):
     options = {"model": "mariner", "sea": ["calm", "moderate"], "noise": 1.0}
-    env = gymnasium.make_vec(f"shipgym:{PATH}", 1, "async", vector_kwargs={"context": context}, **options)
+    env = gymnasium.make_vec(
+        f"shipgym:{PATH}", 1, "async", vector_kwargs={"context": context}, **options
+    )
     ours = gymnasium.make(PATH, **options)
     np.testing.assert_array_equal(env.reset(seed=4)[0][0], ours.reset(seed=4)[0])
     action = np.array([0.3], dtype=np.float32)
@@ -112,7 +138,10 @@ def test_workers_of_stable_baselines3(start_method):
     [
         ([np.nan], "action: nan found"),
         ([-np.inf], "action: -inf found"),
-        ([0.0, 0.0], r"action: shape \(2,\) found, expected \(1,\): the commanded rudder"),
+        (
+            [0.0, 0.0],
+            r"action: shape \(2,\) found, expected \(1,\): the commanded rudder",
+        ),
         (0.0, r"action: shape \(\) found"),
         ([[0.0]], r"action: shape \(1, 1\) found"),
     ],
@@ -136,10 +165,23 @@ RAGGED = [[0.0], [0.0, 1.0]]
 @pytest.mark.parametrize("name", [COURSE, "shipgym/CourseKeepingDiscrete-v0"])
 @pytest.mark.parametrize(
     "action",
-    ["left", "0.5", ["0.5"], np.array([0.5], dtype=object), [None], [1j], {"rudder": 0}, RAGGED, b"0"],
+    [
+        "left",
+        "0.5",
+        ["0.5"],
+        np.array([0.5], dtype=object),
+        [None],
+        [1j],
+        {"rudder": 0},
+        RAGGED,
+        b"0",
+    ],
 )
 def test_texts_objects_and_complex_numbers_are_no_actions(name, action):
-    env, rows = gymnasium.make(name, model="mariner").unwrapped, gymnasium.make_vec(name, 1, model="mariner")
+    env, rows = (
+        gymnasium.make(name, model="mariner").unwrapped,
+        gymnasium.make_vec(name, 1, model="mariner"),
+    )
     for one, given in ((env, action), (rows, action), (rows, [action])):
         one.reset(seed=0)
         before = one.physical_state()
@@ -164,7 +206,9 @@ def test_a_step_before_the_reset_or_after_the_end_is_refused(name):
 def test_wrong_actions_of_rudder_and_shaft():
     env = gymnasium.make(PATH, model="kvlcc2", action="rudder-shaft").unwrapped
     env.reset(seed=0)
-    with pytest.raises(InputError, match=r"shape \(1,\) found, expected \(2,\): .* and shaft speed"):
+    with pytest.raises(
+        InputError, match=r"shape \(1,\) found, expected \(2,\): .* and shaft speed"
+    ):
         env.step(np.zeros(1, dtype=np.float32))
     with pytest.raises(InputError, match="action: nan found"):
         env.step(np.array([0.0, np.nan], dtype=np.float32))
@@ -179,24 +223,39 @@ def test_wrong_actions_of_rudder_and_shaft():
         ({"sea": []}, "sea: none found"),
         ({"sea": ["calm", "rugh"]}, "sea: 'rugh' found.*Did you mean 'rough'"),
         ({"action": "ruder"}, "action: 'ruder' found.*Did you mean 'rudder'"),
-        ({"action": "rudder-shaft"}, "action: 'rudder-shaft' found, but 'mariner' has no shaft speed"),
+        (
+            {"action": "rudder-shaft"},
+            "action: 'rudder-shaft' found, but 'mariner' has no shaft speed",
+        ),
         ({"measurement": "filterd"}, "Did you mean 'filtered'"),
         ({"noise": -0.1}, "noise: -0.1 found"),
         ({"noise": math.nan}, "noise: nan found"),
         ({"roll": True}, "roll: 'mariner' does not roll"),
         ({"roll_weight": -1.0}, "roll_weight: -1 found"),
         ({"envelope_weight": "much"}, "envelope_weight: 'much'"),
-        ({"water_depth": 30.0}, "water_depth: 30 m found, but 'mariner' is a deep-water model"),
-        ({"model": "tanker", "water_depth": 18.0}, "water_depth: 18 m found, expected more than the draught"),
+        (
+            {"water_depth": 30.0},
+            "water_depth: 30 m found, but 'mariner' is a deep-water model",
+        ),
+        (
+            {"model": "tanker", "water_depth": 18.0},
+            "water_depth: 18 m found, expected more than the draught",
+        ),
         ({"dt": 1e6}, r"dt: 1e\+06 found, expected a number <= 104"),
         ({"dt": math.nan}, "dt: nan found"),
         ({"episode_steps": 2.5}, "episode_steps: 2.5 found, expected a whole number"),
         ({"change_interval_steps": 0}, "change_interval_steps: 0 found"),
         ({"max_envelope_distance": 0.5}, "max_envelope_distance: 0.5 found"),
         ({"course_change_deg": 120.0}, "course_change_deg: 120 found"),
-        ({"course_changes_deg": 20.0}, "course_changes_deg: 20.0 found, expected a list"),
+        (
+            {"course_changes_deg": 20.0},
+            "course_changes_deg: 20.0 found, expected a list",
+        ),
         ({"course_changes_deg": []}, "course_changes_deg: none found"),
-        ({"course_changes_deg": [0.0, math.inf]}, "course_changes_deg: number 1: inf found"),
+        (
+            {"course_changes_deg": [0.0, math.inf]},
+            "course_changes_deg: number 1: inf found",
+        ),
         ({"model": None}, "model: None found, expected a name"),
         ({"model": "marinr"}, "Did you mean 'mariner'"),
         ({"model_uncertainty": "prior"}, "model_uncertainty: 'prior' found"),
@@ -205,8 +264,14 @@ def test_wrong_actions_of_rudder_and_shaft():
         ({"ensemble": ["tanker"]}, "ensemble: 'tanker' has other equations"),
         ({"speed_range": (0.9, 0.5)}, "speed_range: the largest: 0.5 found"),
         ({"speed_range": (0.0, 0.5)}, "speed_range: the least: 0 found"),
-        ({"model": "kvlcc2", "loading_range": (0.8, 1.0)}, "loading_range: the equations of 'kvlcc2'"),
-        ({"render_mode": "ansi"}, r"render_mode: 'ansi' found, expected one of .*'rgb_array', or None\."),
+        (
+            {"model": "kvlcc2", "loading_range": (0.8, 1.0)},
+            "loading_range: the equations of 'kvlcc2'",
+        ),
+        (
+            {"render_mode": "ansi"},
+            r"render_mode: 'ansi' found, expected one of .*'rgb_array', or None\.",
+        ),
     ],
 )
 @pytest.mark.filterwarnings("ignore:.*render_mode='ansi'")
@@ -219,18 +284,26 @@ def test_wrong_options_are_named_when_an_environment_is_made(options, message):
 
 @pytest.mark.parametrize("count", [0, -1, 2.5, True])
 def test_a_count_that_is_none(count):
-    with pytest.raises(InputError, match=f"num_envs: {count} found, expected a whole number of at least 1"):
+    with pytest.raises(
+        InputError,
+        match=f"num_envs: {count} found, expected a whole number of at least 1",
+    ):
         gymnasium.make_vec(PATH, count, model="mariner")
 
 
 def test_a_ship_without_a_rudder_is_refused(monkeypatch):
-    monkeypatch.setattr("shipgym.ships.structures.STRUCTURES", dict(shipgym.ships.structures.STRUCTURES))
+    monkeypatch.setattr(
+        "shipgym.ships.structures.STRUCTURES", dict(shipgym.ships.structures.STRUCTURES)
+    )
     shipgym.register_structure("drifting", {"v": "v, |v| v", "r": "v, r"})
     mariner = shipgym.load_model("mariner")
     drifting = ShipModel(
-        "drifting", "drifting", mariner.particulars, mariner.steering,
+        "drifting",
+        "drifting",
+        mariner.particulars,
+        mariner.steering,
         {"b_v": -0.05, "b_|v|v": 0.0, "c_v": 0.0, "c_r": -0.1},
-    )  # fmt: skip
+    )
     for name in (COURSE, PATH):
         with pytest.raises(InputError, match="model: 'drifting' has no rudder"):
             gymnasium.make(name, model=drifting)
@@ -238,9 +311,13 @@ def test_a_ship_without_a_rudder_is_refused(monkeypatch):
 
 def test_weather_needs_the_size_of_a_ship():
     mariner = shipgym.load_model("mariner")
-    bare = replace(mariner, particulars=replace(mariner.particulars, beam=None, draught=None))
+    bare = replace(
+        mariner, particulars=replace(mariner.particulars, beam=None, draught=None)
+    )
     assert gymnasium.make(COURSE, model=bare).reset(seed=0)
-    with pytest.raises(InputError, match="weather without the particulars it needs: beam, draught"):
+    with pytest.raises(
+        InputError, match="weather without the particulars it needs: beam, draught"
+    ):
         gymnasium.make(COURSE, model=bare, sea="moderate")
 
 
@@ -253,9 +330,13 @@ def test_reset_says_what_is_wrong():
 @pytest.mark.parametrize("name", IDS)
 def test_every_id_conforms_as_a_vector(name):
     options = {"episode_steps": 6, "disable_env_checker": True}
-    with warnings.catch_warnings(action="ignore", category=DeprecationWarning):  # of ids that are out of date
+    with warnings.catch_warnings(
+        action="ignore", category=DeprecationWarning
+    ):  # of ids that are out of date
         shipgym.check_vector_env(
-            lambda: gymnasium.make_vec(name, 3, episode_steps=6), lambda: gymnasium.make(name, **options), 20
+            lambda: gymnasium.make_vec(name, 3, episode_steps=6),
+            lambda: gymnasium.make(name, **options),
+            20,
         )
 
 

@@ -22,7 +22,12 @@ from shipgym.ships import Envelope
 from shipgym.tasks.contract import Interval, Random
 from shipgym.tasks.definition import read_definition
 from shipgym.tasks.steering import ROLL_SCALE
-from shipgym.tasks.task import RUDDER_ORDERS, Task, course_keeping_task, rounded_interval
+from shipgym.tasks.task import (
+    RUDDER_ORDERS,
+    Task,
+    course_keeping_task,
+    rounded_interval,
+)
 from shipgym.trials.sensors import SEA_TRIAL
 
 pytestmark = pytest.mark.interpreted
@@ -37,7 +42,9 @@ def make(name=COURSE, **options):
 
 
 def many(num_envs, name=COURSE, **options):
-    return gymnasium.make_vec(name, num_envs=num_envs, **{"model": "mariner", **options})
+    return gymnasium.make_vec(
+        name, num_envs=num_envs, **{"model": "mariner", **options}
+    )
 
 
 def idle(env):
@@ -47,14 +54,19 @@ def idle(env):
 
 def misreadings(env, seen):
     """What is shown less what is so, SI units, by name."""
-    state, shown = env.physical_state(), dict(zip(env.observation_names, seen.T, strict=True))
+    state, shown = (
+        env.physical_state(),
+        dict(zip(env.observation_names, seen.T, strict=True)),
+    )
     scales = dict(zip(env.observation_names, env.observation_scales, strict=True))
     wrong = {
         name: shown[name] * scales[name] - state[channel]
         for name, channel in (("yaw_rate", "r"), ("sway", "v"), ("surge", "u"))
     }
     error = np.arctan2(shown["heading_error_sin"], shown["heading_error_cos"])
-    wrong["psi"] = (error - state["set_point"] + state["psi"] + np.pi) % (2 * np.pi) - np.pi
+    wrong["psi"] = (error - state["set_point"] + state["psi"] + np.pi) % (
+        2 * np.pi
+    ) - np.pi
     return wrong
 
 
@@ -67,35 +79,62 @@ def test_noise_has_the_deviation_of_a_sea_trials_sensors(noise):
     env.reset(seed=0)
     first = misreadings(env, env.step(idle(env))[0])
     second = misreadings(env, env.step(idle(env))[0])
-    for name, channel in (("psi", "psi"), ("yaw_rate", "r"), ("sway", "u"), ("surge", "u")):
+    for name, channel in (
+        ("psi", "psi"),
+        ("yaw_rate", "r"),
+        ("sway", "u"),
+        ("surge", "u"),
+    ):
         deviation = noise * SEA_TRIAL[channel].noise
-        assert np.std(second[name]) == pytest.approx(deviation, rel=5.0 / np.sqrt(2 * count)), name
+        assert np.std(second[name]) == pytest.approx(
+            deviation, rel=5.0 / np.sqrt(2 * count)
+        ), name
         assert abs(np.mean(second[name])) < 5.0 * deviation / np.sqrt(count)
         assert abs(np.corrcoef(first[name], second[name])[0, 1]) < 5.0 / np.sqrt(count)
-    assert abs(np.corrcoef(second["sway"], second["surge"])[0, 1]) < 5.0 / np.sqrt(count)
+    assert abs(np.corrcoef(second["sway"], second["surge"])[0, 1]) < 5.0 / np.sqrt(
+        count
+    )
 
 
 @pytest.mark.compiled
 def test_noise_of_the_position_shows_in_the_cross_track_error():
-    count, env = 4000, many(4000, PATH, **SHAFT, noise=2.0, waypoints=[[0.0, 0.0], [5000.0, 1000.0]])
+    count, env = (
+        4000,
+        many(4000, PATH, **SHAFT, noise=2.0, waypoints=[[0.0, 0.0], [5000.0, 1000.0]]),
+    )
     env.reset(seed=0)
     seen, *_, infos = env.step(idle(env))
     k = env.observation_names.index("cross_track")
     wrong = seen[:, k] * env.observation_scales[k] - infos["cross_track"]
-    assert np.std(wrong) == pytest.approx(2.0 * SEA_TRIAL["x"].noise, rel=5.0 / np.sqrt(2 * count))
+    assert np.std(wrong) == pytest.approx(
+        2.0 * SEA_TRIAL["x"].noise, rel=5.0 / np.sqrt(2 * count)
+    )
 
 
 @pytest.mark.compiled
 def test_the_course_to_steer_is_that_of_the_position_shown():
     """So satellite noise reaches it: what remains of the heading error's noise is the compass's alone."""
     count, lookahead, length = 4000, 0.2, 160.93
-    env = many(count, PATH, noise=2.0, lookahead=lookahead, waypoints=[[0.0, 0.0], [-3000.0, 4000.0]])
+    env = many(
+        count,
+        PATH,
+        noise=2.0,
+        lookahead=lookahead,
+        waypoints=[[0.0, 0.0], [-3000.0, 4000.0]],
+    )
     env.reset(seed=0)
     seen, *_, infos = env.step(idle(env))
-    shown = dict(zip(env.observation_names, (seen * env.observation_scales).T, strict=True))
-    wrong = np.arctan2(shown["heading_error_sin"], shown["heading_error_cos"]) - infos["heading_error"]
+    shown = dict(
+        zip(env.observation_names, (seen * env.observation_scales).T, strict=True)
+    )
+    wrong = (
+        np.arctan2(shown["heading_error_sin"], shown["heading_error_cos"])
+        - infos["heading_error"]
+    )
     ahead = lookahead * length
-    of_position = np.arctan2(infos["cross_track"], ahead) - np.arctan2(shown["cross_track"], ahead)
+    of_position = np.arctan2(infos["cross_track"], ahead) - np.arctan2(
+        shown["cross_track"], ahead
+    )
     margin = 5.0 / np.sqrt(2 * count)
     assert np.std(of_position) > np.std(wrong - of_position)
     compass = 2.0 * SEA_TRIAL["psi"].noise
@@ -103,7 +142,9 @@ def test_the_course_to_steer_is_that_of_the_position_shown():
 
 
 def test_noise_is_only_shown_and_none_is_none():
-    plain, none, noisy = (make(**options) for options in ({}, {"noise": 0.0}, {"noise": 2.0}))
+    plain, none, noisy = (
+        make(**options) for options in ({}, {"noise": 0.0}, {"noise": 2.0})
+    )
     for env in (plain, none, noisy):
         env.reset(seed=3)
     for k in range(60):
@@ -118,7 +159,13 @@ def test_noise_is_only_shown_and_none_is_none():
 
 def waves_shown(measurement, **options):
     """Part of the variance of first-order yaw rate and heading that is shown, half of 64 ships show less."""
-    env = many(64, sea=Weather(waves=Waves(3.0, 9.0)), measurement=measurement, **options, **UNBOUND)
+    env = many(
+        64,
+        sea=Weather(waves=Waves(3.0, 9.0)),
+        measurement=measurement,
+        **options,
+        **UNBOUND,
+    )
     env.reset(seed=1)
     wrong, waves = [], []
     for _ in range(400):
@@ -141,7 +188,13 @@ def test_a_filter_takes_most_of_the_waves_out_of_what_is_shown():
 @pytest.mark.compiled
 def test_a_filter_keeps_slow_motion():
     """Rudder to and fro in 120 s, in waves too low to matter: the yaw rate comes through, a little late."""
-    env = many(64, sea=Weather(waves=Waves(0.01, 9.0)), measurement="filtered", noise=1e-6, **UNBOUND)
+    env = many(
+        64,
+        sea=Weather(waves=Waves(0.01, 9.0)),
+        measurement="filtered",
+        noise=1e-6,
+        **UNBOUND,
+    )
     env.reset(seed=1)
     wrong, so = [], []
     for k in range(360):
@@ -173,9 +226,15 @@ def test_roll_is_observed_and_priced_where_it_is_asked_for():
         seen, _, terminated, _, info = env.step(np.array([order], dtype=np.float32))
         state = env.physical_state()
         shown = dict(zip(names, seen * env.observation_scales, strict=True))
-        assert shown["roll"] == pytest.approx(state["phi"] + state["phi_wave"], abs=1e-6)
-        assert shown["roll_rate"] == pytest.approx(state["p"] + state["p_wave"], abs=1e-6)
-        assert info["reward_roll"] == pytest.approx(-2.0 * (state["phi"] / ROLL_SCALE) ** 2, abs=1e-12)
+        assert shown["roll"] == pytest.approx(
+            state["phi"] + state["phi_wave"], abs=1e-6
+        )
+        assert shown["roll_rate"] == pytest.approx(
+            state["p"] + state["p_wave"], abs=1e-6
+        )
+        assert info["reward_roll"] == pytest.approx(
+            -2.0 * (state["phi"] / ROLL_SCALE) ** 2, abs=1e-12
+        )
         heels.append(state["phi"])
         assert not terminated
     assert np.ptp(heels) > np.radians(2.0)
@@ -187,7 +246,10 @@ def test_roll_is_observed_and_priced_where_it_is_asked_for():
 
 @pytest.mark.parametrize(
     ("name", "model", "shown"),
-    [(PATH, "kvlcc2", ("last_shaft_command",)), (COURSE, "tanker", ("shaft_speed", "last_shaft_command"))],
+    [
+        (PATH, "kvlcc2", ("last_shaft_command",)),
+        (COURSE, "tanker", ("shaft_speed", "last_shaft_command")),
+    ],
 )
 def test_rudder_and_shaft_are_commanded(name, model, shown):
     env = make(name, model=model, action="rudder-shaft")
@@ -202,8 +264,14 @@ def test_rudder_and_shaft_are_commanded(name, model, shown):
     assert state["n_command"] == pytest.approx(0.5 * env.model.service_shaft_speed)
     assert state["u"] < 0.97 * speed
     if "n" in state:
-        assert by_name["shaft_speed"] == pytest.approx(state["n"] / env.model.service_shaft_speed, rel=1e-6)
-        assert 0.5 * env.model.service_shaft_speed < state["n"] < env.model.service_shaft_speed
+        assert by_name["shaft_speed"] == pytest.approx(
+            state["n"] / env.model.service_shaft_speed, rel=1e-6
+        )
+        assert (
+            0.5 * env.model.service_shaft_speed
+            < state["n"]
+            < env.model.service_shaft_speed
+        )
 
 
 def test_a_tanker_goes_astern():
@@ -233,13 +301,19 @@ def test_discrete_orders_are_the_continuous_ones():
 def test_an_action_that_is_no_rudder_order_is_refused(wrong):
     env = make(action="rudder-discrete")
     env.reset(seed=0)
-    with pytest.raises(InputError, match="expected a whole number from 0 to 8: a rudder order"):
+    with pytest.raises(
+        InputError, match="expected a whole number from 0 to 8: a rudder order"
+    ):
         env.step(wrong)
 
 
 def test_listed_course_changes_come_one_after_another():
     changes = [20.0, -35.0, 10.0]
-    env = make(course_changes_deg=changes, change_interval_steps=40, max_heading_error_deg=180.0)
+    env = make(
+        course_changes_deg=changes,
+        change_interval_steps=40,
+        max_heading_error_deg=180.0,
+    )
     env.reset(seed=9)
     state = env.physical_state()
     begun, courses = state["psi"], [state["set_point"]]
@@ -253,7 +327,10 @@ def test_listed_course_changes_come_one_after_another():
 def test_extrapolating_costs_what_was_asked():
     normal = np.random.default_rng(0).normal
     known = Envelope.from_samples(
-        *(normal(m, s, 500) for m, s in ((7.7, 0.1), (0.0, 0.05), (0.0, 5e-4), (0.0, 0.02)))
+        *(
+            normal(m, s, 500)
+            for m, s in ((7.7, 0.1), (0.0, 0.05), (0.0, 5e-4), (0.0, 0.02))
+        )
     )
     ship = replace(shipgym.load_model("mariner"), envelope=known)
     env = make(model=ship, envelope_weight=0.7, max_envelope_distance=1e6, **UNBOUND)
@@ -304,7 +381,9 @@ def turned(count=600, steps=30, **options):
 @pytest.mark.compiled
 def test_an_ensemble_gives_each_episode_one_of_its_ships():
     mariner = shipgym.load_model("mariner")
-    weak = replace(mariner, name="weak", coefficients={**mariner.coefficients, "N_d": 0.0011})
+    weak = replace(
+        mariner, name="weak", coefficients={**mariner.coefficients, "N_d": 0.0011}
+    )
     rates = np.unique(turned(ensemble=[weak]).round(9))
     assert len(rates) == 2
     assert rates.max() == pytest.approx(turned(2)[0], abs=1e-8)
@@ -329,9 +408,15 @@ def test_speed_and_loading_come_from_their_ranges():
     levels = np.unique(speeds.round(9))
     np.testing.assert_allclose(levels, np.linspace(0.6, 0.9, N_SPEEDS), atol=1e-9)
     surge = seen[:, env.observation_names.index("surge")]
-    np.testing.assert_allclose(surge, speeds, rtol=1e-6)  # seen in one scale, so that an agent can tell
-    light, heavy = (turned(2, steps=4, loading_range=(load, load))[0] for load in (0.8, 1.25))
-    assert 0.6 < heavy / light < 0.75  # 0.64 at first, while the rudder's moment is all there is
+    np.testing.assert_allclose(
+        surge, speeds, rtol=1e-6
+    )  # seen in one scale, so that an agent can tell
+    light, heavy = (
+        turned(2, steps=4, loading_range=(load, load))[0] for load in (0.8, 1.25)
+    )
+    assert (
+        0.6 < heavy / light < 0.75
+    )  # 0.64 at first, while the rudder's moment is all there is
 
 
 def test_a_model_found_unstable_is_refused_unless_asked_for():
@@ -346,27 +431,41 @@ def test_a_model_found_unstable_is_refused_unless_asked_for():
 @pytest.mark.parametrize("path", document_settings.PAGES, ids=lambda path: path.stem)
 def test_pages_name_every_setting_with_its_default(path):
     text = path.read_text(encoding="utf-8")
-    assert document_settings.page(text) == text, "run python scripts/document_settings.py"
+    assert document_settings.page(text) == text, (
+        "run python scripts/document_settings.py"
+    )
     assert "| `heading_scale_deg` | 30 | above 0 |" in text
 
 
 def test_weights_and_scales_are_settings():
-    env = gymnasium.make("shipgym/CourseKeeping-v0", rudder_weight=2.0, heading_scale_deg=10.0).unwrapped
+    env = gymnasium.make(
+        "shipgym/CourseKeeping-v0", rudder_weight=2.0, heading_scale_deg=10.0
+    ).unwrapped
     env.reset(seed=0)
     *_, info = env.step(np.array([1.0], dtype=np.float32))
     rudder = env.physical_state()["delta"]
-    assert info["reward_heading"] == pytest.approx(-((info["heading_error"] / np.radians(10.0)) ** 2))
-    assert info["reward_rudder"] == pytest.approx(-2.0 * (rudder / np.radians(10.0)) ** 2)
+    assert info["reward_heading"] == pytest.approx(
+        -((info["heading_error"] / np.radians(10.0)) ** 2)
+    )
+    assert info["reward_rudder"] == pytest.approx(
+        -2.0 * (rudder / np.radians(10.0)) ** 2
+    )
 
 
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"speed_range": 0.8}, "speed_range: 0.8 found, expected the least and the largest, two numbers"),
+        (
+            {"speed_range": 0.8},
+            "speed_range: 0.8 found, expected the least and the largest, two numbers",
+        ),
         ({"speed_range": (0.8,)}, "expected the least and the largest, two numbers"),
         ({"speed_range": (0.0, 1.0)}, "speed_range: the least: 0 found"),
         ({"loading_range": (1.2, 0.9)}, "loading_range: the largest: 0.9 found"),
-        ({"loading_range": (0.9, 1.1), "model": "kvlcc2"}, "the equations of 'kvlcc2' are not a table"),
+        (
+            {"loading_range": (0.9, 1.1), "model": "kvlcc2"},
+            "the equations of 'kvlcc2' are not a table",
+        ),
         ({"ensemble": "kvlcc2"}, "ensemble: 'kvlcc2' found, expected a list of models"),
         ({"model_uncertainty": "prior"}, "model_uncertainty: 'prior' found"),
     ],
@@ -379,17 +478,34 @@ def test_ranges_that_are_none_are_refused(options, message):
 def test_an_approach_speed_turns_the_shaft_in_proportion_and_load_divides_what_forces_do():
     tanker, mariner = shipgym.load_model("tanker"), shipgym.load_model("mariner")
     slower = Randomisation(speed_range=(0.5, 0.9)).ships(tanker, [Weather()])
-    parts = np.array([ship.particulars["speed"] for ship, _ in slower]) / tanker.particulars["speed"]
-    shafts = np.array([ship.service_shaft_speed for ship, _ in slower]) / tanker.service_shaft_speed
+    parts = (
+        np.array([ship.particulars["speed"] for ship, _ in slower])
+        / tanker.particulars["speed"]
+    )
+    shafts = (
+        np.array([ship.service_shaft_speed for ship, _ in slower])
+        / tanker.service_shaft_speed
+    )
     np.testing.assert_allclose(shafts, parts)
-    np.testing.assert_allclose(np.unique(parts.round(9)), np.linspace(0.5, 0.9, N_SPEEDS))
-    loaded = [ship for ship, _ in Randomisation(loading_range=(0.8, 1.25)).ships(mariner, [Weather()])]
-    loads = np.array([mariner.coefficients["N_d"] / ship.coefficients["N_d"] for ship in loaded])
+    np.testing.assert_allclose(
+        np.unique(parts.round(9)), np.linspace(0.5, 0.9, N_SPEEDS)
+    )
+    loaded = [
+        ship
+        for ship, _ in Randomisation(loading_range=(0.8, 1.25)).ships(
+            mariner, [Weather()]
+        )
+    ]
+    loads = np.array(
+        [mariner.coefficients["N_d"] / ship.coefficients["N_d"] for ship in loaded]
+    )
     assert len(loaded) == POOL_SIZE
     assert 0.8 <= loads.min() < 0.82
     assert 1.23 < loads.max() <= 1.25
     for ship, load in zip(loaded[:3], loads, strict=False):
-        assert ship.coefficients == pytest.approx({k: v / load for k, v in mariner.coefficients.items()})
+        assert ship.coefficients == pytest.approx(
+            {k: v / load for k, v in mariner.coefficients.items()}
+        )
 
 
 PAGES = Path(__file__).parents[2] / "docs" / "environments"
@@ -406,7 +522,8 @@ def documented(page):
         )
         if bounds and len(cells) == 5:
             found |= {
-                name: (float(low), float(high)) for name, (low, high) in zip(names, bounds, strict=False)
+                name: (float(low), float(high))
+                for name, (low, high) in zip(names, bounds, strict=False)
             }
     return found
 
@@ -421,7 +538,8 @@ def documented(page):
 )
 def test_observations_have_the_bounds_of_their_page(name, page, count):
     own = {
-        path.rpartition(".")[2]: (seen.low, seen.high) for path, seen in read_definition(name).seen.items()
+        path.rpartition(".")[2]: (seen.low, seen.high)
+        for path, seen in read_definition(name).seen.items()
     }
     found = documented(page)
     assert len(found) == count
@@ -431,10 +549,20 @@ def test_observations_have_the_bounds_of_their_page(name, page, count):
 
 def test_scales_of_roll_and_shaft_are_those_of_their_page():
     tanker, container = shipgym.load_model("tanker"), shipgym.load_model("container")
-    seen = {one.name: one for one in Task.of("CourseKeeping", action="rudder-shaft").observed(tanker)}
-    assert seen["shaft_speed"].scale == seen["last_shaft_command"].scale == tanker.service_shaft_speed
+    seen = {
+        one.name: one
+        for one in Task.of("CourseKeeping", action="rudder-shaft").observed(tanker)
+    }
+    assert (
+        seen["shaft_speed"].scale
+        == seen["last_shaft_command"].scale
+        == tanker.service_shaft_speed
+    )
     assert "roll" not in seen
-    rolls = {one.name: one.scale for one in Task.of("CourseKeeping", roll=True).observed(container)}
+    rolls = {
+        one.name: one.scale
+        for one in Task.of("CourseKeeping", roll=True).observed(container)
+    }
     assert (rolls["roll"], rolls["roll_rate"]) == (pytest.approx(np.pi / 6), 0.1)
     assert "last_shaft_command" not in rolls
 
@@ -443,9 +571,12 @@ def test_scales_of_a_path_are_those_of_its_page():
     mariner = shipgym.load_model("mariner")
     length = mariner.particulars["length"]
     for name, far, turns in (
-        ("PathFollowing-v1", 20.0, ("next_turn", "second_turn")), ("PathFollowing", 10.0, ("turn",)),
-    ):  # fmt: skip
-        scales = {one.name: one.scale for one in Task.of(name, corridor=0.5).observed(mariner)}
+        ("PathFollowing-v1", 20.0, ("next_turn", "second_turn")),
+        ("PathFollowing", 10.0, ("turn",)),
+    ):
+        scales = {
+            one.name: one.scale for one in Task.of(name, corridor=0.5).observed(mariner)
+        }
         assert scales["cross_track"] == pytest.approx(0.5 * length)
         for turn in turns:
             assert scales[f"{turn}_distance"] == pytest.approx(far * length)
@@ -455,24 +586,45 @@ def test_scales_of_a_path_are_those_of_its_page():
 @pytest.mark.parametrize(
     ("travel_s", "interval"),
     [
-        (20.0, 1.0), (28.2, 1.0), (28.4, 2.0), (63.0, 2.0), (63.5, 5.0), (141.0, 5.0), (142.0, 10.0),
-        (400.0, 20.0), (3.0, 0.2), (0.5, 0.02),
+        (20.0, 1.0),
+        (28.2, 1.0),
+        (28.4, 2.0),
+        (63.0, 2.0),
+        (63.5, 5.0),
+        (141.0, 5.0),
+        (142.0, 10.0),
+        (400.0, 20.0),
+        (3.0, 0.2),
+        (0.5, 0.02),
     ],
-)  # fmt: skip
-def test_a_control_interval_is_about_a_twentieth_of_the_time_a_length_takes(travel_s, interval):
+)
+def test_a_control_interval_is_about_a_twentieth_of_the_time_a_length_takes(
+    travel_s, interval
+):
     """As 1, 2 or 5 times a power of ten, by the nearest ratio."""
     assert rounded_interval(travel_s) == pytest.approx(interval)
 
 
 def test_an_interval_is_integrated_in_steps_of_at_most_one_and_a_half_usual_ones():
     mariner = shipgym.load_model("mariner")
-    for dt, steps in ((None, 1), (0.25, 1), (1.0, 1), (1.5, 1), (1.51, 2), (3.0, 2), (3.01, 3), (30.0, 20)):
+    for dt, steps in (
+        (None, 1),
+        (0.25, 1),
+        (1.0, 1),
+        (1.5, 1),
+        (1.51, 2),
+        (3.0, 2),
+        (3.01, 3),
+        (30.0, 20),
+    ):
         task = course_keeping_task(dt=dt)
         assert task.interval(mariner) == (dt or 1.0)
         assert task.substeps(mariner) == steps
         assert task.substep(mariner) == pytest.approx((dt or 1.0) / steps)
     tanker = shipgym.load_model("kvlcc2")  # whose usual interval is 2 s
-    assert [course_keeping_task(dt=dt).substeps(tanker) for dt in (None, 3.0, 3.01, 6.0)] == [1, 1, 2, 2]
+    assert [
+        course_keeping_task(dt=dt).substeps(tanker) for dt in (None, 3.0, 3.01, 6.0)
+    ] == [1, 1, 2, 2]
 
 
 def test_an_interval_is_at_most_five_ship_lengths():
@@ -480,7 +632,8 @@ def test_an_interval_is_at_most_five_ship_lengths():
     longest = 5.0 * 160.93 / 7.7175
     course_keeping_task(dt=longest - 0.01).check_fits(mariner)
     with pytest.raises(
-        InputError, match=r"^dt: 104.3 found, expected a number <= 104.263; s: 5 ship lengths$"
+        InputError,
+        match=r"^dt: 104.3 found, expected a number <= 104.263; s: 5 ship lengths$",
     ):
         course_keeping_task(dt=104.3).check_fits(mariner)
 
@@ -488,24 +641,42 @@ def test_an_interval_is_at_most_five_ship_lengths():
 def test_settings_of_a_task_are_its_attributes_weights_too():
     task = Task.of("PathFollowing-v1", corridor=0.7, heading_scale_deg=20.0)
     assert (task.corridor, task.heading_scale_deg, task.turn_radius, task.name) == (
-        0.7, 20.0, 4.0, "PathFollowing-v1",
-    )  # fmt: skip
-    with pytest.raises(AttributeError, match="task 'PathFollowing-v1' has no setting 'acceptance'"):
+        0.7,
+        20.0,
+        4.0,
+        "PathFollowing-v1",
+    )
+    with pytest.raises(
+        AttributeError, match="task 'PathFollowing-v1' has no setting 'acceptance'"
+    ):
         _ = task.acceptance
     assert task.follows_path
     assert not course_keeping_task().follows_path
     assert task.changed(corridor=0.9).corridor == 0.9
     assert task.changed(ground=5.0).corridor == 0.7
-    assert (task.n_commands, Task.of("PathFollowing", action="rudder-shaft").n_commands) == (1, 2)
+    assert (
+        task.n_commands,
+        Task.of("PathFollowing", action="rudder-shaft").n_commands,
+    ) == (1, 2)
 
 
 def test_info_has_what_the_task_reports_and_the_parts_of_its_reward():
     task = course_keeping_task()
     parts = ("heading", "rudder", "rudder_rate", "roll", "envelope", "end")
     assert task.reward_parts == tuple(f"reward_{part}" for part in parts)
-    assert task.info_names == ("heading_error", "envelope_distance", "extrapolating", *task.reward_parts)
+    assert task.info_names == (
+        "heading_error",
+        "envelope_distance",
+        "extrapolating",
+        *task.reward_parts,
+    )
     assert task.flags == {"extrapolating"}
-    assert Task.of("PathFollowing").flags == {"extrapolating", "success", "in_corridor", "grounded"}
+    assert Task.of("PathFollowing").flags == {
+        "extrapolating",
+        "success",
+        "in_corridor",
+        "grounded",
+    }
 
 
 def test_ships_and_seas_of_a_pool_go_together_in_all_pairs():
@@ -519,7 +690,9 @@ def test_ships_and_seas_of_a_pool_go_together_in_all_pairs():
     drawn = Randomisation(ensemble=others, speed_range=(0.5, 1.0)).ships(mariner, seas)
     assert len(drawn) == POOL_SIZE == 256
     pairs = [(ship.name, seas.index(sea)) for ship, sea in drawn]
-    assert pairs[:6] == [(name, k) for k in (0, 1) for name in ("mariner", "second", "third")]
+    assert pairs[:6] == [
+        (name, k) for k in (0, 1) for name in ("mariner", "second", "third")
+    ]
     assert pairs == (pairs[:6] * 43)[:256]
     again = Randomisation(ensemble=others, speed_range=(0.5, 1.0)).ships(mariner, seas)
     assert [ship.particulars["speed"] for ship, _ in again] == [
@@ -529,9 +702,20 @@ def test_ships_and_seas_of_a_pool_go_together_in_all_pairs():
 
 
 def test_options_are_parted_into_what_is_randomised_and_the_rest():
-    randomised, rest = Randomisation.take_from({"speed_range": (0.5, 1.0), "noise": 1.0})
-    assert (randomised.speed_range, randomised.loading_range, rest) == ((0.5, 1.0), None, {"noise": 1.0})
-    assert Randomisation.names() == ("model_uncertainty", "ensemble", "speed_range", "loading_range")
+    randomised, rest = Randomisation.take_from(
+        {"speed_range": (0.5, 1.0), "noise": 1.0}
+    )
+    assert (randomised.speed_range, randomised.loading_range, rest) == (
+        (0.5, 1.0),
+        None,
+        {"noise": 1.0},
+    )
+    assert Randomisation.names() == (
+        "model_uncertainty",
+        "ensemble",
+        "speed_range",
+        "loading_range",
+    )
 
 
 def test_ids_have_a_version_the_first_is_none():
@@ -540,8 +724,9 @@ def test_ids_have_a_version_the_first_is_none():
     found = environments()
     assert len(found) == 14
     assert found["shipgym/CourseKeepingRoll-v1"] == {
-        **found["shipgym/CourseKeepingRoll-v0"], "model": "container-4dof-output-error",
-    }  # fmt: skip
+        **found["shipgym/CourseKeepingRoll-v0"],
+        "model": "container-4dof-output-error",
+    }
     assert found["shipgym/PathFollowingShaft-v1"]["task"] == "PathFollowing-v1"
     before = dict(gymnasium.registry)
     register_environments()  # a second time changes nothing
@@ -551,10 +736,13 @@ def test_ids_have_a_version_the_first_is_none():
 @pytest.mark.parametrize(
     ("windy", "noise", "filtered", "name"),
     [
-        (False, False, False, "perfect"), (True, False, False, "bridge"), (False, True, False, "bridge"),
-        (False, False, True, "bridge"), (True, True, True, "bridge"),
+        (False, False, False, "perfect"),
+        (True, False, False, "bridge"),
+        (False, True, False, "bridge"),
+        (False, False, True, "bridge"),
+        (True, True, True, "bridge"),
     ],
-)  # fmt: skip
+)
 def test_instruments_are_without_error_only_in_calm_water_without_noise_and_filter(
     windy, noise, filtered, name
 ):
@@ -567,14 +755,23 @@ def test_instruments_are_without_error_only_in_calm_water_without_noise_and_filt
 
 INTERVAL = Interval(0.5, 7.0, 0.0, 0.0, 1.0, 0.0, 0.0)
 WAVES = {"psi_wave": 0.02, "r_wave": 0.003, "phi_wave": 0.04, "p_wave": 0.005}
-SEA = Sea(**dict.fromkeys(Sea._fields, 0.0) | WAVES | {"current_north": 0.6, "current_east": 0.8})
+SEA = Sea(
+    **dict.fromkeys(Sea._fields, 0.0)
+    | WAVES
+    | {
+        "current_north": 0.6,
+        "current_east": 0.8,
+    }
+)
 NO_NOTCH = bridge.Notch(0.0, 0.0, 0.0, 0.0)
 NO_MEMORY = bridge.Memory(*[0.0] * 6, NO_NOTCH, NO_NOTCH)
 SAILING = Motion(10.0, 20.0, 0.5 * np.pi, 5.0, 0.3, 0.01, 0.02, 0.1, 0.0, 0.2, 1.5)
 
 
 def test_perfect_instruments_show_what_is_so_and_the_way_over_ground():
-    assert perfect.measure(SAILING, SEA, "memory", 0.5, INTERVAL, None, None) == "memory"
+    assert (
+        perfect.measure(SAILING, SEA, "memory", 0.5, INTERVAL, None, None) == "memory"
+    )
     shown = perfect.readings(SAILING, SEA, None)
     over_ground = (5.0 + 0.8, 0.3 * np.cos(0.1) - 0.6)  # heading east
     assert (shown.ahead, shown.aside) == pytest.approx(over_ground, abs=1e-12)
@@ -585,16 +782,38 @@ def test_perfect_instruments_show_what_is_so_and_the_way_over_ground():
 
 def test_a_bridge_shows_waves_and_noise_beside_the_slow_motion():
     memory = bridge.Memory(1.0, 2.0, 3.0, 4.0, 5.0, 6.0, NO_NOTCH, NO_NOTCH)
-    shown, plain = bridge.readings(SAILING, SEA, memory), perfect.readings(SAILING, SEA, None)
-    added = {name: getattr(shown, name) - getattr(plain, name) for name in plain._fields}
-    expected = {"x": 1.0, "y": 2.0, "psi": 3.0, "u": 4.0, "v": 5.0, "r": 6.0, "p": 0.005, "phi": 0.04}
+    shown, plain = (
+        bridge.readings(SAILING, SEA, memory),
+        perfect.readings(SAILING, SEA, None),
+    )
+    added = {
+        name: getattr(shown, name) - getattr(plain, name) for name in plain._fields
+    }
+    expected = {
+        "x": 1.0,
+        "y": 2.0,
+        "psi": 3.0,
+        "u": 4.0,
+        "v": 5.0,
+        "r": 6.0,
+        "p": 0.005,
+        "phi": 0.04,
+    }
     assert added == pytest.approx(dict.fromkeys(plain._fields, 0.0) | expected)
 
 
 def test_without_noise_and_filter_a_bridge_adds_the_waves_alone(monkeypatch):
     monkeypatch.setattr(bridge, "HAS_NOISE", False)
     monkeypatch.setattr(bridge, "HAS_FILTER", False)
-    found = bridge.measure(SAILING, SEA, NO_MEMORY, 0.6, INTERVAL, bridge.Settings(9.0, 9.0, 9.0, 9.0), None)
+    found = bridge.measure(
+        SAILING,
+        SEA,
+        NO_MEMORY,
+        0.6,
+        INTERVAL,
+        bridge.Settings(9.0, 9.0, 9.0, 9.0),
+        None,
+    )
     assert found == NO_MEMORY._replace(psi=0.02, r=0.003)
 
 
@@ -602,7 +821,13 @@ def measured(settings, steps=7.0, key=1):
     random = Random(np.uint64(key), np.uint64(2))
     with np.errstate(over="ignore"):
         return bridge.measure(
-            SAILING, SEA, NO_MEMORY, 0.6, INTERVAL._replace(steps=steps), bridge.Settings(**settings), random
+            SAILING,
+            SEA,
+            NO_MEMORY,
+            0.6,
+            INTERVAL._replace(steps=steps),
+            bridge.Settings(**settings),
+            random,
         )
 
 
@@ -610,37 +835,67 @@ def test_noise_of_each_instrument_is_its_own_and_grows_with_its_deviation(monkey
     monkeypatch.setattr(bridge, "HAS_FILTER", False)
     plain = measured({})
     assert plain[:6] == (0.0, 0.0, 0.02, 0.0, 0.0, 0.003)
-    shows = {"heading": ("psi",), "yaw_rate": ("r",), "speed": ("u", "v"), "position": ("x", "y")}
+    shows = {
+        "heading": ("psi",),
+        "yaw_rate": ("r",),
+        "speed": ("u", "v"),
+        "position": ("x", "y"),
+    }
     drawn = []
     for setting, channels in shows.items():
         one, twice = measured({setting: 0.1}), measured({setting: 0.2})
         for name in plain._fields[:6]:
             noise = getattr(one, name) - getattr(plain, name)
-            assert getattr(twice, name) - getattr(plain, name) == pytest.approx(2.0 * noise)
+            assert getattr(twice, name) - getattr(plain, name) == pytest.approx(
+                2.0 * noise
+            )
             assert (noise != 0.0) == (name in channels)
             drawn += [noise] if noise else []
     assert len(set(drawn)) == 6
     assert measured({"speed": 0.1}) == measured({"speed": 0.1})
-    assert len({measured({"speed": 0.1}, steps, key).u for steps in (0.0, 1.0, 2.0) for key in (1, 2)}) == 6
+    assert (
+        len(
+            {
+                measured({"speed": 0.1}, steps, key).u
+                for steps in (0.0, 1.0, 2.0)
+                for key in (1, 2)
+            }
+        )
+        == 6
+    )
 
 
 def test_a_filter_takes_nothing_away_in_the_first_sample(monkeypatch):
     monkeypatch.setattr(bridge, "HAS_NOISE", False)
     first = bridge.measure(
-        SAILING, SEA, NO_MEMORY, 0.6, INTERVAL._replace(steps=0.0), bridge.Settings(), None
+        SAILING,
+        SEA,
+        NO_MEMORY,
+        0.6,
+        INTERVAL._replace(steps=0.0),
+        bridge.Settings(),
+        None,
     )
     assert (first.psi, first.r) == (0.02, 0.003)
-    assert first.heading == bridge.Notch(SAILING.psi + 0.02, SAILING.psi + 0.02, 0.0, 0.0)
+    assert first.heading == bridge.Notch(
+        SAILING.psi + 0.02, SAILING.psi + 0.02, 0.0, 0.0
+    )
     assert first.rate == pytest.approx(bridge.Notch(0.013, 0.013, 0.0, 0.0))
     later = bridge.measure(SAILING, SEA, first, 0.6, INTERVAL, bridge.Settings(), None)
-    assert later.heading == bridge.notched(SAILING.psi + 0.02, 0.3, False, first.heading)
+    assert later.heading == bridge.notched(
+        SAILING.psi + 0.02, 0.3, False, first.heading
+    )
     assert later.psi == pytest.approx(0.02 - later.heading.taken_1)
     changed = SEA._replace(psi_wave=0.05, r_wave=-0.01)
-    later = bridge.measure(SAILING, changed, first, 0.6, INTERVAL, bridge.Settings(), None)
+    later = bridge.measure(
+        SAILING, changed, first, 0.6, INTERVAL, bridge.Settings(), None
+    )
     assert later.rate == pytest.approx(bridge.notched(0.0, 0.3, False, first.rate))
     assert later.r == pytest.approx(-0.01 - later.rate.taken_1)
     assert later.heading.taken_1 != 0.0 != later.rate.taken_1
-    fast = bridge.measure(SAILING, changed, first, 99.0, INTERVAL, bridge.Settings(), None)
+    fast = bridge.measure(
+        SAILING, changed, first, 99.0, INTERVAL, bridge.Settings(), None
+    )
     assert fast.rate == pytest.approx(
         bridge.notched(0.0, 2.8, False, first.rate)
     )  # not beyond what is sampled

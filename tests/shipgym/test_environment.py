@@ -14,9 +14,17 @@ from shipgym import InputError, load_model
 from shipgym.envs.engine import episode_keys
 from shipgym.envs.environment import rudder_orders
 
-PATH, FIRST, COURSE = "shipgym/PathFollowing-v1", "shipgym/PathFollowing-v0", "shipgym/CourseKeeping-v0"
+PATH, FIRST, COURSE = (
+    "shipgym/PathFollowing-v1",
+    "shipgym/PathFollowing-v0",
+    "shipgym/CourseKeeping-v0",
+)
 HOOK = [[0.0, 0.0], [1500.0, 0.0], [2900.0, 1400.0]]
-SEA = {"model": "mariner", "sea": ["calm", "moderate"], "noise": 1.0}  # shared with other tests
+SEA = {
+    "model": "mariner",
+    "sea": ["calm", "moderate"],
+    "noise": 1.0,
+}  # shared with other tests
 
 
 def one(name=PATH, **options):
@@ -31,10 +39,18 @@ def sailed(env, steps=30, swing=0.5):
     """All that some steps show."""
     shown = []
     for step in range(steps):
-        action = np.full(env.action_space.shape, swing * np.sin(step / 5.0), dtype=np.float32)
+        action = np.full(
+            env.action_space.shape, swing * np.sin(step / 5.0), dtype=np.float32
+        )
         seen, rewards, terminated, truncated, infos = env.step(action)
-        shown.append([seen.copy(), np.copy(rewards), np.copy(terminated), np.copy(truncated)])
-        shown[-1] += [np.copy(infos[name]) for name in sorted(infos) if not name.startswith(("_", "final"))]
+        shown.append(
+            [seen.copy(), np.copy(rewards), np.copy(terminated), np.copy(truncated)]
+        )
+        shown[-1] += [
+            np.copy(infos[name])
+            for name in sorted(infos)
+            if not name.startswith(("_", "final"))
+        ]
         if np.ndim(terminated) == 0 and (terminated or truncated):
             env.reset()
     return shown
@@ -47,7 +63,9 @@ def same(first, second):
 
 
 @pytest.mark.parametrize(
-    "again", [copy.deepcopy, lambda env: pickle.loads(pickle.dumps(env))], ids=["copy", "pickle"]
+    "again",
+    [copy.deepcopy, lambda env: pickle.loads(pickle.dumps(env))],
+    ids=["copy", "pickle"],
 )
 @pytest.mark.parametrize(
     ("make", "options"),
@@ -83,8 +101,12 @@ def test_a_state_is_gone_back_to(make):
     same(ours, sailed(env, swing=0.9))
     other = make(episode_steps=40).unwrapped
     seen, info = other.reset(options={"state": state})
-    np.testing.assert_array_equal(seen, state["engine"]["observations"].reshape(seen.shape))
-    np.testing.assert_array_equal(info["cross_track"], np.squeeze(state["engine"]["outcomes"][4]))
+    np.testing.assert_array_equal(
+        seen, state["engine"]["observations"].reshape(seen.shape)
+    )
+    np.testing.assert_array_equal(
+        info["cross_track"], np.squeeze(state["engine"]["outcomes"][4])
+    )
     same(ours, sailed(other, swing=0.9))
 
 
@@ -98,15 +120,29 @@ def test_states_that_do_not_fit_are_refused_and_change_nothing():
     broken["engine"]["states"][0, 0] = np.nan
     blind = {
         **state,
-        "engine": {**state["engine"], "observations": np.full_like(env.reset(seed=0)[0], np.nan)[None]},
+        "engine": {
+            **state["engine"],
+            "observations": np.full_like(env.reset(seed=0)[0], np.nan)[None],
+        },
     }
     before = env.physical_state()
-    first, tanker, short, vector = one(FIRST), one(model="mariner-tls-svm"), one(waypoints=HOOK), many()
+    first, tanker, short, vector = (
+        one(FIRST),
+        one(model="mariner-tls-svm"),
+        one(waypoints=HOOK),
+        many(),
+    )
     for other in (first, tanker, short, vector):
         other.reset(seed=0)
     states = [other.unwrapped.get_state() for other in (first, tanker, short, vector)]
     for given, message in [
-        (states[0], "state: task 'PathFollowing' found, expected 'PathFollowing-v1': .* same version"),
+        (
+            states[0],
+            (
+                "state: task 'PathFollowing' found, expected 'PathFollowing-v1': .*"
+                " same version"
+            ),
+        ),
         (states[1], "state: model 'mariner-tls-svm' found, expected 'mariner'"),
         (states[2], "state: states of shape"),
         (states[3], "state: unknown key 'some_over'"),
@@ -125,7 +161,10 @@ def test_states_that_do_not_fit_are_refused_and_change_nothing():
             env.set_state(given)
         with pytest.raises(InputError, match=message):
             env.reset(options={"state": given})
-    with pytest.raises(InputError, match=r"'state' found together with \['waypoints'\], expected it alone"):
+    with pytest.raises(
+        InputError,
+        match=r"'state' found together with \['waypoints'\], expected it alone",
+    ):
         env.reset(options={"state": state, "waypoints": HOOK})
     assert env.physical_state() == before
 
@@ -148,13 +187,24 @@ def test_waypoints_of_a_reset_hold_until_the_next(make):
 
 
 def test_a_model_index_chooses_among_the_ships_that_are_drawn_from():
-    options = {"model": "mariner-tls-svm", "ensemble": ["mariner"], "speed_range": (0.5, 1.0)}
+    options = {
+        "model": "mariner-tls-svm",
+        "ensemble": ["mariner"],
+        "speed_range": (0.5, 1.0),
+    }
     env = many(COURSE, 2, **options)
     env.reset(seed=0, options={"model_index": 7})
     speeds = env.unwrapped.physical_state()["u"]
-    assert speeds[0] == speeds[1] == env.unwrapped._own_engine.pool[7][0].particulars["speed"]
+    assert (
+        speeds[0]
+        == speeds[1]
+        == env.unwrapped._own_engine.pool[7][0].particulars["speed"]
+    )
     for wrong in (-1, 256, 1.0, "first"):
-        with pytest.raises(InputError, match=r"model_index: .* found, expected a whole number of at least 0"):
+        with pytest.raises(
+            InputError,
+            match=r"model_index: .* found, expected a whole number of at least 0",
+        ):
             env.reset(options={"model_index": wrong})
     with pytest.raises(InputError, match=r"model_index: 1 found.* at most 0"):
         one().reset(options={"model_index": 1})
@@ -168,8 +218,15 @@ def test_libraries_read_the_steps_of_an_episode():
     assert TimeAwareObservation(one(COURSE)).reset(seed=0)[0][-1] == 0.0
     env = many(max_episode_steps=4)
     env.reset(seed=0)
-    assert [env.step(np.zeros((3, 1), np.float32))[3].all() for _ in range(4)] == [False, False, False, True]
-    with pytest.raises(InputError, match="max_episode_steps: 4 found together with episode_steps 5"):
+    assert [env.step(np.zeros((3, 1), np.float32))[3].all() for _ in range(4)] == [
+        False,
+        False,
+        False,
+        True,
+    ]
+    with pytest.raises(
+        InputError, match="max_episode_steps: 4 found together with episode_steps 5"
+    ):
         many(max_episode_steps=4, episode_steps=5)
 
 
@@ -184,12 +241,21 @@ def test_a_refused_action_leaves_what_was_shown():
     env.reset(seed=3)
     sailed(env, 4)
     engine = env._engine
-    shown = [engine.observations, engine.info("heading_error").copy(), engine.shown.outcomes[0].copy()]
-    with pytest.raises(InputError, match=r"^actions: inf found in lane 1, expected numbers in \[-1, 1\]$"):
+    shown = [
+        engine.observations,
+        engine.info("heading_error").copy(),
+        engine.shown.outcomes[0].copy(),
+    ]
+    with pytest.raises(
+        InputError,
+        match=r"^actions: inf found in lane 1, expected numbers in \[-1, 1\]$",
+    ):
         env.step(np.array([[0.0], [np.inf], [np.nan]], np.float32))
     assert shown[2].all()  # costs
     for before, now in zip(
-        shown, [engine.observations, engine.info("heading_error"), engine.shown.outcomes[0]], strict=True
+        shown,
+        [engine.observations, engine.info("heading_error"), engine.shown.outcomes[0]],
+        strict=True,
     ):
         np.testing.assert_array_equal(now, before)
     mask = np.array([True, False, True])
@@ -202,15 +268,21 @@ def test_the_first_reward_that_is_no_number_is_named():
     engine.reset([1, 2, 3])
     engine.step(np.zeros((3, 1)))
     own = engine.task.definition.reward_source
-    engine.shown.outcomes[0, 1] = np.inf  # a sum beyond all numbers, of parts that are within
+    engine.shown.outcomes[0, 1] = (
+        np.inf
+    )  # a sum beyond all numbers, of parts that are within
     with pytest.raises(InputError) as caught:
         engine.refuse_rewards()
     value = engine.info("reward_heading")[1]
     assert str(caught.value).startswith(
-        f"{own}: reward_heading is {value} in lane 1 at step 1, expected a finite number; look for"
+        f"{own}: reward_heading is {value} in lane 1 at step 1, expected a finite"
+        " number; look for"
     )
     engine.info("reward_rudder_rate")[2] = np.nan
-    with pytest.raises(InputError, match=r"reward_rudder_rate is nan in lane 2 at step 1, expected a finite"):
+    with pytest.raises(
+        InputError,
+        match=r"reward_rudder_rate is nan in lane 2 at step 1, expected a finite",
+    ):
         engine.refuse_rewards()
 
 
@@ -223,7 +295,10 @@ def test_a_state_tells_which_number_of_which_ship_is_none():
     for row, name in ((3, "motion.u"), (rows, "plan"), (rows + 9, "plan")):
         wrong = copy.deepcopy(state)
         wrong["engine"]["states"].reshape(-1, 64)[row, 2] = np.inf
-        with pytest.raises(InputError, match=f"^state: {name} in row 2 is not finite, expected a number$"):
+        with pytest.raises(
+            InputError,
+            match=f"^state: {name} in row 2 is not finite, expected a number$",
+        ):
             env.set_state(wrong)
     first[:, 3:] = np.nan  # lanes without a ship
     env.set_state(state)
@@ -235,11 +310,17 @@ def test_a_state_of_another_ship_by_the_same_name_is_refused():
     env, another = (one(COURSE, model=ship).unwrapped for ship in (mariner, other))
     for each in (env, another):
         each.reset(seed=0)
-    with pytest.raises(InputError, match=r"^state: of another ship than this 'mariner', expected the same$"):
+    with pytest.raises(
+        InputError,
+        match=r"^state: of another ship than this 'mariner', expected the same$",
+    ):
         env.set_state(another.get_state())
     short = env.get_state()
     short["engine"]["keys"] = short["engine"]["keys"][:, :2]
-    with pytest.raises(InputError, match=r"^state: keys of shape \(1, 2, 64\) found, expected \(1, 3, 64\)$"):
+    with pytest.raises(
+        InputError,
+        match=r"^state: keys of shape \(1, 2, 64\) found, expected \(1, 3, 64\)$",
+    ):
         env.set_state(short)
 
 
@@ -247,7 +328,12 @@ def test_numbers_of_the_state_are_read_and_written_by_name():
     engine = many(COURSE, model="mariner").unwrapped._engine
     engine.reset([1, 2, 3])
     assert engine.read("u").tolist() == [engine.model.particulars["speed"]] * 3
-    assert not np.any([engine.read(name) for name in ("v", "r", "delta", "rudder_command", "steps", "ended")])
+    assert not np.any(
+        [
+            engine.read(name)
+            for name in ("v", "r", "delta", "rudder_command", "steps", "ended")
+        ]
+    )
     assert engine.read("shaft_command").tolist() == [1.0] * 3
     engine.write("r", [1e-3, 2e-3, 3e-3])
     assert engine.read("r").tolist() == [1e-3, 2e-3, 3e-3]
@@ -276,7 +362,10 @@ def test_masks_and_orders_of_all_ships_cannot_be_written_by_accident():
 
 
 def test_episodes_of_a_checkpoint_go_on_for_every_row():
-    env, other = many(COURSE, model="mariner").unwrapped, many(COURSE, model="mariner").unwrapped
+    env, other = (
+        many(COURSE, model="mariner").unwrapped,
+        many(COURSE, model="mariner").unwrapped,
+    )
     env.reset(seed=4)
     sailed(env, 10)
     memory = env.memory()
@@ -287,7 +376,8 @@ def test_episodes_of_a_checkpoint_go_on_for_every_row():
 
 
 @pytest.mark.parametrize(
-    ("given", "expected"), [(4, [[0.0]]), (np.int64(0), [[-1.0]]), (8, [[1.0]]), (np.uint8(5), [[0.1]])]
+    ("given", "expected"),
+    [(4, [[0.0]]), (np.int64(0), [[-1.0]]), (8, [[1.0]]), (np.uint8(5), [[0.1]])],
 )
 def test_an_order_is_one_of_nine(given, expected):
     np.testing.assert_allclose(rudder_orders(given, (), "action"), expected)
@@ -297,8 +387,10 @@ def test_an_order_is_one_of_nine(given, expected):
 def test_what_is_no_order_is_refused(wrong):
     with pytest.raises(InputError) as caught:
         rudder_orders(wrong, (), "action")
-    assert str(caught.value) == (
-        f"action: {wrong!r} found, expected a whole number from 0 to 8: a rudder order"
+    assert (
+        str(caught.value)
+        == f"action: {wrong!r} found, expected a whole number from 0 to 8: a rudder"
+        " order"
     )
 
 
@@ -307,7 +399,10 @@ def test_orders_of_several_ships_are_a_column():
     np.testing.assert_allclose(found, [[-1.0], [1.0], [-0.25]])
     assert found.dtype == np.float32
     for wrong in ([0, 8], [0, 8, 9], [-1, 0, 0], [0.0, 1.0, 2.0], 3):
-        with pytest.raises(InputError, match=r"expected int of shape \(3,\) from 0 to 8: rudder orders$"):
+        with pytest.raises(
+            InputError,
+            match=r"expected int of shape \(3,\) from 0 to 8: rudder orders$",
+        ):
             rudder_orders(wrong, (3,), "actions")
 
 

@@ -12,7 +12,9 @@ STEPS = 4
 
 def states(**more):
     names = ("x", "y", "psi", "u", "v", "r", "delta")
-    known = {name: np.linspace(0.1, 1.0 / 3.0, STEPS + 1) + k for k, name in enumerate(names)}
+    known = {
+        name: np.linspace(0.1, 1.0 / 3.0, STEPS + 1) + k for k, name in enumerate(names)
+    }
     return known | more
 
 
@@ -90,28 +92,55 @@ def test_an_episode_cannot_be_changed():
         (("kind",), None, "kind: None found, expected 'episode'"),
         (("dt",), 0, "dt: 0 found, expected a number > 0"),
         (("dt",), "1", "dt: '1' (a text; write the number without quotes) found"),
-        (("dt",), 2**64, "dt: 18446744073709551616 found, expected a whole number of at most 64 bits"),
+        (
+            ("dt",),
+            2**64,
+            (
+                "dt: 18446744073709551616 found, expected a whole number of at most 64"
+                " bits"
+            ),
+        ),
         (("model",), "", "model: '' found"),
         (("model",), "m" * 5000, "model: 5000 characters found, expected at most 4096"),
         (("seed",), -1, "seed: -1 found, expected a whole number of at least 0"),
         (("number",), 1.5, "number: 1.5 found"),
-        (("ship", "beam"), 500.0, "beam: 500 found, expected a number > 0 and <= 160.93"),
+        (
+            ("ship", "beam"),
+            500.0,
+            "beam: 500 found, expected a number > 0 and <= 160.93",
+        ),
         (("ship", "beem"), 1.0, "ship: unknown key 'beem'. Did you mean 'beam'?"),
         (("path", "corridor"), -5.0, "corridor: -5 found"),
         (("path", "waypoints"), [[0.0, 0.0]], "waypoints: shape (1, 2) found"),
         (("states", "x"), [0.0, 1.0], "states.x: shape (2,) found, expected (5,)"),
-        (("states", "x"), [0.0, 1.0, None, 2.0, 3.0], "states.x[2]: None found, expected a number"),
+        (
+            ("states", "x"),
+            [0.0, 1.0, None, 2.0, 3.0],
+            "states.x[2]: None found, expected a number",
+        ),
         (("states", "x"), [0.0, 1.0, True, 2.0, 3.0], "states.x[2]: True found"),
-        (("info", "cross_track"), [0.0] * STEPS, "info.cross_track: shape (4,) found, expected (5,)"),
+        (
+            ("info", "cross_track"),
+            [0.0] * STEPS,
+            "info.cross_track: shape (4,) found, expected (5,)",
+        ),
         (("commands", "delta"), 0.1, "commands.delta: 0.1 found, expected a list"),
-        (("actions",), [[0.1], [0.2]], "actions: shape (2, 1) found, expected (4, n_actions)"),
+        (
+            ("actions",),
+            [[0.1], [0.2]],
+            "actions: shape (2, 1) found, expected (4, n_actions)",
+        ),
         (
             ("actions",),
             [[0.1], [0.2, 0.3], [0.1], [0.1]],
             "actions[1]: 2 entries found, expected a list of 1 numbers",
         ),
         (("rewards",), [], "rewards: no step found"),
-        (("rewards",), [1.0, float("nan"), 1.0, 1.0], "rewards[1]: nan found, expected a number"),
+        (
+            ("rewards",),
+            [1.0, float("nan"), 1.0, 1.0],
+            "rewards[1]: nan found, expected a number",
+        ),
         (("outcome", "success"), "yes", "success: 'yes' found, expected true or false"),
         (("states",), {"x": [0.0] * 5}, "states: 'y', 'psi', 'delta' missing"),
         (("note",), "", "unknown key 'note'"),
@@ -127,7 +156,9 @@ def test_a_wrong_field_is_named_with_its_file(tmp_path, place, value, said):
         table = table[name]
     table[key] = value
     path.write_text(json.dumps(content))
-    with pytest.raises(InputError, match=f"^{re.escape(f'{path}: ')}.*{re.escape(said)}"):
+    with pytest.raises(
+        InputError, match=f"^{re.escape(f'{path}: ')}.*{re.escape(said)}"
+    ):
         Episode.load(path)
 
 
@@ -167,34 +198,60 @@ def test_the_path_of_an_episode_is_drawn_with_its_turns():
     )
     assert replace(EPISODE, waypoints=corner, turn_radius=None).path.tolist() == corner
     assert replace(EPISODE, waypoints=None, turn_radius=None).path is None
-    with pytest.raises(InputError, match=r"rows 0 and 1 are 1000 m apart, expected at least 1200 m"):
+    with pytest.raises(
+        InputError, match=r"rows 0 and 1 are 1000 m apart, expected at least 1200 m"
+    ):
         replace(episode, turn_radius=1200.0)
 
 
 @pytest.mark.parametrize(
     ("changes", "said"),
     [
-        ({"environment": " "}, "environment: ' ' found, expected a text that is not empty"),
+        (
+            {"environment": " "},
+            "environment: ' ' found, expected a text that is not empty",
+        ),
         ({"length": None}, "length: None found, expected a number > 0"),
         ({"dt": None}, "dt: None found, expected a number > 0"),
-        ({"rudder_limit": 1.58}, "rudder_limit: 1.58 found, expected a number > 0 and <= 1.5708"),
+        (
+            {"rudder_limit": 1.58},
+            "rudder_limit: 1.58 found, expected a number > 0 and <= 1.5708",
+        ),
         ({"beam": 160.94}, "beam: 160.94 found, expected a number > 0 and <= 160.93"),
         ({"corridor": 0.0}, "corridor: 0 found, expected a number > 0"),
         ({"turn_radius": -1.0}, "turn_radius: -1 found, expected a number > 0"),
-        ({"arguments": ["mariner"]}, "arguments: ['mariner'] found, expected a table of keys and values"),
+        (
+            {"arguments": ["mariner"]},
+            "arguments: ['mariner'] found, expected a table of keys and values",
+        ),
         ({"number": -1}, "number: -1 found, expected a whole number of at least 0"),
         ({"seed": 1.0}, "seed: 1.0 found, expected a whole number of at least 0"),
         ({"terminated": None}, "terminated: None found, expected true or false"),
         ({"truncated": 1}, "truncated: 1 found, expected true or false"),
         ({"success": 0}, "success: 0 found, expected true or false"),
-        ({"actions": np.zeros(STEPS)}, "actions: shape (4,) found, expected (4, n_actions), a row for each"),
-        ({"rewards": np.zeros((STEPS, 1))}, "rewards: shape (4, 1) found, expected (n_steps,)"),
-        ({"rewards": np.zeros(0)}, "rewards: no step found, expected at least one step"),
-        ({"commands": {"n": np.zeros(STEPS + 1)}}, "commands.n: shape (5,) found, expected (4,)"),
-        ({"reward_parts": {"end": np.zeros(STEPS + 1)}}, "reward_parts.end: shape (5,) found, expected (4,)"),
+        (
+            {"actions": np.zeros(STEPS)},
+            "actions: shape (4,) found, expected (4, n_actions), a row for each",
+        ),
+        (
+            {"rewards": np.zeros((STEPS, 1))},
+            "rewards: shape (4, 1) found, expected (n_steps,)",
+        ),
+        (
+            {"rewards": np.zeros(0)},
+            "rewards: no step found, expected at least one step",
+        ),
+        (
+            {"commands": {"n": np.zeros(STEPS + 1)}},
+            "commands.n: shape (5,) found, expected (4,)",
+        ),
+        (
+            {"reward_parts": {"end": np.zeros(STEPS + 1)}},
+            "reward_parts.end: shape (5,) found, expected (4,)",
+        ),
         ({"info": [1.0]}, "info: [1.0] found, expected a table of keys and values"),
     ],
-)  # fmt: skip
+)
 def test_an_episode_that_cannot_be_is_refused(changes, said):
     with pytest.raises(InputError) as caught:
         replace(EPISODE, **changes)
@@ -202,7 +259,9 @@ def test_an_episode_that_cannot_be_is_refused(changes, said):
 
 
 def test_what_need_not_be_known_may_be_left_out():
-    unknown = dict.fromkeys(("waypoints", "corridor", "turn_radius", "beam", "seed", "success"))
+    unknown = dict.fromkeys(
+        ("waypoints", "corridor", "turn_radius", "beam", "seed", "success")
+    )
     bare = replace(EPISODE, **unknown, commands={})
     assert (bare.n_steps, bare.number, bare.rudder_limit) == (STEPS, 3, 0.7)
     assert replace(bare, rudder_limit=np.pi / 2.0, beam=160.93, number=0).number == 0
@@ -217,7 +276,9 @@ def test_a_path_is_told_as_far_as_there_is_one(tmp_path, changes):
     assert (path is None) == ("waypoints" in changes)
     if path is not None:
         assert path.keys() == {"waypoints", "corridor", "turn_radius"} - changes.keys()
-        assert Episode.load(tmp_path / "episode.json").turn_radius == episode.turn_radius
+        assert (
+            Episode.load(tmp_path / "episode.json").turn_radius == episode.turn_radius
+        )
     else:
         assert Episode.load(tmp_path / "episode.json").waypoints is None
     assert (tmp_path / "episode.json").read_text().count("\n") == 1  # all in one line
@@ -226,6 +287,7 @@ def test_a_path_is_told_as_far_as_there_is_one(tmp_path, changes):
 def test_a_file_of_another_kind_is_told_so(tmp_path):
     (tmp_path / "model.json").write_text('{"kind": "model", "format": 7}')
     with pytest.raises(
-        InputError, match=r"kind: 'model' found, expected 'episode': a file that RecordEpisode"
+        InputError,
+        match=r"kind: 'model' found, expected 'episode': a file that RecordEpisode",
     ):
         Episode.load(tmp_path / "model.json")

@@ -4,7 +4,12 @@ import numpy as np
 import pytest
 
 from shipgym import InputError, load_model
-from shipgym.manoeuvres import multi_sine_rudder, prbs_rudder, random_rudder_steps, shaft_speed_steps
+from shipgym.manoeuvres import (
+    multi_sine_rudder,
+    prbs_rudder,
+    random_rudder_steps,
+    shaft_speed_steps,
+)
 
 SEQUENCES = [prbs_rudder, multi_sine_rudder, random_rudder_steps, shaft_speed_steps]
 
@@ -16,7 +21,9 @@ def tanker():
 
 @pytest.mark.parametrize("sequence", SEQUENCES)
 def test_a_seed_replays_its_trial_and_another_gives_another(tanker, sequence):
-    first, again, other = (sequence(tanker, seed=seed, duration=500.0) for seed in (1, 1, 2))
+    first, again, other = (
+        sequence(tanker, seed=seed, duration=500.0) for seed in (1, 1, 2)
+    )
     assert first.sha256 == again.sha256 != other.sha256
     assert first.kind == "random"
 
@@ -78,14 +85,28 @@ def test_sequences_go_by_the_time_to_travel_a_ship_length(tanker):
     strong = np.flatnonzero(np.abs(np.fft.rfft(waves)) > 1e-6 * len(waves))
     assert (400.0 / strong.max(), 400.0 / strong.min()) == (2.0, 20.0)
     steps = random_rudder_steps(tanker, **times)
-    assert np.degrees(np.abs(steps["delta_command"]).max()) == pytest.approx(20.0, abs=0.5)
-    shortest, longest = held(steps, "delta_command").min(), held(steps, "delta_command").max()
-    assert (shortest, longest) == (pytest.approx(0.5, abs=0.15), pytest.approx(4.0, abs=0.15))
+    assert np.degrees(np.abs(steps["delta_command"]).max()) == pytest.approx(
+        20.0, abs=0.5
+    )
+    shortest, longest = (
+        held(steps, "delta_command").min(),
+        held(steps, "delta_command").max(),
+    )
+    assert (shortest, longest) == (
+        pytest.approx(0.5, abs=0.15),
+        pytest.approx(4.0, abs=0.15),
+    )
     shaft = shaft_speed_steps(tanker, **times | {"duration": 900.0 * travel})
     orders = shaft["n_command"] / tanker.service_shaft_speed
-    assert (orders.min(), orders.max()) == (pytest.approx(0.5, abs=0.03), pytest.approx(1.1, abs=0.03))
+    assert (orders.min(), orders.max()) == (
+        pytest.approx(0.5, abs=0.03),
+        pytest.approx(1.1, abs=0.03),
+    )
     shortest, longest = held(shaft, "n_command").min(), held(shaft, "n_command").max()
-    assert (shortest, longest) == (pytest.approx(5.0, abs=0.3), pytest.approx(15.0, abs=0.3))
+    assert (shortest, longest) == (
+        pytest.approx(5.0, abs=0.3),
+        pytest.approx(15.0, abs=0.3),
+    )
     assert np.all(shaft["delta_command"] == 0.0)
     asked = {"shortest_s": 0.5 * travel, "longest_s": 4.0 * travel}
     assert steps.sha256 == random_rudder_steps(tanker, **asked, **times).sha256
@@ -94,7 +115,9 @@ def test_sequences_go_by_the_time_to_travel_a_ship_length(tanker):
 def test_the_multi_sine_of_least_crest_is_taken(tanker):
     """Of 32 draws of phases; of one draw alone it is up to half as much again."""
     waves = [
-        multi_sine_rudder(tanker, seed=seed, duration=3000.0, dt=5.0)["delta_command"][:-1]
+        multi_sine_rudder(tanker, seed=seed, duration=3000.0, dt=5.0)["delta_command"][
+            :-1
+        ]
         for seed in range(5)
     ]
     crests = [np.abs(wave).max() / wave.std() for wave in waves]
@@ -107,7 +130,9 @@ def test_the_multi_sine_is_of_the_least_crest_of_32_draws(tanker):
     angles = 2.0 * np.pi * np.outer(np.arange(10, 31), np.arange(300) / 300.0)
     waves = np.cos(phases[:, :, None] + angles).sum(axis=1)
     crests = np.abs(waves).max(axis=1) / waves.std(axis=1)
-    found = multi_sine_rudder(tanker, 5.0, 139, 30.0, 10.0, duration=300.0, dt=1.0)["delta_command"][:-1]
+    found = multi_sine_rudder(tanker, 5.0, 139, 30.0, 10.0, duration=300.0, dt=1.0)[
+        "delta_command"
+    ][:-1]
     assert crests[:29].min() > crests[:32].min() > crests[32:35].min()
     assert np.abs(found).max() / found.std() == pytest.approx(crests[:32].min())
 
@@ -133,12 +158,26 @@ def test_shaft_orders_cover_their_range(tanker):
     [
         (lambda m: prbs_rudder(m, 50.0), "amplitude_deg: 50 found.*the rudder's limit"),
         (lambda m: prbs_rudder(m, clock_s=0.01), "clock_s: 0.01 found"),
-        (lambda m: multi_sine_rudder(m, longest_period_s=5.0, shortest_period_s=10.0), "longest_period_s: 5"),
+        (
+            lambda m: multi_sine_rudder(
+                m, longest_period_s=5.0, shortest_period_s=10.0
+            ),
+            "longest_period_s: 5",
+        ),
         (lambda m: multi_sine_rudder(m, duration=10.0), "at least one whole period"),
-        (lambda m: random_rudder_steps(m, shortest_s=20.0, longest_s=10.0), "longest_s: 10 found"),
+        (
+            lambda m: random_rudder_steps(m, shortest_s=20.0, longest_s=10.0),
+            "longest_s: 10 found",
+        ),
         (lambda m: random_rudder_steps(m, duration=-1.0), "duration: -1 found"),
-        (lambda m: random_rudder_steps(m, shortest_s=0.0, longest_s=9.0), "shortest_s: 0 found"),
-        (lambda m: multi_sine_rudder(m, shortest_period_s=0.1), "shortest_period_s: 0.1 found.*two samples"),
+        (
+            lambda m: random_rudder_steps(m, shortest_s=0.0, longest_s=9.0),
+            "shortest_s: 0 found",
+        ),
+        (
+            lambda m: multi_sine_rudder(m, shortest_period_s=0.1),
+            "shortest_period_s: 0.1 found.*two samples",
+        ),
         (lambda m: shaft_speed_steps(m, 0.5, 1.6), "highest_ratio: 1.6 found"),
         (lambda m: shaft_speed_steps(m, -0.5), "lowest_ratio: -0.5 found"),
         (lambda m: shaft_speed_steps(m, 0.9, 0.8), "highest_ratio: 0.8 found"),
@@ -151,5 +190,7 @@ def test_wrong_arguments(tanker, call, message):
 
 
 def test_a_ship_without_shaft_is_refused():
-    with pytest.raises(InputError, match="'mariner': no shaft speed among its commands"):
+    with pytest.raises(
+        InputError, match="'mariner': no shaft speed among its commands"
+    ):
         shaft_speed_steps(load_model("mariner"))

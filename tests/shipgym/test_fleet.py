@@ -11,52 +11,148 @@ from shipgym.ships.catalogue import container, kvlcc2, kvlcc2_l7, tanker
 from tests.shipgym.reference import table
 
 
-def container_row(u, v, r, x, y, psi, p, phi, delta, n, delta_command, n_command, *rates):
+def container_row(
+    u, v, r, x, y, psi, p, phi, delta, n, delta_command, n_command, *rates
+):
     """State, command and rates of a row in our order and units; the toolbox has rpm."""
     *others, p_dot, phi_dot, delta_dot, n_dot = rates
     u_dot, v_dot, r_dot, x_dot, y_dot, psi_dot = others
-    expected = [x_dot, y_dot, psi_dot, u_dot, v_dot, r_dot, p_dot, phi_dot, delta_dot, n_dot / 60]
-    return [x, y, psi, u, v, r, p, phi, delta, n / 60], [delta_command, n_command / 60], expected
+    expected = [
+        x_dot,
+        y_dot,
+        psi_dot,
+        u_dot,
+        v_dot,
+        r_dot,
+        p_dot,
+        phi_dot,
+        delta_dot,
+        n_dot / 60,
+    ]
+    return (
+        [x, y, psi, u, v, r, p, phi, delta, n / 60],
+        [delta_command, n_command / 60],
+        expected,
+    )
 
 
 def tanker_row(u, v, r, x, y, psi, delta, n, delta_command, n_command, depth, *rates):
     """State, command, rates and depth; the toolbox's rudder is positive to port."""
     u_dot, v_dot, r_dot, x_dot, y_dot, psi_dot, delta_dot, n_dot = rates
     expected = [x_dot, y_dot, psi_dot, u_dot, v_dot, r_dot, -delta_dot, n_dot / 60]
-    return [x, y, psi, u, v, r, -delta, n / 60], [-delta_command, n_command / 60], expected, depth
+    return (
+        [x, y, psi, u, v, r, -delta, n / 60],
+        [-delta_command, n_command / 60],
+        expected,
+        depth,
+    )
 
 
 # the second row has the shaft below 18 rpm
 CONTAINER = [
-    (4.98912279063591, 0.499276421736138, 0.0124865233043288, -1512.23620147254, -1593.25979789705,
-     2.70724061535968, 0.0282350866218125, -0.0196277776125746, -0.0294264178425493, 89.3928954440687,
-     0.0206866215710838, 132.011090990532, 0.0522655845034039, -0.0337535289578942, -0.00152473402831129,
-     -4.73591374457325, 1.6467082764659, 0.0124841181671537, -0.00130972507509572, 0.0282350866218125,
-     0.0501130394136331, 60 * (132.011090990532 - 89.3928954440687) / 60 * 89.3928954440687 / 60 / 5.65),
-    (6.03864737066765, -1.17190450771868, 0.0141814797445314, -1379.18367735636, 1729.02652179201,
-     2.93414957947155, 0.0065406311244854, 0.220820707496305, -0.0936365701931937, 6.56571573036577,
-     -0.0383203789495308, 74.7684242817076, -0.0418590823735167, 0.0167601016254026, -0.00223513914347979,
-     -5.67368033089455, 2.36264421453462, 0.0138371253086416, -0.0183114865418724, 0.00654063112448539,
-     0.0553161912436629, (74.7684242817076 - 6.56571573036577) / 18.83),
-]  # fmt: skip
+    (
+        4.98912279063591,
+        0.499276421736138,
+        0.0124865233043288,
+        -1512.23620147254,
+        -1593.25979789705,
+        2.70724061535968,
+        0.0282350866218125,
+        -0.0196277776125746,
+        -0.0294264178425493,
+        89.3928954440687,
+        0.0206866215710838,
+        132.011090990532,
+        0.0522655845034039,
+        -0.0337535289578942,
+        -0.00152473402831129,
+        -4.73591374457325,
+        1.6467082764659,
+        0.0124841181671537,
+        -0.00130972507509572,
+        0.0282350866218125,
+        0.0501130394136331,
+        60 * (132.011090990532 - 89.3928954440687) / 60 * 89.3928954440687 / 60 / 5.65,
+    ),
+    (
+        6.03864737066765,
+        -1.17190450771868,
+        0.0141814797445314,
+        -1379.18367735636,
+        1729.02652179201,
+        2.93414957947155,
+        0.0065406311244854,
+        0.220820707496305,
+        -0.0936365701931937,
+        6.56571573036577,
+        -0.0383203789495308,
+        74.7684242817076,
+        -0.0418590823735167,
+        0.0167601016254026,
+        -0.00223513914347979,
+        -5.67368033089455,
+        2.36264421453462,
+        0.0138371253086416,
+        -0.0183114865418724,
+        0.00654063112448539,
+        0.0553161912436629,
+        (74.7684242817076 - 6.56571573036577) / 18.83,
+    ),
+]
 
 # the second row is in very shallow water
 TANKER = [
-    (5.49030052638621, -1.07886084165628, 0.00768227611108917, 1103.40300035019, 3155.05713923105,
-     -0.994530324078971, -0.0114745500254942, 75.1834116481104, 0.00354929883767126, 28.3938619639945,
-     137.416143903219, -0.0099724741259201, 0.00149895677989801, -8.6576090247494e-05, 2.08701885021692,
-     -5.1915019892643, 0.00768227611108917, 0.0150238488631654, -0.935790993682317),
-    (6.57906119919723, 0.57238095262376, 0.00341485221161143, -1534.27179775906, -3147.93987782346,
-     -1.62541611500054, 0.50243669363863, 41.2282820036695, 0.50243669363863, 84.8390609289674,
-     40.7420054194697, -0.00121908731977836, -0.0111229872899441, -0.000465622175017064, 0.212359085345544,
-     -6.60049769612717, 0.00341485221161143, -0.0406661715714679, 0.77543435992661),
-]  # fmt: skip
+    (
+        5.49030052638621,
+        -1.07886084165628,
+        0.00768227611108917,
+        1103.40300035019,
+        3155.05713923105,
+        -0.994530324078971,
+        -0.0114745500254942,
+        75.1834116481104,
+        0.00354929883767126,
+        28.3938619639945,
+        137.416143903219,
+        -0.0099724741259201,
+        0.00149895677989801,
+        -8.6576090247494e-05,
+        2.08701885021692,
+        -5.1915019892643,
+        0.00768227611108917,
+        0.0150238488631654,
+        -0.935790993682317,
+    ),
+    (
+        6.57906119919723,
+        0.57238095262376,
+        0.00341485221161143,
+        -1534.27179775906,
+        -3147.93987782346,
+        -1.62541611500054,
+        0.50243669363863,
+        41.2282820036695,
+        0.50243669363863,
+        84.8390609289674,
+        40.7420054194697,
+        -0.00121908731977836,
+        -0.0111229872899441,
+        -0.000465622175017064,
+        0.212359085345544,
+        -6.60049769612717,
+        0.00341485221161143,
+        -0.0406661715714679,
+        0.77543435992661,
+    ),
+]
 
 
 @pytest.mark.parametrize("row", CONTAINER)
 def test_quoted_rows_of_the_container_ship(row):
     state, command, expected = container_row(*row)
-    np.testing.assert_allclose(container(10.0).derivatives(state, command), expected, rtol=1e-10)
+    np.testing.assert_allclose(
+        container(10.0).derivatives(state, command), expected, rtol=1e-10
+    )
 
 
 @pytest.mark.parametrize("row", TANKER)
@@ -66,23 +162,53 @@ def test_quoted_rows_of_the_tanker(row):
     np.testing.assert_allclose(rates, expected, rtol=1e-10)
 
 
-MODEL_STATE = (1.28816006817002, 0.0377516720983244, -0.0038618251898478, 0.224888115042733)
-SHIP_STATE = (3.3578867532232, 0.114961926976131, 0.00734564928274089, 0.00772106236413008)
+MODEL_STATE = (
+    1.28816006817002,
+    0.0377516720983244,
+    -0.0038618251898478,
+    0.224888115042733,
+)
+SHIP_STATE = (
+    3.3578867532232,
+    0.114961926976131,
+    0.00734564928274089,
+    0.00772106236413008,
+)
 
 
 @pytest.mark.parametrize(
     ("ship", "form", "state", "n", "expected"),
     [
-        (kvlcc2_l7, "shipmmg", MODEL_STATE,
-         10.8532517036481, (-0.00740899684976068, -0.00861434626131447, 0.0044770137934743)),
-        (kvlcc2_l7, "published", MODEL_STATE,
-         10.8532517036481, (-0.00742457323619287, -0.00861722011006149, 0.00448031124716304)),
-        (kvlcc2, "shipmmg", SHIP_STATE,
-         1.68450101953431, (0.0151235379640384, -0.00783183791136703, -0.000248099883982493)),
-        (kvlcc2, "published", SHIP_STATE,
-         1.68450101953431, (0.0152436101539732, -0.00801784894791814, -0.000243699776273127)),
+        (
+            kvlcc2_l7,
+            "shipmmg",
+            MODEL_STATE,
+            10.8532517036481,
+            (-0.00740899684976068, -0.00861434626131447, 0.0044770137934743),
+        ),
+        (
+            kvlcc2_l7,
+            "published",
+            MODEL_STATE,
+            10.8532517036481,
+            (-0.00742457323619287, -0.00861722011006149, 0.00448031124716304),
+        ),
+        (
+            kvlcc2,
+            "shipmmg",
+            SHIP_STATE,
+            1.68450101953431,
+            (0.0151235379640384, -0.00783183791136703, -0.000248099883982493),
+        ),
+        (
+            kvlcc2,
+            "published",
+            SHIP_STATE,
+            1.68450101953431,
+            (0.0152436101539732, -0.00801784894791814, -0.000243699776273127),
+        ),
     ],
-)  # fmt: skip
+)
 def test_quoted_rows_of_kvlcc2(ship, form, state, n, expected):
     rates = ship(form).derivatives([0.0, 0.0, 0.0, *state], [state[-1], n])
     np.testing.assert_allclose(rates[3:6], expected, rtol=1e-10)
@@ -91,7 +217,9 @@ def test_quoted_rows_of_kvlcc2(ship, form, state, n, expected):
 def test_all_rows_of_the_container_ship():
     for row in table("container_derivatives.csv"):
         state, command, expected = container_row(*list(row)[1:23])
-        np.testing.assert_allclose(container(10.0).derivatives(state, command), expected, rtol=1e-10)
+        np.testing.assert_allclose(
+            container(10.0).derivatives(state, command), expected, rtol=1e-10
+        )
 
 
 def test_all_rows_of_the_tanker():
@@ -104,36 +232,63 @@ def test_all_rows_of_the_tanker():
 def test_all_rows_of_kvlcc2():
     for row in table("kvlcc2_derivatives.csv"):
         ship = kvlcc2 if row["is_full_scale"] else kvlcc2_l7
-        state = [0.0, 0.0, row["psi_rad"], row["u_m_s"], row["v_m_s"], row["r_rad_s"], row["delta_rad"]]
+        state = [
+            0.0,
+            0.0,
+            row["psi_rad"],
+            row["u_m_s"],
+            row["v_m_s"],
+            row["r_rad_s"],
+            row["delta_rad"],
+        ]
         for form, prefix in (("published", "paperform_dot"), ("shipmmg", "dot")):
             rates = ship(form).derivatives(state, [row["delta_rad"], row["n_rps"]])
-            expected = [row[f"{prefix}_{name}"] for name in ("u_m_s2", "v_m_s2", "r_rad_s2")]
+            expected = [
+                row[f"{prefix}_{name}"] for name in ("u_m_s2", "v_m_s2", "r_rad_s2")
+            ]
             np.testing.assert_allclose(rates[3:6], expected, rtol=1e-10)
 
 
 COLUMNS = {
-    "x": "x_m", "y": "y_m", "psi": "psi_rad", "u": "u_m_s", "v": "v_m_s", "r": "r_rad_s", "p": "p_rad_s",
-    "phi": "phi_rad", "delta": "delta_rad",
-}  # fmt: skip
+    "x": "x_m",
+    "y": "y_m",
+    "psi": "psi_rad",
+    "u": "u_m_s",
+    "v": "v_m_s",
+    "r": "r_rad_s",
+    "p": "p_rad_s",
+    "phi": "phi_rad",
+    "delta": "delta_rad",
+}
 DEEP = 1e6  # m, the depth of the tanker's reference runs
 RUNS = {
-    "container_turning_35": lambda: manoeuvres.turning_circle(container(10.0), 35, 1000),
-    "container_zigzag_10_10": lambda: manoeuvres.zigzag(container(10.0), 10, 10, duration=800, switch="step"),
+    "container_turning_35": lambda: manoeuvres.turning_circle(
+        container(10.0), 35, 1000
+    ),
+    "container_zigzag_10_10": lambda: manoeuvres.zigzag(
+        container(10.0), 10, 10, duration=800, switch="step"
+    ),
     "container_zigzag_20_20": lambda: manoeuvres.zigzag(
         container(10.0), 20, 20, duration=1000, switch="step"
     ),
-    "tanker_turning_35": lambda: manoeuvres.turning_circle(tanker(10.0), 35, 1500, water_depth=DEEP),
+    "tanker_turning_35": lambda: manoeuvres.turning_circle(
+        tanker(10.0), 35, 1500, water_depth=DEEP
+    ),
     "tanker_zigzag_10_10": lambda: manoeuvres.zigzag(
         tanker(10.0), 10, 10, duration=1000, switch="step", water_depth=DEEP
     ),
     "tanker_dmax35_zigzag_20_20": lambda: manoeuvres.zigzag(
         tanker(), 20, 20, duration=1000, switch="step", water_depth=DEEP
     ),
-    "kvlcc2_L7_turning_35": lambda: manoeuvres.turning_circle(kvlcc2_l7("shipmmg"), 35, 200, 0.02),
+    "kvlcc2_L7_turning_35": lambda: manoeuvres.turning_circle(
+        kvlcc2_l7("shipmmg"), 35, 200, 0.02
+    ),
     "kvlcc2_L7_zigzag_20_20": lambda: manoeuvres.zigzag(
         kvlcc2_l7("shipmmg"), 20, 20, duration=160, dt=0.02, switch="step"
     ),
-    "kvlcc2_L7_paperform_turning_35": lambda: manoeuvres.turning_circle(kvlcc2_l7(), 35, 200, 0.02),
+    "kvlcc2_L7_paperform_turning_35": lambda: manoeuvres.turning_circle(
+        kvlcc2_l7(), 35, 200, 0.02
+    ),
     "kvlcc2_L7_paperform_zigzag_20_20": lambda: manoeuvres.zigzag(
         kvlcc2_l7(), 20, 20, duration=160, dt=0.02, switch="step"
     ),
@@ -148,7 +303,9 @@ def test_trajectories_are_the_reference_s(name):
         if channel in trial.channels:
             own = trial[channel][::5] * (sign if channel == "delta" else 1.0)
             span = np.ptp(expected[column])
-            np.testing.assert_allclose(own, expected[column], rtol=0.0, atol=1e-6 * span)
+            np.testing.assert_allclose(
+                own, expected[column], rtol=0.0, atol=1e-6 * span
+            )
 
 
 @pytest.mark.parametrize(
@@ -183,15 +340,21 @@ def test_overshoots(run, first, second):
 )
 def test_turning_circles(model, rudder, duration, advance, tactical):
     dt = model.particulars["length"] / model.particulars["speed"] / 300.0
-    indices = manoeuvres.turning_indices(manoeuvres.turning_circle(model, rudder, duration, dt))
+    indices = manoeuvres.turning_indices(
+        manoeuvres.turning_circle(model, rudder, duration, dt)
+    )
     assert indices.advance_lengths == pytest.approx(advance, abs=0.01)
     assert indices.tactical_diameter_lengths == pytest.approx(tactical, abs=0.01)
 
 
 def test_the_tanker_turns_wider_in_shallow_water():
     """At 30 m, starting from 7.588 m/s: advance 3.12 L, tactical diameter 3.22 L."""
-    slow = replace(tanker(), particulars=replace(tanker().particulars, speed=7.588415331336))
-    shallow = manoeuvres.turning_indices(manoeuvres.turning_circle(slow, 35, 1500, water_depth=30.0))
+    slow = replace(
+        tanker(), particulars=replace(tanker().particulars, speed=7.588415331336)
+    )
+    shallow = manoeuvres.turning_indices(
+        manoeuvres.turning_circle(slow, 35, 1500, water_depth=30.0)
+    )
     assert shallow.advance_lengths == pytest.approx(3.12, abs=0.01)
     assert shallow.tactical_diameter_lengths == pytest.approx(3.22, abs=0.01)
 
@@ -201,12 +364,28 @@ def test_port_is_the_mirror_of_starboard_where_the_ship_is_symmetric(name):
     """KVLCC2's rudder and wake are not, so it is given one side's numbers for both."""
     model = shipgym.load_model(name)
     if name == "kvlcc2":
-        even = {**model.coefficients, "gamma_minus": 0.5, "gamma_plus": 0.5, "C_2_port": 1.6}
+        even = {
+            **model.coefficients,
+            "gamma_minus": 0.5,
+            "gamma_plus": 0.5,
+            "C_2_port": 1.6,
+        }
         model = replace(model, coefficients=even)
-    starboard, port = manoeuvres.turning_circle(model, 20.0), manoeuvres.turning_circle(model, -20.0)
-    for channel in ("y", "psi", "v", "r", *(["p", "phi"] if name == "container" else [])):
+    starboard, port = (
+        manoeuvres.turning_circle(model, 20.0),
+        manoeuvres.turning_circle(model, -20.0),
+    )
+    for channel in (
+        "y",
+        "psi",
+        "v",
+        "r",
+        *(["p", "phi"] if name == "container" else []),
+    ):
         span = np.ptp(port[channel])
-        np.testing.assert_allclose(starboard[channel], -port[channel], rtol=0.0, atol=1e-9 * span)
+        np.testing.assert_allclose(
+            starboard[channel], -port[channel], rtol=0.0, atol=1e-9 * span
+        )
     np.testing.assert_allclose(starboard["u"], port["u"], rtol=1e-9)
 
 
@@ -221,17 +400,28 @@ def test_kvlcc2_and_its_model_scale_by_froude():
         "volume": numbers["volume"] * scale**3,
     }
     lengths = {
-        key: small.particulars[key] * scale for key in ("length", "beam", "draught", "xg", "yaw_gyradius")
+        key: small.particulars[key] * scale
+        for key in ("length", "beam", "draught", "xg", "yaw_gyradius")
     }
-    mass, speed = small.particulars["mass"] * scale**3, small.particulars["speed"] * scale**0.5
+    mass, speed = (
+        small.particulars["mass"] * scale**3,
+        small.particulars["speed"] * scale**0.5,
+    )
     particulars = replace(
-        small.particulars, **lengths, mass=mass, speed=speed,
-        rudder_area=larger["A_R"], propeller_diameter=larger["D_P"],
-    )  # fmt: skip
+        small.particulars,
+        **lengths,
+        mass=mass,
+        speed=speed,
+        rudder_area=larger["A_R"],
+        propeller_diameter=larger["D_P"],
+    )
     big = replace(
-        small, particulars=particulars, coefficients=larger, service_shaft_speed=11.85159 / scale**0.5,
+        small,
+        particulars=particulars,
+        coefficients=larger,
+        service_shaft_speed=11.85159 / scale**0.5,
         steering=shipgym.SteeringGear(35.0, 15.8 / scale**0.5),
-    )  # fmt: skip
+    )
     dt = 0.05
     one = manoeuvres.turning_circle(small, 35, 100, dt)
     other = manoeuvres.turning_circle(big, 35, 100 * scale**0.5, dt * scale**0.5)
@@ -255,7 +445,9 @@ def test_a_shaft_at_rest_is_the_limit_of_one_that_hardly_turns(name):
 
     def rates(shaft):
         state = dict(zip(model.state_names, model.service_state, strict=True))
-        state |= {"v": -0.5, "r": 0.004, "delta": 0.2} | ({"n": shaft} if "n" in state else {})
+        state |= {"v": -0.5, "r": 0.004, "delta": 0.2} | (
+            {"n": shaft} if "n" in state else {}
+        )
         return model.derivatives(list(state.values()), [0.2, shaft])[3:6]
 
     np.testing.assert_allclose(rates(0.0), rates(1e-9), rtol=1e-6)
@@ -265,11 +457,17 @@ def test_a_shaft_at_rest_is_the_limit_of_one_that_hardly_turns(name):
 def test_the_service_state_is_steady_straight_running(name):
     model = shipgym.load_model(name)
     rates = dict(
-        zip(model.state_names, model.derivatives(model.service_state, model.service_command), strict=True)
+        zip(
+            model.state_names,
+            model.derivatives(model.service_state, model.service_command),
+            strict=True,
+        )
     )
     speed, length = model.particulars["speed"], model.particulars["length"]
     assert abs(rates["u"]) * length / speed**2 < 1e-5
-    assert abs(rates["r"]) * length**2 / speed**2 < 1e-2  # the tanker's propeller pushes it to port
+    assert (
+        abs(rates["r"]) * length**2 / speed**2 < 1e-2
+    )  # the tanker's propeller pushes it to port
 
 
 @pytest.mark.parametrize("name", ["container", "kvlcc2"])
@@ -292,7 +490,9 @@ def test_each_ship_sails_in_the_environment(name):
     observation, _ = env.reset(seed=0)
     for _ in range(300):
         error = np.arctan2(observation[0], observation[1])
-        action = np.array([np.clip(1.5 * error - 1.5 * observation[2], -1, 1)], dtype=np.float32)
+        action = np.array(
+            [np.clip(1.5 * error - 1.5 * observation[2], -1, 1)], dtype=np.float32
+        )
         observation, reward, terminated, _, info = env.step(action)
         assert observation in env.observation_space
         assert not terminated

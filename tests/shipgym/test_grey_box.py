@@ -37,14 +37,20 @@ def kvlcc2() -> ShipModel:
 @pytest.fixture(scope="module")
 def bare(tanker: ShipModel, kvlcc2: ShipModel) -> ShipModel:
     """KVLCC2 as the bare tanker."""
-    return converted_model(tanker, kvlcc2.particulars, kvlcc2.steering, kvlcc2.service_shaft_speed)
+    return converted_model(
+        tanker, kvlcc2.particulars, kvlcc2.steering, kvlcc2.service_shaft_speed
+    )
 
 
 @pytest.mark.parametrize("name", ["mariner", "container"])
 def test_a_reference_ship_converted_to_itself_is_itself(name: str) -> None:
     ship = shipgym.load_model(name)
-    same = converted_model(ship, ship.particulars, ship.steering, ship.service_shaft_speed)
-    ours, theirs = (zigzag(model, 20, 20, duration=300, dt=0.5) for model in (same, ship))
+    same = converted_model(
+        ship, ship.particulars, ship.steering, ship.service_shaft_speed
+    )
+    ours, theirs = (
+        zigzag(model, 20, 20, duration=300, dt=0.5) for model in (same, ship)
+    )
     for channel in ("u", "v", "r", "psi"):
         np.testing.assert_allclose(ours[channel], theirs[channel], rtol=0.0, atol=1e-12)
 
@@ -59,36 +65,57 @@ def test_a_bare_table_of_terms_at_another_scale_is_the_scaled_model() -> None:
     np.testing.assert_allclose(ours["psi"], theirs["psi"], rtol=0.0, atol=1e-11)
 
 
-def test_a_bare_reference_ship_turns_in_as_many_ship_lengths_at_any_scale(tanker: ShipModel) -> None:
+def test_a_bare_reference_ship_turns_in_as_many_ship_lengths_at_any_scale(
+    tanker: ShipModel,
+) -> None:
     p = tanker.particulars
     same = converted_model(tanker, p, tanker.steering, tanker.service_shaft_speed)
     small = scale_model(same, 7.0)
     factor = np.sqrt(7.0 / p.length)
     large, little = (
-        turning_indices(turning_circle(model, 35, duration=900 * f, dt=0.5 * f), model.particulars.length)
+        turning_indices(
+            turning_circle(model, 35, duration=900 * f, dt=0.5 * f),
+            model.particulars.length,
+        )
         for model, f in ((same, 1.0), (small, factor))
     )
     assert little.advance_lengths == pytest.approx(large.advance_lengths, rel=1e-9)
-    assert little.tactical_diameter_lengths == pytest.approx(large.tactical_diameter_lengths, rel=1e-9)
+    assert little.tactical_diameter_lengths == pytest.approx(
+        large.tactical_diameter_lengths, rel=1e-9
+    )
 
 
-def test_model_scale_and_full_scale_of_one_ship_are_nearly_similar(kvlcc2: ShipModel) -> None:
+def test_model_scale_and_full_scale_of_one_ship_are_nearly_similar(
+    kvlcc2: ShipModel,
+) -> None:
     """What is left: the scale effect on the wake, another propeller and rounded particulars."""
     model = shipgym.load_model("kvlcc2-l7")
-    bare = converted_model(kvlcc2, model.particulars, model.steering, model.service_shaft_speed)
+    bare = converted_model(
+        kvlcc2, model.particulars, model.steering, model.service_shaft_speed
+    )
     ours, theirs = (
-        turning_indices(turning_circle(ship, 35, duration=140, dt=0.05), 7.0) for ship in (bare, model)
+        turning_indices(turning_circle(ship, 35, duration=140, dt=0.05), 7.0)
+        for ship in (bare, model)
     )
     assert ours.advance_lengths == pytest.approx(theirs.advance_lengths, rel=0.05)
-    assert ours.tactical_diameter_lengths == pytest.approx(theirs.tactical_diameter_lengths, rel=0.05)
+    assert ours.tactical_diameter_lengths == pytest.approx(
+        theirs.tactical_diameter_lengths, rel=0.05
+    )
 
 
-def test_accelerations_are_the_converted_ones_and_the_terms(bare: ShipModel, tanker: ShipModel) -> None:
+def test_accelerations_are_the_converted_ones_and_the_terms(
+    bare: ShipModel, tanker: ShipModel
+) -> None:
     """Equations 7 and 8 of Mei 2019, and back: written out by hand for one state."""
-    model = replace(bare, coefficients=bare.coefficients | {"a_0": 0.01, "c_v": -0.3, "b_d": 0.2})
+    model = replace(
+        bare, coefficients=bare.coefficients | {"a_0": 0.01, "c_v": -0.3, "b_d": 0.2}
+    )
     p, q = model.particulars, tanker.particulars
     u, v, r, delta, n = 6.5, -0.8, 0.006, 0.3, 1.7
-    fast, turning = q["speed"] / p["speed"], (q["speed"] / q.length) / (p["speed"] / p.length)
+    fast, turning = (
+        q["speed"] / p["speed"],
+        (q["speed"] / q.length) / (p["speed"] / p.length),
+    )
     shaft = n * tanker.service_shaft_speed / model.service_shaft_speed
     at = [0.0, 0.0, 0.0, fast * u, fast * v, turning * r, delta, shaft]
     theirs = tanker.derivatives(at, [delta, shaft])[3:6]
@@ -96,8 +123,10 @@ def test_accelerations_are_the_converted_ones_and_the_terms(bare: ShipModel, tan
     linear = (V**2 / L) / (q["speed"] ** 2 / q.length)
     angular = (V**2 / L**2) / (q["speed"] ** 2 / q.length**2)
     expected = theirs * [linear, linear, angular] + [
-        0.01 * V**2 / L, 0.2 * delta * V**2 / L, -0.3 * (v / V) * V**2 / L**2
-    ]  # fmt: skip
+        0.01 * V**2 / L,
+        0.2 * delta * V**2 / L,
+        -0.3 * (v / V) * V**2 / L**2,
+    ]
     found = model.derivatives([0.0, 0.0, 0.0, u, v, r, delta], [delta, n])[3:6]
     np.testing.assert_allclose(found, expected, rtol=1e-12)
 
@@ -111,7 +140,9 @@ def test_a_memory_of_yaw_is_converted_as_the_state_it_is() -> None:
     found = small.dynamics.converted_accelerations(
         {k: np.array([x]) for k, x in state.items()}, small.particulars
     )
-    slopes = small.derivatives([state.get(name, 0.0) for name in small.state_names], [0.1])
+    slopes = small.derivatives(
+        [state.get(name, 0.0) for name in small.state_names], [0.1]
+    )
     rates = dict(zip(small.state_names, slopes, strict=True))
     for name in ("r", "q"):
         np.testing.assert_allclose(found[name], rates[name], rtol=1e-12)
@@ -123,7 +154,9 @@ def test_the_grey_box_is_listed_among_the_structures() -> None:
         get_structure("gray-box")
 
 
-def test_a_grey_box_is_a_sound_ship_that_can_be_steered(bare: ShipModel, tanker: ShipModel) -> None:
+def test_a_grey_box_is_a_sound_ship_that_can_be_steered(
+    bare: ShipModel, tanker: ShipModel
+) -> None:
     assert check_ship_model(bare).problems == ()
     ours, theirs = nomoto(bare), nomoto(tanker)
     p, q = bare.particulars, tanker.particulars
@@ -131,7 +164,9 @@ def test_a_grey_box_is_a_sound_ship_that_can_be_steered(bare: ShipModel, tanker:
     assert pytest.approx(slower * theirs.K, rel=1e-3) == ours.K
 
 
-def test_the_file_of_a_grey_box_holds_the_reference_ship(bare: ShipModel, tmp_path: Path) -> None:
+def test_the_file_of_a_grey_box_holds_the_reference_ship(
+    bare: ShipModel, tmp_path: Path
+) -> None:
     model = replace(bare, coefficients=bare.coefficients | {"c_r": -0.25})
     model.save(tmp_path / "model.json")
     again = ShipModel.load(tmp_path / "model.json")
@@ -141,9 +176,13 @@ def test_the_file_of_a_grey_box_holds_the_reference_ship(bare: ShipModel, tmp_pa
     assert again.table.to_dict() == model.table.to_dict()
 
 
-def test_a_table_may_have_other_terms_and_fewer_equations(tanker: ShipModel, kvlcc2: ShipModel) -> None:
+def test_a_table_may_have_other_terms_and_fewer_equations(
+    tanker: ShipModel, kvlcc2: ShipModel
+) -> None:
     box = grey_box(tanker, {"r": "|v| r"})
-    model = converted_model(box, kvlcc2.particulars, kvlcc2.steering, kvlcc2.service_shaft_speed)
+    model = converted_model(
+        box, kvlcc2.particulars, kvlcc2.steering, kvlcc2.service_shaft_speed
+    )
     assert list(model.coefficients) == ["c_|v|r"]
     assert check_ship_model(model).problems == ()
 
@@ -153,7 +192,11 @@ def test_a_table_may_have_other_terms_and_fewer_equations(tanker: ShipModel, kvl
     [
         (("reference",), 3, "structure.reference"),
         (("shaft",), "yes", "structure.shaft: 'yes' found"),
-        (("reference", "coefficients", "t"), "x", "structure.reference: coefficients.t"),
+        (
+            ("reference", "coefficients", "t"),
+            "x",
+            "structure.reference: coefficients.t",
+        ),
         (("reference", "structure", "name"), "tankr", "tankr"),
     ],
 )
@@ -171,33 +214,50 @@ def test_a_broken_file_names_the_field(
         ShipModel.load(tmp_path / "model.json")
 
 
-def test_what_cannot_be_a_reference_is_refused(bare: ShipModel, tanker: ShipModel) -> None:
+def test_what_cannot_be_a_reference_is_refused(
+    bare: ShipModel, tanker: ShipModel
+) -> None:
     with pytest.raises(InputError, match="grey box itself"):
         grey_box(bare)
     with pytest.raises(InputError, match="has no shaft speed"):
         grey_box("mariner", shaft=True)
     with pytest.raises(InputError, match="give the reference"):
         get_structure("grey-box")
-    with pytest.raises(InputError, match="'grey-box' found, which is another structure's"):
+    with pytest.raises(
+        InputError, match="'grey-box' found, which is another structure's"
+    ):
         register_structure("grey-box", {"r": "r, delta"})
     with pytest.raises(InputError, match="expected 'acceleration'"):
         replace(grey_box(tanker), quantity="force")
-    with pytest.raises(InputError, match="equations 'w' found, expected some of 'u', 'v', 'r'"):
+    with pytest.raises(
+        InputError, match="equations 'w' found, expected some of 'u', 'v', 'r'"
+    ):
         grey_box(tanker, {"w": "v"})
 
 
-def test_the_reference_ship_of_the_regression_is_the_one_that_sails(bare: ShipModel) -> None:
+def test_the_reference_ship_of_the_regression_is_the_one_that_sails(
+    bare: ShipModel,
+) -> None:
     """Without terms the box accelerates as its converted reference ship, at several states."""
     rng = np.random.default_rng(0)
     channels = {
-        "u": rng.uniform(4.0, 8.0, 6), "v": rng.uniform(-1.0, 1.0, 6), "r": rng.uniform(-0.01, 0.01, 6),
-        "delta": rng.uniform(-0.5, 0.5, 6), "n": rng.uniform(1.0, 2.0, 6),
-    }  # fmt: skip
+        "u": rng.uniform(4.0, 8.0, 6),
+        "v": rng.uniform(-1.0, 1.0, 6),
+        "r": rng.uniform(-0.01, 0.01, 6),
+        "delta": rng.uniform(-0.5, 0.5, 6),
+        "n": rng.uniform(1.0, 2.0, 6),
+    }
     box = bare.dynamics
-    found = box.converted_accelerations(channels, bare.particulars, bare.service_shaft_speed)
+    found = box.converted_accelerations(
+        channels, bare.particulars, bare.service_shaft_speed
+    )
     states = np.zeros((6, len(bare.state_names)))
     for name in ("u", "v", "r", "delta"):
         states[:, bare.state_names.index(name)] = channels[name]
-    rates = bare.derivatives(states, np.stack([channels["delta"], channels["n"]], axis=-1))
+    rates = bare.derivatives(
+        states, np.stack([channels["delta"], channels["n"]], axis=-1)
+    )
     for q in "uvr":
-        np.testing.assert_allclose(found[q], rates[:, bare.state_names.index(q)], rtol=1e-9)
+        np.testing.assert_allclose(
+            found[q], rates[:, bare.state_names.index(q)], rtol=1e-9
+        )

@@ -38,8 +38,14 @@ def test_starboard_of_the_leg_is_positive():
 @given(coordinates, coordinates)
 def test_distance_is_that_of_the_nearest_of_many_points(x, y):
     corner = EAST_THEN_SOUTH.waypoints[1]
-    legs = [EAST_THEN_SOUTH.waypoints[0] + np.linspace(0, 1, 4001)[:, None] * (corner - [0.0, 0.0])]
-    legs.append(corner + np.linspace(0, 1, 4001)[:, None] * (EAST_THEN_SOUTH.waypoints[2] - corner))
+    legs = [
+        EAST_THEN_SOUTH.waypoints[0]
+        + np.linspace(0, 1, 4001)[:, None] * (corner - [0.0, 0.0])
+    ]
+    legs.append(
+        corner
+        + np.linspace(0, 1, 4001)[:, None] * (EAST_THEN_SOUTH.waypoints[2] - corner)
+    )
     nearest = np.hypot(*(np.vstack(legs) - [x, y]).T).min()
     assert EAST_THEN_SOUTH.distance(x, y) == pytest.approx(nearest, abs=0.3)
 
@@ -65,7 +71,10 @@ def test_integral_line_of_sight_holds_a_steady_drift_without_error():
 
 
 def test_random_paths_keep_their_bounds_and_their_seed():
-    one, other = (random_path(np.random.default_rng(7), 12, (300.0, 900.0), 60.0) for _ in range(2))
+    one, other = (
+        random_path(np.random.default_rng(7), 12, (300.0, 900.0), 60.0)
+        for _ in range(2)
+    )
     assert np.array_equal(one.waypoints, other.waypoints)
     assert one.n_legs == 12
     assert np.all((one.lengths >= 300.0) & (one.lengths <= 900.0))
@@ -77,10 +86,15 @@ def test_random_paths_differ_and_are_drawn_evenly():
     rng = np.random.default_rng(0)
     paths = [random_path(rng, 6, (300.0, 900.0), 60.0) for _ in range(400)]
     lengths, turns = (
-        np.concatenate(one) for one in zip(*((p.lengths, p.turns[:-1]) for p in paths), strict=True)
+        np.concatenate(one)
+        for one in zip(*((p.lengths, p.turns[:-1]) for p in paths), strict=True)
     )
     first = np.array([path.courses[0] for path in paths])
-    for drawn, low, high in ((lengths, 300.0, 900.0), (turns, -np.pi / 3, np.pi / 3), (first, -np.pi, np.pi)):
+    for drawn, low, high in (
+        (lengths, 300.0, 900.0),
+        (turns, -np.pi / 3, np.pi / 3),
+        (first, -np.pi, np.pi),
+    ):
         margin = (high - low) / np.sqrt(12.0 * drawn.size)
         assert drawn.mean() == pytest.approx(0.5 * (low + high), abs=4.0 * margin)
         assert drawn.std() == pytest.approx((high - low) / np.sqrt(12.0), rel=0.05)
@@ -117,7 +131,10 @@ def test_wrapped_is_the_same_direction(angle):
         ("north", "at least 2 rows"),
         ([[0.0, 0.0], [0.0, 0.0]], "row 1 repeats"),
         ([[0.0, 0.0], [np.nan, 1.0]], "row 1 is"),
-        ([[0.0, 0.0], [1.0, 0.0], [1.0, -1.01e8]], "row 2 is .* expected m within 1e\\+08 of the origin"),
+        (
+            [[0.0, 0.0], [1.0, 0.0], [1.0, -1.01e8]],
+            "row 2 is .* expected m within 1e\\+08 of the origin",
+        ),
     ],
 )
 def test_a_path_that_is_none_is_refused(waypoints, message):
@@ -128,14 +145,22 @@ def test_a_path_that_is_none_is_refused(waypoints, message):
 def test_a_turn_is_as_sharp_as_a_hundred_and_fifty_degrees():
     def back(angle_deg):
         angle = np.radians(angle_deg)
-        return Path([[0.0, 0.0], [100.0, 0.0], [100.0 + 100.0 * np.cos(angle), 100.0 * np.sin(angle)]])
+        return Path(
+            [
+                [0.0, 0.0],
+                [100.0, 0.0],
+                [100.0 + 100.0 * np.cos(angle), 100.0 * np.sin(angle)],
+            ]
+        )
 
     back(149.9).check_turns(1.0)
     back(-149.9).check_turns(1.0)
     with pytest.raises(InputError) as caught:
         back(-151.0).check_turns(1.0)
-    assert str(caught.value) == (
-        "waypoints: the path doubles back at row 1, by 151 deg, expected turns of 150 deg at most"
+    assert (
+        str(caught.value)
+        == "waypoints: the path doubles back at row 1, by 151 deg, expected turns of"
+        " 150 deg at most"
     )
 
 
@@ -146,21 +171,29 @@ def test_turns_leave_room_for_each_other_on_a_leg():
     divided = Path([[0, 0], [60, 0], [100, 0], [100, 90], [100, 200], [200, 200]])
     divided.check_turns(100.0)
     with pytest.raises(InputError) as caught:
-        Path([[0, 0], [60, 0], [100, 0], [100, 90], [100, 199], [200, 199]]).check_turns(100.0)
-    assert str(caught.value) == (
-        "waypoints: rows 2 and 4 are 199 m apart, expected at least 200 m, which turns with a radius of "
-        "100 m take; set them further apart, or set a smaller turn_radius"
+        Path(
+            [[0, 0], [60, 0], [100, 0], [100, 90], [100, 199], [200, 199]]
+        ).check_turns(100.0)
+    assert (
+        str(caught.value)
+        == "waypoints: rows 2 and 4 are 199 m apart, expected at least 200 m, which"
+        " turns with a radius of 100 m take; set them further apart, or set a"
+        " smaller turn_radius"
     )
-    with pytest.raises(InputError, match="rows 0 and 1 are 99 m apart, expected at least 100 m"):
+    with pytest.raises(
+        InputError, match="rows 0 and 1 are 99 m apart, expected at least 100 m"
+    ):
         Path([[0, 0], [99, 0], [99, 300]]).check_turns(100.0)
-    with pytest.raises(InputError, match="rows 1 and 2 are 99 m apart, expected at least 100 m"):
+    with pytest.raises(
+        InputError, match="rows 1 and 2 are 99 m apart, expected at least 100 m"
+    ):
         Path([[0, 0], [300, 0], [300, 99]]).check_turns(100.0)
 
 
 def test_the_distance_from_a_path_goes_round_its_ends():
-    assert EAST_THEN_SOUTH.distance([3.0, 0.0, -503.0], [-4.0, 500.0, 1004.0]).tolist() == pytest.approx(
-        [5.0, 0.0, 5.0]
-    )
+    assert EAST_THEN_SOUTH.distance(
+        [3.0, 0.0, -503.0], [-4.0, 500.0, 1004.0]
+    ).tolist() == pytest.approx([5.0, 0.0, 5.0])
     assert EAST_THEN_SOUTH.distance(0.0, 1000.0).shape == ()
 
 
@@ -184,10 +217,22 @@ def test_points_of_a_turn_are_at_most_five_degrees_apart():
 @pytest.mark.parametrize(
     ("waypoints", "message"),
     [
-        ([[0, 0], [1, 0], [1, 0], [2, 0]], r"waypoints: row 2 repeats \[1.0, 0.0\] of the row before"),
-        ([[1e8, -1e8], [0, np.inf]], r"waypoints: row 1 is \[0.0, inf\], expected finite numbers in m"),
-        ([[0, 0, 0], [1, 1, 1]], r"waypoints: shape \(2, 3\) found, expected at least 2 rows"),
-        ([[[0, 0], [1, 1]]], r"waypoints: shape \(1, 2, 2\) found, expected at least 2 rows"),
+        (
+            [[0, 0], [1, 0], [1, 0], [2, 0]],
+            r"waypoints: row 2 repeats \[1.0, 0.0\] of the row before",
+        ),
+        (
+            [[1e8, -1e8], [0, np.inf]],
+            r"waypoints: row 1 is \[0.0, inf\], expected finite numbers in m",
+        ),
+        (
+            [[0, 0, 0], [1, 1, 1]],
+            r"waypoints: shape \(2, 3\) found, expected at least 2 rows",
+        ),
+        (
+            [[[0, 0], [1, 1]]],
+            r"waypoints: shape \(1, 2, 2\) found, expected at least 2 rows",
+        ),
         ({"a": 1}, r"waypoints: shape \(0,\) found, expected at least 2 rows"),
     ],
 )
@@ -207,8 +252,15 @@ def test_waypoints_cannot_be_changed_and_may_lie_a_hundred_thousand_kilometres_o
 
 def test_the_integral_of_a_line_of_sight_gathers_less_far_from_the_path():
     """Borhaug 2008: sigma L^2 e / ((e + i)^2 + L^2) per second, and the course towards e + i."""
-    where = PathPosition(np.array(0.0), np.array([3.0, 300.0]), np.array(0.2), np.array(1.0))
-    course, integral = integral_line_of_sight(where, 10.0, np.array([1.0, 0.0]), 0.5, 2.0)
-    expected = [1.0 + 2.0 * 0.5 * 100.0 * 3.0 / 116.0, 2.0 * 0.5 * 100.0 * 300.0 / 90_100.0]
+    where = PathPosition(
+        np.array(0.0), np.array([3.0, 300.0]), np.array(0.2), np.array(1.0)
+    )
+    course, integral = integral_line_of_sight(
+        where, 10.0, np.array([1.0, 0.0]), 0.5, 2.0
+    )
+    expected = [
+        1.0 + 2.0 * 0.5 * 100.0 * 3.0 / 116.0,
+        2.0 * 0.5 * 100.0 * 300.0 / 90_100.0,
+    ]
     np.testing.assert_allclose(integral, expected)
     np.testing.assert_allclose(course, 0.2 - np.arctan([0.4, 30.0]))

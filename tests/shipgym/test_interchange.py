@@ -15,18 +15,43 @@ from shipgym.interchange import minari_datasets
 from shipgym.ships.catalogue import kvlcc2_l7
 
 TRIAL = Trial(
-    [0.0, 0.1, 0.3], {"psi": [0.0, 0.1, 0.3], "delta": [0.1, 1 / 3, 0.0]}, name="a", kind="zigzag",
-    use="validate", derived=["psi"], length=7.0, repaired={"psi": 1}, notes=["one", "two"],
-)  # fmt: skip
-FACTS = ("name", "kind", "use", "derived", "length", "repaired", "over_ground", "notes", "sha256")
-CARD = {"author": "a", "author_email": "b", "code_permalink": "c", "description": "d", "algorithm_name": "e"}
+    [0.0, 0.1, 0.3],
+    {"psi": [0.0, 0.1, 0.3], "delta": [0.1, 1 / 3, 0.0]},
+    name="a",
+    kind="zigzag",
+    use="validate",
+    derived=["psi"],
+    length=7.0,
+    repaired={"psi": 1},
+    notes=["one", "two"],
+)
+FACTS = (
+    "name",
+    "kind",
+    "use",
+    "derived",
+    "length",
+    "repaired",
+    "over_ground",
+    "notes",
+    "sha256",
+)
+CARD = {
+    "author": "a",
+    "author_email": "b",
+    "code_permalink": "c",
+    "description": "d",
+    "algorithm_name": "e",
+}
 
 
 @pytest.fixture(scope="module")
 def episodes(tmp_path_factory):
     """Two of one environment, the second one cut off and begun without a seed of its own."""
     folder = tmp_path_factory.mktemp("recorded")
-    env = shipgym.RecordEpisode(gymnasium.make("shipgym/CourseKeeping-v0", max_episode_steps=5), folder)
+    env = shipgym.RecordEpisode(
+        gymnasium.make("shipgym/CourseKeeping-v0", max_episode_steps=5), folder
+    )
     for seed, steps in ((3, 5), (None, 2)):
         env.reset(seed=seed)
         for k in range(steps):
@@ -47,9 +72,14 @@ def content(episode):
 
 @pytest.mark.parametrize("form", ["frame", "xarray"])
 def test_trials_and_episodes_come_back_from_frames_and_datasets(form, episodes):
-    there, back = getattr(interchange, f"to_{form}"), getattr(interchange, f"from_{form}")
+    there, back = (
+        getattr(interchange, f"to_{form}"),
+        getattr(interchange, f"from_{form}"),
+    )
     trial = back(there(TRIAL))
-    assert [getattr(trial, name) for name in FACTS] == [getattr(TRIAL, name) for name in FACTS]
+    assert [getattr(trial, name) for name in FACTS] == [
+        getattr(TRIAL, name) for name in FACTS
+    ]
     assert all(same(one, back(there(one))) for one in episodes)
 
 
@@ -68,11 +98,16 @@ def test_a_dataset_has_units():
 
 
 def test_a_frame_of_something_else_is_refused():
-    with pytest.raises(InputError, match=r"none of shipgym's found; Trial\.from_frame reads that of a log"):
+    with pytest.raises(
+        InputError,
+        match=r"none of shipgym's found; Trial\.from_frame reads that of a log",
+    ):
         interchange.from_frame(pandas.DataFrame({"psi": [0.0, 1.0]}))
 
 
-def test_minari_has_the_observations_and_gives_the_episodes_back(tmp_path, monkeypatch, episodes):
+def test_minari_has_the_observations_and_gives_the_episodes_back(
+    tmp_path, monkeypatch, episodes
+):
     monkeypatch.setenv("MINARI_DATASETS_PATH", str(tmp_path))
     closed, close = [], ShipEnv.close
     monkeypatch.setattr(ShipEnv, "close", lambda env: closed.append(env) or close(env))
@@ -82,7 +117,10 @@ def test_minari_has_the_observations_and_gives_the_episodes_back(tmp_path, monke
     assert dataset[0].observations.shape == (6, *dataset.observation_space.shape)
     env = dataset.recover_environment()
     assert dataset[0].observations[0] == pytest.approx(env.reset(seed=3)[0])
-    assert (dataset[0].truncations.tolist(), dataset[1].terminations.any()) == ([False] * 4 + [True], False)
+    assert (dataset[0].truncations.tolist(), dataset[1].terminations.any()) == (
+        [False] * 4 + [True],
+        False,
+    )
     assert all(map(same, interchange.from_minari(dataset), episodes))
     env.close()
 
@@ -90,17 +128,26 @@ def test_minari_has_the_observations_and_gives_the_episodes_back(tmp_path, monke
 def test_an_episode_that_ran_otherwise_is_no_dataset(tmp_path, monkeypatch, episodes):
     monkeypatch.setenv("MINARI_DATASETS_PATH", str(tmp_path))
     other = Episode(**(vars(episodes[0]) | {"rewards": episodes[0].rewards - 1.0}))
-    with pytest.raises(InputError, match=r"episodes\[0\]: cost .* when run again") as refused:
+    with pytest.raises(
+        InputError, match=r"episodes\[0\]: cost .* when run again"
+    ) as refused:
         interchange.to_minari([other], "shipgym/mariner/other-v0", **CARD)
-    again, recorded = (float(word) for word in re.findall(r" (-?[\d.]+) ", str(refused.value)))
+    again, recorded = (
+        float(word) for word in re.findall(r" (-?[\d.]+) ", str(refused.value))
+    )
     assert again == pytest.approx(-episodes[0].rewards.sum(), rel=1e-4)
     assert recorded == pytest.approx(again + episodes[0].n_steps, rel=1e-4)
     unknown = Episode(**(vars(episodes[0]) | {"seed": None}))
     with pytest.raises(InputError, match=r"episodes\[1\]: no seed found"):
-        interchange.to_minari([episodes[0], unknown], "shipgym/mariner/other-v0", **CARD)
+        interchange.to_minari(
+            [episodes[0], unknown], "shipgym/mariner/other-v0", **CARD
+        )
     longer = Episode(**(vars(episodes[0]) | {"arguments": {"max_episode_steps": 9}}))
     for several in ([], [episodes[0], longer]):
-        with pytest.raises(InputError, match=f"of {len(several)} environments found, expected all of one"):
+        with pytest.raises(
+            InputError,
+            match=f"of {len(several)} environments found, expected all of one",
+        ):
             interchange.to_minari(several, "shipgym/mariner/other-v0", **CARD)
 
 
@@ -115,12 +162,32 @@ def test_parameters_of_mss_come_back(name):
 
 
 def test_parameters_have_the_names_and_signs_of_the_files_of_mss():
-    mariner, container = (interchange.to_mss(load_model(name)) for name in ("mariner", "container"))
-    named = {"m": 798e-5, "Iz": 39.2e-5, "xG": -0.023, "Nvdot": 4.646e-5, "Xrv": 798e-5, "Yvu": -1160e-5,
-             "Nd": -139e-5, "Yvvd": 1190e-5, "Xudd": -190e-5, "N0uu": 3e-5, "U0": 7.7175}  # fmt: skip
+    mariner, container = (
+        interchange.to_mss(load_model(name)) for name in ("mariner", "container")
+    )
+    named = {
+        "m": 798e-5,
+        "Iz": 39.2e-5,
+        "xG": -0.023,
+        "Nvdot": 4.646e-5,
+        "Xrv": 798e-5,
+        "Yvu": -1160e-5,
+        "Nd": -139e-5,
+        "Yvvd": 1190e-5,
+        "Xudd": -190e-5,
+        "N0uu": 3e-5,
+        "U0": 7.7175,
+    }
     assert {key: mariner[key] for key in named} == pytest.approx(named)
-    rolling = {"Xphiphi": -0.00020, "Yvvphi": 0.04605, "Krphiphi": 0.00003569, "kk": 0.631, "cRrrv": 1.96,
-               "alphay": 0.05, "ga": 0.088}  # fmt: skip
+    rolling = {
+        "Xphiphi": -0.00020,
+        "Yvvphi": 0.04605,
+        "Krphiphi": 0.00003569,
+        "kk": 0.631,
+        "cRrrv": 1.96,
+        "alphay": 0.05,
+        "ga": 0.088,
+    }
     assert {key: container[key] for key in rolling} == rolling
 
 
@@ -135,7 +202,9 @@ def test_parameters_have_the_names_and_signs_of_the_files_of_mss():
 def test_wrong_parameters_are_refused(changes, message):
     with pytest.raises(InputError, match=message):
         interchange.from_mss(interchange.to_mss(load_model("mariner")) | changes)
-    with pytest.raises(InputError, match="structure 'kvlcc2' found, expected abkowitz or container"):
+    with pytest.raises(
+        InputError, match="structure 'kvlcc2' found, expected abkowitz or container"
+    ):
         interchange.to_mss(load_model("kvlcc2"))
 
 
@@ -148,7 +217,14 @@ def test_the_turn_of_shipmmg_is_ours():
     back = interchange.from_shipmmg(parameters, 1.179, shaft_speed=n, steering=gear)
     assert dict(back.coefficients) == pytest.approx(dict(ship.coefficients), abs=1e-12)
     turn = back.simulate(np.tile([np.radians(35.0), n], (1000, 1)), 0.2)
-    theirs = {"u": 0.410837, "v": -0.143888, "r": 0.055712, "x": 4.9501, "y": 12.2047, "psi": 11.48811}
+    theirs = {
+        "u": 0.410837,
+        "v": -0.143888,
+        "r": 0.055712,
+        "x": 4.9501,
+        "y": 12.2047,
+        "psi": 11.48811,
+    }
     assert {name: turn[name][-1] for name in theirs} == pytest.approx(theirs, rel=2e-4)
 
 
@@ -192,9 +268,15 @@ def test_a_set_of_mss_has_its_inertia_about_midship():
         known["m"] * ((p["yaw_gyradius"] / p["length"]) ** 2 + known["xG"] ** 2)
     )
     back = interchange.from_mss(known)
-    assert (back.name, back.particulars["water_density"], back.steering.time_constant) == ("mss", 1025.0, 1.0)
+    assert (
+        back.name,
+        back.particulars["water_density"],
+        back.steering.time_constant,
+    ) == ("mss", 1025.0, 1.0)
     for share, gyradius in ((4.0, np.sqrt(3.0)), (2.0, 1.0)):
-        changed = interchange.from_mss(known | {"Iz": share * known["m"] * known["xG"] ** 2})
+        changed = interchange.from_mss(
+            known | {"Iz": share * known["m"] * known["xG"] ** 2}
+        )
         assert changed.particulars["yaw_gyradius"] == pytest.approx(-gyradius * p["xg"])
     with pytest.raises(InputError, match="yaw_gyradius: 0 found"):
         interchange.from_mss(known | {"Iz": 0.9 * known["m"] * known["xG"] ** 2})

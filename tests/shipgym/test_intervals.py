@@ -31,16 +31,23 @@ def test_the_interval_is_that_of_the_linearised_index(identified):
     """For small uncertainty an index is linear in the coefficients: its spread is root(g' S g)."""
     covariance = 1e-2 * identified.covariance
     model = replace(identified, covariance=covariance)
-    found = manoeuvres.index_intervals(model, "turning circle 35 deg to starboard", n_draws=300, seed=0)
+    found = manoeuvres.index_intervals(
+        model, "turning circle 35 deg to starboard", n_draws=300, seed=0
+    )
     names, deviations = list(model.coefficients), np.sqrt(np.diag(covariance))
-    judged = manoeuvres.standard_manoeuvres(model)["turning circle 35 deg to starboard"].evaluate
+    judged = manoeuvres.standard_manoeuvres(model)[
+        "turning circle 35 deg to starboard"
+    ].evaluate
 
     def advance(name, change):
         moved = {**model.coefficients, name: model.coefficients[name] + change}
         return judged(replace(model, coefficients=moved)).advance_lengths
 
     slope = np.array(
-        [(advance(n, d) - advance(n, -d)) / (2 * d) for n, d in zip(names, deviations, strict=True)]
+        [
+            (advance(n, d) - advance(n, -d)) / (2 * d)
+            for n, d in zip(names, deviations, strict=True)
+        ]
     )
     expected = np.sqrt(slope @ covariance @ slope)
     assert np.std(found["advance_lengths"].values) == pytest.approx(expected, rel=0.15)
@@ -48,23 +55,34 @@ def test_the_interval_is_that_of_the_linearised_index(identified):
 
 def test_a_manoeuvre_of_one_s_own(identified):
     found = manoeuvres.index_intervals(
-        identified, lambda ship: manoeuvres.zigzag_indices(manoeuvres.zigzag(ship, 15, 5)), n_draws=5
+        identified,
+        lambda ship: manoeuvres.zigzag_indices(manoeuvres.zigzag(ship, 15, 5)),
+        n_draws=5,
     )
     assert found["overshoot_1_deg"].interval is not None
 
 
 def test_draws_that_run_away_or_never_reach_are_counted():
     ship = load_model("mariner")
-    wild = replace(ship, coefficients=ship.coefficients | {"N_r": 5e-3})  # yaw that feeds itself
-    numb = {name: 0.0 if "d" in name.split("_")[1] else value for name, value in ship.coefficients.items()}
+    wild = replace(
+        ship, coefficients=ship.coefficients | {"N_r": 5e-3}
+    )  # yaw that feeds itself
+    numb = {
+        name: 0.0 if "d" in name.split("_")[1] else value
+        for name, value in ship.coefficients.items()
+    }
     numb = replace(
-        ship, coefficients=numb | dict.fromkeys(("Y_0", "N_0", "Y_0u", "N_0u", "Y_0uu", "N_0uu"), 0.0)
+        ship,
+        coefficients=numb
+        | dict.fromkeys(("Y_0", "N_0", "Y_0u", "N_0u", "Y_0uu", "N_0uu"), 0.0),
     )
     name = "turning circle 35 deg to starboard"
     manoeuvre = manoeuvres.standard_manoeuvres(ship)[name]
     own = {name: {"advance_lengths": manoeuvre.evaluate(ship).advance_lengths}}
     found = intervals_of(
-        own, [ship, wild, numb, ship], {name: lambda s: _only_advance(manoeuvre.evaluate(s))}
+        own,
+        [ship, wild, numb, ship],
+        {name: lambda s: _only_advance(manoeuvre.evaluate(s))},
     )
     index = found[name]["advance_lengths"]
     assert (index.n_ran_away, index.n_never_reached) == (1, 1)
@@ -112,12 +130,18 @@ def test_an_identified_ship_is_judged_with_intervals(identified):
 def test_stopping_is_judged_where_the_ship_goes_astern(name, passed, said):
     """Track reach of a full astern stop, MSC.137(76) 5.3.4: the tanker's 8.95 lengths are within 15."""
     ship = load_model(name)
-    needed = {n: m for n, m in manoeuvres.standard_manoeuvres(ship).items() if "stop" not in n}
+    needed = {
+        n: m for n, m in manoeuvres.standard_manoeuvres(ship).items() if "stop" not in n
+    }
     own = {n: m.no_indices for n, m in needed.items()}
     stops = intervals_of(own, [], {})
     if passed:
-        reach = manoeuvres.stopping_indices(manoeuvres.crash_stop(ship)).track_reach_lengths
-        stops["crash stop"] = {"track_reach_lengths": IndexInterval(reach, np.empty(0), np.empty(0, bool))}
+        reach = manoeuvres.stopping_indices(
+            manoeuvres.crash_stop(ship)
+        ).track_reach_lengths
+        stops["crash stop"] = {
+            "track_reach_lengths": IndexInterval(reach, np.empty(0), np.empty(0, bool))
+        }
         assert reach == pytest.approx(8.95, abs=0.01)
     criterion = imo_criteria(ship, stops)["stopping"]
     assert criterion.passed is passed
@@ -137,7 +161,9 @@ def test_wrong_arguments(identified):
 
 
 def index(value, values, ran_away=()):
-    return IndexInterval(value, np.array(values, dtype=float), np.isin(np.arange(len(values)), ran_away))
+    return IndexInterval(
+        value, np.array(values, dtype=float), np.isin(np.arange(len(values)), ran_away)
+    )
 
 
 def test_an_interval_is_told_in_numbers_and_words():
@@ -147,10 +173,17 @@ def test_an_interval_is_told_in_numbers_and_words():
     assert found.interval == pytest.approx((7.05, 8.95))
     assert found.quantiles(0.0, 0.5, 1.0) == pytest.approx((7.0, 8.0, 9.0))
     assert (found.n_ran_away, found.n_never_reached) == (1, 1)
-    assert str(found) == "7.778 [7.05, 8.95] (1 of 43 draws ran away, 1 of 43 draws never got so far)"
+    assert (
+        str(found)
+        == "7.778 [7.05, 8.95] (1 of 43 draws ran away, 1 of 43 draws never got so far)"
+    )
     assert found.to_dict() == {
-        "value": 7.77777, "interval_95": found.interval, "draws": 43, "ran_away": 1, "never_reached": 1
-    }  # fmt: skip
+        "value": 7.77777,
+        "interval_95": found.interval,
+        "draws": 43,
+        "ran_away": 1,
+        "never_reached": 1,
+    }
     assert str(index(None, [])) == "-"
     assert str(index(2.0, [1.0, 3.0])).startswith("2 [1.05, 2.95]")
     assert index(2.0, [np.nan]).interval is None
@@ -167,9 +200,13 @@ def test_the_worst_of_two_runs_is_the_larger_draw_by_draw():
     assert worst([one, index(None, [1.0, 1.0, 1.0])]).value is None
 
 
-def test_an_identified_ship_is_judged_by_a_hundred_draws_and_another_by_none(identified, monkeypatch):
+def test_an_identified_ship_is_judged_by_a_hundred_draws_and_another_by_none(
+    identified, monkeypatch
+):
     drawn = []
-    monkeypatch.setattr(imo, "assess_draws", lambda model, draws: drawn.append(len(draws)))
+    monkeypatch.setattr(
+        imo, "assess_draws", lambda model, draws: drawn.append(len(draws))
+    )
     manoeuvres.imo_assessment(identified)
     manoeuvres.imo_assessment(load_model("mariner"))
     manoeuvres.imo_assessment(identified, n_draws=3)
@@ -181,7 +218,15 @@ def test_an_identified_ship_is_judged_by_a_hundred_draws_and_another_by_none(ide
 def test_progress_counts_the_draws_done(identified):
     done = []
     ship = load_model("mariner")
-    evaluate = {"a": lambda ship: _only_advance(SimpleNamespace(advance_lengths=len(ship.name)))}
-    found = intervals_of({"a": {"advance_lengths": 7.0}}, [ship, identified, ship], evaluate, done.append)
+    evaluate = {
+        "a": lambda ship: _only_advance(SimpleNamespace(advance_lengths=len(ship.name)))
+    }
+    found = intervals_of(
+        {"a": {"advance_lengths": 7.0}}, [ship, identified, ship], evaluate, done.append
+    )
     assert done == [1, 2, 3]
-    assert found["a"]["advance_lengths"].values.tolist() == [7.0, len(identified.name), 7.0]
+    assert found["a"]["advance_lengths"].values.tolist() == [
+        7.0,
+        len(identified.name),
+        7.0,
+    ]

@@ -26,7 +26,10 @@ PRIME_B = np.array([[LENGTH / SPEED**2], [LENGTH**2 / SPEED**2]])
 
 
 def with_coefficients(factors=None, **values):
-    changed = {name: MARINER.coefficients[name] * factor for name, factor in (factors or {}).items()}
+    changed = {
+        name: MARINER.coefficients[name] * factor
+        for name, factor in (factors or {}).items()
+    }
     return replace(MARINER, coefficients={**MARINER.coefficients, **changed, **values})
 
 
@@ -35,12 +38,16 @@ COURSE_UNSTABLE = with_coefficients({"N_v": 1.7, "N_uv": 1.7})
 
 def test_linear_coefficients_of_mariner_are_those_of_its_derivatives():
     A, B = linearise(MARINER, StraightRunning(SPEED, 0.0, 0.0))
-    inertia = np.array([[798 + 748, 798 * -0.023 + 9.354], [798 * -0.023 - 4.646, 39.2 + 43.8]])
+    inertia = np.array(
+        [[798 + 748, 798 * -0.023 + 9.354], [798 * -0.023 - 4.646, 39.2 + 43.8]]
+    )
     forces = np.array([[-1160.0, -499.0, -278.0], [-264.0, -166.0, 139.0]])
     expected = np.linalg.solve(inertia, forces)
     np.testing.assert_allclose(A * PRIME_A, expected[:, :2], rtol=1e-6)
     np.testing.assert_allclose(B * PRIME_B, expected[:, 2:], rtol=1e-6)
-    np.testing.assert_allclose(A * PRIME_A, [[-0.770, -0.335], [-3.394, -2.093]], atol=6e-4)
+    np.testing.assert_allclose(
+        A * PRIME_A, [[-0.770, -0.335], [-3.394, -2.093]], atol=6e-4
+    )
     np.testing.assert_allclose(B * PRIME_B, [[-0.170], [1.627]], atol=6e-4)
 
 
@@ -51,27 +58,41 @@ def test_mariner_runs_straight_with_one_degree_of_port_rudder():
     assert neutral.rudder == pytest.approx(rudder, rel=2e-3)
     assert neutral.sway == pytest.approx(sway * SPEED, rel=2e-3)
     assert np.degrees(neutral.rudder) == pytest.approx(-1.11, abs=0.01)
-    trial = MARINER.simulate(np.full((2000, 1), neutral.rudder), 0.5, neutral.state(MARINER))
+    trial = MARINER.simulate(
+        np.full((2000, 1), neutral.rudder), 0.5, neutral.state(MARINER)
+    )
     assert np.abs(trial["psi"]).max() < 1e-8
 
 
 def test_time_constants_of_mariner_are_the_published_ones():
     """Fossen 2011, table 7.2, after Chislett & Strom-Tejsen 1965."""
     found = nomoto(MARINER)
-    published = {"K": 0.185, "T1": 118.0, "T2": 7.8, "T3": 18.5, "T": 118.0 + 7.8 - 18.5}
+    published = {
+        "K": 0.185,
+        "T1": 118.0,
+        "T2": 7.8,
+        "T3": 18.5,
+        "T": 118.0 + 7.8 - 18.5,
+    }
     assert asdict(found) == pytest.approx(published, rel=5e-3)
-    assert found.rudder_effect == pytest.approx(published["K"] / published["T"], rel=5e-3)
+    assert found.rudder_effect == pytest.approx(
+        published["K"] / published["T"], rel=5e-3
+    )
     assert is_course_stable(MARINER)
 
 
-@pytest.mark.parametrize("model", [MARINER, COURSE_UNSTABLE], ids=["stable", "unstable"])
+@pytest.mark.parametrize(
+    "model", [MARINER, COURSE_UNSTABLE], ids=["stable", "unstable"]
+)
 def test_small_rudder_steps_follow_the_transfer_function(model):
     neutral, found, dt, n = straight_running(model), nomoto(model), 0.1, 600
     step, lag = np.radians(0.02), model.steering.time_constant
     state = [0.0, 0.0, 0.0, neutral.surge, neutral.sway, 0.0, neutral.rudder]
     trial = model.simulate(np.full((n, 1), neutral.rudder + step), dt, state)
     denominator = np.polymul(np.polymul([found.T1, 1.0], [found.T2, 1.0]), [lag, 1.0])
-    _, r, _ = lsim(([found.K * found.T3, found.K], denominator), np.full(n + 1, step), trial.t)
+    _, r, _ = lsim(
+        ([found.K * found.T3, found.K], denominator), np.full(n + 1, step), trial.t
+    )
     assert trial["r"][-1] > 0.0  # rudder to starboard turns to starboard
     assert np.abs(trial["r"] - r).max() < 2e-3 * np.abs(r).max()
 
@@ -123,10 +144,20 @@ def test_units_of_states_are_those_of_the_prime_system():
     ship = load_model("container")
     length, speed = ship.particulars["length"], ship.particulars["speed"]
     units = dict(zip(ship.state_names, linear._scales(ship).tolist(), strict=True))
-    assert units == pytest.approx({
-        "x": 1.0, "y": 1.0, "psi": 1.0, "phi": 1.0, "delta": 1.0, "u": speed, "v": speed,
-        "r": speed / length, "p": speed / length, "n": ship.service_shaft_speed,
-    })  # fmt: skip
+    assert units == pytest.approx(
+        {
+            "x": 1.0,
+            "y": 1.0,
+            "psi": 1.0,
+            "phi": 1.0,
+            "delta": 1.0,
+            "u": speed,
+            "v": speed,
+            "r": speed / length,
+            "p": speed / length,
+            "n": ship.service_shaft_speed,
+        }
+    )
 
 
 def test_without_a_steady_speed_service_speed_is_held():
@@ -137,7 +168,10 @@ def test_without_a_steady_speed_service_speed_is_held():
 
 
 def test_a_model_without_straight_course_is_refused_by_name():
-    with pytest.raises(InputError, match=r"model 'mariner': no straight course found with less than 20 deg"):
+    with pytest.raises(
+        InputError,
+        match=r"model 'mariner': no straight course found with less than 20 deg",
+    ):
         straight_running(with_coefficients(N_0=0.01))
 
 
@@ -145,8 +179,14 @@ def test_a_straight_course_has_less_than_20_deg_of_rudder_and_sway_of_half_the_s
     """Of two linear equations, one for each: sway over all of the speed = -Y_0 / Y_v, rudder = -N_0 / N_d."""
 
     def running(sway, rudder):  # sway over surge
-        none = dict.fromkeys(MARINER.coefficients, 0.0) | {"Y_v": -0.01, "N_d": 0.002, "N_r": -0.002}
-        found = with_coefficients(**none | {"Y_0": 0.01 * sway / np.hypot(1.0, sway), "N_0": -0.002 * rudder})
+        none = dict.fromkeys(MARINER.coefficients, 0.0) | {
+            "Y_v": -0.01,
+            "N_d": 0.002,
+            "N_r": -0.002,
+        }
+        found = with_coefficients(
+            **none | {"Y_0": 0.01 * sway / np.hypot(1.0, sway), "N_0": -0.002 * rudder}
+        )
         return straight_running(found)
 
     for side in (1.0, -1.0):
@@ -154,7 +194,9 @@ def test_a_straight_course_has_less_than_20_deg_of_rudder_and_sway_of_half_the_s
         assert running(sway, 0.0).sway == pytest.approx(sway * SPEED)
         assert running(0.0, rudder).rudder == pytest.approx(rudder)
         for beyond in ((1.04 * sway, 0.0), (0.0, 1.01 * rudder)):
-            with pytest.raises(InputError, match="no straight course found with less than 20 deg"):
+            with pytest.raises(
+                InputError, match="no straight course found with less than 20 deg"
+            ):
                 running(*beyond)
 
 
@@ -164,7 +206,9 @@ def test_rudder_of_a_steady_turn_is_that_which_turns_her_so(degrees):
     commands[:, 0] = np.radians(degrees)
     turn = MARINER.simulate(commands, 0.5)
     assert turn["r"][-1] == pytest.approx(turn["r"][-200], rel=1e-6)
-    assert steady_turn_rudder(MARINER, turn["r"][-1]) == pytest.approx(np.radians(degrees), rel=1e-4)
+    assert steady_turn_rudder(MARINER, turn["r"][-1]) == pytest.approx(
+        np.radians(degrees), rel=1e-4
+    )
 
 
 def test_a_rudder_without_effect_has_no_nomoto_form():
@@ -173,18 +217,32 @@ def test_a_rudder_without_effect_has_no_nomoto_form():
         nomoto_of(A, np.zeros((2, 1)))
 
 
-@pytest.mark.parametrize(("share", "believed"), [(0.74, False), (0.76, True), (1.24, True), (1.26, False)])
-def test_a_steady_speed_is_believed_within_a_quarter_of_service_speed(share, believed, monkeypatch):
+@pytest.mark.parametrize(
+    ("share", "believed"), [(0.74, False), (0.76, True), (1.24, True), (1.26, False)]
+)
+def test_a_steady_speed_is_believed_within_a_quarter_of_service_speed(
+    share, believed, monkeypatch
+):
     def balance(model, unknowns, speed=None):
-        return {"u": 7.7175 * (share if "u" in unknowns else 1.0), "v": 0.0, "delta": 0.0}
+        return {
+            "u": 7.7175 * (share if "u" in unknowns else 1.0),
+            "v": 0.0,
+            "delta": 0.0,
+        }
 
     monkeypatch.setattr(linear, "_balance", balance)
-    assert linear.straight_running(MARINER).surge == pytest.approx(7.7175 * (share if believed else 1.0))
+    assert linear.straight_running(MARINER).surge == pytest.approx(
+        7.7175 * (share if believed else 1.0)
+    )
 
 
 @pytest.mark.parametrize(("rate", "at_rest"), [(0.95e-8, True), (-1.05e-8, False)])
-def test_a_ship_is_at_rest_where_prime_accelerations_are_below_1e_8(rate, at_rest, monkeypatch):
-    monkeypatch.setattr(linear, "_rates", lambda model, states: np.full(states.shape, rate))
+def test_a_ship_is_at_rest_where_prime_accelerations_are_below_1e_8(
+    rate, at_rest, monkeypatch
+):
+    monkeypatch.setattr(
+        linear, "_rates", lambda model, states: np.full(states.shape, rate)
+    )
     assert (linear._balance(MARINER, ["v", "delta"]) is not None) == at_rest
 
 
@@ -195,8 +253,16 @@ def test_a_rudder_beyond_a_right_angle_counts_as_one():
     seen = []
 
     class Asked:
-        service_command, command_names, state_names = MARINER.service_command, ("delta",), MARINER.state_names
-        particulars, travel_time, service_shaft_speed = MARINER.particulars, MARINER.travel_time, 0.0
+        service_command, command_names, state_names = (
+            MARINER.service_command,
+            ("delta",),
+            MARINER.state_names,
+        )
+        particulars, travel_time, service_shaft_speed = (
+            MARINER.particulars,
+            MARINER.travel_time,
+            0.0,
+        )
 
         def derivatives(self, states, commands):
             seen.append(commands[:, 0])

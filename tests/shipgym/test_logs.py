@@ -34,7 +34,9 @@ def sail(n=1201, step=0.5, current=(0.3, -0.4)):
     order += 14 * DEGREE * ((t > 260) & (t < 330))
     delta, r, psi = np.zeros(n), np.zeros(n), np.full(n, 0.5)
     for k in range(1, n):
-        delta[k] = delta[k - 1] + np.clip(order[k] - delta[k - 1], -2.5 * DEGREE * step, 2.5 * DEGREE * step)
+        delta[k] = delta[k - 1] + np.clip(
+            order[k] - delta[k - 1], -2.5 * DEGREE * step, 2.5 * DEGREE * step
+        )
         r[k] = r[k - 1] + step * (0.08 * delta[k - 1] - r[k - 1]) / 12.0
         psi[k] = psi[k - 1] + step * 0.5 * (r[k] + r[k - 1])
     u, v = np.full(n, 7.0) - 400.0 * r**2, -45.0 * r
@@ -64,18 +66,24 @@ def at_antenna(s):
     east = s["east"] + s["r"] * (c * FORWARD - sn * STARBOARD)
     per = local_metres(np.array([LAT + 1e-3]), np.array([LON + 1e-3]), (LAT, LON))
     return {
-        "lat": LAT + 1e-3 * x / per[0][0], "lon": LON + 1e-3 * y / per[1][0],
-        "sog": np.hypot(north, east), "cog": np.arctan2(east, north) % (2 * np.pi),
-    }  # fmt: skip
+        "lat": LAT + 1e-3 * x / per[0][0],
+        "lon": LON + 1e-3 * y / per[1][0],
+        "sog": np.hypot(north, east),
+        "cog": np.arctan2(east, north) % (2 * np.pi),
+    }
 
 
 SAILED = sail()
 GNSS = at_antenna(SAILED)
 COLUMNS = {
-    "t": "Zeit", "lat": "Breite", "lon": "Länge", "sog": {"column": "SOG [kn]", "unit": "knots"},
-    "cog": {"column": "COG [°]", "unit": "deg"}, "psi": {"column": "Gyro [°]", "unit": "deg"},
+    "t": "Zeit",
+    "lat": "Breite",
+    "lon": "Länge",
+    "sog": {"column": "SOG [kn]", "unit": "knots"},
+    "cog": {"column": "COG [°]", "unit": "deg"},
+    "psi": {"column": "Gyro [°]", "unit": "deg"},
     "delta": {"column": "Ruder [°]", "unit": "deg"},
-}  # fmt: skip
+}
 
 
 def bridge_log(path, keep=lambda row: row, gyro=1.0):
@@ -86,13 +94,23 @@ def bridge_log(path, keep=lambda row: row, gyro=1.0):
         here = ["", "", "", ""]
         if k % 2 == 0:
             minutes = ((abs(GNSS["lat"][k]) % 1) * 60, (abs(GNSS["lon"][k]) % 1) * 60)
-            here = [f"57°{minutes[0]:.4f}'N", f"011°{minutes[1]:.4f}'E", f"{GNSS['sog'][k] / KNOT:.2f}"]
+            here = [
+                f"57°{minutes[0]:.4f}'N",
+                f"011°{minutes[1]:.4f}'E",
+                f"{GNSS['sog'][k] / KNOT:.2f}",
+            ]
             here.append(f"{GNSS['cog'][k] / DEGREE:.1f}")
         ship = [
             f"{gyro * SAILED['psi'][k] / DEGREE % 360:.1f}",
             f"{-round(SAILED['delta'][k] / DEGREE * 2) / 2:.1f}",
         ]
-        row = keep([f"2024-05-31T09:{30 + int(t) // 60:02d}:{t % 60:04.1f}+02:00", *here, *ship])
+        row = keep(
+            [
+                f"2024-05-31T09:{30 + int(t) // 60:02d}:{t % 60:04.1f}+02:00",
+                *here,
+                *ship,
+            ]
+        )
         lines.append(";".join(row).replace(".", ","))
     path.write_bytes(("\n".join(lines) + "\n").encode("latin-1"))
     return path
@@ -102,7 +120,11 @@ ANTENNA = {"gnss_antenna": {"forward": FORWARD, "starboard": STARBOARD}}
 
 
 def error(trial, name):
-    return float(np.sqrt(np.mean((trial[name] - np.interp(trial.t, SAILED["t"], SAILED[name])) ** 2)))
+    return float(
+        np.sqrt(
+            np.mean((trial[name] - np.interp(trial.t, SAILED["t"], SAILED[name])) ** 2)
+        )
+    )
 
 
 def test_a_bridge_log_becomes_a_trial_at_midship_on_one_clock(tmp_path):
@@ -113,11 +135,16 @@ def test_a_bridge_log_becomes_a_trial_at_midship_on_one_clock(tmp_path):
     assert error(trial, "psi") < 0.05 * DEGREE
     assert error(trial, "delta") < 0.3 * DEGREE
     c, s = np.cos(trial["psi"]), np.sin(trial["psi"])
-    truth = {name: np.interp(trial.t, SAILED["t"], SAILED[name]) for name in ("u", "v", "x", "y")}
+    truth = {
+        name: np.interp(trial.t, SAILED["t"], SAILED[name])
+        for name in ("u", "v", "x", "y")
+    }
     assert np.std(trial["u"] - truth["u"] - (0.3 * c - 0.4 * s)) < 0.03
     assert np.std(trial["v"] - truth["v"] - (-0.3 * s - 0.4 * c)) < 0.03
     for name in ("x", "y"):
-        assert np.ptp(trial[name] - truth[name]) < 1.5  # by rounding and the tangent plane
+        assert (
+            np.ptp(trial[name] - truth[name]) < 1.5
+        )  # by rounding and the tangent plane
     shifted = Trial.from_csv(path, COLUMNS, "port")
     assert np.std(shifted["v"] - truth["v"] - (-0.3 * s - 0.4 * c)) > 0.2
 
@@ -155,14 +182,20 @@ def test_latitudes_are_read_in_degrees_and_minutes():
     ]
     expected = [57.68723333] * 4 + [-57.68723333] * 2 + [math.nan]
     np.testing.assert_allclose(read_angles(texts), expected, atol=1e-7)
-    np.testing.assert_allclose(read_angles(["5741.234N", "5741.234"]), 57.68723333, atol=1e-7)
-    np.testing.assert_allclose(read_angles(["0044.3", "00044.3W"], True), [44.3 / 60, -44.3 / 60])
+    np.testing.assert_allclose(
+        read_angles(["5741.234N", "5741.234"]), 57.68723333, atol=1e-7
+    )
+    np.testing.assert_allclose(
+        read_angles(["0044.3", "00044.3W"], True), [44.3 / 60, -44.3 / 60]
+    )
     with pytest.raises(ValueError, match="57°61'N"):
         read_angles(["57°61'N"])
 
 
 def test_a_track_over_the_date_line_has_no_jump():
-    x, y = local_metres(np.array([-17.0, -17.0]), np.array([179.999, -179.999]), (-17.0, 179.999))
+    x, y = local_metres(
+        np.array([-17.0, -17.0]), np.array([179.999, -179.999]), (-17.0, 179.999)
+    )
     assert x == pytest.approx([0.0, 0.0])
     assert y == pytest.approx([0.0, 212.9], abs=0.5)
 
@@ -172,9 +205,14 @@ def test_a_track_over_the_date_line_has_no_jump():
 
 def frame():
     pandas = pytest.importorskip("pandas")
-    times = pandas.Timestamp("2024-05-31 09:30") + pandas.to_timedelta(SAILED["t"][::2], unit="s")
+    times = pandas.Timestamp("2024-05-31 09:30") + pandas.to_timedelta(
+        SAILED["t"][::2], unit="s"
+    )
     return pandas.DataFrame(
-        {"time": times, **{name: SAILED[name][::2] for name in ("psi", "u", "v", "delta")}}
+        {
+            "time": times,
+            **{name: SAILED[name][::2] for name in ("psi", "u", "v", "delta")},
+        }
     )
 
 
@@ -189,16 +227,21 @@ def test_every_kind_of_table_gives_the_same_trial(tmp_path):
     table.to_csv(tmp_path / "log.csv", index=False)
     savemat(
         tmp_path / "log.mat",
-        {"time": SAILED["t"][::2], "name": "x"} | {c: table[c].to_numpy() for c in table if c != "time"},
+        {"time": SAILED["t"][::2], "name": "x"}
+        | {c: table[c].to_numpy() for c in table if c != "time"},
     )
     for ending in ("xlsx", "parquet", "csv", "mat"):
         trial = Trial.from_csv(tmp_path / f"log.{ending}", columns)
         for name in ("t", "psi", "u", "v", "r", "delta"):
-            np.testing.assert_allclose(trial[name], expected[name], atol=1e-6, err_msg=ending)
+            np.testing.assert_allclose(
+                trial[name], expected[name], atol=1e-6, err_msg=ending
+            )
     unix = table.assign(time=1.7e9 + SAILED["t"][::2])
     trial = Trial.from_frame(unix, columns | {"t": {"column": "time", "unit": "unix"}})
     np.testing.assert_allclose(trial.t, expected.t, atol=1e-6)
-    with pytest.raises(InputError, match="frame: a list found, expected a pandas DataFrame"):
+    with pytest.raises(
+        InputError, match="frame: a list found, expected a pandas DataFrame"
+    ):
         Trial.from_frame([1, 2])
 
 
@@ -209,7 +252,9 @@ def test_a_sheet_with_merged_cells_is_refused(tmp_path):
         book.active.append(row)
     book.active.merge_cells("A3:A4")
     book.save(tmp_path / "log.xlsx")
-    with pytest.raises(InputError, match=r"merged cells A3:A4 found in sheet 'Sheet'.*unmerge them"):
+    with pytest.raises(
+        InputError, match=r"merged cells A3:A4 found in sheet 'Sheet'.*unmerge them"
+    ):
         read_log(tmp_path / "log.xlsx")
 
 
@@ -224,14 +269,19 @@ def test_a_sheet_begins_with_names_where_it_is_not_empty(names, tmp_path):
     assert (table.header, list(table.lines)) == (("t", "u"), [3, 5])
     book.active["B2"], book.active["C2"] = names
     book.save(tmp_path / "log.xlsx")
-    with pytest.raises(InputError, match=r"log.xlsx: row 2: .* found, expected names of columns, each once"):
+    with pytest.raises(
+        InputError,
+        match=r"log.xlsx: row 2: .* found, expected names of columns, each once",
+    ):
         read_log(tmp_path / "log.xlsx")
 
 
 @pytest.mark.parametrize("ending", ["xlsx", "parquet", "mat"])
 def test_a_damaged_file_is_one_message(tmp_path, ending):
     (tmp_path / f"log.{ending}").write_bytes(b"PK\x03\x04" + bytes(300))
-    with pytest.raises(InputError, match=rf"log.{ending}: (cannot be read|no numeric vectors)"):
+    with pytest.raises(
+        InputError, match=rf"log.{ending}: (cannot be read|no numeric vectors)"
+    ):
         read_log(tmp_path / f"log.{ending}")
 
 
@@ -256,11 +306,21 @@ def nmea_log(path, rudder=True, end=600):
         lines.append(f"IIGGA,{clock}.00,{place},1,08,1.0,20.0,M,,M,,")
         for j in (k, k + 1):
             heading = SAILED["psi"][j] / DEGREE % 360
-            lines += [f"HETHS,{heading:.2f},A", f"HCHDG,{(heading - 5) % 360:.1f},0.0,E,3.0,E"]
+            lines += [
+                f"HETHS,{heading:.2f},A",
+                f"HCHDG,{(heading - 5) % 360:.1f},0.0,E,3.0,E",
+            ]
             lines.append(f"TIROT,{SAILED['r'][j] / DEGREE * 60:.2f},A")
             lines += [f"RIRSA,{SAILED['delta'][j] / DEGREE:.1f},A,,"] if rudder else []
-        lines += ["ERRPM,S,1,90.0,100.0,A", "WIMWV,030.0,R,10.0,M,A", "VWVHW,,T,,M,13.6,N,,K"]
-    path.write_text("\r\n".join(line if line[0] == "!" else sentence(line) for line in lines) + "\r\n")
+        lines += [
+            "ERRPM,S,1,90.0,100.0,A",
+            "WIMWV,030.0,R,10.0,M,A",
+            "VWVHW,,T,,M,13.6,N,,K",
+        ]
+    path.write_text(
+        "\r\n".join(line if line[0] == "!" else sentence(line) for line in lines)
+        + "\r\n"
+    )
     return path
 
 
@@ -275,9 +335,12 @@ def test_an_nmea_log_becomes_a_trial(tmp_path):
     assert not trial.over_ground
     assert error(trial, "v") < 0.1
     assert "psi is from HETHS; HCHDG left out" in trial.notes
-    assert any("set and drift" in note and "toward 3" in note for note in trial.notes), trial.notes
+    assert any(
+        "set and drift" in note and "toward 3" in note for note in trial.notes
+    ), trial.notes
     expected = (
-        10.0 * np.exp(1j * (SAILED["psi"][0] + 30 * DEGREE)) - (SAILED["north"] + 1j * SAILED["east"])[0]
+        10.0 * np.exp(1j * (SAILED["psi"][0] + 30 * DEGREE))
+        - (SAILED["north"] + 1j * SAILED["east"])[0]
     )
     assert trial["wind_speed"][0] == pytest.approx(abs(expected), abs=0.1)
     assert trial["wind_from"][0] == pytest.approx(np.angle(expected), abs=0.02)
@@ -288,25 +351,38 @@ def test_a_log_with_wrong_checksums_or_without_time_is_refused(tmp_path):
     (tmp_path / "bad.nmea").write_text(
         "\n".join(one[:-2] + "00" if k % 2 else one for k, one in enumerate(lines))
     )
-    with pytest.raises(InputError, match=r"sentences have a wrong checksum.*the first in line 2\)"):
+    with pytest.raises(
+        InputError, match=r"sentences have a wrong checksum.*the first in line 2\)"
+    ):
         read_log(tmp_path / "bad.nmea")
     lines[3:4] = [sentence("GPVTG,inf,T,,M,5.0,N,,K"), lines[3]]
     (tmp_path / "infinite.nmea").write_text("\n".join(lines))
     notes = read_log(tmp_path / "infinite.nmea").notes
     assert [note.partition(" of ")[0] for note in notes if "checksum" in note] == ["1"]
-    (tmp_path / "dark.nmea").write_text("\n".join(one for one in lines if "HETHS" in one))
-    with pytest.raises(InputError, match="no time that can be read in this log, expected some of RMC"):
+    (tmp_path / "dark.nmea").write_text(
+        "\n".join(one for one in lines if "HETHS" in one)
+    )
+    with pytest.raises(
+        InputError, match="no time that can be read in this log, expected some of RMC"
+    ):
         read_log(tmp_path / "dark.nmea")
 
 
 def test_a_tenth_of_the_sentences_may_be_damaged(tmp_path):
     lines = nmea_log(tmp_path / "log.nmea", end=20).read_text().splitlines()[1:201]
     for count in (20, 21):
-        damaged = [one[:-2] + "ZZ" if k >= 200 - count else one for k, one in enumerate(lines)]
+        damaged = [
+            one[:-2] + "ZZ" if k >= 200 - count else one for k, one in enumerate(lines)
+        ]
         (tmp_path / "log.nmea").write_text("\n".join(damaged))
         if count == 20:
-            assert "20 of 200 sentences with a wrong checksum" in read_log(tmp_path / "log.nmea").notes[0]
-    with pytest.raises(InputError, match=r"21 of 200 sentences have a wrong checksum.*in line 180\)"):
+            assert (
+                "20 of 200 sentences with a wrong checksum"
+                in read_log(tmp_path / "log.nmea").notes[0]
+            )
+    with pytest.raises(
+        InputError, match=r"21 of 200 sentences have a wrong checksum.*in line 180\)"
+    ):
         read_log(tmp_path / "log.nmea")
 
 
@@ -317,16 +393,29 @@ def test_a_wind_of_no_unit_is_left_out(tmp_path):
     assert Trial.from_csv(path).channels.keys() == before.channels.keys()
 
 
-@pytest.mark.parametrize(("unit", "metres"), [("M", 1.0), ("N", 1852.0 / 3600.0), ("K", 1.0 / 3.6)])
-def test_a_wind_is_told_in_metres_per_second_knots_or_kilometres_per_hour(unit, metres, tmp_path):
-    clocks = [f"GPGGA,00000{k},5741.0000,N,01144.0000,E,1,08,1.0,20.0,M,,M,," for k in range(3)]
+@pytest.mark.parametrize(
+    ("unit", "metres"), [("M", 1.0), ("N", 1852.0 / 3600.0), ("K", 1.0 / 3.6)]
+)
+def test_a_wind_is_told_in_metres_per_second_knots_or_kilometres_per_hour(
+    unit, metres, tmp_path
+):
+    clocks = [
+        f"GPGGA,00000{k},5741.0000,N,01144.0000,E,1,08,1.0,20.0,M,,M,,"
+        for k in range(3)
+    ]
     wind = f"WIMWV,030.0,T,10.0,{unit},A"
-    lines = [sentence(text) for clock in clocks for text in (clock, "HEHDT,20.0,T", wind)]
+    lines = [
+        sentence(text) for clock in clocks for text in (clock, "HEHDT,20.0,T", wind)
+    ]
     (tmp_path / "log.nmea").write_text("\n".join(lines))
     table = read_log(tmp_path / "log.nmea")
     found = {name: table.numbers(name) for name in ("wind_speed", "wind_from")}
-    assert found["wind_speed"][np.isfinite(found["wind_speed"])] == pytest.approx(10.0 * metres)
-    assert np.degrees(found["wind_from"][np.isfinite(found["wind_from"])]) == pytest.approx(50.0)
+    assert found["wind_speed"][np.isfinite(found["wind_speed"])] == pytest.approx(
+        10.0 * metres
+    )
+    assert np.degrees(
+        found["wind_from"][np.isfinite(found["wind_from"])]
+    ) == pytest.approx(50.0)
 
 
 def test_a_log_without_dates_goes_on_at_midnight(tmp_path):
@@ -334,7 +423,10 @@ def test_a_log_without_dates_goes_on_at_midnight(tmp_path):
     lines = [
         sentence(one)
         for clock in texts
-        for one in (f"GPGGA,{clock},5741.0000,N,01144.0000,E,1,08,1.0,20.0,M,,M,,", "HEHDT,30.0,T")
+        for one in (
+            f"GPGGA,{clock},5741.0000,N,01144.0000,E,1,08,1.0,20.0,M,,M,,",
+            "HEHDT,30.0,T",
+        )
     ]
     (tmp_path / "log.nmea").write_text("\n".join(lines))
     assert np.ptp(read_log(tmp_path / "log.nmea").numbers("t")) == 4.0
@@ -351,19 +443,29 @@ def test_a_log_without_dates_goes_on_at_midnight(tmp_path):
         ("10.0,,W,3.0,E", 13.0),
     ],
 )
-def test_deviation_and_variation_to_the_east_are_added_to_a_compass(fields, true_deg, tmp_path):
-    clocks = [f"GPGGA,00000{k},5741.0000,N,01144.0000,E,1,08,1.0,20.0,M,,M,," for k in range(3)]
+def test_deviation_and_variation_to_the_east_are_added_to_a_compass(
+    fields, true_deg, tmp_path
+):
+    clocks = [
+        f"GPGGA,00000{k},5741.0000,N,01144.0000,E,1,08,1.0,20.0,M,,M,,"
+        for k in range(3)
+    ]
     lines = [sentence(text) for clock in clocks for text in (clock, f"HCHDG,{fields}")]
     (tmp_path / "log.nmea").write_text("\n".join(lines))
     found = np.degrees(read_log(tmp_path / "log.nmea").numbers("psi"))
     assert found[np.isfinite(found)] == pytest.approx(true_deg)
 
 
-@pytest.mark.skipif(not DATA.is_dir(), reason="the real log lies beside the checkout and is absent here")
+@pytest.mark.skipif(
+    not DATA.is_dir(), reason="the real log lies beside the checkout and is absent here"
+)
 def test_the_real_log_is_read_and_says_that_it_has_no_rudder():
     trial = Trial.from_csv(DATA / "nmea0183" / "hakefjord.txt")
     assert 1300 < trial.duration < 1320
-    assert any(note.startswith("no rudder angle in this log: without rudder nothing") for note in trial.notes)
+    assert any(
+        note.startswith("no rudder angle in this log: without rudder nothing")
+        for note in trial.notes
+    )
     assert any("set and drift" in note for note in trial.notes)
 
 
@@ -374,7 +476,9 @@ def written(path, **changed):
     """A CSV in SI units of the ship's own record, some channels changed."""
     names = ("t", "psi", "r", "delta", "u", "v")
     columns = [np.asarray(changed.get(name, SAILED[name])) for name in names]
-    rows = (",".join(f"{value:.7g}" for value in row) for row in zip(*columns, strict=True))
+    rows = (
+        ",".join(f"{value:.7g}" for value in row) for row in zip(*columns, strict=True)
+    )
     path.write_text("\n".join([",".join(names), *rows]) + "\n")
     return path
 
@@ -383,10 +487,16 @@ def late(name, seconds):
     return np.interp(SAILED["t"] - seconds, SAILED["t"], SAILED[name])
 
 
-@pytest.mark.parametrize(("name", "seconds", "within"), [("r", 1.5, 0.05), ("delta", 3.0, 0.6)])
-def test_a_late_channel_is_named_and_put_right_where_that_is_asked_for(tmp_path, name, seconds, within):
+@pytest.mark.parametrize(
+    ("name", "seconds", "within"), [("r", 1.5, 0.05), ("delta", 3.0, 0.6)]
+)
+def test_a_late_channel_is_named_and_put_right_where_that_is_asked_for(
+    tmp_path, name, seconds, within
+):
     path = written(tmp_path / "run.csv", **{name: late(name, seconds)})
-    with pytest.raises(InputError, match=r'is [0-9.]+ s late against .* clock_offsets = "correct"'):
+    with pytest.raises(
+        InputError, match=r'is [0-9.]+ s late against .* clock_offsets = "correct"'
+    ):
         Trial.from_csv(path)
     kept = Trial.from_csv(path, sensors={"clock_offsets": "keep"})
     assert [note for note in kept.notes if note.endswith("left as logged")]
@@ -399,7 +509,9 @@ def test_a_late_channel_is_named_and_put_right_where_that_is_asked_for(tmp_path,
 
 def test_a_rudder_of_the_wrong_sign_is_named(tmp_path):
     path = written(tmp_path / "run.csv", delta=-SAILED["delta"])
-    with pytest.raises(InputError, match=r'opposite sign.*write rudder_positive = "port" in'):
+    with pytest.raises(
+        InputError, match=r'opposite sign.*write rudder_positive = "port" in'
+    ):
         Trial.from_csv(path)
     assert not Trial.from_csv(path, rudder_positive="port").notes
 
@@ -407,7 +519,10 @@ def test_a_rudder_of_the_wrong_sign_is_named(tmp_path):
 def test_a_yaw_rate_or_heading_of_the_wrong_sign_is_not_taken_for_the_rudders(tmp_path):
     for changed in ({"r": -SAILED["r"]}, {"psi": -SAILED["psi"]}):
         path = written(tmp_path / "run.csv", **changed)
-        with pytest.raises(InputError, match=r"'psi' \(heading\) and 'r' \(yaw rate\) have opposite signs"):
+        with pytest.raises(
+            InputError,
+            match=r"'psi' \(heading\) and 'r' \(yaw rate\) have opposite signs",
+        ):
             Trial.from_csv(path)
 
 
@@ -415,10 +530,17 @@ def test_a_yaw_rate_or_heading_of_the_wrong_sign_is_not_taken_for_the_rudders(tm
 def test_time_in_milliseconds_or_minutes_is_named_and_no_other_unit(tmp_path, shown):
     for unit, scale in (("ms", 1e3), ("min", 1.0 / 60.0)):
         columns = {"t": scale * SAILED["t"], **{name: SAILED[name] for name in shown}}
-        rows = (",".join(f"{value:.9g}" for value in row) for row in zip(*columns.values(), strict=True))
+        rows = (
+            ",".join(f"{value:.9g}" for value in row)
+            for row in zip(*columns.values(), strict=True)
+        )
         (tmp_path / "run.csv").write_text("\n".join([",".join(columns), *rows]))
         with pytest.raises(
-            InputError, match=rf'wrong unit(:| of time,) declare t = {{ column = "t", unit = "{unit}" }}'
+            InputError,
+            match=(
+                r'wrong unit(:| of time,) declare t = { column = "t", unit ='
+                rf' "{unit}" }}'
+            ),
         ):
             Trial.from_csv(tmp_path / "run.csv")
 
@@ -437,16 +559,26 @@ def test_rows_that_are_unusually_far_apart_are_a_remark(tmp_path):
 def test_a_circle_away_from_the_rudder_is_named(tmp_path):
     """In a turning circle nothing goes there and back; its side alone tells the sign of the rudder."""
     t = np.arange(0.0, 400.0, 1.0)
-    circle = {"psi": 0.01 * t, "delta": np.full(t.size, -0.5), "u": np.full(t.size, 5.0), "v": 0.0 * t}
+    circle = {
+        "psi": 0.01 * t,
+        "delta": np.full(t.size, -0.5),
+        "u": np.full(t.size, 5.0),
+        "v": 0.0 * t,
+    }
     Trial(t, circle).to_csv(path := tmp_path / "circle.csv")
-    with pytest.raises(InputError, match=r'turns away from the rudder.*write rudder_positive = "port" in'):
+    with pytest.raises(
+        InputError,
+        match=r'turns away from the rudder.*write rudder_positive = "port" in',
+    ):
         Trial.from_csv(path)
     assert Trial.from_csv(path, rudder_positive="port")["delta"][0] == 0.5
 
 
 def changed(column, value):
     def keep(row):
-        return [value(cell) if k == column and cell else cell for k, cell in enumerate(row)]
+        return [
+            value(cell) if k == column and cell else cell for k, cell in enumerate(row)
+        ]
 
     return keep
 
@@ -459,13 +591,21 @@ def refusal(path, columns=COLUMNS, **settings):
 
 
 def test_no_time_that_can_be_read_is_named_by_its_line(tmp_path):
-    path = bridge_log(tmp_path / "log.csv", changed(0, lambda cell: "noon" if "30:02" in cell else cell))
-    assert "line 6 (data row 5), column 'Zeit': no time that can be read: 'noon'" in refusal(path)
+    path = bridge_log(
+        tmp_path / "log.csv",
+        changed(0, lambda cell: "noon" if "30:02" in cell else cell),
+    )
+    assert (
+        "line 6 (data row 5), column 'Zeit': no time that can be read: 'noon'"
+        in refusal(path)
+    )
 
 
 def test_an_outlier_of_the_position_is_named_and_left_out_on_demand(tmp_path):
     rows = iter(range(10_000))
-    keep = changed(1, lambda cell: cell.replace("57°", "58°") if next(rows) == 30 else cell)
+    keep = changed(
+        1, lambda cell: cell.replace("57°", "58°") if next(rows) == 30 else cell
+    )
     path = bridge_log(tmp_path / "log.csv", keep)
     assert "line 62 (data row 61), column 'Breite': position 58.6" in refusal(path)
     trial = Trial.from_csv(path, COLUMNS, "port", repair="interpolate", sensors=ANTENNA)
@@ -476,14 +616,17 @@ def test_an_outlier_of_the_position_is_named_and_left_out_on_demand(tmp_path):
 def test_two_ships_in_one_log_are_named(tmp_path):
     rows = iter(range(10_000))
     path = bridge_log(
-        tmp_path / "log.csv", changed(1, lambda cell: cell.replace("57°", "58°") if next(rows) % 2 else cell)
+        tmp_path / "log.csv",
+        changed(1, lambda cell: cell.replace("57°", "58°") if next(rows) % 2 else cell),
     )
     assert "two ships are in one log" in refusal(path)
 
 
 def test_a_heading_that_contradicts_the_course_over_ground_is_named(tmp_path):
     course = changed(5, lambda cell: f"{(float(cell) + 90) % 360:.1f}")
-    assert "contradicts the course over ground by 9" in refusal(bridge_log(tmp_path / "log.csv", course))
+    assert "contradicts the course over ground by 9" in refusal(
+        bridge_log(tmp_path / "log.csv", course)
+    )
     mirrored = bridge_log(tmp_path / "log.csv", gyro=-1.0)
     assert "it turns the other way, expected it clockwise" in refusal(mirrored)
 
@@ -495,11 +638,17 @@ def test_the_course_over_ground_taken_for_the_heading_is_named(tmp_path):
 
 
 def test_a_magnetic_heading_is_told_and_its_offset_taken_out(tmp_path):
-    path = bridge_log(tmp_path / "log.csv", changed(5, lambda cell: f"{(float(cell) + 6) % 360:.1f}"))
+    path = bridge_log(
+        tmp_path / "log.csv", changed(5, lambda cell: f"{(float(cell) + 6) % 360:.1f}")
+    )
     trial = Trial.from_csv(path, COLUMNS, "port", sensors=ANTENNA)
     (note,) = (note for note in trial.notes if "magnetic compass" in note)
-    assert float(note.split("heading_offset_deg = ")[1].split()[0]) == pytest.approx(6.0, abs=0.5)
-    right = Trial.from_csv(path, COLUMNS, "port", sensors=ANTENNA | {"heading_offset_deg": "estimate"})
+    assert float(note.split("heading_offset_deg = ")[1].split()[0]) == pytest.approx(
+        6.0, abs=0.5
+    )
+    right = Trial.from_csv(
+        path, COLUMNS, "port", sensors=ANTENNA | {"heading_offset_deg": "estimate"}
+    )
     assert error(right, "psi") < 0.5 * DEGREE
 
 
@@ -507,7 +656,9 @@ def test_the_zero_of_the_rudder_is_estimated_from_straight_parts(tmp_path):
     path = written(tmp_path / "run.csv", delta=SAILED["delta"] + 1.5 * DEGREE)
     trial = Trial.from_csv(path, sensors={"rudder_offset_deg": "estimate"})
     assert error(trial, "delta") < 0.05 * DEGREE
-    assert error(Trial.from_csv(path, sensors={"rudder_offset_deg": 1.5}), "delta") < 1e-6
+    assert (
+        error(Trial.from_csv(path, sensors={"rudder_offset_deg": 1.5}), "delta") < 1e-6
+    )
 
 
 @pytest.mark.parametrize("name", ["kvlcc2", "mariner", "container"])
@@ -522,7 +673,9 @@ def test_overshoots_are_not_taken_for_straight_parts(name, angle):
     found = []
     for first in (0, 60):
         channels = {"psi": psi[first:], "delta": delta[first:]}
-        found.append(rudder_offset(t[first:], channels, straight_parts(t[first:], channels)))
+        found.append(
+            rudder_offset(t[first:], channels, straight_parts(t[first:], channels))
+        )
     assert found[0][0] == pytest.approx(3.0 * DEGREE, abs=0.1 * DEGREE)
     assert found[1] is None
 
@@ -530,7 +683,9 @@ def test_overshoots_are_not_taken_for_straight_parts(name, angle):
 def test_a_ship_at_berth_is_named(tmp_path):
     still = "2024-05-31T09:30:{:02d};57,687;11,74;90,0;0,0\n"
     head = "Zeit;lat;lon;psi;delta\n"
-    (tmp_path / "log.csv").write_text(head + "".join(still.format(k) for k in range(60)))
+    (tmp_path / "log.csv").write_text(
+        head + "".join(still.format(k) for k in range(60))
+    )
     columns = {"t": "Zeit"} | {name: name for name in ("lat", "lon", "psi", "delta")}
     assert "she is at berth or at anchor" in refusal(tmp_path / "log.csv", columns)
 
@@ -561,21 +716,34 @@ def ship_file(tmp_path, text):
 
 def test_a_log_is_cut_into_trials_by_rudder_by_seconds_and_by_the_clock(tmp_path):
     written(tmp_path / "run.csv")
-    by_rudder = ship_file(tmp_path, SHIP + '[[trials]]\nfile = "run.csv"\ncut = "rudder"\n').trials()
+    by_rudder = ship_file(
+        tmp_path, SHIP + '[[trials]]\nfile = "run.csv"\ncut = "rudder"\n'
+    ).trials()
     assert [round(trial.t[0], -1) for trial in by_rudder] == [30.0, 370.0]
     assert by_rudder[0].name == "run.csv 32-364 s"
     marks = '[[trials]]\nfile = "run.csv"\ncut = [[0, 250], [390, 600]]\n'
-    assert [trial.t[-1] for trial in ship_file(tmp_path, SHIP + marks).trials()] == [250.0, 600.0]
+    assert [trial.t[-1] for trial in ship_file(tmp_path, SHIP + marks).trials()] == [
+        250.0,
+        600.0,
+    ]
     table = frame()
     table.to_csv(tmp_path / "clock.csv", index=False)
-    clock = SHIP.replace('t = "t"', 't = { column = "time", zone = "+02:00" }').replace('r = "r"\n', "")
+    clock = SHIP.replace('t = "t"', 't = { column = "time", zone = "+02:00" }').replace(
+        'r = "r"\n', ""
+    )
     marks = '[[trials]]\nfile = "clock.csv"\ncut = [["09:31", "2024-05-31 09:34:00"]]\n'
     (trial,) = ship_file(tmp_path, clock + marks).trials()
     assert trial.t[[0, -1]] == pytest.approx([60.0, 240.0])
     with pytest.raises(
-        InputError, match=r"11:00 to 11:10 holds no trial.*2024-05-31 09:30:00 to 2024-05-31 09:40:00"
+        InputError,
+        match=(
+            r"11:00 to 11:10 holds no trial.*2024-05-31 09:30:00 to 2024-05-31 09:40:00"
+        ),
     ):
-        ship_file(tmp_path, clock + '[[trials]]\nfile = "clock.csv"\ncut = [["11:00", "11:10"]]').trials()
+        ship_file(
+            tmp_path,
+            clock + '[[trials]]\nfile = "clock.csv"\ncut = [["11:00", "11:10"]]',
+        ).trials()
 
 
 def test_files_of_one_log_are_joined_and_another_time_zone_is_named(tmp_path):
@@ -590,15 +758,22 @@ def test_files_of_one_log_are_joined_and_another_time_zone_is_named(tmp_path):
         tmp_path / "rudder.csv", index=False
     )
     with pytest.raises(
-        InputError, match=r'another time zone: write t = \{ column = "time", zone = "\+02:00" \}'
+        InputError,
+        match=r'another time zone: write t = \{ column = "time", zone = "\+02:00" \}',
     ):
         ship_file(tmp_path, columns + files).trials()
 
 
 def test_an_antenna_outside_the_ship_is_refused(tmp_path):
-    text = SHIP + '[sensors]\ngnss_antenna = { forward = 125.0 }\n[[trials]]\nfile = "run.csv"\n'
+    text = (
+        SHIP + "[sensors]\ngnss_antenna = { forward = 125.0 }\n[[trials]]\nfile ="
+        ' "run.csv"\n'
+    )
     with pytest.raises(
-        InputError, match=r"\[sensors\] gnss_antenna.forward: 125 m found, outside the ship of 150 m"
+        InputError,
+        match=(
+            r"\[sensors\] gnss_antenna.forward: 125 m found, outside the ship of 150 m"
+        ),
     ):
         ship_file(tmp_path, text)
 
@@ -606,11 +781,19 @@ def test_an_antenna_outside_the_ship_is_refused(tmp_path):
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        ("speed = 7.0", "speed = 13.6", "13.6 is 6.99. m/s in knots.*write speed = 6.99"),
+        (
+            "speed = 7.0",
+            "speed = 13.6",
+            "13.6 is 6.99. m/s in knots.*write speed = 6.99",
+        ),
         ("length = 150.0", "length = 28.0", "28 m by 22 m.*an antenna's height"),
     ],
 )
-def test_knots_for_metres_per_second_and_a_height_for_the_length_are_named(tmp_path, old, new, message):
+def test_knots_for_metres_per_second_and_a_height_for_the_length_are_named(
+    tmp_path, old, new, message
+):
     written(tmp_path / "run.csv")
     with pytest.raises(InputError, match=message):
-        ship_file(tmp_path, SHIP.replace(old, new) + '[[trials]]\nfile = "run.csv"\n').trials()
+        ship_file(
+            tmp_path, SHIP.replace(old, new) + '[[trials]]\nfile = "run.csv"\n'
+        ).trials()

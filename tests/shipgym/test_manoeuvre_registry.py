@@ -63,7 +63,15 @@ def shifts(tmp_path):
 
 def test_a_manoeuvre_from_a_folder_of_ones_own_is_sailed_and_reported(shifts, tmp_path):
     page = tmp_path / "page.html"
-    command = ["trials", "mariner-tls-svm", "--draws", "3", "--json", "--out", str(page)]
+    command = [
+        "trials",
+        "mariner-tls-svm",
+        "--draws",
+        "3",
+        "--json",
+        "--out",
+        str(page),
+    ]
     answer = CliRunner().invoke(app, command)
     assert answer.exit_code == 0, answer.stderr
     found = json.loads(answer.stdout)["manoeuvres"]["parallel shift to starboard"]
@@ -81,8 +89,15 @@ def test_its_indices_have_intervals_and_its_trials_a_kind(shifts, tmp_path):
     trial = shifts.parallel_shift(model)
     trial.to_csv(tmp_path / "shift.csv")
     ship = tmp_path / "ship.toml"
-    ship.write_text('[ship]\nlength = 160.93\n[[trials]]\nfile = "shift.csv"\nkind = "parallel-shift"\n')
-    assert [read.kind for read in ShipFile.load(ship).trials()] == [trial.kind] == ["parallel-shift"]
+    ship.write_text(
+        '[ship]\nlength = 160.93\n[[trials]]\nfile = "shift.csv"\nkind ='
+        ' "parallel-shift"\n'
+    )
+    assert (
+        [read.kind for read in ShipFile.load(ship).trials()]
+        == [trial.kind]
+        == ["parallel-shift"]
+    )
 
 
 def test_a_name_is_registered_once(shifts):
@@ -91,13 +106,17 @@ def test_a_name_is_registered_once(shifts):
 
 
 def test_a_kind_that_nobody_registered_is_refused():
-    with pytest.raises(InputError, match="'parallel-shift' found, expected one of 'zigzag'"):
+    with pytest.raises(
+        InputError, match="'parallel-shift' found, expected one of 'zigzag'"
+    ):
         Trial([0.0, 1.0, 2.0], {"u": [1.0, 1.0, 1.0]}, kind="parallel-shift")
 
 
 def test_the_documentation_names_every_manoeuvre():
     from pathlib import Path
 
-    text = (Path(__file__).parents[2] / "docs" / "manoeuvres.md").read_text(encoding="utf-8")
+    text = (Path(__file__).parents[2] / "docs" / "manoeuvres.md").read_text(
+        encoding="utf-8"
+    )
     for name in manoeuvres.standard_manoeuvres(load_model("tanker")):
         assert name in text

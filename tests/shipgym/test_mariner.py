@@ -10,27 +10,67 @@ from tests.shipgym.reference import table
 
 STATE = ("x_m", "y_m", "psi_rad", "u_m_s", "v_m_s", "r_rad_s", "delta_rad")
 
-# u - U0, v, r, psi, delta and command in the toolbox's signs; dot x, y, psi, u, v, r, delta (rows 2, 9, 74)
+# u - U0, v, r, psi, delta and command in the toolbox's signs; dot x, y, psi, u, v, r,
+# delta (rows 2, 9, 74)
 QUOTED = [
     (
-        (0.109922006385504, -1.28104557403754, -0.000236012473635734, -1.6592545915132, 0.463090115976534,
-         -0.493775397495325),
-        (-1.9675343688253, -7.6836463698104, -0.000236012473635734, -0.0248488781949769, 0.0899953536218345,
-         -0.000639396277595128, 0.0306852815187907),
+        (
+            0.109922006385504,
+            -1.28104557403754,
+            -0.000236012473635734,
+            -1.6592545915132,
+            0.463090115976534,
+            -0.493775397495325,
+        ),
+        (
+            -1.9675343688253,
+            -7.6836463698104,
+            -0.000236012473635734,
+            -0.0248488781949769,
+            0.0899953536218345,
+            -0.000639396277595128,
+            0.0306852815187907,
+        ),
     ),
     (
-        (-2.36031323033306, 0.868584607808822, -0.00468575781008243, -0.531783358161809, 0.0919319512080486,
-         -0.133117521863383),
-        (5.05781578551091, -1.9678386076743, -0.00468575781008243, 0.00809371814830123, -0.0169180517352556,
-         0.000123742035452563, 0.041185570655334),
+        (
+            -2.36031323033306,
+            0.868584607808822,
+            -0.00468575781008243,
+            -0.531783358161809,
+            0.0919319512080486,
+            -0.133117521863383,
+        ),
+        (
+            5.05781578551091,
+            -1.9678386076743,
+            -0.00468575781008243,
+            0.00809371814830123,
+            -0.0169180517352556,
+            0.000123742035452563,
+            0.041185570655334,
+        ),
     ),
     (
-        (-1.85530905563183, 0.102028819411614, -0.00699777654520087, 2.58821330186862, -0.109910795327196,
-         -0.81628443378589),
-        (-5.04090116921831, 2.99416231196576, -0.00699777654520087, 0.0130209171184678, 0.00521660991970111,
-         0.000448466989932269, 0.0872664625997165),
+        (
+            -1.85530905563183,
+            0.102028819411614,
+            -0.00699777654520087,
+            2.58821330186862,
+            -0.109910795327196,
+            -0.81628443378589,
+        ),
+        (
+            -5.04090116921831,
+            2.99416231196576,
+            -0.00699777654520087,
+            0.0130209171184678,
+            0.00521660991970111,
+            0.000448466989932269,
+            0.0872664625997165,
+        ),
     ),
-]  # fmt: skip
+]
 
 
 @pytest.mark.parametrize(("given", "expected"), QUOTED)
@@ -45,14 +85,22 @@ def test_all_derivatives_of_the_reference_table():
     rows = table("mariner_derivatives.csv")
     for row in rows:
         state = [
-            row["x_m"], row["y_m"], row["psi_rad"], row["U0_m_s"] + row["du_pert_m_s"], row["v_m_s"],
-            row["r_rad_s"], -row["delta_state_rad"],
-        ]  # fmt: skip
+            row["x_m"],
+            row["y_m"],
+            row["psi_rad"],
+            row["U0_m_s"] + row["du_pert_m_s"],
+            row["v_m_s"],
+            row["r_rad_s"],
+            -row["delta_state_rad"],
+        ]
         expected = [
-            row[f"dot_{name}"] for name in ("x_m_s", "y_m_s", "psi_rad_s", "u_m_s2", "v_m_s2", "r_rad_s2")
+            row[f"dot_{name}"]
+            for name in ("x_m_s", "y_m_s", "psi_rad_s", "u_m_s2", "v_m_s2", "r_rad_s2")
         ]
         rates = mariner(row["U0_m_s"]).derivatives(state, [row["ui_delta_cmd_rad"]])
-        np.testing.assert_allclose(rates, [*expected, -row["dot_delta_rad_s"]], rtol=1e-10)
+        np.testing.assert_allclose(
+            rates, [*expected, -row["dot_delta_rad_s"]], rtol=1e-10
+        )
 
 
 def test_derivatives_take_batches():
@@ -60,24 +108,32 @@ def test_derivatives_take_batches():
     states = np.random.default_rng(0).uniform(0.1, 0.2, (5, 3, 7)) + model.service_state
     together = model.derivatives(states, [[0.1]])
     assert together.shape == (5, 3, 7)
-    np.testing.assert_array_equal(together[2, 1], model.derivatives(states[2, 1], [0.1]))
+    np.testing.assert_array_equal(
+        together[2, 1], model.derivatives(states[2, 1], [0.1])
+    )
 
 
 @pytest.mark.parametrize(
-    ("angle", "first", "second"), [(10, 4.98, 4.47), (15, 6.59, 5.61), (20, 7.78, 6.36), (25, 8.83, 6.96)]
+    ("angle", "first", "second"),
+    [(10, 4.98, 4.47), (15, 6.59, 5.61), (20, 7.78, 6.36), (25, 8.83, 6.96)],
 )
 def test_zigzag_overshoots(angle, first, second):
-    trial = manoeuvres.zigzag(shipgym.load_model("mariner"), angle, angle, switch="step")
+    trial = manoeuvres.zigzag(
+        shipgym.load_model("mariner"), angle, angle, switch="step"
+    )
     indices = manoeuvres.zigzag_indices(trial)
     assert indices.overshoot_1_deg == pytest.approx(first, abs=0.01)
     assert indices.overshoot_2_deg == pytest.approx(second, abs=0.01)
 
 
 @pytest.mark.parametrize(
-    ("rudder", "advance", "tactical"), [(35, 3.54, 6.40), (-35, 3.71, 6.65), (30, 3.67, 6.52)]
+    ("rudder", "advance", "tactical"),
+    [(35, 3.54, 6.40), (-35, 3.71, 6.65), (30, 3.67, 6.52)],
 )
 def test_turning_circles(rudder, advance, tactical):
-    indices = manoeuvres.turning_indices(manoeuvres.turning_circle(shipgym.load_model("mariner"), rudder))
+    indices = manoeuvres.turning_indices(
+        manoeuvres.turning_circle(shipgym.load_model("mariner"), rudder)
+    )
     assert indices.advance_lengths == pytest.approx(advance, abs=0.006)
     assert indices.tactical_diameter_lengths == pytest.approx(tactical, abs=0.006)
 
@@ -90,14 +146,20 @@ def simulated(file: str):
     return manoeuvres.zigzag(model, angle, angle, switch="step")
 
 
-@pytest.mark.parametrize("file", ["zigzag_10_10", "zigzag_15_15", "zigzag_20_20", "turning_35"])
+@pytest.mark.parametrize(
+    "file", ["zigzag_10_10", "zigzag_15_15", "zigzag_20_20", "turning_35"]
+)
 def test_trajectories_are_the_reference_s(file):
     expected = table(f"mariner_{file}.csv")
     trial = simulated(f"mariner_{file}")
-    for name, column in zip(("x", "y", "psi", "u", "v", "r", "delta"), STATE, strict=True):
+    for name, column in zip(
+        ("x", "y", "psi", "u", "v", "r", "delta"), STATE, strict=True
+    ):
         sign = -1.0 if name == "delta" else 1.0
         span = np.ptp(expected[column])
-        np.testing.assert_allclose(trial[name][::5], sign * expected[column], rtol=0.0, atol=1e-6 * span)
+        np.testing.assert_allclose(
+            trial[name][::5], sign * expected[column], rtol=0.0, atol=1e-6 * span
+        )
 
 
 def test_port_and_starboard_turns_differ_by_the_propeller_s_side_force():
@@ -105,10 +167,24 @@ def test_port_and_starboard_turns_differ_by_the_propeller_s_side_force():
     model = shipgym.load_model("mariner")
     assert model.derivatives(model.service_state, [0.0])[5] > 0.0
     mirrored = {
-        name: (-value if name.startswith(("Y_0", "N_0")) else value)
+        name: -value if name.startswith(("Y_0", "N_0")) else value
         for name, value in model.coefficients.items()
     }
-    twin = shipgym.ShipModel("twin", "abkowitz", model.particulars, model.steering, mirrored)
-    starboard, port = manoeuvres.turning_circle(model, 20.0), manoeuvres.turning_circle(twin, -20.0)
-    for name, sign in (("x", 1), ("y", -1), ("psi", -1), ("u", 1), ("v", -1), ("r", -1)):
-        np.testing.assert_allclose(starboard[name], sign * port[name], rtol=0, atol=1e-9 * np.ptp(port[name]))
+    twin = shipgym.ShipModel(
+        "twin", "abkowitz", model.particulars, model.steering, mirrored
+    )
+    starboard, port = (
+        manoeuvres.turning_circle(model, 20.0),
+        manoeuvres.turning_circle(twin, -20.0),
+    )
+    for name, sign in (
+        ("x", 1),
+        ("y", -1),
+        ("psi", -1),
+        ("u", 1),
+        ("v", -1),
+        ("r", -1),
+    ):
+        np.testing.assert_allclose(
+            starboard[name], sign * port[name], rtol=0, atol=1e-9 * np.ptp(port[name])
+        )

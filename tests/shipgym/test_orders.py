@@ -19,8 +19,18 @@ pytestmark = pytest.mark.interpreted
     [
         ("tanker", 20.0, 1.0, r"row 0: rudder 20 found, expected rad \(not degrees\)"),
         ("tanker", 0.1, 80.0, r"row 0: shaft speed 80 found, expected 1/s \(not rpm\)"),
-        ("container", 0.1, -0.5, "shaft speed -0.5 found, .* >= 0: .* a shaft turning ahead only"),
-        ("kvlcc2", 0.1, 700.0, r"shaft speed 700 found, expected 1/s \(not rpm\) between 0 and 8\.893"),
+        (
+            "container",
+            0.1,
+            -0.5,
+            "shaft speed -0.5 found, .* >= 0: .* a shaft turning ahead only",
+        ),
+        (
+            "kvlcc2",
+            0.1,
+            700.0,
+            r"shaft speed 700 found, expected 1/s \(not rpm\) between 0 and 8\.893",
+        ),
     ],
 )
 def test_orders_out_of_range_are_told_with_their_row(name, rudder, shaft, said):
@@ -30,14 +40,24 @@ def test_orders_out_of_range_are_told_with_their_row(name, rudder, shaft, said):
 
 def test_a_rudder_ordered_beyond_its_limit_stays_at_the_limit():
     trial = load_model("mariner").simulate(np.full((400, 1), 1.0), 0.1)
-    assert trial["delta"].max() == pytest.approx(np.radians(load_model("mariner").steering.rudder_limit_deg))
+    assert trial["delta"].max() == pytest.approx(
+        np.radians(load_model("mariner").steering.rudder_limit_deg)
+    )
 
 
 @pytest.mark.parametrize(
     ("state", "command", "said"),
     [
-        ([0.0, 0.0, 0.0, np.nan, 0.0, 0.0, 0.0], [0.0], "state: nan found, expected finite numbers"),
-        ([0.0, 0.0, 0.0, 7.0, 0.0, 0.0, 0.0], [20.0], r"command: row 0: rudder 20 found, expected rad"),
+        (
+            [0.0, 0.0, 0.0, np.nan, 0.0, 0.0, 0.0],
+            [0.0],
+            "state: nan found, expected finite numbers",
+        ),
+        (
+            [0.0, 0.0, 0.0, 7.0, 0.0, 0.0, 0.0],
+            [20.0],
+            r"command: row 0: rudder 20 found, expected rad",
+        ),
         ([0.0, 0.0, 0.0, 7.0, 0.0, 0.0, 0.0], [np.inf], "command: row 0 is not finite"),
     ],
 )
@@ -56,17 +76,26 @@ def test_derivatives_refuse_what_would_make_no_numbers(state, command, said):
     ],
 )
 def test_a_depth_that_no_ship_floats_in_is_told(depth, said):
-    for sail in (manoeuvres.zigzag, manoeuvres.turning_circle, manoeuvres.direct_spiral):
+    for sail in (
+        manoeuvres.zigzag,
+        manoeuvres.turning_circle,
+        manoeuvres.direct_spiral,
+    ):
         with pytest.raises(InputError, match=f"water_depth: .*{said}"):
             sail(load_model("tanker"), water_depth=depth)
 
 
 def test_a_ship_that_capsizes_is_an_error_even_if_nothing_else_feels_her_roll():
-    shipgym.register_structure("tender", {"v": "v", "r": "r, delta", "p": "p, phi, delta"})
+    shipgym.register_structure(
+        "tender", {"v": "v", "r": "r, delta", "p": "p, phi, delta"}
+    )
     ship = shipgym.ShipModel(
-        "tender", "tender", shipgym.Particulars(length=100.0, speed=5.0), shipgym.SteeringGear(),
+        "tender",
+        "tender",
+        shipgym.Particulars(length=100.0, speed=5.0),
+        shipgym.SteeringGear(),
         {"b_v": -0.1, "c_r": -0.1, "c_d": 0.01, "d_p": -0.1, "d_f": 0.05, "d_d": 0.1},
-    )  # fmt: skip
+    )
     with pytest.raises(UnstableModelError, match="phi = ") as error:
         manoeuvres.turning_circle(ship, 20.0)
     assert abs(error.value.state["phi"]) < np.pi / 2
@@ -79,11 +108,19 @@ def test_a_step_that_is_far_too_long_is_suspected_and_a_shorter_one_named():
 
 
 @pytest.mark.parametrize(
-    "sail", [manoeuvres.zigzag, manoeuvres.turning_circle, manoeuvres.pull_out, manoeuvres.direct_spiral]
+    "sail",
+    [
+        manoeuvres.zigzag,
+        manoeuvres.turning_circle,
+        manoeuvres.pull_out,
+        manoeuvres.direct_spiral,
+    ],
 )
 def test_a_ship_that_blows_up_is_an_error_with_time_and_state(sail):
     ship = load_model("mariner")
-    wild = replace(ship, coefficients=ship.coefficients | {"N_r": 5e-3})  # yaw that feeds itself
+    wild = replace(
+        ship, coefficients=ship.coefficients | {"N_r": 5e-3}
+    )  # yaw that feeds itself
     with pytest.raises(UnstableModelError, match=r"runs away after .* s") as error:
         sail(wild)
     assert error.value.time_s > 0.0
@@ -109,7 +146,9 @@ def test_a_ship_is_changed_in_what_is_asked_for_alone():
     gear = trajectories.with_gear(SHIP, 0.5, 0.25)
     assert gear == SHIP._replace(rudder_limit=0.5, rudder_rate=0.25, gear_frequency=0.0)
     assert trajectories.in_depth(SHIP, 20.0) == SHIP._replace(water_depth=20.0)
-    assert trajectories.replaced(MOTION, 1.0, 2.0, 3.0) == MOTION._replace(psi=1.0, delta=2.0, n=3.0)
+    assert trajectories.replaced(MOTION, 1.0, 2.0, 3.0) == MOTION._replace(
+        psi=1.0, delta=2.0, n=3.0
+    )
 
 
 @pytest.mark.parametrize("command", [0.3, -0.3])
@@ -119,7 +158,9 @@ def test_a_rudder_reverses_within_a_step_at_the_very_heading(monkeypatch, comman
 
     def advanced(motion, command, n, h, *more):
         asked.append((command, h))
-        return motion._replace(psi=motion.psi + command * h * (1.0 + h * h / 3.0), x=motion.x + h)
+        return motion._replace(
+            psi=motion.psi + command * h * (1.0 + h * h / 3.0), x=motion.x + h
+        )
 
     monkeypatch.setattr(trajectories, "advanced", advanced)
     start = Motion(*[0.0] * 11)
@@ -130,6 +171,8 @@ def test_a_rudder_reverses_within_a_step_at_the_very_heading(monkeypatch, comman
     rest = 2.0 - time
     assert asked[-2] == (command, pytest.approx(time, abs=1e-4))
     assert asked[-1] == (-command, pytest.approx(rest, abs=1e-4))
-    assert after.psi == pytest.approx(side * (0.07 - 0.3 * rest * (1.0 + rest * rest / 3.0)), abs=2e-4)
+    assert after.psi == pytest.approx(
+        side * (0.07 - 0.3 * rest * (1.0 + rest * rest / 3.0)), abs=2e-4
+    )
     assert after.x == pytest.approx(2.0)
     assert len(asked) <= 15

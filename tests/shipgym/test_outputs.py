@@ -10,7 +10,9 @@ from shipgym.errors import InputError
 
 @pytest.fixture
 def env():
-    env = gymnasium.make_vec("shipgym/CourseKeeping-v0", num_envs=3, vectorization_mode="vector_entry_point")
+    env = gymnasium.make_vec(
+        "shipgym/CourseKeeping-v0", num_envs=3, vectorization_mode="vector_entry_point"
+    )
     env.reset(seed=0)
     return env
 

@@ -25,7 +25,9 @@ ID = "shipgym/PathFollowing-v1"
 LENGTH, SPEED = 160.93, 7.7175  # of the Mariner
 RADIUS = 4.0 * LENGTH
 SHIP = Ship(LENGTH, SPEED, 0.6, 0.05, 0.0, 1.5, np.inf, SPEED)
-HOOK = np.array([[0.0, 0.0], [1500.0, 0.0], [2900.0, 1400.0], [2900.0, 3400.0]])  # turns of 45 degrees
+HOOK = np.array(
+    [[0.0, 0.0], [1500.0, 0.0], [2900.0, 1400.0], [2900.0, 3400.0]]
+)  # turns of 45 degrees
 LINE = np.array([[0.0, 0.0], [40.0 * LENGTH, 0.0]])
 WIDE = {"ground": 40.0}  # a sea in which nobody runs aground
 
@@ -56,7 +58,9 @@ def divided(path, parts):
     return np.concatenate([*legs, path[-1:]])
 
 
-@pytest.mark.parametrize(("path", "cost"), [(LINE, 16.11), (HOOK, 50.99)], ids=["line", "hook"])
+@pytest.mark.parametrize(
+    ("path", "cost"), [(LINE, 16.11), (HOOK, 50.99)], ids=["line", "hook"]
+)
 def test_dividing_a_leg_changes_nothing(path, cost):
     """The first version's cost of the straight path rises from 13.2 to 105.2 with four legs."""
     costs = [-sail(waypoints=divided(path, parts))[0].sum() for parts in (1, 2, 4, 8)]
@@ -72,15 +76,22 @@ def rounded(path, radius):
         course, corner = path.courses[number], path.waypoints[number + 1]
         begin = corner - cut * np.array([np.cos(course), np.sin(course)])
         angles = np.linspace(0.0, abs(turn), int(abs(turn) / np.radians(3.0)) + 2)
-        ahead, side = radius * np.sin(angles), np.sign(turn) * radius * (1.0 - np.cos(angles))
-        turned = np.array([[np.cos(course), np.sin(course)], [-np.sin(course), np.cos(course)]])
+        ahead, side = (
+            radius * np.sin(angles),
+            np.sign(turn) * radius * (1.0 - np.cos(angles)),
+        )
+        turned = np.array(
+            [[np.cos(course), np.sin(course)], [-np.sin(course), np.cos(course)]]
+        )
         points.append(begin + np.stack([ahead, side], axis=-1) @ turned)
     return np.concatenate([*points, path.waypoints[-1:]])
 
 
 def on_path(radius, plan):
     """The state at the first waypoint."""
-    return State(leg_from(0, 0.0, radius, plan), *[0.0] * 8, RudderWork(0.0, 0.0, 0.0), 0.0, 0.0)
+    return State(
+        leg_from(0, 0.0, radius, plan), *[0.0] * 8, RudderWork(0.0, 0.0, 0.0), 0.0, 0.0
+    )
 
 
 def followed(path, radius, places):
@@ -99,7 +110,11 @@ def followed(path, radius, places):
 
 
 @settings(max_examples=20, deadline=None)
-@given(st.lists(st.floats(-2.5, 2.5), min_size=1, max_size=4), st.floats(-3.1, 3.1), st.floats(-0.6, 0.6))
+@given(
+    st.lists(st.floats(-2.5, 2.5), min_size=1, max_size=4),
+    st.floats(-3.1, 3.1),
+    st.floats(-0.6, 0.6),
+)
 def test_a_position_lies_where_the_rounded_path_is_nearest(turns, course, off):
     """Against a polyline of the path, chords of 3 degrees in its turns."""
     points, radius = [np.zeros(2)], 300.0
@@ -121,7 +136,9 @@ def test_a_position_lies_where_the_rounded_path_is_nearest(turns, course, off):
 
 def test_way_and_course_go_on_evenly_through_turns():
     states, ways, _ = followed(Path(HOOK), RADIUS, np.linspace(0.0, 1.0, 800))
-    made, course = np.array([(state.distance_made_good, state.course) for state, _ in states]).T
+    made, course = np.array(
+        [(state.distance_made_good, state.course) for state, _ in states]
+    ).T
     np.testing.assert_allclose(np.diff(made), ways[1], rtol=0.01)
     assert np.abs(np.diff(course)).max() < 1.3 * ways[1] / RADIUS
     assert course[[0, -1]] == pytest.approx([0.0, np.pi / 2.0], abs=1e-3)
@@ -131,7 +148,10 @@ def test_way_and_course_go_on_evenly_through_turns():
 def test_two_turns_are_seen_ahead():
     env = sail(waypoints=HOOK)[2]
     assert env.waypoints.tolist() == HOOK.tolist()
-    assert (env.turn_radius, env.corridor) == (pytest.approx(RADIUS), pytest.approx(LENGTH))
+    assert (env.turn_radius, env.corridor) == (
+        pytest.approx(RADIUS),
+        pytest.approx(LENGTH),
+    )
     (seen, info), over, checked = env.reset(seed=0), False, set()
     tangent, arc = RADIUS * np.tan(np.pi / 8.0), RADIUS * np.pi / 4.0
     first = 1500.0 - tangent
@@ -139,7 +159,9 @@ def test_two_turns_are_seen_ahead():
     end = second + arc + 2000.0 - tangent
     while not over:
         seen, _, over, _, info = env.step(np.array([pd(seen)], dtype=np.float32))
-        at = dict(zip(env.observation_names, seen * env.observation_scales, strict=True))
+        at = dict(
+            zip(env.observation_names, seen * env.observation_scales, strict=True)
+        )
         way = info["distance_made_good"]
         marks, turn = (first, first + arc, second, second + arc), np.pi / 4.0
         expected = [
@@ -149,7 +171,12 @@ def test_two_turns_are_seen_ahead():
             (0.0, turn - (way - second) / RADIUS, end - way, 0.0),
             (end - way, 0.0, end - way, 0.0),
         ][sum(way >= mark for mark in marks)]
-        names = ("next_turn_distance", "next_turn_angle", "second_turn_distance", "second_turn_angle")
+        names = (
+            "next_turn_distance",
+            "next_turn_angle",
+            "second_turn_distance",
+            "second_turn_angle",
+        )
         for name, value in zip(names, expected, strict=True):
             most = 20.0 * LENGTH if "distance" in name else np.pi
             assert at[name] == pytest.approx(min(value, most), abs=1e-4 * most), name
@@ -158,34 +185,68 @@ def test_two_turns_are_seen_ahead():
 
 
 def test_each_episode_has_one_of_a_list_of_paths():
-    engine = Engine(shipgym.load_model("mariner"), 40, Task.of("PathFollowing-v1", waypoints=[LINE, HOOK]))
+    engine = Engine(
+        shipgym.load_model("mariner"),
+        40,
+        Task.of("PathFollowing-v1", waypoints=[LINE, HOOK]),
+    )
     engine.reset(np.arange(40))
     ends = [engine.waypoints(lane)[-1].tolist() for lane in range(40)]
-    assert [ends.count(path[-1].tolist()) for path in (LINE, HOOK)] == pytest.approx([20, 20], abs=8)
+    assert [ends.count(path[-1].tolist()) for path in (LINE, HOOK)] == pytest.approx(
+        [20, 20], abs=8
+    )
     assert sum(ends.count(path[-1].tolist()) for path in (LINE, HOOK)) == 40
 
 
 def test_the_mirrored_voyage_earns_the_same():
     """A ship without a preferred side, on the path that is reflected in the north axis."""
     mariner = shipgym.load_model("mariner")
-    even = {name: value for name, value in mariner.coefficients.items() if name[1:3] == "_0"}
-    symmetric = replace(mariner, coefficients={**mariner.coefficients, **dict.fromkeys(even, 0.0)})
+    even = {
+        name: value for name, value in mariner.coefficients.items() if name[1:3] == "_0"
+    }
+    symmetric = replace(
+        mariner, coefficients={**mariner.coefficients, **dict.fromkeys(even, 0.0)}
+    )
     task = Task.of("PathFollowing-v1", waypoints=HOOK)
     engine = Engine(symmetric, 1, task)
     mirror = Engine(symmetric, 1, task.changed(waypoints=HOOK * [1.0, -1.0]))
     mirrored = {
-        "y", "psi", "v", "r", "delta", "course", "integral", "heading_error", "cross_track", "leg.east",
-        "leg.sine", "leg.course", "leg.turn", "leg.second_turn", "work.direction", "work.furthest",
-    }  # fmt: skip
+        "y",
+        "psi",
+        "v",
+        "r",
+        "delta",
+        "course",
+        "integral",
+        "heading_error",
+        "cross_track",
+        "leg.east",
+        "leg.sine",
+        "leg.course",
+        "leg.turn",
+        "leg.second_turn",
+        "work.direction",
+        "work.furthest",
+    }
     for one in (engine, mirror):
         one.reset([4])
     for name in (*Motion._fields[:6], "delta", *leaves(task.definition.State)):
         mirror.write(name, (-1.0 if name in mirrored else 1.0) * engine.read(name))
     odd = {
-        "heading_error_sin", "yaw_rate", "sway", "rudder", "last_command", "heading_error_integral",
-        "cross_track", "course_error_sin", "next_turn_angle", "second_turn_angle",
-    }  # fmt: skip
-    signs = np.array([-1.0 if quantity.name in odd else 1.0 for quantity in task.observed(symmetric)])
+        "heading_error_sin",
+        "yaw_rate",
+        "sway",
+        "rudder",
+        "last_command",
+        "heading_error_integral",
+        "cross_track",
+        "course_error_sin",
+        "next_turn_angle",
+        "second_turn_angle",
+    }
+    signs = np.array(
+        [-1.0 if quantity.name in odd else 1.0 for quantity in task.observed(symmetric)]
+    )
     random, seen = np.random.default_rng(0), engine.observations
     for _ in range(500):
         order = pd(seen[0]) + 0.3 * random.normal()
@@ -199,9 +260,15 @@ def test_the_mirrored_voyage_earns_the_same():
 def cutter(seen, step, env):
     """Steer straight for the waypoint behind the next, across the inside of the turn."""
     state = env.physical_state()
-    goal = HOOK[2] if np.hypot(*(HOOK[2] - (state["x"], state["y"]))) > 3.0 * LENGTH else HOOK[3]
+    goal = (
+        HOOK[2]
+        if np.hypot(*(HOOK[2] - (state["x"], state["y"]))) > 3.0 * LENGTH
+        else HOOK[3]
+    )
     goal = HOOK[3] if state["y"] > 1300.0 else goal
-    error = wrapped(np.arctan2(goal[1] - state["y"], goal[0] - state["x"]) - state["psi"])
+    error = wrapped(
+        np.arctan2(goal[1] - state["y"], goal[0] - state["x"]) - state["psi"]
+    )
     return [float(np.clip(1.5 * error - 0.7 * seen[2], -1.0, 1.0))]
 
 
@@ -219,9 +286,19 @@ def cutter(seen, step, env):
         (lambda seen, step, env: [np.sign(pd(seen))], {}, 1.5),
         (lambda seen, step, env: [pd(seen) + 0.5 * np.sin(step / 8.0)], {}, 1.5),
     ],
-    ids=["circles", "circles where it is wide", "circles after a while", "circles before the end",
-         "does nothing", "runs aground", "cuts", "chatters", "bangs", "weaves"],
-)  # fmt: skip
+    ids=[
+        "circles",
+        "circles where it is wide",
+        "circles after a while",
+        "circles before the end",
+        "does nothing",
+        "runs aground",
+        "cuts",
+        "chatters",
+        "bangs",
+        "weaves",
+    ],
+)
 def test_gaming_the_reward_does_not_pay(policy, options, times):
     for seed in (0, 1):
         honest, kept, _ = sail(seed=seed, waypoints=HOOK, **options)
@@ -243,7 +320,12 @@ def test_gaming_the_reward_does_not_pay(policy, options, times):
     ids=["stops", "stops after a while", "stops before the end", "creeps"],
 )
 def test_stopping_does_not_pay(policy):
-    asked = {"model": "kvlcc2", "action": "rudder-shaft", "episode_steps": 900, "n_legs": 2}
+    asked = {
+        "model": "kvlcc2",
+        "action": "rudder-shaft",
+        "episode_steps": 900,
+        "n_legs": 2,
+    }
     played, infos, _ = sail(policy, **asked)
     honest, kept, _ = sail(lambda seen, step, env: [pd(seen), 1.0], **asked)
     assert kept[-1]["success"]
@@ -253,9 +335,13 @@ def test_stopping_does_not_pay(policy):
 
 def test_rudder_work_is_told_and_charged():
     honest, infos, _ = sail(waypoints=HOOK)
-    _, chatter, env = sail(lambda seen, step, env: [pd(seen) + (0.3 if step % 2 else -0.3)], waypoints=HOOK)
+    _, chatter, env = sail(
+        lambda seen, step, env: [pd(seen) + (0.3 if step % 2 else -0.3)], waypoints=HOOK
+    )
     for told in (infos, chatter):
-        travel = -sum(info["reward_rudder_travel"] for info in told) / 0.1 * np.radians(30.0)
+        travel = (
+            -sum(info["reward_rudder_travel"] for info in told) / 0.1 * np.radians(30.0)
+        )
         assert told[-1]["rudder_travel"] == pytest.approx(travel)
         reversals = -sum(info["reward_reversals"] for info in told) / 0.05
         minutes = len(told) * env.dt / 60.0
@@ -263,7 +349,8 @@ def test_rudder_work_is_told_and_charged():
     assert infos[-1]["reversals_per_minute"] < 2.0
     assert chatter[-1]["reversals_per_minute"] > 25.0
     assert (
-        sum(info["reward_reversals"] + info["reward_rudder_travel"] for info in chatter) < 0.5 * honest.sum()
+        sum(info["reward_reversals"] + info["reward_rudder_travel"] for info in chatter)
+        < 0.5 * honest.sum()
     )
 
 
@@ -279,16 +366,27 @@ def test_a_reversal_is_a_way_back_of_the_rudder_and_not_its_noise():
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"waypoints": [[0, 0], [2000, 0], [0, 10]]}, "the path doubles back at row 1, by 180 deg, expected"),
-        ({"waypoints": [[0, 0], [900, 0], [1800, 900], [1900, 900]]},
-         "rows 2 and 3 are 100 m apart, expected at least 266.6"),
-        ({"waypoints": [[0, 0], [1, 0], [1, 1]]}, "rows 0 and 1 are 1 m apart, .* smaller turn_radius"),
+        (
+            {"waypoints": [[0, 0], [2000, 0], [0, 10]]},
+            "the path doubles back at row 1, by 180 deg, expected",
+        ),
+        (
+            {"waypoints": [[0, 0], [900, 0], [1800, 900], [1900, 900]]},
+            "rows 2 and 3 are 100 m apart, expected at least 266.6",
+        ),
+        (
+            {"waypoints": [[0, 0], [1, 0], [1, 1]]},
+            "rows 0 and 1 are 1 m apart, .* smaller turn_radius",
+        ),
         ({"waypoints": [[0, 0], [900, 0], [900, 0]]}, "waypoints: row 2 repeats"),
-        ({"max_turn_deg": 120.0}, "leg_lengths: the least: 8 found, expected a number >= 13.8.*turns"),
+        (
+            {"max_turn_deg": 120.0},
+            "leg_lengths: the least: 8 found, expected a number >= 13.8.*turns",
+        ),
         ({"turn_radius": 0.0}, "turn_radius: 0 found"),
         ({"acceptance": 1.0}, "unknown key 'acceptance'"),
     ],
-)  # fmt: skip
+)
 def test_a_path_that_cannot_be_planned_is_refused(options, message):
     with pytest.raises(InputError, match=message):
         gymnasium.make(ID, model="mariner", **options)
@@ -298,7 +396,9 @@ def test_a_path_that_cannot_be_planned_is_refused(options, message):
 def test_the_next_leg_is_one_of_the_plan_whatever_a_checkpoint_holds(leg):
     asked, plan = Settings(), HOOK.ravel()
     state = on_path(RADIUS, plan)
-    state = state._replace(leg=state.leg._replace(number=leg), distance_made_good=5000.0)
+    state = state._replace(
+        leg=state.leg._replace(number=leg), distance_made_good=5000.0
+    )
     motion = Motion(1500.0, 100.0, *[0.0] * 9)
     found = path_following.on_event(motion, state, None, SHIP, asked, None, plan)
     assert found.leg.number in (1.0, 3.0)
@@ -306,19 +406,27 @@ def test_the_next_leg_is_one_of_the_plan_whatever_a_checkpoint_holds(leg):
 
 
 @given(st.floats(-0.9, 0.9), st.floats(0.0, 0.099), st.sampled_from([1.0, -1.0]))
-def test_near_the_centre_of_a_turn_places_on_it_are_those_of_a_tenth_of_its_radius(angle, near, side):
+def test_near_the_centre_of_a_turn_places_on_it_are_those_of_a_tenth_of_its_radius(
+    angle, near, side
+):
     """Seen from the centre the arc passes below the ship as slowly as a tenth of the radius off."""
     plan, radius = np.array([0.0, 0.0, 3000.0, 0.0, 3000.0, side * 3000.0]), 1000.0
     leg, asked = leg_from(0, 0.0, radius, plan), Settings(turn_radius=radius / LENGTH)
-    towards = np.array([1.0, -side]) / np.sqrt(2.0)  # from the centre to the arc's middle
+    towards = np.array([1.0, -side]) / np.sqrt(
+        2.0
+    )  # from the centre to the arc's middle
     across = np.array([1.0, side]) / np.sqrt(2.0)
-    x, y = np.array([2000.0, side * 1000.0]) + radius * (near * towards + 0.1 * angle * across)
+    x, y = np.array([2000.0, side * 1000.0]) + radius * (
+        near * towards + 0.1 * angle * across
+    )
     found = fix(x, y, leg, SHIP, asked)
     if x > 2000.0:
         turned = np.pi / 4.0 + np.arctan(angle)
         assert found.turned == pytest.approx(turned)
         assert found.way == pytest.approx(2000.0 + radius * turned)
-        off = radius - 0.1 * radius * np.hypot(1.0, angle) + 0.1 * radius - near * radius
+        off = (
+            radius - 0.1 * radius * np.hypot(1.0, angle) + 0.1 * radius - near * radius
+        )
         assert found.cross == pytest.approx(side * off)
     else:
         assert (found.way, found.turned) == (pytest.approx(x), 0.0)
@@ -326,14 +434,20 @@ def test_near_the_centre_of_a_turn_places_on_it_are_those_of_a_tenth_of_its_radi
 
 def test_a_course_leads_to_the_path_a_lookahead_distance_ahead():
     """On the arc it is the direction of the chord to the point that far ahead on the path."""
-    plan, radius, lookahead = np.array([0.0, 0.0, 3000.0, 0.0, 3000.0, 3000.0]), 1000.0, 400.0
+    plan, radius, lookahead = (
+        np.array([0.0, 0.0, 3000.0, 0.0, 3000.0, 3000.0]),
+        1000.0,
+        400.0,
+    )
     leg = leg_from(0, 0.0, radius, plan)
     asked = Settings(turn_radius=radius / LENGTH, lookahead=lookahead / LENGTH)
     for turned in (0.1, 0.6, 1.1):
         x, y = 2000.0 + radius * np.sin(turned), radius * (1.0 - np.cos(turned))
         found = fix(x, y, leg, SHIP, asked)
         ahead = turned + lookahead / radius
-        chord = np.arctan2(np.cos(turned) - np.cos(ahead), np.sin(ahead) - np.sin(turned))
+        chord = np.arctan2(
+            np.cos(turned) - np.cos(ahead), np.sin(ahead) - np.sin(turned)
+        )
         assert found.cross == pytest.approx(0.0, abs=1e-9)
         assert found.course == pytest.approx(chord)
     aside = fix(500.0, 30.0, leg, SHIP, asked)
@@ -343,12 +457,17 @@ def test_a_course_leads_to_the_path_a_lookahead_distance_ahead():
 @pytest.mark.parametrize(("legs", "least"), [(1, 0.0), (2, 4.0), (3, 8.0), (9, 8.0)])
 def test_legs_of_a_drawn_path_leave_room_for_the_turns_at_their_ends(legs, least):
     """Right angles with a radius of 4 lengths: none for a single leg, one for two, two for others."""
-    asked = Settings(n_legs=legs, max_turn_deg=90.0, leg_lengths=path_following.Range(max(least, 0.1), 9.0))
+    asked = Settings(
+        n_legs=legs,
+        max_turn_deg=90.0,
+        leg_lengths=path_following.Range(max(least, 0.1), 9.0),
+    )
     path_following.check(asked, None)
     if least:
         tight = asked._replace(leg_lengths=path_following.Range(least - 0.01, 9.0))
         with pytest.raises(
-            InputError, match=f"the least: {least - 0.01:g} found, .* >= {least:g}; ship lengths"
+            InputError,
+            match=f"the least: {least - 0.01:g} found, .* >= {least:g}; ship lengths",
         ):
             path_following.check(tight, None)
 
@@ -370,8 +489,12 @@ def test_paths_of_a_list_are_filled_up_to_the_longest_on_their_last_leg():
 def test_each_listed_path_has_to_leave_room_for_its_turns():
     mariner = shipgym.load_model("mariner")
     paths = path_following.listed([LINE, [[0, 0], [900, 0], [900, 500]]])
-    path_following.check(Settings(waypoints=paths), None)  # lengths of an unknown ship are not known
-    with pytest.raises(InputError, match=r"rows 1 and 2 are 500 m apart, expected at least 643.7"):
+    path_following.check(
+        Settings(waypoints=paths), None
+    )  # lengths of an unknown ship are not known
+    with pytest.raises(
+        InputError, match=r"rows 1 and 2 are 500 m apart, expected at least 643.7"
+    ):
         path_following.check(Settings(waypoints=paths), mariner)
     path_following.check(Settings(waypoints=paths, turn_radius=3.0), mariner)
 
@@ -382,15 +505,17 @@ def test_a_corridor_is_wider_than_the_ship_whose_beam_is_known():
     path_following.check_path(Settings(corridor=1.01 * least), mariner)
     with pytest.raises(InputError) as caught:
         path_following.check_path(Settings(corridor=0.07), mariner)
-    assert str(caught.value) == (
-        "corridor: 0.07 ship lengths to each side is 22.5 m wide, expected more than the beam of 'mariner', "
-        "23.2 m"
+    assert (
+        str(caught.value)
+        == "corridor: 0.07 ship lengths to each side is 22.5 m wide, expected more than"
+        " the beam of 'mariner', 23.2 m"
     )
     path_following.check_path(Settings(corridor=0.07), None)
     bare = replace(mariner, particulars=replace(mariner.particulars, beam=None))
     path_following.check_path(Settings(corridor=0.07), bare)
     with pytest.raises(
-        InputError, match="ground: 1 found, expected a number > 1; in ship lengths, beyond the c"
+        InputError,
+        match="ground: 1 found, expected a number > 1; in ship lengths, beyond the c",
     ):
         path_following.check_path(Settings(ground=1.0), None)
 
@@ -398,15 +523,29 @@ def test_a_corridor_is_wider_than_the_ship_whose_beam_is_known():
 def test_turns_and_distances_of_a_plan():
     plan = np.array([0.0, 0.0, 300.0, 0.0, 300.0, 400.0, 300.0, 900.0, 0.0, 900.0])
     assert path_following.between(1, 2, plan) == pytest.approx((400.0, np.pi / 2))
-    assert path_following.between(0, 2, plan) == pytest.approx((500.0, np.arctan2(400.0, 300.0)))
+    assert path_following.between(0, 2, plan) == pytest.approx(
+        (500.0, np.arctan2(400.0, 300.0))
+    )
     turns = [path_following.change_of_course(number, plan) for number in range(5)]
     assert turns == pytest.approx([0.0, np.pi / 2, 0.0, np.pi / 2, 0.0])
-    assert [path_following.next_turn(number, plan) for number in range(5)] == [1, 3, 3, 4, 4]
-    assert [path_following.part_of(turn, way, 100.0) for turn, way in ((0.5, 20.0), (-0.5, 20.0))] == [
+    assert [path_following.next_turn(number, plan) for number in range(5)] == [
+        1,
+        3,
+        3,
+        4,
+        4,
+    ]
+    assert [
+        path_following.part_of(turn, way, 100.0)
+        for turn, way in ((0.5, 20.0), (-0.5, 20.0))
+    ] == [
         0.2,
         -0.2,
     ]
-    assert [path_following.part_of(-0.5, way, 100.0) for way in (-9.0, 60.0)] == [0.0, -0.5]
+    assert [path_following.part_of(-0.5, way, 100.0) for way in (-9.0, 60.0)] == [
+        0.0,
+        -0.5,
+    ]
 
 
 def test_a_step_on_the_last_leg_earns_way_up_to_its_end_only():
@@ -415,17 +554,30 @@ def test_a_step_on_the_last_leg_earns_way_up_to_its_end_only():
     state = on_path(RADIUS, plan)._replace(distance_made_good=39.0 * LENGTH)
     interval = Interval(2.0 * LENGTH / SPEED, 7.0, 0.02, 0.0, 1.0, 0.0, 0.0)
     motion = Motion(40.5 * LENGTH, 0.5 * LENGTH, *[0.0] * 7, 0.12, 0.0)
-    after, reward, aground, arrived = path_following.step(motion, state, interval, SHIP, asked)
+    after, reward, aground, arrived = path_following.step(
+        motion, state, interval, SHIP, asked
+    )
     assert after.distance_made_good == pytest.approx(40.0 * LENGTH)
     assert reward.progress == pytest.approx(-0.5)
     assert reward.cross_track == pytest.approx(-0.25)
-    assert (bool(aground), bool(arrived), after.success, after.in_corridor) == (False, True, 1.0, 1.0)
+    assert (bool(aground), bool(arrived), after.success, after.in_corridor) == (
+        False,
+        True,
+        1.0,
+        1.0,
+    )
     assert after.rudder_travel == pytest.approx(0.1)
     assert reward.rudder_travel == pytest.approx(-0.1 * 0.1 / np.radians(30.0))
     for aside, within, ashore in ((1.01, 0.0, 0.0), (4.01, 0.0, 1.0)):
         off = motion._replace(y=aside * LENGTH)
-        after, reward, aground, arrived = path_following.step(off, state, interval, SHIP, asked)
-        assert (after.success, after.in_corridor, after.grounded) == (0.0, within, ashore)
+        after, reward, aground, arrived = path_following.step(
+            off, state, interval, SHIP, asked
+        )
+        assert (after.success, after.in_corridor, after.grounded) == (
+            0.0,
+            within,
+            ashore,
+        )
         assert not arrived
         assert bool(aground) == bool(ashore)
     back = motion._replace(x=30.0 * LENGTH)
@@ -446,5 +598,7 @@ def test_reversals_are_counted_by_the_minute():
         assert after.work.reversals == count
         assert after.reversals_per_minute == pytest.approx(count * 60.0 / 50.0)
         assert reward.reversals == pytest.approx(-0.3 * (count - 4.0))
-    first, *_ = path_following.step(motion, state, interval._replace(steps=0.0), SHIP, asked)
+    first, *_ = path_following.step(
+        motion, state, interval._replace(steps=0.0), SHIP, asked
+    )
     assert first.reversals_per_minute == pytest.approx(5.0 * 60.0 / 0.5)

@@ -24,13 +24,24 @@ pytestmark = pytest.mark.interpreted
 
 ID = "shipgym/PathFollowing-v0"
 LENGTH, SPEED = 160.93, 7.7175  # of the Mariner
-HOOK = [[0.0, 0.0], [1500.0, 0.0], [2600.0, 1100.0], [2600.0, 2800.0]]  # turns of 45 degrees
+HOOK = [
+    [0.0, 0.0],
+    [1500.0, 0.0],
+    [2600.0, 1100.0],
+    [2600.0, 2800.0],
+]  # turns of 45 degrees
 TROUBLED = Weather(
-    current=Current(1.0, towards_deg=90.0), wind=Wind(10.0, from_deg=0.0), waves=Waves(2.0, 8.0)
+    current=Current(1.0, towards_deg=90.0),
+    wind=Wind(10.0, from_deg=0.0),
+    waves=Waves(2.0, 8.0),
 )
 
 
-SIZES = {"corridor": 1.0, "ground": 4.0, "episode_steps": 1500}  # whatever the defaults are
+SIZES = {
+    "corridor": 1.0,
+    "ground": 4.0,
+    "episode_steps": 1500,
+}  # whatever the defaults are
 
 
 def make(**options):
@@ -67,7 +78,9 @@ def test_guidance_is_that_of_the_library(waypoints):
     task, path, leg, over = env.task, Path(env.waypoints), 0, False
     names = {name: k for k, name in enumerate(env.observation_names)}
     while not over:
-        observation, _, terminated, truncated, info = env.step(np.array([pd(observation)], np.float32))
+        observation, _, terminated, truncated, info = env.step(
+            np.array([pd(observation)], np.float32)
+        )
         over = terminated or truncated
         state = env.physical_state()
         where = path.position(state["x"], state["y"], leg)
@@ -80,13 +93,19 @@ def test_guidance_is_that_of_the_library(waypoints):
         error = wrapped(course - state["psi"])
         seen = observation * env.observation_scales
         assert wrapped(state["set_point"] - course) == pytest.approx(0.0, abs=1e-9)
-        assert seen[names["heading_error_sin"]] == pytest.approx(np.sin(error), abs=1e-6)
-        assert seen[names["cross_track"]] == pytest.approx(float(where.cross_track), abs=1e-3)
+        assert seen[names["heading_error_sin"]] == pytest.approx(
+            np.sin(error), abs=1e-6
+        )
+        assert seen[names["cross_track"]] == pytest.approx(
+            float(where.cross_track), abs=1e-3
+        )
         assert info["cross_track"] == pytest.approx(float(where.cross_track), abs=1e-6)
         horizon = TURN_HORIZON * LENGTH
         distance = np.clip(where.to_go, 0.0, horizon)
         assert seen[names["turn_distance"]] == pytest.approx(float(distance), abs=1e-3)
-        assert wrapped(seen[names["turn_angle"]] - path.turns[leg]) == pytest.approx(0.0, abs=1e-6)
+        assert wrapped(seen[names["turn_angle"]] - path.turns[leg]) == pytest.approx(
+            0.0, abs=1e-6
+        )
     assert leg == path.n_legs - 1
     assert info["success"]
 
@@ -138,23 +157,33 @@ def test_the_reward_is_the_sum_of_its_named_parts():
     env = make(waypoints=HOOK, sea=TROUBLED)
     rewards, infos = fly(env, seed=2)
     parts = env.task.reward_parts
-    np.testing.assert_allclose(rewards, [sum(info[name] for name in parts) for info in infos], rtol=1e-12)
+    np.testing.assert_allclose(
+        rewards, [sum(info[name] for name in parts) for info in infos], rtol=1e-12
+    )
     assert set(parts) == {name for name in infos[0] if name.startswith("reward_")}
     furthest, checked = 2.0 * SPEED * env.dt, 0
     for last, info in pairwise(infos):
         way = info["distance_made_good"] - last["distance_made_good"]
         aside = info["cross_track"] - last["cross_track"]
-        if 0.0 < way < furthest and abs(aside) < furthest:  # not where the next leg begins
+        if (
+            0.0 < way < furthest and abs(aside) < furthest
+        ):  # not where the next leg begins
             checked += 1
-            assert info["reward_cross_track"] == pytest.approx(-((info["cross_track"] / env.corridor) ** 2))
+            assert info["reward_cross_track"] == pytest.approx(
+                -((info["cross_track"] / env.corridor) ** 2)
+            )
             pace = way / (SPEED * env.dt)
-            assert info["reward_progress"] == pytest.approx(-np.clip(1.0 - pace, 0.0, 2.0), abs=1e-9)
+            assert info["reward_progress"] == pytest.approx(
+                -np.clip(1.0 - pace, 0.0, 2.0), abs=1e-9
+            )
             assert info["in_corridor"] == (abs(info["cross_track"]) <= env.corridor)
     assert checked > 0.9 * len(infos)
 
 
 def test_running_aground_ends_the_episode_and_says_so():
-    rewards, infos = fly(make(waypoints=HOOK), lambda observation, step: [0.0 if step < 50 else 1.0])
+    rewards, infos = fly(
+        make(waypoints=HOOK), lambda observation, step: [0.0 if step < 50 else 1.0]
+    )
     last = infos[-1]
     assert last["grounded"]
     assert not last["success"]
@@ -173,8 +202,16 @@ WIDE = {"ground": 40.0}  # a sea in which nobody runs aground
     [
         ("circles", lambda seen, step: [1.0], {}),
         ("circles where it is wide", lambda seen, step: [1.0], WIDE),
-        ("circles after a while", lambda seen, step: [pd(seen) if step < 400 else -1.0], WIDE),
-        ("circles before the end", lambda seen, step: [pd(seen) if step < 450 else 1.0], WIDE),
+        (
+            "circles after a while",
+            lambda seen, step: [pd(seen) if step < 400 else -1.0],
+            WIDE,
+        ),
+        (
+            "circles before the end",
+            lambda seen, step: [pd(seen) if step < 450 else 1.0],
+            WIDE,
+        ),
         ("does nothing", lambda seen, step: [0.0], WIDE),
         ("turns back", lambda seen, step: [-pd(seen)], WIDE),
         ("runs aground early", lambda seen, step: [-pd(seen)], {}),
@@ -201,9 +238,15 @@ def test_gaming_the_reward_does_not_pay(name, policy, options):
     ("name", "policy"),
     [
         ("stops", lambda seen, step: [0.0, 0.0]),
-        ("stops after a while", lambda seen, step: [pd(seen), 1.0 if step < 100 else 0.0]),
+        (
+            "stops after a while",
+            lambda seen, step: [pd(seen), 1.0 if step < 100 else 0.0],
+        ),
         ("goes astern", lambda seen, step: [0.0, -1.0]),
-        ("goes to and fro", lambda seen, step: [pd(seen), 1.0 if step // 60 % 2 else -1.0]),
+        (
+            "goes to and fro",
+            lambda seen, step: [pd(seen), 1.0 if step // 60 % 2 else -1.0],
+        ),
         ("creeps", lambda seen, step: [pd(seen), 0.4]),
     ],
 )
@@ -250,7 +293,9 @@ def test_a_current_sets_the_ship_off_and_course_error_shows_it():
         one.reset(seed=1)
         for _ in range(30):
             one.step(np.zeros(1, dtype=np.float32))
-    assert env.physical_state()["y"] - calm.physical_state()["y"] == pytest.approx(30.0, abs=0.1)
+    assert env.physical_state()["y"] - calm.physical_state()["y"] == pytest.approx(
+        30.0, abs=0.1
+    )
 
 
 SHIP = Ship(LENGTH, SPEED, 0.6, 0.05, 0.0, 1.5, np.inf, SPEED)
@@ -258,18 +303,30 @@ angles, speeds = st.floats(-3.1, 3.1), st.floats(-3.0, 3.0)
 
 
 @given(angles, angles, st.floats(0.5, 8.0), speeds, speeds, speeds)
-def test_course_over_ground_is_the_way_that_the_ship_moves_on_every_leg(leg, psi, u, v, north, east):
+def test_course_over_ground_is_the_way_that_the_ship_moves_on_every_leg(
+    leg, psi, u, v, north, east
+):
     """Worked with vectors north and east: way through the water, turned by the heading, and the current."""
     motion = Motion(30.0, -40.0, psi, u, v, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     ahead, aside = ground_velocity(motion, north, east)
     over_ground = (u + 1j * v) * np.exp(1j * psi) + north + 1j * east
-    assert (ahead + 1j * aside) * np.exp(1j * psi) == pytest.approx(over_ground, abs=1e-9)
-    state = leg_from(0, 0.0, np.array([0.0, 0.0, 2000.0 * np.cos(leg), 2000.0 * np.sin(leg)]))
-    assert (state.length, state.cosine, state.sine) == pytest.approx((2000.0, np.cos(leg), np.sin(leg)))
+    assert (ahead + 1j * aside) * np.exp(1j * psi) == pytest.approx(
+        over_ground, abs=1e-9
+    )
+    state = leg_from(
+        0, 0.0, np.array([0.0, 0.0, 2000.0 * np.cos(leg), 2000.0 * np.sin(leg)])
+    )
+    assert (state.length, state.cosine, state.sine) == pytest.approx(
+        (2000.0, np.cos(leg), np.sin(leg))
+    )
     assert state.leg_course == pytest.approx(leg)
     assume(abs(over_ground) > 0.01)
-    readings = Readings(30.0, -40.0, psi, u, v, 0.0, 0.0, 0.0, 0.0, 0.0, psi, ahead, aside)
-    seen = observe(readings, state, Interval(1.0, 3.0, 0.0, 0.0, 0.0, 0.0, 0.0), SHIP, Settings())
+    readings = Readings(
+        30.0, -40.0, psi, u, v, 0.0, 0.0, 0.0, 0.0, 0.0, psi, ahead, aside
+    )
+    seen = observe(
+        readings, state, Interval(1.0, 3.0, 0.0, 0.0, 0.0, 0.0, 0.0), SHIP, Settings()
+    )
     across = np.imag((30.0 - 40.0j) * np.exp(-1j * leg))
     assert seen.cross_track == pytest.approx(across, abs=1e-9)
     course = leg - np.arctan2(across, 2.5 * LENGTH)
@@ -301,26 +358,41 @@ MIRRORED = (
     *("east", "sine", "leg_course", "turn", "cross_track"),
 )
 SEEN_MIRRORED = (
-    "heading_error_sin", "yaw_rate", "sway", "rudder", "last_command", "heading_error_integral",
-    "cross_track", "course_error_sin", "turn_angle",
-)  # fmt: skip
+    "heading_error_sin",
+    "yaw_rate",
+    "sway",
+    "rudder",
+    "last_command",
+    "heading_error_integral",
+    "cross_track",
+    "course_error_sin",
+    "turn_angle",
+)
 
 
 def test_the_mirrored_voyage_earns_the_same():
     """A ship without a preferred side, on the path that is reflected in the north axis."""
     mariner = shipgym.load_model("mariner")
-    even = {name: value for name, value in mariner.coefficients.items() if name[1:3] == "_0"}
-    symmetric = replace(mariner, coefficients={**mariner.coefficients, **dict.fromkeys(even, 0.0)})
+    even = {
+        name: value for name, value in mariner.coefficients.items() if name[1:3] == "_0"
+    }
+    symmetric = replace(
+        mariner, coefficients={**mariner.coefficients, **dict.fromkeys(even, 0.0)}
+    )
     drawn = Engine(symmetric, 1, path_following_task(n_legs=3, leg_lengths=(3.0, 5.0)))
     drawn.reset([4])
     task = path_following_task(waypoints=drawn.waypoints())
     engine = Engine(symmetric, 1, task)
-    mirror = Engine(symmetric, 1, task.changed(waypoints=drawn.waypoints() * [1.0, -1.0]))
+    mirror = Engine(
+        symmetric, 1, task.changed(waypoints=drawn.waypoints() * [1.0, -1.0])
+    )
     for one in (engine, mirror):
         one.reset([4])
     for name in (*Motion._fields[:6], "delta", *task.definition.State._fields):
         mirror.write(name, (-1.0 if name in MIRRORED else 1.0) * engine.read(name))
-    signs = np.array([-1.0 if q.name in SEEN_MIRRORED else 1.0 for q in task.observed(symmetric)])
+    signs = np.array(
+        [-1.0 if q.name in SEEN_MIRRORED else 1.0 for q in task.observed(symmetric)]
+    )
     random = np.random.default_rng(0)
     seen = engine.observations
     for _ in range(250):
@@ -340,10 +412,18 @@ def test_the_mirrored_voyage_earns_the_same():
 )
 def test_observations_stay_in_their_space_and_are_never_nan(seed, actions, troubled):
     options = {"sea": ["calm", TROUBLED], "noise": 3.0} if troubled else {}
-    env = make(ground=40.0, acceptance=0.0, max_turn_deg=150.0, leg_lengths=(0.5, 3.0), **options)
+    env = make(
+        ground=40.0,
+        acceptance=0.0,
+        max_turn_deg=150.0,
+        leg_lengths=(0.5, 3.0),
+        **options,
+    )
     env.reset(seed=seed)
     for action in actions * 10:
-        observation, reward, terminated, *_ = env.step(np.array([action], dtype=np.float32))
+        observation, reward, terminated, *_ = env.step(
+            np.array([action], dtype=np.float32)
+        )
         assert observation in env.observation_space
         assert np.isfinite(reward)
         assert reward <= 0.0
@@ -354,11 +434,17 @@ def test_observations_stay_in_their_space_and_are_never_nan(seed, actions, troub
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"waypoints": [[0.0, 0.0]]}, r"waypoints: shape \(1, 2\) found, expected at least 2"),
+        (
+            {"waypoints": [[0.0, 0.0]]},
+            r"waypoints: shape \(1, 2\) found, expected at least 2",
+        ),
         ({"waypoints": [[0.0, 0.0], [0.0, 0.0]]}, "waypoints: row 1 repeats"),
         ({"waypoints": [[0.0, 0.0], [np.nan, 1.0]]}, "waypoints: row 1 is"),
         ({"waypoints": "north"}, "waypoints: shape"),
-        ({"corridor": 0.05, "ground": 1.0}, "corridor: 0.05 ship lengths to each side is 16.1 m wide"),
+        (
+            {"corridor": 0.05, "ground": 1.0},
+            "corridor: 0.05 ship lengths to each side is 16.1 m wide",
+        ),
         ({"corridor": 5.0}, "ground: 4 found, expected a number > 5"),
         ({"leg_lengths": (5.0, 4.0)}, "leg_lengths: the largest: 4 found"),
         ({"leg_lengths": (5.0,)}, "leg_lengths: .* expected the least and the largest"),
@@ -379,7 +465,9 @@ def test_the_next_leg_is_one_of_the_plan_whatever_a_checkpoint_holds(leg):
     state = path_following.leg_from(0, 0.0, plan)._replace(leg=leg)
     ship = ship_of(shipgym.load_model("mariner"))
     motion = Motion(490.0, 0.0, *[0.0] * 9)
-    found = path_following.on_event(motion, state, None, ship, path_following.Settings(), None, plan)
+    found = path_following.on_event(
+        motion, state, None, ship, path_following.Settings(), None, plan
+    )
     assert (found.leg, found.north, found.east) == (1.0, 500.0, 0.0)
 
 
@@ -389,13 +477,20 @@ PLAN = np.array([0.0, 0.0, 3000.0, 0.0, 3000.0, 4000.0, 0.0, 0.0])
 def test_a_leg_knows_its_length_its_course_and_the_turn_at_its_end():
     legs = [leg_from(number, 100.0, PLAN) for number in range(3)]
     assert [leg.leg for leg in legs] == [0.0, 1.0, 2.0]
-    assert [leg.length for leg in legs] == [leg.to_go for leg in legs] == [3000.0, 4000.0, 5000.0]
+    assert (
+        [leg.length for leg in legs]
+        == [leg.to_go for leg in legs]
+        == [3000.0, 4000.0, 5000.0]
+    )
     back = np.arctan2(-4000.0, -3000.0)
     assert [leg.leg_course for leg in legs] == pytest.approx([0.0, np.pi / 2, back])
-    assert [leg.turn for leg in legs] == pytest.approx([np.pi / 2, wrapped(back - np.pi / 2), 0.0])
-    assert {(leg.before, leg.sailed, leg.distance_made_good, leg.in_corridor) for leg in legs} == {
-        (100.0, 0.0, 0.0, 1.0)
-    }
+    assert [leg.turn for leg in legs] == pytest.approx(
+        [np.pi / 2, wrapped(back - np.pi / 2), 0.0]
+    )
+    assert {
+        (leg.before, leg.sailed, leg.distance_made_good, leg.in_corridor)
+        for leg in legs
+    } == {(100.0, 0.0, 0.0, 1.0)}
     assert (legs[2].cosine, legs[2].sine) == pytest.approx((-0.6, -0.8))
 
 
@@ -417,14 +512,24 @@ def test_the_next_leg_is_due_near_the_end_of_each_but_the_last():
 def test_a_leg_beyond_the_plan_that_a_state_may_claim_is_the_last():
     state = leg_from(0, 0.0, PLAN)._replace(leg=1e5, last=1e6)
     motion = Motion(2900.0, 150.0, 0.2, *[0.0] * 8)
-    assert path_following.on_event(motion, state, None, SHIP, Settings(), None, PLAN).leg == 2.0
+    assert (
+        path_following.on_event(motion, state, None, SHIP, Settings(), None, PLAN).leg
+        == 2.0
+    )
 
 
 def test_the_way_round_a_corner_that_is_cut_counts_as_sailed():
-    state = leg_from(0, 0.0, PLAN)._replace(heading_error=0.7, distance_made_good=2500.0, integral=0.3)
+    state = leg_from(0, 0.0, PLAN)._replace(
+        heading_error=0.7, distance_made_good=2500.0, integral=0.3
+    )
     motion = Motion(2900.0, 150.0, 0.2, *[0.0] * 8)
     found = path_following.on_event(motion, state, None, SHIP, Settings(), None, PLAN)
-    assert (found.leg, found.before, found.sailed, found.to_go) == (1.0, 3000.0, 3150.0, 3850.0)
+    assert (found.leg, found.before, found.sailed, found.to_go) == (
+        1.0,
+        3000.0,
+        3150.0,
+        3850.0,
+    )
     assert found.cross_track == pytest.approx(100.0)  # south of a leg due east
     assert found.course == pytest.approx(np.pi / 2 - np.arctan(100.0 / (2.5 * LENGTH)))
     assert (found.heading_error, found.distance_made_good, found.integral) == (
@@ -432,7 +537,9 @@ def test_the_way_round_a_corner_that_is_cut_counts_as_sailed():
         2500.0,
         0.3,
     )  # as reported
-    behind = path_following.on_event(motion._replace(y=-80.0), state, None, SHIP, Settings(), None, PLAN)
+    behind = path_following.on_event(
+        motion._replace(y=-80.0), state, None, SHIP, Settings(), None, PLAN
+    )
     assert (behind.sailed, behind.to_go) == (3000.0, 4080.0)
 
 
@@ -444,19 +551,36 @@ def test_a_step_on_a_leg_is_charged_for_its_distance_and_for_way_not_made():
 
     def step(way, off):
         x, y = PLAN[4:6] + way * along + off * LENGTH * aside
-        return path_following.step(Motion(x, y, *[0.0] * 9), state, interval, SHIP, asked)
+        return path_following.step(
+            Motion(x, y, *[0.0] * 9), state, interval, SHIP, asked
+        )
 
     after, reward, aground, arrived = step(4000.0 + 50.0 * SPEED, 0.25)
-    assert after.sailed == after.distance_made_good == pytest.approx(11_000.0 + 50.0 * SPEED)
+    assert (
+        after.sailed
+        == after.distance_made_good
+        == pytest.approx(11_000.0 + 50.0 * SPEED)
+    )
     assert after.to_go == pytest.approx(1000.0 - 50.0 * SPEED)
     assert (reward.progress, reward.cross_track) == pytest.approx((-0.5, -0.25))
-    assert (bool(aground), bool(arrived), after.in_corridor, after.grounded) == (False, False, 1.0, 0.0)
+    assert (bool(aground), bool(arrived), after.in_corridor, after.grounded) == (
+        False,
+        False,
+        1.0,
+        0.0,
+    )
     assert step(4000.0 - 300.0 * SPEED, 0.0)[1].progress == -2.0
     assert step(4000.0 + 300.0 * SPEED, 0.0)[1].progress == 0.0
-    for way, off, end in ((5001.0, 0.49, True), (5001.0, 0.51, False), (4999.0, 0.0, False)):
+    for way, off, end in (
+        (5001.0, 0.49, True),
+        (5001.0, 0.51, False),
+        (4999.0, 0.0, False),
+    ):
         after, *_, arrived = step(way, off)
         assert bool(arrived) is bool(after.success) is end
     assert step(5001.0, 0.0)[0].sailed == pytest.approx(12_000.0)  # the path's end
     assert [bool(step(4500.0, off)[2]) for off in (1.99, -2.01)] == [False, True]
-    first = path_following.step(Motion(0.0, 0.0, *[0.0] * 9), state._replace(leg=1.0), interval, SHIP, asked)
+    first = path_following.step(
+        Motion(0.0, 0.0, *[0.0] * 9), state._replace(leg=1.0), interval, SHIP, asked
+    )
     assert not first[3]

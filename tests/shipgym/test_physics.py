@@ -26,11 +26,19 @@ def symmetric(name):
     """The ship without what makes her sides differ: propeller walk, and KVLCC2's flow straightening."""
     model = shipgym.load_model(name)
     changes = {
-        "mariner": {key: 0.0 for key in model.coefficients if key[:3] in ("Y_0", "N_0")},
+        "mariner": {
+            key: 0.0 for key in model.coefficients if key[:3] in ("Y_0", "N_0")
+        },
         "container": {},
         "tanker": {"Y_T": 0.0, "N_T": 0.0},
         "kvlcc2": {"gamma_minus": 0.5, "gamma_plus": 0.5, "C_2_port": 1.6},
-    }[model.structure if model.structure in ("container", "tanker", "kvlcc2") else "mariner"]
+    }[
+        (
+            model.structure
+            if model.structure in ("container", "tanker", "kvlcc2")
+            else "mariner"
+        )
+    ]
     return replace(model, coefficients={**model.coefficients, **changes})
 
 
@@ -39,14 +47,17 @@ def test_port_mirrors_starboard_on_a_ship_that_is_symmetric(name):
     model = symmetric(name)
     dt = ship_time(model) / 50
     runs = [
-        manoeuvres.zigzag(model, 20, 20, port, 500 * dt, dt, must_reverse=False) for port in (False, True)
+        manoeuvres.zigzag(model, 20, 20, port, 500 * dt, dt, must_reverse=False)
+        for port in (False, True)
     ]
     starboard, port = runs
     for channel, values in starboard.channels.items():
         if not channel.endswith("_command"):
             sign = -1.0 if channel in MIRRORED else 1.0
             atol = 1e-8 * max(np.ptp(values), 1e-12)
-            np.testing.assert_allclose(port[channel], sign * values, rtol=1e-10, atol=atol, err_msg=channel)
+            np.testing.assert_allclose(
+                port[channel], sign * values, rtol=1e-10, atol=atol, err_msg=channel
+            )
 
 
 @pytest.mark.parametrize("name", SHIPS)
@@ -59,12 +70,18 @@ def test_place_and_heading_do_not_matter(name):
     moved[:3] = 5000.0, -8000.0, 2.0
     here, there = model.simulate(orders, dt), model.simulate(orders, dt, moved)
     for channel in set(model.state_names) - {"x", "y", "psi"}:
-        np.testing.assert_allclose(there[channel], here[channel], rtol=1e-10, atol=1e-11)
+        np.testing.assert_allclose(
+            there[channel], here[channel], rtol=1e-10, atol=1e-11
+        )
     np.testing.assert_allclose(there["psi"] - 2.0, here["psi"], atol=1e-10)
     c, s = np.cos(2.0), np.sin(2.0)
     length = model.particulars["length"]
-    np.testing.assert_allclose(there["x"] - 5000.0, c * here["x"] - s * here["y"], atol=1e-9 * length)
-    np.testing.assert_allclose(there["y"] + 8000.0, s * here["x"] + c * here["y"], atol=1e-9 * length)
+    np.testing.assert_allclose(
+        there["x"] - 5000.0, c * here["x"] - s * here["y"], atol=1e-9 * length
+    )
+    np.testing.assert_allclose(
+        there["y"] + 8000.0, s * here["x"] + c * here["y"], atol=1e-9 * length
+    )
 
 
 @pytest.mark.parametrize("name", SHIPS)
@@ -74,14 +91,21 @@ def test_halving_the_step_divides_the_error_by_sixteen(name):
     start = model.service_state.copy()
     start[model.state_names.index("delta")] = 0.05
     compared = [c for c in model.state_names if c not in ("x", "y", "n", "delta")]
-    scale = {"u": model.particulars["speed"], "v": model.particulars["speed"], "psi": 1.0, "phi": 1.0}
+    scale = {
+        "u": model.particulars["speed"],
+        "v": model.particulars["speed"],
+        "psi": 1.0,
+        "phi": 1.0,
+    }
 
     def end(steps):
         dt = ship_time(model) / steps
         orders = np.repeat(model.service_command[None], 3 * steps, axis=0)
         orders[:, 0] = 0.05
         trial = model.simulate(orders, dt, start)
-        return np.array([trial[c][-1] / scale.get(c, 1.0 / ship_time(model)) for c in compared])
+        return np.array(
+            [trial[c][-1] / scale.get(c, 1.0 / ship_time(model)) for c in compared]
+        )
 
     exact = end(512)
     ratio = np.linalg.norm(end(16) - exact) / np.linalg.norm(end(32) - exact)
@@ -110,7 +134,11 @@ def test_a_ship_without_thrust_loses_energy(name, drift_deg, turn):
     """From straight, drifting and turning states with the shaft at rest; heeling counts as stored energy."""
     model = shipgym.load_model(name)
     speed, angle = model.particulars["speed"], np.radians(drift_deg)
-    values = {"u": speed * np.cos(angle), "v": -speed * np.sin(angle), "r": turn / ship_time(model)}
+    values = {
+        "u": speed * np.cos(angle),
+        "v": -speed * np.sin(angle),
+        "r": turn / ship_time(model),
+    }
     start = np.array([values.get(state, 0.0) for state in model.state_names])
     dt = ship_time(model) / 100
     trial = model.simulate(np.zeros((1000, 2)), dt, start)
@@ -120,16 +148,21 @@ def test_a_ship_without_thrust_loses_energy(name, drift_deg, turn):
 
 
 @pytest.mark.parametrize(
-    "name", [name for name in SHIPS if isinstance(REFERENCE_SHIPS[name]().dynamics, Structure)]
+    "name",
+    [name for name in SHIPS if isinstance(REFERENCE_SHIPS[name]().dynamics, Structure)],
 )
 @pytest.mark.parametrize("size", [1 / 23.0, 2.0])
 def test_a_ship_scaled_by_froude_sails_the_same_track_in_ship_lengths(name, size):
     """Speeds and times go with the root of the length."""
     ship = shipgym.load_model(name)
     other = scale_model(ship, ship.particulars["length"] * size)
-    assert other.particulars["speed"] == pytest.approx(ship.particulars["speed"] * np.sqrt(size))
+    assert other.particulars["speed"] == pytest.approx(
+        ship.particulars["speed"] * np.sqrt(size)
+    )
     one = manoeuvres.turning_circle(ship, 35, 400.0, 0.5)
-    two = manoeuvres.turning_circle(other, 35, 400.0 * np.sqrt(size), 0.5 * np.sqrt(size))
+    two = manoeuvres.turning_circle(
+        other, 35, 400.0 * np.sqrt(size), 0.5 * np.sqrt(size)
+    )
     np.testing.assert_allclose(two["psi"], one["psi"], rtol=1e-9, atol=1e-12)
     np.testing.assert_allclose(two["x"] / size, one["x"], rtol=1e-8, atol=1e-6)
     np.testing.assert_allclose(two["u"] / np.sqrt(size), one["u"], rtol=1e-9)
@@ -153,9 +186,13 @@ def linear(state, coefficients, ship):
 def test_a_step_sails_by_the_equations_of_motion_in_wind_and_current(monkeypatch):
     """Position, heading, heel, memory of yaw, rudder with lag and shaft against SciPy's integrator."""
     monkeypatch.setattr(motion, "accelerations", linear)
-    monkeypatch.setattr(motion, "shaft_acceleration", lambda n, command, *_: 0.3 * (command - n))
+    monkeypatch.setattr(
+        motion, "shaft_acceleration", lambda n, command, *_: 0.3 * (command - n)
+    )
     push = motion.Push(0.04, -0.03, 0.002, 0.01, 0.7, -0.4)
-    start = motion.Motion(10.0, -20.0, 0.4, 4.0, 0.5, 0.03, 0.02, 0.15, 0.001, 0.05, 1.2)
+    start = motion.Motion(
+        10.0, -20.0, 0.4, 4.0, 0.5, 0.03, 0.02, 0.15, 0.001, 0.05, 1.2
+    )
     order, shaft, h, steps = 0.07, 0.9, 0.25, 40
 
     def rates(_, state):
@@ -164,10 +201,18 @@ def test_a_step_sails_by_the_equations_of_motion_in_wind_and_current(monkeypatch
         level = np.cos(now.phi)
         c, s = np.cos(now.psi), np.sin(now.psi)
         return [
-            now.u * c - now.v * level * s + 0.7, now.u * s + now.v * level * c - 0.4, now.r * level,
-            udot + 0.04, vdot - 0.03, rdot + 0.002, pdot + 0.01, now.p, qdot, 0.5 * (order - now.delta),
+            now.u * c - now.v * level * s + 0.7,
+            now.u * s + now.v * level * c - 0.4,
+            now.r * level,
+            udot + 0.04,
+            vdot - 0.03,
+            rdot + 0.002,
+            pdot + 0.01,
+            now.p,
+            qdot,
+            0.5 * (order - now.delta),
             0.3 * (shaft - now.n),
-        ]  # fmt: skip
+        ]
 
     exact = solve_ivp(rates, (0.0, h * steps), start, rtol=1e-10, atol=1e-12).y[:, -1]
     now = start
@@ -176,7 +221,9 @@ def test_a_step_sails_by_the_equations_of_motion_in_wind_and_current(monkeypatch
     np.testing.assert_allclose(now, exact, rtol=1e-5, atol=1e-5)
     one = motion.sail(start, order, shaft, h, push, None, SHIP)
     there = solve_ivp(rates, (0.0, h), start, rtol=1e-11, atol=1e-13).y[:, -1]
-    np.testing.assert_allclose(np.array(one) - start, there - start, rtol=1e-4, atol=1e-8)
+    np.testing.assert_allclose(
+        np.array(one) - start, there - start, rtol=1e-4, atol=1e-8
+    )
 
 
 def test_a_rudder_follows_its_order_by_lag_and_rate(monkeypatch):
@@ -197,11 +244,17 @@ def test_a_rudder_follows_its_order_by_lag_and_rate(monkeypatch):
 @pytest.mark.parametrize(
     ("velocities", "heel", "lost"),
     [
-        ((14.9, 0.0, 0.0), 0.0, False), ((15.1, 0.0, 0.0), 0.0, True), ((12.0, 9.5, 0.0), 0.0, True),
-        ((5.0, 0.0, 0.29), 0.0, False), ((5.0, 0.0, -0.31), 0.0, True), ((5.0, 0.0, 0.0), 1.57, False),
-        ((5.0, 0.0, 0.0), -1.58, True), ((np.nan, 0.0, 0.0), 0.0, True), ((5.0, 0.0, np.nan), 0.0, True),
+        ((14.9, 0.0, 0.0), 0.0, False),
+        ((15.1, 0.0, 0.0), 0.0, True),
+        ((12.0, 9.5, 0.0), 0.0, True),
+        ((5.0, 0.0, 0.29), 0.0, False),
+        ((5.0, 0.0, -0.31), 0.0, True),
+        ((5.0, 0.0, 0.0), 1.57, False),
+        ((5.0, 0.0, 0.0), -1.58, True),
+        ((np.nan, 0.0, 0.0), 0.0, True),
+        ((5.0, 0.0, np.nan), 0.0, True),
     ],
-)  # fmt: skip
+)
 def test_a_ship_is_lost_beyond_what_any_ship_does(velocities, heel, lost, monkeypatch):
     """Three times service speed, six times U / L, a right angle of heel, or no number."""
     state = motion.Motion(0.0, 0.0, 0.0, *velocities, 0.0, heel, 0.0, 0.0, 0.0)
@@ -229,22 +282,32 @@ def test_inertia_of_each_ship_is_that_of_her_source():
     container = shipgym.load_model("container")
     found = inertia(container) / unit
     assert found[0, 0] == pytest.approx(0.00792 + 0.000238)
-    assert found[1] == pytest.approx([0.0, 0.00792 + 0.007049, 0.007049 * 0.05 * L, -0.007049 * 0.0313 * L])
-    assert found[2] == pytest.approx([0.0, 0.007049 * 0.05 * L, (0.000456 + 0.000419) * L**2, 0.0])
-    assert rigid_inertia(container) == pytest.approx((0.00792 * unit, 0.0, 0.000456 * unit * L**2))
+    assert found[1] == pytest.approx(
+        [0.0, 0.00792 + 0.007049, 0.007049 * 0.05 * L, -0.007049 * 0.0313 * L]
+    )
+    assert found[2] == pytest.approx(
+        [0.0, 0.007049 * 0.05 * L, (0.000456 + 0.000419) * L**2, 0.0]
+    )
+    assert rigid_inertia(container) == pytest.approx(
+        (0.00792 * unit, 0.0, 0.000456 * unit * L**2)
+    )
 
     tanker = shipgym.load_model("tanker")
     shallow = 18.46 / (37.0 - 18.46)
     in_tons = np.diag(inertia(tanker, 37.0)[:, :3]) / 225.5e6
     yaw = (0.1232 + 0.0045 * shallow) * 304.8**2
-    np.testing.assert_allclose(in_tons, [1.05 + 0.05 * shallow, 2.02 + 0.387 * shallow, yaw])
+    np.testing.assert_allclose(
+        in_tons, [1.05 + 0.05 * shallow, 2.02 + 0.387 * shallow, yaw]
+    )
 
 
 def test_inertia_of_a_table_is_that_of_the_particulars():
     """With the centre of gravity off midship: mass, static moment, Steiner's part and added mass."""
     mariner = shipgym.load_model("mariner")
     ship = replace(mariner.particulars, mass=2e7, xg=-3.0, yaw_gyradius=40.0)
-    ship = replace(ship, X_udot=-1e-3, Y_vdot=-8e-3, Y_rdot=-1e-4, N_vdot=-2e-4, N_rdot=-5e-4)
+    ship = replace(
+        ship, X_udot=-1e-3, Y_vdot=-8e-3, Y_rdot=-1e-4, N_vdot=-2e-4, N_rdot=-5e-4
+    )
     model = replace(mariner, particulars=ship)
     unit, L = 0.5 * ship.require("water_density") * ship.length**3, ship.length
     yaw = 2e7 * (40.0**2 + 9.0)

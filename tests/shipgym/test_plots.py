@@ -22,7 +22,15 @@ from shipgym.plots import (
     turning_figure,
     zigzag_figure,
 )
-from shipgym.plots.style import MEASURED, PALETTE, Panel, line_styles, panels, points, translucent
+from shipgym.plots.style import (
+    MEASURED,
+    PALETTE,
+    Panel,
+    line_styles,
+    panels,
+    points,
+    translucent,
+)
 from shipgym.plots.trials import AXES, thinned
 from tests.golden.texts import flat, same_text
 
@@ -30,7 +38,9 @@ DERIVED = ("speed", "drift")  # channels that u and v give
 
 
 def same_figure(name, figure):
-    return same_text(f"plots/{name}", "\n".join(flat(json.loads(figure.to_json()), "figure")))
+    return same_text(
+        f"plots/{name}", "\n".join(flat(json.loads(figure.to_json()), "figure"))
+    )
 
 
 def values(figure, axis, trace=0):
@@ -52,15 +62,30 @@ def test_angles_are_drawn_in_degrees_and_speeds_in_metres_per_second(circle):
 
 
 def test_measured_lines_are_dark_and_lines_share_one_entry_of_the_legend(circle):
-    figure = history_figure({"measured": circle, "predicted": circle}, ["psi", "r", "u"])
+    figure = history_figure(
+        {"measured": circle, "predicted": circle}, ["psi", "r", "u"]
+    )
     assert same_figure("histories", figure)
-    assert [trace.showlegend for trace in figure.data] == [True, True, False, False, False, False]
-    assert {trace.line.color for trace in figure.data if trace.name == "measured"} == {"#1f2a37"}
+    assert [trace.showlegend for trace in figure.data] == [
+        True,
+        True,
+        False,
+        False,
+        False,
+        False,
+    ]
+    assert {trace.line.color for trace in figure.data if trace.name == "measured"} == {
+        "#1f2a37"
+    }
 
 
 def test_every_channel_is_drawn_in_its_unit():
     t = np.arange(4000.0)  # so many that not all are drawn
-    channels = {name: 0.01 * (k + 1.0) + 1e-5 * t for k, name in enumerate(AXES) if name not in DERIVED}
+    channels = {
+        name: 0.01 * (k + 1.0) + 1e-5 * t
+        for k, name in enumerate(AXES)
+        if name not in DERIVED
+    }
     figure = history_figure({"run": Trial(t, channels)}, [*AXES])
     assert same_figure("every channel", figure)
     factors = [values(figure, "y", k)[0] / (0.01 * (k + 1.0)) for k in (0, 2)]
@@ -125,8 +150,12 @@ def test_a_turning_circle_is_drawn_with_its_indices():
     indices, figure = turning_indices(trial), turning_figure(trial)
     assert same_figure("turning circle", figure)
     marks = {trace.name.rsplit(" ", 2)[0]: trace for trace in figure.data}
-    assert np.ptp(np.asarray(marks["advance"].y, dtype=float)) == pytest.approx(indices.advance_lengths)
-    assert np.ptp(np.asarray(marks["transfer"].x, dtype=float)) == pytest.approx(indices.transfer_lengths)
+    assert np.ptp(np.asarray(marks["advance"].y, dtype=float)) == pytest.approx(
+        indices.advance_lengths
+    )
+    assert np.ptp(np.asarray(marks["transfer"].x, dtype=float)) == pytest.approx(
+        indices.transfer_lengths
+    )
     diameter = np.asarray(marks["tactical diameter"].x, dtype=float)
     assert diameter.min() == pytest.approx(-indices.tactical_diameter_lengths)
 
@@ -135,10 +164,16 @@ def test_the_loop_of_a_spiral_is_marked_where_it_is():
     t = np.arange(3.0)
     trial = Trial(t, {"delta": t, "r": t})
     spiral = Spiral(
-        trial, np.array([10, 3, 1, -5, 1, 3, 10.0]), np.array([1, 0.5, -0.5, -1, -0.7, 0.5, 1.0]), "direct"
+        trial,
+        np.array([10, 3, 1, -5, 1, 3, 10.0]),
+        np.array([1, 0.5, -0.5, -1, -0.7, 0.5, 1.0]),
+        "direct",
     )
     wide = Spiral(
-        trial, np.array([10, 1, -1, -10, 1, 5, 10.0]), np.array([1, 0.5, -0.5, -1, -0.7, 0.7, 1.0]), "direct"
+        trial,
+        np.array([10, 1, -1, -10, 1, 5, 10.0]),
+        np.array([1, 0.5, -0.5, -1, -0.7, 0.7, 1.0]),
+        "direct",
     )
     assert [trace.name for trace in spiral_figure(spiral).data] == ["there", "and back"]
     assert same_figure("spiral", spiral_figure(wide))
@@ -169,16 +204,25 @@ def test_every_manoeuvre_has_its_figure():
 
 def test_speed_and_drift_follow_from_surge_and_sway(circle):
     figure = history_figure({"turn": circle}, ["speed", "drift"])
-    assert values(figure, "y", 0) == pytest.approx(np.hypot(circle["u"], circle["v"]), rel=1e-6)
-    assert values(figure, "y", 1)[-1] > 0.0  # in a turn to starboard the ship moves to port of her heading
+    assert values(figure, "y", 0) == pytest.approx(
+        np.hypot(circle["u"], circle["v"]), rel=1e-6
+    )
+    assert (
+        values(figure, "y", 1)[-1] > 0.0
+    )  # in a turn to starboard the ship moves to port of her heading
 
 
 def test_a_turn_to_starboard_has_its_marks_to_starboard(circle):
     indices, figure = turning_indices(circle), turning_figure(circle)
-    x = {trace.name.rsplit(" ", 2)[0]: np.asarray(trace.x, dtype=float) for trace in figure.data}
+    x = {
+        trace.name.rsplit(" ", 2)[0]: np.asarray(trace.x, dtype=float)
+        for trace in figure.data
+    }
     assert x["advance"] == pytest.approx(np.full(2, indices.transfer_lengths))
     assert x["transfer"] == pytest.approx([0.0, indices.transfer_lengths])
-    assert x["tactical diameter"] == pytest.approx([0.0, indices.tactical_diameter_lengths])
+    assert x["tactical diameter"] == pytest.approx(
+        [0.0, indices.tactical_diameter_lengths]
+    )
 
 
 def test_a_turn_that_ends_early_is_drawn_without_marks(circle):
@@ -187,7 +231,13 @@ def test_a_turn_that_ends_early_is_drawn_without_marks(circle):
 
 
 def test_fifteen_hundred_samples_of_a_line_are_drawn_at_most():
-    assert [thinned(range(n)).step for n in (3, 1500, 1501, 3000, 3001)] == [1, 1, 2, 2, 3]
+    assert [thinned(range(n)).step for n in (3, 1500, 1501, 3000, 3001)] == [
+        1,
+        1,
+        2,
+        2,
+        3,
+    ]
 
 
 def test_lines_beyond_the_palette_begin_with_it_again():
@@ -203,7 +253,9 @@ def test_rows_of_panels_have_a_gap_between_them():
     """Of 0.36 of the height by the number of rows, of two rows at least."""
     for count in (2, 3, 4):
         figure = panels([Panel([])] * count, 400)
-        ends = [figure.layout[f"yaxis{k or ''}"].domain for k in ("", *range(2, count + 1))]
+        ends = [
+            figure.layout[f"yaxis{k or ''}"].domain for k in ("", *range(2, count + 1))
+        ]
         gaps = [above[0] - below[1] for above, below in pairwise(ends)]
         assert gaps == pytest.approx([0.36 / count] * (count - 1))
     empty = panels([], 400)
@@ -214,13 +266,20 @@ def test_rows_of_panels_have_a_gap_between_them():
 def test_points_are_markers_of_seven_pixels():
     for size, drawn in ((), 7.0), ((9.0,), 9.0):
         found = points([0.0, 1.0], [2.0, 3.0], "measured", "#1f2a37", *size)
-        assert (found.mode, found.marker.size, found.marker.color) == ("markers", drawn, "#1f2a37")
+        assert (found.mode, found.marker.size, found.marker.color) == (
+            "markers",
+            drawn,
+            "#1f2a37",
+        )
 
 
 def test_a_spiral_to_one_side_has_no_loop():
     t = np.arange(3.0)
     one_side = np.array([3.0, 2.0, 1.0]), np.array([0.9, 0.6, 0.3])
-    for method, lines in (("reverse", ["reverse spiral"]), ("direct", ["there", "and back"])):
+    for method, lines in (
+        ("reverse", ["reverse spiral"]),
+        ("direct", ["there", "and back"]),
+    ):
         spiral = Spiral(Trial(t, {"delta": t, "r": t}), *one_side, method)
         assert [trace.name for trace in spiral_figure(spiral).data] == lines
 
@@ -228,14 +287,19 @@ def test_a_spiral_to_one_side_has_no_loop():
 def test_a_zigzag_that_never_reverses_has_no_switch_heading():
     t = np.arange(50.0)
     trial = Trial(t, {"psi": 0.001 * t, "delta": np.full(50, 0.1)}, kind="zigzag")
-    assert [trace.name for trace in manoeuvre_figure(trial).data] == ["heading change", "rudder"]
+    assert [trace.name for trace in manoeuvre_figure(trial).data] == [
+        "heading change",
+        "rudder",
+    ]
 
 
 def test_a_pull_out_is_drawn_from_the_end_of_its_turn():
     """The rudder is amidships from where it is below half of what it was."""
     t = np.arange(60.0)
     delta = np.r_[np.full(20, 0.3), np.full(10, 0.16), np.full(10, 0.14), np.zeros(20)]
-    trial = Trial(t, {"delta": delta, "r": 0.02 - 1e-4 * t}, name="starboard", kind="pull-out")
+    trial = Trial(
+        t, {"delta": delta, "r": 0.02 - 1e-4 * t}, name="starboard", kind="pull-out"
+    )
     (drawn,) = manoeuvre_figure(trial).data
     assert np.asarray(drawn.x, dtype=float)[[0, 30]] == pytest.approx([-30.0, 0.0])
     assert np.asarray(drawn.y, dtype=float)[0] == pytest.approx(np.degrees(0.02))
@@ -248,8 +312,14 @@ def test_a_ship_without_shaft_has_two_panels_of_speed():
     channels = {"u": 5.0 - 0.1 * t, "v": 0.0 * t}
     trial = Trial(t, channels, kind="straight", length=10.0)
     assert len(manoeuvre_figure(trial).data) == 2
-    figure = manoeuvre_figure(Trial(t, channels | {"n": 1.0 + t}, kind="straight", length=10.0))
-    assert [trace.name for trace in figure.data] == ["surge speed", "surge speed", "shaft"]
+    figure = manoeuvre_figure(
+        Trial(t, channels | {"n": 1.0 + t}, kind="straight", length=10.0)
+    )
+    assert [trace.name for trace in figure.data] == [
+        "surge speed",
+        "surge speed",
+        "shaft",
+    ]
     assert values(figure, "x", 0)[:2] == pytest.approx([0.0, 0.495])  # ship lengths
     assert values(figure, "y", 2) == pytest.approx(1.0 + t)
 
@@ -257,8 +327,13 @@ def test_a_ship_without_shaft_has_two_panels_of_speed():
 def test_orders_that_never_change_are_not_drawn():
     t = np.arange(20.0)
     still = dict.fromkeys(("delta_command", "n_command", "n"), np.ones(20))
-    trial = Trial(t, still | {"delta": 0.01 * t, "psi": 0.0 * t, "r": 0.0 * t}, kind="random")
+    trial = Trial(
+        t, still | {"delta": 0.01 * t, "psi": 0.0 * t, "r": 0.0 * t}, kind="random"
+    )
     figure = manoeuvre_figure(trial)
     titles = [figure.layout[f"yaxis{k}"].title.text for k in ("", 2, 3)]
-    assert (len(figure.data), titles) == (3, ["rudder, deg", "heading, deg", "yaw rate, deg/s"])
+    assert (len(figure.data), titles) == (
+        3,
+        ["rudder, deg", "heading, deg", "yaw rate, deg/s"],
+    )
     assert figure.layout.showlegend is False

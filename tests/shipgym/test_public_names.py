@@ -15,7 +15,14 @@ import shipgym.manoeuvres
 import shipgym.sea
 
 DEFAULTS = Path(__file__).with_name("defaults.json")
-PUBLIC = ("shipgym", "shipgym.manoeuvres", "shipgym.sea", "shipgym.ships", "identification", "agents")
+PUBLIC = (
+    "shipgym",
+    "shipgym.manoeuvres",
+    "shipgym.sea",
+    "shipgym.ships",
+    "identification",
+    "agents",
+)
 
 
 def defaults():
@@ -24,12 +31,19 @@ def defaults():
     for package in map(importlib.import_module, PUBLIC):
         for name in sorted(set(package.__all__) - {"ShipVecEnv"}):  # which loads torch
             given = getattr(package, name)
-            if not callable(given) or (inspect.isclass(given) and issubclass(given, Exception)):
+            if not callable(given) or (
+                inspect.isclass(given) and issubclass(given, Exception)
+            ):
                 continue
-            for called, function in {f"{package.__name__}.{name}": given, **methods(package, name)}.items():
+            for called, function in {
+                f"{package.__name__}.{name}": given,
+                **methods(package, name),
+            }.items():
                 parameters = inspect.signature(function).parameters.values()
                 own = {
-                    p.name: p.default for p in parameters if isinstance(p.default, int | float | str | tuple)
+                    p.name: p.default
+                    for p in parameters
+                    if isinstance(p.default, int | float | str | tuple)
                 }
                 if own:
                     found[called] = json.loads(json.dumps(own, default=repr))
@@ -72,8 +86,8 @@ def test_weather_and_towing_tank_are_reached_by_their_names():
 
 def test_the_import_registers_environments_and_loads_nothing_that_compiles():
     code = (
-        "import sys, shipgym; "
-        "sys.exit(any(name in sys.modules for name in ('numba', 'scipy', 'control', 'plotly', 'torch')))"
+        "import sys, shipgym; sys.exit(any(name in sys.modules for name in ('numba',"
+        " 'scipy', 'control', 'plotly', 'torch')))"
     )
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
     assert "shipgym/CourseKeeping-v0" in gymnasium.registry

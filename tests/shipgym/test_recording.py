@@ -5,7 +5,15 @@ import gymnasium
 import numpy as np
 import pytest
 
-from shipgym import Current, Episode, InputError, RecordEpisode, Weather, Wind, load_model
+from shipgym import (
+    Current,
+    Episode,
+    InputError,
+    RecordEpisode,
+    Weather,
+    Wind,
+    load_model,
+)
 from shipgym.envs import recording
 from shipgym.envs.recording import plain
 
@@ -14,7 +22,9 @@ PATH = np.array([[0.0, 0.0], [2000.0, 500.0]])
 
 
 def course_keeping(**arguments):
-    return gymnasium.make(COURSE_KEEPING, **{"model": "mariner", "episode_steps": 5, **arguments})
+    return gymnasium.make(
+        COURSE_KEEPING, **{"model": "mariner", "episode_steps": 5, **arguments}
+    )
 
 
 def sail(env, seed=None, steps=None):
@@ -46,12 +56,16 @@ def test_what_an_agent_did_is_identified_again(tmp_path):
         for rudder in np.repeat(random.uniform(-0.6, 0.6, 10), 40):
             env.step(np.array([rudder], dtype=np.float32))
     trials = [Episode.load(tmp_path / name).to_trial() for name in files(tmp_path)]
-    result = identify([*trials[:2], trials[2].with_(use="validate")], particulars=ship.particulars)
+    result = identify(
+        [*trials[:2], trials[2].with_(use="validate")], particulars=ship.particulars
+    )
     unseen = result.metrics["trials"][trials[2].name]["rmse"]
     assert unseen["psi"] < np.radians(0.5)
     assert unseen["u"] < 0.001 * ship.particulars["speed"]
     for name in ("N_d", "Y_d", "N_v", "N_r"):
-        assert result.coefficients[name] == pytest.approx(ship.coefficients[name], rel=0.05)
+        assert result.coefficients[name] == pytest.approx(
+            ship.coefficients[name], rel=0.05
+        )
 
 
 def test_a_recorded_episode_is_begun_again_from_its_seed_and_number(tmp_path):
@@ -75,23 +89,42 @@ def test_rewards_parts_and_orders_are_those_of_the_environment(tmp_path):
     rewards = sail(env, seed=3)
     episode = Episode.load(tmp_path / "episode-00000.json")
     assert episode.rewards.tolist() == rewards
-    assert sum(episode.reward_parts.values()) == pytest.approx(episode.rewards, abs=1e-12)
-    assert episode.commands["delta"] == pytest.approx(episode.actions[:, 0] * np.radians(40.0))
+    assert sum(episode.reward_parts.values()) == pytest.approx(
+        episode.rewards, abs=1e-12
+    )
+    assert episode.commands["delta"] == pytest.approx(
+        episode.actions[:, 0] * np.radians(40.0)
+    )
     assert episode.info.keys() >= {"heading_error", "extrapolating"}
     error = episode.states["set_point"] - episode.states["psi"]
-    assert np.cos(episode.info["heading_error"]) == pytest.approx(np.cos(error), abs=1e-6)
-    assert (episode.truncated, episode.terminated, episode.success) == (True, False, None)
-    assert (episode.length, episode.beam, episode.dt) == (160.93, 23.17, env.unwrapped.dt)
+    assert np.cos(episode.info["heading_error"]) == pytest.approx(
+        np.cos(error), abs=1e-6
+    )
+    assert (episode.truncated, episode.terminated, episode.success) == (
+        True,
+        False,
+        None,
+    )
+    assert (episode.length, episode.beam, episode.dt) == (
+        160.93,
+        23.17,
+        env.unwrapped.dt,
+    )
     assert episode.waypoints is None
 
 
 def test_only_the_episodes_that_the_trigger_picks_are_written(tmp_path):
-    env = RecordEpisode(course_keeping(), tmp_path, lambda number: number % 2 == 1, trials=True)
+    env = RecordEpisode(
+        course_keeping(), tmp_path, lambda number: number % 2 == 1, trials=True
+    )
     for _ in range(4):
         sail(env)
     assert files(tmp_path) == [
-        "episode-00001.csv", "episode-00001.json", "episode-00003.csv", "episode-00003.json",
-    ]  # fmt: skip
+        "episode-00001.csv",
+        "episode-00001.json",
+        "episode-00003.csv",
+        "episode-00003.json",
+    ]
 
 
 def test_an_episode_that_is_cut_off_is_written_and_says_so(tmp_path):
@@ -100,7 +133,11 @@ def test_an_episode_that_is_cut_off_is_written_and_says_so(tmp_path):
     sail(env, steps=3)
     env.reset()
     env.close()
-    assert files(tmp_path) == ["episode-00000.json", "episode-00001.csv", "episode-00001.json"]
+    assert files(tmp_path) == [
+        "episode-00000.json",
+        "episode-00001.csv",
+        "episode-00001.json",
+    ]
     episode = Episode.load(tmp_path / "episode-00001.json")
     assert episode.n_steps == 3
     assert not episode.truncated
@@ -120,7 +157,11 @@ class Follower(gymnasium.Wrapper):
         return getattr(self.env.unwrapped, name)
 
     def physical_state(self):
-        return {**self.env.unwrapped.physical_state(), "delta_command": 0.125, "cross_track_error": 1.0}
+        return {
+            **self.env.unwrapped.physical_state(),
+            "delta_command": 0.125,
+            "cross_track_error": 1.0,
+        }
 
     def step(self, action):
         *outcome, info = super().step(action)
@@ -134,14 +175,20 @@ def test_path_orders_and_success_are_recorded_where_there_are_any(tmp_path):
     assert np.array_equal(episode.waypoints, PATH)
     assert episode.corridor == 80.0
     with pytest.raises(InputError, match="waypoints"):
-        replace(episode, waypoints=np.vstack([PATH, PATH[-1:]]))  # the last leg has no direction
+        replace(
+            episode, waypoints=np.vstack([PATH, PATH[-1:]])
+        )  # the last leg has no direction
     assert episode.success is True
     assert episode.commands["delta"].tolist() == [0.125] * 5
     assert episode.states["cross_track_error"].tolist() == [1.0] * 6
 
 
-def test_orders_are_what_the_ship_was_told_whatever_a_wrapper_makes_of_the_action(tmp_path):
-    env = gymnasium.wrappers.RescaleAction(course_keeping(), np.float32(-2.0), np.float32(2.0))
+def test_orders_are_what_the_ship_was_told_whatever_a_wrapper_makes_of_the_action(
+    tmp_path,
+):
+    env = gymnasium.wrappers.RescaleAction(
+        course_keeping(), np.float32(-2.0), np.float32(2.0)
+    )
     sail(RecordEpisode(env, tmp_path))
     episode = Episode.load(tmp_path / "episode-00000.json")
     ordered = np.clip(episode.actions[:, 0] / 2.0, -1.0, 1.0) * episode.rudder_limit
@@ -168,12 +215,18 @@ def test_weather_and_models_given_as_objects_are_told_in_words(tmp_path):
 
 def test_arguments_are_told_with_texts_as_keys():
     given = {1: np.float32(0.5), None: (np.inf, None), ("a", 2): {True: np.arange(2)}}
-    assert plain(given) == {"1": 0.5, "None": ["inf", None], "('a', 2)": {"True": [0, 1]}}
+    assert plain(given) == {
+        "1": 0.5,
+        "None": ["inf", None],
+        "('a', 2)": {"True": [0, 1]},
+    }
 
 
 def test_recordings_are_not_mixed_with_earlier_ones(tmp_path):
     sail(RecordEpisode(course_keeping(), tmp_path))
-    with pytest.raises(InputError, match=r"holds 'episode-00000\.json' of an earlier recording"):
+    with pytest.raises(
+        InputError, match=r"holds 'episode-00000\.json' of an earlier recording"
+    ):
         RecordEpisode(course_keeping(), tmp_path)
     sail(RecordEpisode(course_keeping(), tmp_path, overwrite=True))
     sail(RecordEpisode(course_keeping(), tmp_path, name_prefix="lq"))
@@ -181,7 +234,9 @@ def test_recordings_are_not_mixed_with_earlier_ones(tmp_path):
 
 
 def test_what_cannot_be_recorded_is_refused_at_once(tmp_path):
-    with pytest.raises(InputError, match="has no 'physical_state', expected an environment of shipgym"):
+    with pytest.raises(
+        InputError, match="has no 'physical_state', expected an environment of shipgym"
+    ):
         RecordEpisode(gymnasium.make("CartPole-v1"), tmp_path)
     several = gymnasium.make_vec(COURSE_KEEPING, num_envs=2, vectorization_mode="sync")
     with pytest.raises(InputError, match="expected a single environment"):
@@ -205,20 +260,36 @@ def test_an_environment_that_records_is_made_again_from_its_spec(tmp_path):
 def test_a_recorded_environment_is_still_gymnasiums(tmp_path):
     from gymnasium.utils.env_checker import check_env
 
-    check_env(RecordEpisode(course_keeping(), tmp_path, overwrite=True), skip_render_check=True)
+    check_env(
+        RecordEpisode(course_keeping(), tmp_path, overwrite=True),
+        skip_render_check=True,
+    )
 
 
 def test_of_what_is_reported_single_finite_numbers_are_kept():
     info = {
-        "cross_track": np.float32(1.5), "in_corridor": np.True_, "steps": 3, "far": np.inf, "text": "a",
-        "waypoints": np.zeros(2), "reward_end": -1.0, "success": True, "is_success": False,
-    }  # fmt: skip
-    assert recording._numbers(info) == {"cross_track": 1.5, "in_corridor": 1.0, "steps": 3.0}
+        "cross_track": np.float32(1.5),
+        "in_corridor": np.True_,
+        "steps": 3,
+        "far": np.inf,
+        "text": "a",
+        "waypoints": np.zeros(2),
+        "reward_end": -1.0,
+        "success": True,
+        "is_success": False,
+    }
+    assert recording._numbers(info) == {
+        "cross_track": 1.5,
+        "in_corridor": 1.0,
+        "steps": 3.0,
+    }
 
 
 def test_a_name_that_some_step_lacks_is_left_out():
     found = recording._columns([{"a": 1.0, "b": 2.0}, {"b": 3.0, "c": 4.0}])
-    assert {name: values.tolist() for name, values in found.items()} == {"b": [2.0, 3.0]}
+    assert {name: values.tolist() for name, values in found.items()} == {
+        "b": [2.0, 3.0]
+    }
 
 
 def test_episodes_are_counted_from_the_last_seed(tmp_path):
@@ -228,14 +299,18 @@ def test_episodes_are_counted_from_the_last_seed(tmp_path):
     recorded = [Episode.load(tmp_path / name) for name in files(tmp_path)]
     assert [one.number for one in recorded] == [0, 0, 1, 2, 0]
     assert [one.seed for one in recorded][1:] == [4, 4, 4, 5]
-    env.unwrapped.np_random = np.random.default_rng(0)  # a generator put in by hand has no seed
+    env.unwrapped.np_random = np.random.default_rng(
+        0
+    )  # a generator put in by hand has no seed
     sail(env)
     assert Episode.load(tmp_path / "episode-00005.json").seed is None
 
 
 def test_a_trigger_is_asked_with_the_number_of_the_episode(tmp_path):
     asked = []
-    env = RecordEpisode(course_keeping(episode_steps=1), tmp_path, lambda number: asked.append(number))
+    env = RecordEpisode(
+        course_keeping(episode_steps=1), tmp_path, lambda number: asked.append(number)
+    )
     for _ in range(3):
         sail(env)
     assert asked == [0, 1, 2]

@@ -37,7 +37,10 @@ LENGTH, BEAM = 160.0, 40.0
 SHIP = Scene(5000.0, -300.0, 0.0, 0.0, LENGTH, BEAM, np.radians(35.0), np.zeros((0, 2)))
 CHART = slice(150, 520)  # rows without read-outs, compass and gauge
 METRES = 14.0 * LENGTH / SIZE
-PLACES = ((200.0, -300.0), (182.8, -182.8))  # m north and east of a ship, on a leg and on an arc
+PLACES = (
+    (200.0, -300.0),
+    (182.8, -182.8),
+)  # m north and east of a ship, on a leg and on an arc
 
 
 @pytest.fixture(scope="module")
@@ -70,19 +73,27 @@ def test_a_rudder_to_starboard_shows_to_starboard(renderer, side):
 
 
 def test_a_path_lies_where_it_is(renderer):
-    path = np.array([[4000.0, -100.0], [6000.0, -100.0]])  # 200 m to starboard of the ship
-    north, east = where(renderer.draw(replace(SHIP, waypoints=path, corridor=50.0)), PATH)
+    path = np.array(
+        [[4000.0, -100.0], [6000.0, -100.0]]
+    )  # 200 m to starboard of the ship
+    north, east = where(
+        renderer.draw(replace(SHIP, waypoints=path, corridor=50.0)), PATH
+    )
     assert east.mean() == pytest.approx(200.0, abs=2 * METRES)
     assert np.ptp(north) > 1000.0
 
 
-@pytest.mark.parametrize(("anchor", "left", "right"), [("left", 0, 1), ("right", 1, 0), ("centre", 1, 1)])
+@pytest.mark.parametrize(
+    ("anchor", "left", "right"), [("left", 0, 1), ("right", 1, 0), ("centre", 1, 1)]
+)
 def test_a_text_stands_at_its_anchor(renderer, anchor, left, right):
     picture, brush = renderer._pygame.Surface((SIZE, SIZE)), renderer._brush
     brush.fill((255, 255, 255))
     brush.text("HIH", (300.0, 100.0), (0, 0, 0), anchor)
     brush.show(picture)
-    columns, rows = np.nonzero(renderer._pygame.surfarray.array3d(picture)[..., 0] < 200)
+    columns, rows = np.nonzero(
+        renderer._pygame.surfarray.array3d(picture)[..., 0] < 200
+    )
     width = left * (300 - columns.min()) + right * (columns.max() - 300)
     assert np.ptp(columns) == pytest.approx(width, abs=4)
     assert 0 <= rows.mean() - (90 if anchor == "centre" else 100) < 20
@@ -94,17 +105,22 @@ def test_the_same_scene_gives_the_same_picture(renderer):
 
 def test_an_unknown_mode_is_refused():
     with pytest.raises(
-        InputError, match=r"render_mode: 'ansi' found, expected one of 'human', 'rgb_array'\."
+        InputError,
+        match=r"render_mode: 'ansi' found, expected one of 'human', 'rgb_array'\.",
     ):
         Renderer("ansi")
 
 
 COURSE_KEEPING, PATH_FOLLOWING = "shipgym/CourseKeeping-v0", "shipgym/PathFollowing-v0"
-TROUBLED = Weather(current=Current(0.8, towards_deg=90.0), wind=Wind(9.0, from_deg=200.0))
+TROUBLED = Weather(
+    current=Current(0.8, towards_deg=90.0), wind=Wind(9.0, from_deg=200.0)
+)
 
 
 def make(name, **options):
-    return gymnasium.make(name, **{"model": "mariner", "render_mode": "rgb_array", **options})
+    return gymnasium.make(
+        name, **{"model": "mariner", "render_mode": "rgb_array", **options}
+    )
 
 
 def sailed(env, steps=60):
@@ -122,14 +138,21 @@ def shows(picture, colour):
 def test_a_ship_without_a_known_beam_is_drawn_like_most(beam, drawn):
     ship = load_model("mariner")
     ship = replace(ship, particulars=replace(ship.particulars, beam=beam))
-    shown = scene(make(COURSE_KEEPING, model=ship).unwrapped._engine, 0, np.zeros((0, 2)))
+    shown = scene(
+        make(COURSE_KEEPING, model=ship).unwrapped._engine, 0, np.zeros((0, 2))
+    )
     assert (shown.length, shown.beam) == pytest.approx((160.93, drawn))
 
 
 @pytest.mark.parametrize(
     ("name", "options", "shown", "absent"),
     [
-        (COURSE_KEEPING, {}, (HULL, ORDER, WAKE, RUDDER), (PATH, CORRIDOR, WIND, CURRENT)),
+        (
+            COURSE_KEEPING,
+            {},
+            (HULL, ORDER, WAKE, RUDDER),
+            (PATH, CORRIDOR, WIND, CURRENT),
+        ),
         (COURSE_KEEPING, {"sea": "moderate"}, (HULL, ORDER, WIND), (PATH, CURRENT)),
         (PATH_FOLLOWING, {}, (HULL, ORDER, PATH, CORRIDOR), (WIND, CURRENT)),
         (PATH_FOLLOWING, {"sea": TROUBLED}, (HULL, PATH, WIND, CURRENT), ()),
@@ -153,7 +176,9 @@ def test_a_picture_follows_from_seed_and_actions_and_the_wake_begins_anew():
 
 
 def test_rendering_changes_nothing_of_the_voyage():
-    shown, blind = (make(COURSE_KEEPING, render_mode=mode) for mode in ("rgb_array", None))
+    shown, blind = (
+        make(COURSE_KEEPING, render_mode=mode) for mode in ("rgb_array", None)
+    )
     for env in (shown, blind):
         sailed(env)
     assert shown.unwrapped.physical_state() == blind.unwrapped.physical_state()
@@ -174,7 +199,9 @@ def test_a_window_opens_and_closes_without_a_screen(monkeypatch):
 
 
 def test_rows_of_a_vector_environment_have_their_own_pictures():
-    rows = gymnasium.make_vec(PATH_FOLLOWING, 3, model="mariner", render_mode="rgb_array")
+    rows = gymnasium.make_vec(
+        PATH_FOLLOWING, 3, model="mariner", render_mode="rgb_array"
+    )
     rows.reset(seed=1)
     single = make(PATH_FOLLOWING)
     single.reset(seed=2)
@@ -190,7 +217,9 @@ def test_rows_of_a_vector_environment_have_their_own_pictures():
 
 def test_videos_are_recorded(tmp_path):
     pytest.importorskip("moviepy", reason="RecordVideo writes its files with moviepy")
-    env = gymnasium.wrappers.RecordVideo(make(COURSE_KEEPING, episode_steps=5), str(tmp_path / "videos"))
+    env = gymnasium.wrappers.RecordVideo(
+        make(COURSE_KEEPING, episode_steps=5), str(tmp_path / "videos")
+    )
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # of what moviepy imports
         env.reset(seed=0)
@@ -230,8 +259,15 @@ def sketch(renderer, monkeypatch):
 
 
 def test_readouts_stand_beside_their_names_line_by_line(sketch):
-    scene = replace(SHIP, readouts={"speed": "7.5 m/s", "step": "12"}, wind=(9.96, 0.5), current=(0.456, 1.0))
-    left = [one for one in sketch(scene).texts if one[2] == "left" and one[1][0] == 18.0]
+    scene = replace(
+        SHIP,
+        readouts={"speed": "7.5 m/s", "step": "12"},
+        wind=(9.96, 0.5),
+        current=(0.456, 1.0),
+    )
+    left = [
+        one for one in sketch(scene).texts if one[2] == "left" and one[1][0] == 18.0
+    ]
     right = [one for one in sketch(scene).texts if one[2] == "right"]
     assert [text for text, *_ in left] == ["speed", "step", "wind", "current"]
     assert [text for text, *_ in right] == ["7.5 m/s", "12", "10.0 m/s", "0.46 m/s"]
@@ -243,7 +279,9 @@ def test_readouts_stand_beside_their_names_line_by_line(sketch):
 def test_the_gauge_shows_the_rudder_as_part_of_its_limit(sketch):
     for rudder, part in ((0.0, 0.0), (17.5, 0.5), (-35.0, -1.0), (50.0, 1.0)):
         found = sketch(replace(SHIP, rudder=np.radians(rudder)))
-        (_, (tip, height), _) = next(one for one in found.of("line", RUDDER) if one[2] == 5)
+        _, (tip, height), _ = next(
+            one for one in found.of("line", RUDDER) if one[2] == 5
+        )
         assert tip == pytest.approx(SIZE / 2 + 90.0 * part)
         assert height > 0.9 * SIZE
         texts = [text for text, *_ in found.texts]
@@ -252,10 +290,27 @@ def test_the_gauge_shows_the_rudder_as_part_of_its_limit(sketch):
 
 def test_the_compass_points_where_things_come_from_and_go_to(sketch):
     """Wind towards the middle from its side, current outward, the order's mark outside the circle."""
-    found = sketch(replace(SHIP, heading=0.0, course_order=np.pi / 2, wind=(5.0, np.pi), current=(1.0, 0.0)))
+    found = sketch(
+        replace(
+            SHIP,
+            heading=0.0,
+            course_order=np.pi / 2,
+            wind=(5.0, np.pi),
+            current=(1.0, 0.0),
+        )
+    )
     middle = np.array([SIZE - 70.0, 70.0])
-    letters = {text: np.array(at) - middle for text, at, _ in found.texts if text in tuple("NESW")}
-    for letter, (x, y) in {"N": (0, -1), "E": (1, 0), "S": (0, 1), "W": (-1, 0)}.items():
+    letters = {
+        text: np.array(at) - middle
+        for text, at, _ in found.texts
+        if text in tuple("NESW")
+    }
+    for letter, (x, y) in {
+        "N": (0, -1),
+        "E": (1, 0),
+        "S": (0, 1),
+        "W": (-1, 0),
+    }.items():
         np.testing.assert_allclose(letters[letter], np.array([x, y]) * 37.0, atol=1e-9)
     ((tail, tip),) = found.of("arrow", WIND)
     assert np.hypot(*(np.array(tail) - middle)) == pytest.approx(64.0)
@@ -267,7 +322,10 @@ def test_the_compass_points_where_things_come_from_and_go_to(sketch):
     assert mark[1] == pytest.approx(0.0, abs=1e-9)
     ((_, needle),) = found.of("arrow", HULL)
     np.testing.assert_allclose(np.array(needle) - middle, [0.0, -30.0], atol=1e-9)
-    ticks = [np.hypot(*(np.array(end) - middle)) for start, end in found.of("line", FAINT)[:12]]
+    ticks = [
+        np.hypot(*(np.array(end) - middle))
+        for start, end in found.of("line", FAINT)[:12]
+    ]
     np.testing.assert_allclose(ticks, 47.0)
 
 
@@ -294,29 +352,49 @@ def test_a_corridor_is_drawn_around_its_path(sketch):
     ((strip,),) = found.of("polygon", CORRIDOR)
     width = np.ptp(np.array(strip)[:, 0]) * METRES
     assert width == pytest.approx(100.0)
-    assert [radius for _, radius in found.of("circle", CORRIDOR)] == [pytest.approx(50.0 / METRES)] * 2
+    assert [radius for _, radius in found.of("circle", CORRIDOR)] == [
+        pytest.approx(50.0 / METRES)
+    ] * 2
     assert len(found.of("circle", PATH)) == 2
 
 
 def test_the_turns_of_a_planned_path_are_arcs_that_touch_both_legs(renderer):
-    corner = np.array([[4000.0, 0.0], [5200.0, 0.0], [5200.0, 1200.0]])  # 90 deg to starboard
+    corner = np.array(
+        [[4000.0, 0.0], [5200.0, 0.0], [5200.0, 1200.0]]
+    )  # 90 deg to starboard
     points = track(corner, 400.0)
-    inside = np.hypot(points[:, 0] - 4800.0, points[:, 1] - 400.0)  # from the centre of the turn
+    inside = np.hypot(
+        points[:, 0] - 4800.0, points[:, 1] - 400.0
+    )  # from the centre of the turn
     arc = inside < 401.0
     np.testing.assert_allclose(inside[arc], 400.0)
-    np.testing.assert_allclose(points[arc][[0, -1]], [[4800.0, 0.0], [5200.0, 400.0]], atol=1e-9)
+    np.testing.assert_allclose(
+        points[arc][[0, -1]], [[4800.0, 0.0], [5200.0, 400.0]], atol=1e-9
+    )
     np.testing.assert_allclose(track(corner * [1, -1], 400.0), points * [1, -1])
     assert track(corner, None) is corner
     scene = replace(SHIP, x=4900.0, y=300.0, waypoints=corner)
-    for radius, seen in ((None, (200.0, -300.0)), (400.0, (182.8, -182.8))):  # of the leg, of the arc
+    for radius, seen in (
+        (None, (200.0, -300.0)),
+        (400.0, (182.8, -182.8)),
+    ):  # of the leg, of the arc
         north, east = where(renderer.draw(replace(scene, turn_radius=radius)), PATH)
-        near = {place: (np.hypot(north - place[0], east - place[1]) < 4 * METRES).any() for place in PLACES}
+        near = {
+            place: (np.hypot(north - place[0], east - place[1]) < 4 * METRES).any()
+            for place in PLACES
+        }
         assert near == {place: place == seen for place in PLACES}
 
 
 @pytest.mark.parametrize(
     ("angle_deg", "shown"),
-    [(0.0, "000.0"), (7.26, "007.3"), (-90.0, "270.0"), (359.96, "000.0"), (725.0, "005.0")],
+    [
+        (0.0, "000.0"),
+        (7.26, "007.3"),
+        (-90.0, "270.0"),
+        (359.96, "000.0"),
+        (725.0, "005.0"),
+    ],
 )
 def test_a_bearing_is_shown_as_on_a_compass(angle_deg, shown):
     assert artist._bearing(np.radians(angle_deg)) == f"{shown} deg"
@@ -325,9 +403,19 @@ def test_a_bearing_is_shown_as_on_a_compass(angle_deg, shown):
 class Voyage:
     """Stands for an engine of two lanes, the second of which is looked at."""
 
-    model, shown = load_model("mariner"), SimpleNamespace(outcomes=np.array([[-9.0, -0.1234]]))
+    model, shown = (
+        load_model("mariner"),
+        SimpleNamespace(outcomes=np.array([[-9.0, -0.1234]])),
+    )
     task = SimpleNamespace(info_names=("cross_track",))
-    state = {"x": 10.0, "y": -20.0, "psi": 3.1, "u": 7.2, "v": -2.1, "delta": -0.1}  # noqa: RUF012
+    state = {  # noqa: RUF012
+        "x": 10.0,
+        "y": -20.0,
+        "psi": 3.1,
+        "u": 7.2,
+        "v": -2.1,
+        "delta": -0.1,
+    }
 
     def physical_state(self):
         return {name: np.array([99.0, value]) for name, value in self.state.items()}
@@ -346,9 +434,12 @@ def test_readouts_are_those_of_the_lane_in_usual_units():
     voyage = Voyage()
     shown = scene(voyage, 1, np.zeros((0, 2)))
     assert shown.readouts == {
-        "speed": "7.5 m/s, 14.6 kn", "heading": "177.6 deg", "rudder": "-5.7 deg", "cross-track": "-35 m",
+        "speed": "7.5 m/s, 14.6 kn",
+        "heading": "177.6 deg",
+        "rudder": "-5.7 deg",
+        "cross-track": "-35 m",
         "reward": "-0.123",
-    }  # fmt: skip
+    }
     assert (shown.x, shown.y, shown.heading, shown.rudder) == (10.0, -20.0, 3.1, -0.1)
     assert shown.rudder_limit == pytest.approx(np.radians(40.0))
     assert (shown.course_order, shown.corridor, shown.turn_radius) == (3.1, 160.0, None)
@@ -356,8 +447,18 @@ def test_readouts_are_those_of_the_lane_in_usual_units():
     voyage.state = {**voyage.state, "set_point": -3.1}  # 4.8 degrees on, through south
     voyage.task = SimpleNamespace(info_names=())
     shown = scene(voyage, 1, np.zeros((0, 2)))
-    assert list(shown.readouts) == ["speed", "heading", "to steer", "heading error", "rudder", "reward"]
-    assert (shown.readouts["to steer"], shown.readouts["heading error"]) == ("182.4 deg", "+4.8 deg")
+    assert list(shown.readouts) == [
+        "speed",
+        "heading",
+        "to steer",
+        "heading error",
+        "rudder",
+        "reward",
+    ]
+    assert (shown.readouts["to steer"], shown.readouts["heading error"]) == (
+        "182.4 deg",
+        "+4.8 deg",
+    )
     assert shown.course_order == -3.1
 
 
@@ -365,11 +466,19 @@ def test_readouts_are_those_of_the_lane_in_usual_units():
     ("sea", "wind", "current"),
     [
         ({"wind_speed": 9.0, "wind_from": 0.5}, (9.0, 0.5), None),
-        ({"wind_speed": 0.0, "current_north": 0.0, "current_east": -2.0}, None, (2.0, -np.pi / 2)),
+        (
+            {"wind_speed": 0.0, "current_north": 0.0, "current_east": -2.0},
+            None,
+            (2.0, -np.pi / 2),
+        ),
         ({"current_north": -1.0, "current_east": 0.0}, None, (1.0, np.pi)),
-        ({"current_north": 3.0, "current_east": 4.0}, None, (5.0, np.arctan2(4.0, 3.0))),
+        (
+            {"current_north": 3.0, "current_east": 4.0},
+            None,
+            (5.0, np.arctan2(4.0, 3.0)),
+        ),
     ],
-)  # fmt: skip
+)
 def test_wind_and_current_are_shown_where_there_is_any(sea, wind, current):
     voyage = Voyage()
     voyage.state = {**voyage.state, **sea}
@@ -396,15 +505,23 @@ def test_a_ship_is_drawn_with_her_bow_ahead_and_her_rudder_behind(sketch):
     middle = np.array([SIZE / 2, SIZE / 2])
     start, bow, *_ = found.of("line", HULL)[0]
     np.testing.assert_allclose(
-        (np.array([start, bow]) - middle) * METRES, [[0, 0], [1.1 * LENGTH, 0]], atol=1e-6
+        (np.array([start, bow]) - middle) * METRES,
+        [[0, 0], [1.1 * LENGTH, 0]],
+        atol=1e-6,
     )
     stern, blade, width = next(one for one in found.of("line", RUDDER) if one[2] == 3)
-    np.testing.assert_allclose((stern - middle) * METRES, [-0.5 * LENGTH, 0.0], atol=1e-6)
-    aft = 0.22 * LENGTH * np.array([-np.cos(np.pi / 6), np.sin(np.pi / 6)])  # to starboard is down
+    np.testing.assert_allclose(
+        (stern - middle) * METRES, [-0.5 * LENGTH, 0.0], atol=1e-6
+    )
+    aft = (
+        0.22 * LENGTH * np.array([-np.cos(np.pi / 6), np.sin(np.pi / 6)])
+    )  # to starboard is down
     np.testing.assert_allclose((blade - stern) * METRES, aft, atol=1e-6)
     (tail, tip), *_ = found.of("arrow", ORDER)
     np.testing.assert_allclose(
-        (np.array([tail, tip]) - middle) * METRES, [[0, 0], [0, 1.6 * LENGTH]], atol=1e-6
+        (np.array([tail, tip]) - middle) * METRES,
+        [[0, 0], [0, 1.6 * LENGTH]],
+        atol=1e-6,
     )
     ((hull,),) = found.of("polygon", HULL)
     along, across = ((np.array(hull) - middle) * METRES).T
@@ -413,26 +530,50 @@ def test_a_ship_is_drawn_with_her_bow_ahead_and_her_rudder_behind(sketch):
     assert along[0] == along.max()  # the stem, amidships
     assert across[0] == pytest.approx(0.0, abs=1e-9)
     mirrored = {(round(x, 6), round(-y, 6)) for x, y in zip(along, across, strict=True)}
-    assert mirrored == {(round(x, 6), round(y, 6)) for x, y in zip(along, across, strict=True)}
+    assert mirrored == {
+        (round(x, 6), round(y, 6)) for x, y in zip(along, across, strict=True)
+    }
     assert width == 3
 
 
 def test_what_a_scene_has_not_is_not_drawn(sketch):
     found = sketch(SHIP)
-    assert found.of("arrow", ORDER) == found.of("polygon", ORDER) == found.of("lines", WAKE) == []
-    assert found.of("lines", PATH) == found.of("arrow", WIND) == found.of("arrow", CURRENT) == []
+    assert (
+        found.of("arrow", ORDER)
+        == found.of("polygon", ORDER)
+        == found.of("lines", WAKE)
+        == []
+    )
+    assert (
+        found.of("lines", PATH)
+        == found.of("arrow", WIND)
+        == found.of("arrow", CURRENT)
+        == []
+    )
     one = sketch(replace(SHIP, wake=np.zeros((1, 2))))
     assert one.of("lines", WAKE) == []  # of one place there is no line
     wake = np.array([[4900.0, -300.0], [5000.0, -200.0]])
     ((points, width),) = sketch(replace(SHIP, wake=wake)).of("lines", WAKE)
-    np.testing.assert_allclose((points - SIZE / 2) * METRES, [[0.0, 100.0], [100.0, 0.0]], atol=1e-9)
+    np.testing.assert_allclose(
+        (points - SIZE / 2) * METRES, [[0.0, 100.0], [100.0, 0.0]], atol=1e-9
+    )
     assert width == 2
 
 
 def test_the_gauge_has_marks_at_its_ends_halves_and_middle_within_its_panel(sketch):
     found = sketch(SHIP)
-    marks = [one for one in found.of("line", FAINT) if one[0][0] == one[1][0] and one[0][1] > 0.9 * SIZE]
-    assert [start[0] - SIZE / 2 for start, *_ in marks] == [-90.0, -45.0, 0.0, 45.0, 90.0]
+    marks = [
+        one
+        for one in found.of("line", FAINT)
+        if one[0][0] == one[1][0] and one[0][1] > 0.9 * SIZE
+    ]
+    assert [start[0] - SIZE / 2 for start, *_ in marks] == [
+        -90.0,
+        -45.0,
+        0.0,
+        45.0,
+        90.0,
+    ]
     assert {end[1] - start[1] for start, end in marks} == {10.0}
     left, top, width, height = found.of("panel", PANEL)[-1][0]
     assert left + width / 2 == SIZE / 2
@@ -441,7 +582,9 @@ def test_the_gauge_has_marks_at_its_ends_halves_and_middle_within_its_panel(sket
             assert anchor == "centre"
             assert left < x < left + width
             assert top < y < top + height
-    (scale,) = [start[0] for start, end in [found.of("line", FAINT)[-6]] if start[1] == end[1]]
+    (scale,) = [
+        start[0] for start, end in [found.of("line", FAINT)[-6]] if start[1] == end[1]
+    ]
     assert scale == SIZE / 2 - 90.0
 
 
@@ -465,7 +608,9 @@ class Canvas:
         self.calls = []
 
     def __getattr__(self, kind):
-        return lambda surface, colour, *what, **how: self.calls.append((kind, *what, how))
+        return lambda surface, colour, *what, **how: self.calls.append(
+            (kind, *what, how)
+        )
 
 
 def brushed(draw):
@@ -485,7 +630,9 @@ def test_a_pixel_is_two_of_the_finer_surface():
     assert brushed(lambda brush: brush.lines(INK, [(1, 2), (3, 4)], 2)) == [
         ("lines", False, [[2.0, 4.0], [6.0, 8.0]], 4, {})
     ]
-    assert brushed(lambda brush: brush.circle(INK, (1, 2), 5.0)) == [("circle", [2.0, 4.0], 10.0, 0, {})]
+    assert brushed(lambda brush: brush.circle(INK, (1, 2), 5.0)) == [
+        ("circle", [2.0, 4.0], 10.0, 0, {})
+    ]
     assert brushed(lambda brush: brush.circle(INK, (1, 2), 5.0, 2))[0][3] == 4
     assert brushed(lambda brush: brush.panel(INK, (1, 2, 3, 4))) == [
         ("rect", [2.0, 4.0, 6.0, 8.0], {"border_radius": 16})
@@ -493,18 +640,29 @@ def test_a_pixel_is_two_of_the_finer_surface():
 
 
 def test_an_arrow_has_its_tip_where_it_points_and_is_alike_on_both_sides():
-    (_, tail, end, _, _), (_, head, _) = brushed(lambda brush: brush.arrow(INK, (10.0, 10.0), (10.0, 50.0)))
+    (_, tail, end, _, _), (_, head, _) = brushed(
+        lambda brush: brush.arrow(INK, (10.0, 10.0), (10.0, 50.0))
+    )
     assert tail == [20.0, 20.0]
     assert end == [20.0, 90.0]  # within the head
     tip, left, right = np.array(head)
     assert tip.tolist() == [20.0, 100.0]
     assert sorted([left.tolist(), right.tolist()]) == [[12.0, 82.0], [28.0, 82.0]]
-    assert len(brushed(lambda brush: brush.arrow(INK, (1.0, 1.0), (1.0, 1.0)))) == 2  # of no length
+    assert (
+        len(brushed(lambda brush: brush.arrow(INK, (1.0, 1.0), (1.0, 1.0)))) == 2
+    )  # of no length
 
 
 @pytest.mark.parametrize(
     ("length", "spacing"),
-    [(0.5, 1.0), (43.0, 100.0), (85.5, 100.0), (86.0, 200.0), (214.0, 200.0), (215.0, 500.0)],
+    [
+        (0.5, 1.0),
+        (43.0, 100.0),
+        (85.5, 100.0),
+        (86.0, 200.0),
+        (214.0, 200.0),
+        (215.0, 500.0),
+    ],
 )
 def test_lines_are_a_round_distance_apart_six_to_the_chart_or_more(length, spacing):
     """1, 2 or 5 times a power of ten, at most a sixth of the 14 ship lengths across."""

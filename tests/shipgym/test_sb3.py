@@ -16,7 +16,9 @@ MARINER = shipgym.load_model("mariner")
 
 def dummy(name, num_envs, info_keywords=(), **options):
     def make():
-        return Monitor(gymnasium.make(name, model=MARINER, **options), info_keywords=info_keywords)
+        return Monitor(
+            gymnasium.make(name, model=MARINER, **options), info_keywords=info_keywords
+        )
 
     return DummyVecEnv([make] * num_envs)
 
@@ -30,7 +32,15 @@ def ours(name, num_envs=3, **options):
     [
         (COURSE, {"episode_steps": 23, **LOST}),
         (PATH, {"episode_steps": 39, "corridor": 0.4, "ground": 0.5}),
-        (PATH, {"episode_steps": 33, "n_legs": 1, "leg_lengths": (1.0, 2.0), "corridor": 3.0}),
+        (
+            PATH,
+            {
+                "episode_steps": 33,
+                "n_legs": 1,
+                "leg_lengths": (1.0, 2.0),
+                "corridor": 3.0,
+            },
+        ),
         (
             COURSE,
             {
@@ -78,19 +88,29 @@ def test_it_is_a_dummy_vec_env_step_by_step(name, options):
 
 
 def _same_last_info(info, full):
-    np.testing.assert_array_equal(info["terminal_observation"], full["terminal_observation"])
+    np.testing.assert_array_equal(
+        info["terminal_observation"], full["terminal_observation"]
+    )
     if "success" in full:
         assert info["is_success"] == full["success"]
     assert info["episode"]["l"] == full["episode"]["l"]
     assert info["episode"]["r"] == pytest.approx(full["episode"]["r"], abs=2e-6)
-    assert 0.0 <= info["episode"]["t"] < 3600.0  # since the environment was made, not since 1970
+    assert (
+        0.0 <= info["episode"]["t"] < 3600.0
+    )  # since the environment was made, not since 1970
     same = full.keys() - {"terminal_observation", "episode"}
     assert info.keys() - same <= {"terminal_observation", "episode", "is_success"}
     assert {key: info[key] for key in same} == {key: full[key] for key in same}
 
 
 def test_infos_are_reused_and_parts_of_them_given_on_request():
-    env = ours(COURSE, 4, info_names=["heading_error", "extrapolating"], episode_steps=3, seed=0)
+    env = ours(
+        COURSE,
+        4,
+        info_names=["heading_error", "extrapolating"],
+        episode_steps=3,
+        seed=0,
+    )
     env.reset()
     plain = ours(COURSE, 4, episode_steps=3, seed=0)
     plain.reset()
@@ -118,7 +138,9 @@ def test_statistics_are_those_of_vec_monitor():
     for _ in range(5):
         *_, dones, infos = watched.step(np.zeros((3, 1), np.float32))
     assert dones.all()
-    assert env._infos[0]["episode"]["r"] == pytest.approx(float(infos[0]["episode"]["r"]), rel=1e-6)
+    assert env._infos[0]["episode"]["r"] == pytest.approx(
+        float(infos[0]["episode"]["r"]), rel=1e-6
+    )
     assert env._infos[0]["episode"]["l"] == infos[0]["episode"]["l"] == 5
 
 
@@ -129,10 +151,16 @@ def test_attributes_and_methods_of_rows():
         each.reset()
         each.step(np.full((3, 1), 0.5, np.float32))
     assert env.get_attr("dt") == theirs.get_attr("dt")
-    assert env.get_attr("observation_names", indices=1) == theirs.get_attr("observation_names", indices=1)
+    assert env.get_attr("observation_names", indices=1) == theirs.get_attr(
+        "observation_names", indices=1
+    )
     assert env.get_attr("unwrapped")[0].model is MARINER
-    np.testing.assert_array_equal(env.get_attr("waypoints"), theirs.get_attr("waypoints"))
-    assert env.env_method("physical_state", indices=[2]) == theirs.env_method("physical_state", indices=[2])
+    np.testing.assert_array_equal(
+        env.get_attr("waypoints"), theirs.get_attr("waypoints")
+    )
+    assert env.env_method("physical_state", indices=[2]) == theirs.env_method(
+        "physical_state", indices=[2]
+    )
     assert env.has_attr("task")
     assert not env.has_attr("cargo")
     env.set_attr("cargo", "grain", indices=[0, 2])
@@ -159,12 +187,24 @@ def test_what_is_wrong_is_said():
     for make, message in (
         (lambda: ours("shipgym/CourseKeeping-v0", sae="calm"), "Did you mean 'sea'"),
         (lambda: ours(COURSE, 0), "num_envs: 0 found"),
-        (lambda: ours(COURSE, info_names=["heading_eror"]), "Did you mean 'heading_error'"),
-        (lambda: ours(COURSE, autoreset_mode="Disabled"), "autoreset_mode: found, expected none"),
+        (
+            lambda: ours(COURSE, info_names=["heading_eror"]),
+            "Did you mean 'heading_error'",
+        ),
+        (
+            lambda: ours(COURSE, autoreset_mode="Disabled"),
+            "autoreset_mode: found, expected none",
+        ),
         (lambda: ShipVecEnv(native, 2), "num_envs, options: 2 found"),
         (lambda: ShipVecEnv(native, dt=1.0), "num_envs, options: .*dt"),
-        (lambda: ShipVecEnv(gymnasium.make_vec(COURSE, num_envs=2)), "autoreset_mode NEXT_STEP found"),
-        (lambda: ShipVecEnv(gymnasium.make(COURSE)), "expected the id of an environment of shipgym"),
+        (
+            lambda: ShipVecEnv(gymnasium.make_vec(COURSE, num_envs=2)),
+            "autoreset_mode NEXT_STEP found",
+        ),
+        (
+            lambda: ShipVecEnv(gymnasium.make(COURSE)),
+            "expected the id of an environment of shipgym",
+        ),
     ):
         with pytest.raises(InputError, match=message):
             make()
@@ -195,7 +235,14 @@ def steps(env, count, command=0.4):
     found = []
     for _ in range(count):
         seen, rewards, dones, infos = env.step(np.full((3, 1), command, np.float32))
-        found.append((seen.tolist(), rewards.tolist(), dones.tolist(), [dict(info) for info in infos]))
+        found.append(
+            (
+                seen.tolist(),
+                rewards.tolist(),
+                dones.tolist(),
+                [dict(info) for info in infos],
+            )
+        )
     for *_, infos in found:
         for info in infos:
             if "episode" in info:
@@ -242,12 +289,16 @@ def test_a_row_shows_what_is_fixed_and_its_own_place():
     assert first.observation_space == env.observation_space == second.observation_space
     assert first.action_space == env.action_space
     assert first.render() is None
-    with pytest.raises(AttributeError, match="a row of ShipVecEnv has no attribute 'cargo'"):
+    with pytest.raises(
+        AttributeError, match="a row of ShipVecEnv has no attribute 'cargo'"
+    ):
         _ = first.cargo
     assert not np.array_equal(first.waypoints, second.waypoints)
     assert first.physical_state().keys() == second.physical_state().keys()
     for fixed in ("observation_space", "dt", "waypoints", "render", "physical_state"):
-        with pytest.raises(InputError, match=f"set_attr: '{fixed}' is fixed when the ships are made"):
+        with pytest.raises(
+            InputError, match=f"set_attr: '{fixed}' is fixed when the ships are made"
+        ):
             env.set_attr(fixed, None)
 
 

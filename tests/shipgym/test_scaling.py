@@ -20,10 +20,18 @@ NUMBERS = {
 
 
 def small_ship(name: str) -> ShipModel:
-    coefficients = dict(zip(get_structure(name).coefficient_names, NUMBERS[name], strict=True))
+    coefficients = dict(
+        zip(get_structure(name).coefficient_names, NUMBERS[name], strict=True)
+    )
     particulars = Particulars(length=160.93, speed=7.7175)
-    return ShipModel(name, name, particulars, SteeringGear(35.0, 5.0, 1.0), coefficients,
-                     service_shaft_speed=1.2 if name == "surge" else 0.0)  # fmt: skip
+    return ShipModel(
+        name,
+        name,
+        particulars,
+        SteeringGear(35.0, 5.0, 1.0),
+        coefficients,
+        service_shaft_speed=1.2 if name == "surge" else 0.0,
+    )
 
 
 def test_a_model_of_the_mariner_sails_the_same_circle_in_ship_lengths():
@@ -35,17 +43,26 @@ def test_a_model_of_the_mariner_sails_the_same_circle_in_ship_lengths():
     assert model.particulars.mass_prime == pytest.approx(ship.particulars.mass_prime)
     assert model.coefficients == ship.coefficients
     assert model.steering.rudder_rate_deg_s == pytest.approx(5.0 * np.sqrt(50.0))
-    slow, quick = (turning_circle(s, 35, duration=d, dt=dt) for s, d, dt in (
-        (ship, 900, 0.5), (model, 900 / np.sqrt(50.0), 0.5 / np.sqrt(50.0))))  # fmt: skip
+    slow, quick = (
+        turning_circle(s, 35, duration=d, dt=dt)
+        for s, d, dt in (
+            (ship, 900, 0.5),
+            (model, 900 / np.sqrt(50.0), 0.5 / np.sqrt(50.0)),
+        )
+    )
     np.testing.assert_allclose(quick["x"] * 50.0, slow["x"], rtol=1e-9, atol=1e-6)
     full, small = (turning_indices(t) for t in (slow, quick))
-    assert small.tactical_diameter_lengths == pytest.approx(full.tactical_diameter_lengths, rel=1e-9)
+    assert small.tactical_diameter_lengths == pytest.approx(
+        full.tactical_diameter_lengths, rel=1e-9
+    )
 
 
 def test_a_steering_model_in_si_units_keeps_its_overshoot():
     ship = small_ship("steering5")
     model = scale_model(ship, length=7.0)
-    assert model.coefficients["c_d"] == pytest.approx(3.7e-3 * 160.93 / 7.0)  # U^2/L^2 at one Froude number
+    assert model.coefficients["c_d"] == pytest.approx(
+        3.7e-3 * 160.93 / 7.0
+    )  # U^2/L^2 at one Froude number
     quicker = np.sqrt(160.93 / 7.0)
     overshoots = [
         zigzag_indices(zigzag(s, 20, 20, duration=400 / q, dt=0.5 / q)).overshoot_1_deg
@@ -59,8 +76,10 @@ def test_a_surge_model_stops_in_as_many_ship_lengths_at_another_speed():
     ship = small_ship("surge")
     quick = scale_model(ship, length=160.93, speed=2.0 * 7.7175)
     assert quick.service_shaft_speed == pytest.approx(2.4)
-    stops = [s.simulate(np.tile([0.0, -s.service_shaft_speed], (300, 1)), dt)
-             for s, dt in ((ship, 0.2), (quick, 0.1))]  # fmt: skip
+    stops = [
+        s.simulate(np.tile([0.0, -s.service_shaft_speed], (300, 1)), dt)
+        for s, dt in ((ship, 0.2), (quick, 0.1))
+    ]
     np.testing.assert_allclose(stops[0]["x"], stops[1]["x"], rtol=1e-9, atol=1e-9)
 
 
@@ -70,17 +89,24 @@ def test_there_and_back_is_the_ship_itself():
     ship = replace(
         small_ship("steering5"),
         covariance=root @ root.T,
-        envelope=Envelope.from_samples(*random.normal([[7.0], [0.0], [0.0], [0.0]], 1.0, (4, 200))),
+        envelope=Envelope.from_samples(
+            *random.normal([[7.0], [0.0], [0.0], [0.0]], 1.0, (4, 200))
+        ),
     )
     model = scale_model(ship, 7.0)
     again = scale_model(model, 160.93)
     np.testing.assert_allclose(again.covariance, ship.covariance, rtol=1e-12)
-    np.testing.assert_allclose(again.ship_numbers(), ship.ship_numbers(), rtol=1e-9, atol=1e-15)
+    np.testing.assert_allclose(
+        again.ship_numbers(), ship.ship_numbers(), rtol=1e-9, atol=1e-15
+    )
     state = np.array([7.0, 0.3, 0.01, 0.2])
     scale = [np.sqrt(7.0 / 160.93)] * 2 + [np.sqrt(160.93 / 7.0), 1.0]
-    assert model.envelope.distance(*state * scale) == pytest.approx(ship.envelope.distance(*state))
+    assert model.envelope.distance(*state * scale) == pytest.approx(
+        ship.envelope.distance(*state)
+    )
     deviations = [
-        np.sqrt(np.diag(s.covariance)) / np.abs(list(s.coefficients.values())) for s in (ship, model)
+        np.sqrt(np.diag(s.covariance)) / np.abs(list(s.coefficients.values()))
+        for s in (ship, model)
     ]
     np.testing.assert_allclose(*deviations, rtol=1e-12)
 
@@ -89,9 +115,9 @@ def test_fresh_water_at_model_scale_becomes_salt_water():
     ship = shipgym.load_model("mariner")
     model = scale_model(ship, 3.0, water_density=1000.0)
     assert model.particulars.mass_prime == pytest.approx(ship.particulars.mass_prime)
-    assert scale_model(model, 160.93, water_density=1025.0).particulars.mass == pytest.approx(
-        ship.particulars.mass
-    )
+    assert scale_model(
+        model, 160.93, water_density=1025.0
+    ).particulars.mass == pytest.approx(ship.particulars.mass)
 
 
 @pytest.mark.parametrize(
@@ -111,14 +137,31 @@ def test_each_particular_grows_with_its_power_of_the_length():
     """Four times as long: lengths 4, areas 16, the roll period 2, mass 64 (in denser water more)."""
     small = replace(
         shipgym.load_model("mariner").particulars,
-        rudder_area=30.0, propeller_diameter=6.0, length_overall=170.0,
-        frontal_area=500.0, lateral_area=2000.0, lateral_centroid=-3.0, lateral_centroid_height=8.0,
-        metacentric_height=1.2, roll_period=14.0, xg=-2.0, yaw_gyradius=40.0, mass=1.7e7,
+        rudder_area=30.0,
+        propeller_diameter=6.0,
+        length_overall=170.0,
+        frontal_area=500.0,
+        lateral_area=2000.0,
+        lateral_centroid=-3.0,
+        lateral_centroid_height=8.0,
+        metacentric_height=1.2,
+        roll_period=14.0,
+        xg=-2.0,
+        yaw_gyradius=40.0,
+        mass=1.7e7,
         block_coefficient=0.6,
-    )  # fmt: skip
+    )
     ship = replace(shipgym.load_model("mariner"), particulars=small)
     large = scale_model(ship, 4.0 * small.length).particulars
-    lengths = ("length", "beam", "draught", "xg", "yaw_gyradius", "propeller_diameter", "length_overall")
+    lengths = (
+        "length",
+        "beam",
+        "draught",
+        "xg",
+        "yaw_gyradius",
+        "propeller_diameter",
+        "length_overall",
+    )
     lengths += ("lateral_centroid", "lateral_centroid_height", "metacentric_height")
     growth = dict.fromkeys(lengths, 4.0) | dict.fromkeys(
         ("rudder_area", "frontal_area", "lateral_area"), 16.0

@@ -30,7 +30,9 @@ def test_white_noise_has_its_standard_deviation_and_no_memory(still):
 def test_drift_is_a_gauss_markov_process(still):
     """Variance as given, correlation exp(-lag / T); position errors of GNSS are white plus drift."""
     sensor = Sensor(drift=2.0, drift_time_s=10.0)
-    reading = np.concatenate([Sensors({"x": sensor}).measure(still, seed)["x"] for seed in range(3)])
+    reading = np.concatenate(
+        [Sensors({"x": sensor}).measure(still, seed)["x"] for seed in range(3)]
+    )
     assert reading.std() == pytest.approx(2.0, rel=0.05)
     for lag in (1, 5, 20):
         correlation = np.corrcoef(reading[lag:], reading[:-lag])[0, 1]
@@ -38,7 +40,9 @@ def test_drift_is_a_gauss_markov_process(still):
 
 
 def test_outliers_come_as_often_as_told(still):
-    reading = Sensors({"v": Sensor(outlier_probability=0.02, outlier_size=5.0)}).measure(still)["v"]
+    reading = Sensors(
+        {"v": Sensor(outlier_probability=0.02, outlier_size=5.0)}
+    ).measure(still)["v"]
     wrong = reading != 0.0
     assert wrong.mean() == pytest.approx(0.02, rel=0.15)
     assert reading[wrong].std() == pytest.approx(5.0, rel=0.1)
@@ -84,8 +88,12 @@ def test_the_logger_samples_the_trial_and_orders_stay_orders(zigzag):
     measured = Sensors({}, sampling_s=0.25).measure(zigzag)
     np.testing.assert_allclose(np.diff(measured.t), 0.25)
     assert zigzag.t[-1] - 0.25 < measured.t[-1] <= zigzag.t[-1]
-    assert len(Sensors({}, sampling_s=0.1).measure(zigzag)) == len(zigzag)  # the last one too
-    assert set(np.unique(measured["delta_command"])) == set(np.unique(zigzag["delta_command"]))
+    assert len(Sensors({}, sampling_s=0.1).measure(zigzag)) == len(
+        zigzag
+    )  # the last one too
+    assert set(np.unique(measured["delta_command"])) == set(
+        np.unique(zigzag["delta_command"])
+    )
     assert (measured.kind, measured.length) == ("zigzag", zigzag.length)
 
 
@@ -101,18 +109,32 @@ def test_a_sea_trial_has_instruments_for_roll_as_for_yaw():
     """Gyros of 0.02 deg/s, angles to 0.1 deg; the shaft is counted to a tenth of a turn a minute."""
     degree = np.radians(1.0)
     noise = {name: sensor.noise for name, sensor in SEA_TRIAL.items() if sensor.noise}
-    assert noise == pytest.approx({
-        "x": 0.3, "y": 0.3, "psi": 0.1 * degree, "phi": 0.1 * degree, "r": 0.02 * degree, "p": 0.02 * degree,
-        "u": 0.03, "v": 0.02,
-    })  # fmt: skip
-    steps = {name: sensor.resolution for name, sensor in SEA_TRIAL.items() if sensor.resolution}
+    assert noise == pytest.approx(
+        {
+            "x": 0.3,
+            "y": 0.3,
+            "psi": 0.1 * degree,
+            "phi": 0.1 * degree,
+            "r": 0.02 * degree,
+            "p": 0.02 * degree,
+            "u": 0.03,
+            "v": 0.02,
+        }
+    )
+    steps = {
+        name: sensor.resolution
+        for name, sensor in SEA_TRIAL.items()
+        if sensor.resolution
+    }
     assert steps == pytest.approx({"delta": 0.1 * degree, "n": 0.1 / 60.0})
     assert Sensor() == Sensor(drift_time_s=300.0)
     assert Sensors().dropout_samples == 3.0
 
 
 def test_a_sensor_may_err_always_and_a_gap_be_of_one_sample(still):
-    always = Sensors({"v": Sensor(outlier_probability=1.0, outlier_size=1.0)}, dropout_samples=1.0)
+    always = Sensors(
+        {"v": Sensor(outlier_probability=1.0, outlier_size=1.0)}, dropout_samples=1.0
+    )
     assert np.count_nonzero(always.measure(still)["v"]) == N
     with pytest.raises(InputError, match=r"outlier_probability: 1\.01 found"):
         Sensor(outlier_probability=1.01)
@@ -130,7 +152,9 @@ def test_a_sea_trial_still_tells_the_overshoot(zigzag):
     """6 degrees of overshoot, read through the sensors of a sea trial at 2 Hz, are right to a few tenths."""
     measured = Sensors(sampling_s=0.5, dropout_probability=0.01).measure(zigzag, 1)
     seen = manoeuvres.zigzag_indices(measured).overshoot_1_deg
-    assert seen == pytest.approx(manoeuvres.zigzag_indices(zigzag).overshoot_1_deg, abs=0.4)
+    assert seen == pytest.approx(
+        manoeuvres.zigzag_indices(zigzag).overshoot_1_deg, abs=0.4
+    )
 
 
 @pytest.mark.parametrize(
@@ -142,13 +166,27 @@ def test_a_sea_trial_still_tells_the_overshoot(zigzag):
         (lambda t: Sensors({"speed": Sensor()}), "unknown channel 'speed'"),
         (lambda t: Sensors({"u": 0.1}), "u: 0.1 found, expected a Sensor"),
         (lambda t: Sensors(sampling_s=-1.0), "sampling_s: -1 found"),
-        (lambda t: Sensors(sampling_s=500.0).measure(t), "sampling_s: 500 s found, expected at most half"),
+        (
+            lambda t: Sensors(sampling_s=500.0).measure(t),
+            "sampling_s: 500 s found, expected at most half",
+        ),
         (lambda t: Sensor(drift_time_s=0.0), "sensor drift_time_s: 0 found"),
-        (lambda t: Sensors(dropout_samples=0.99), "sensors dropout_samples: 0.99 found"),
+        (
+            lambda t: Sensors(dropout_samples=0.99),
+            "sensors dropout_samples: 0.99 found",
+        ),
         (lambda t: Sensors(sampling_s=0.0), "sensors sampling_s: 0 found"),
-        (lambda t: Sensors(dropout_probability=-0.1), "sensors dropout_probability: -0.1 found"),
+        (
+            lambda t: Sensors(dropout_probability=-0.1),
+            "sensors dropout_probability: -0.1 found",
+        ),
         (lambda t: Sensors(dropout_probability=1.0), "dropout_probability: 1 found"),
-        (lambda t: Sensors(dropout_probability=0.999, dropout_samples=1e5).measure(t), "outside the gaps"),
+        (
+            lambda t: Sensors(dropout_probability=0.999, dropout_samples=1e5).measure(
+                t
+            ),
+            "outside the gaps",
+        ),
         (lambda t: Sensors().measure(t, -1), "seed: -1 found"),
     ],
 )

@@ -18,7 +18,8 @@ from shipgym.trials.trial import Trial
 SHIPS = Path(__file__).parents[1] / "ships"
 DATA = Path(__file__).parents[2].parent / "shared" / "data"
 needs_data = pytest.mark.skipif(
-    not DATA.is_dir(), reason="the measured trials lie beside the checkout and are absent here"
+    not DATA.is_dir(),
+    reason="the measured trials lie beside the checkout and are absent here",
 )
 
 T = np.arange(0.0, 30.0, 0.25)
@@ -88,14 +89,18 @@ def columns(psi_factor=1.0, sign=1.0, shaft=600.0):
 
 def write_csv(path, table):
     rows = zip(*(values.tolist() for values in table.values()), strict=True)
-    path.write_text("\n".join([",".join(table), *(",".join(map(repr, row)) for row in rows)]) + "\n")
+    path.write_text(
+        "\n".join([",".join(table), *(",".join(map(repr, row)) for row in rows)]) + "\n"
+    )
 
 
 @pytest.fixture
 def folder(tmp_path):
     (tmp_path / "runs").mkdir()
     write_csv(tmp_path / "a.csv", columns(sign=-1.0))
-    write_csv(tmp_path / "runs" / "b.csv", columns(psi_factor=np.pi / 180.0, shaft=10.0))
+    write_csv(
+        tmp_path / "runs" / "b.csv", columns(psi_factor=np.pi / 180.0, shaft=10.0)
+    )
     (tmp_path / "ship.toml").write_text(SHIP)
     return tmp_path
 
@@ -103,9 +108,13 @@ def folder(tmp_path):
 def refusal(folder, old="", new="", read=False, text=None):
     """The message for the ship file with one change."""
     assert old in SHIP
-    (folder / "ship.toml").write_text(SHIP.replace(old, new, 1) if text is None else text)
+    (folder / "ship.toml").write_text(
+        SHIP.replace(old, new, 1) if text is None else text
+    )
     answer = (
-        ShipFile.load(folder / "ship.toml").trials if read else partial(ShipFile.load, folder / "ship.toml")
+        ShipFile.load(folder / "ship.toml").trials
+        if read
+        else partial(ShipFile.load, folder / "ship.toml")
     )
     with pytest.raises(InputError) as caught:
         answer()
@@ -118,7 +127,11 @@ def refusal(folder, old="", new="", read=False, text=None):
 def test_a_ship_file_gives_particulars_steering_gear_and_defaults(folder):
     ship = ShipFile.load(str(folder / "ship.toml"))
     assert ship.path == folder / "ship.toml"
-    assert (ship.particulars.name, ship.particulars.length, ship.particulars.Y_vdot) == (
+    assert (
+        ship.particulars.name,
+        ship.particulars.length,
+        ship.particulars.Y_vdot,
+    ) == (
         "Model",
         7.0,
         -0.0145,
@@ -131,7 +144,11 @@ def test_a_ship_file_gives_particulars_steering_gear_and_defaults(folder):
 
 def test_wind_has_a_table_of_its_own(folder):
     path = folder / "ship.toml"
-    path.write_text(path.read_text().replace("[[trials]]", "[wind]\nrelative = true\n\n[[trials]]", 1))
+    path.write_text(
+        path.read_text().replace(
+            "[[trials]]", "[wind]\nrelative = true\n\n[[trials]]", 1
+        )
+    )
     assert ShipFile.load(path).identify["wind"] == {"relative": True}
 
 
@@ -156,8 +173,13 @@ def test_trials_can_be_asked_for_by_use(folder):
 
 
 def test_length_and_one_trial_are_enough(tmp_path):
-    write_csv(tmp_path / "run.csv", {"t": T, "r": 0.01 * np.cos(0.1 * T), "delta": 0.1 * np.cos(0.1 * T)})
-    (tmp_path / "ship.toml").write_text('[ship]\nlength = 7\n[[trials]]\nfile = "run.csv"\n')
+    write_csv(
+        tmp_path / "run.csv",
+        {"t": T, "r": 0.01 * np.cos(0.1 * T), "delta": 0.1 * np.cos(0.1 * T)},
+    )
+    (tmp_path / "ship.toml").write_text(
+        '[ship]\nlength = 7\n[[trials]]\nfile = "run.csv"\n'
+    )
     ship = ShipFile.load(tmp_path / "ship.toml")
     (trial,) = ship.trials()
     assert ship.steering is None
@@ -165,7 +187,11 @@ def test_length_and_one_trial_are_enough(tmp_path):
     assert trial.use == "fit"
     assert trial.derived == {"psi"}
     with pytest.raises(
-        InputError, match=r"ship\.toml: particulars of ship: mass is not given and cannot be estimated"
+        InputError,
+        match=(
+            r"ship\.toml: particulars of ship: mass is not given and cannot be"
+            r" estimated"
+        ),
     ):
         ship.completed_particulars()
 
@@ -176,23 +202,47 @@ def test_repair_may_be_asked_for_the_whole_file_or_one_trial(folder):
     write_csv(folder / "a.csv", table)
     assert "line 7 (data row 6), column 'u': no value" in refusal(folder, read=True)
     for old in ("[conventions]", 'file = "a.csv"'):
-        (folder / "ship.toml").write_text(SHIP.replace(old, f'{old}\nrepair = "interpolate"'))
-        np.testing.assert_allclose(ShipFile.load(folder / "ship.toml").trials("fit")[0]["u"], 1.1)
+        (folder / "ship.toml").write_text(
+            SHIP.replace(old, f'{old}\nrepair = "interpolate"')
+        )
+        np.testing.assert_allclose(
+            ShipFile.load(folder / "ship.toml").trials("fit")[0]["u"], 1.1
+        )
 
 
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        ("length = 7.0", "length = -7.0", ": [ship] length: -7 found, expected a number > 0"),
+        (
+            "length = 7.0",
+            "length = -7.0",
+            ": [ship] length: -7 found, expected a number > 0",
+        ),
         ("length = 7.0", 'length = "7.0"', ": [ship] length: '7.0' (a text"),
         ("length = 7.0", "length = nan", ": ship.length: nan found, expected a number"),
         ("length = 7.0", "length = true", ": [ship] length: True found"),
         ("length = 7.0", "", ": [ship] length: missing"),
-        ("length = 7.0", f"length = 1{'0' * 400}", "0 found, expected a whole number of at most 64 bits"),
+        (
+            "length = 7.0",
+            f"length = 1{'0' * 400}",
+            "0 found, expected a whole number of at most 64 bits",
+        ),
         ("beam =", "beem =", ": [ship]: unknown key 'beem'. Did you mean 'beam'?"),
-        ("Y_vdot", "Y_wdot", ": [ship] added_mass: unknown key 'Y_wdot'. Did you mean 'Y_vdot'?"),
-        ("[steering]", "[stearing]", ": unknown key 'stearing'. Did you mean 'steering'?"),
-        ("rudder_limit_deg = 35.0", "rudder_limit_deg = -3.0", ": [steering] rudder_limit_deg: -3 found"),
+        (
+            "Y_vdot",
+            "Y_wdot",
+            ": [ship] added_mass: unknown key 'Y_wdot'. Did you mean 'Y_vdot'?",
+        ),
+        (
+            "[steering]",
+            "[stearing]",
+            ": unknown key 'stearing'. Did you mean 'steering'?",
+        ),
+        (
+            "rudder_limit_deg = 35.0",
+            "rudder_limit_deg = -3.0",
+            ": [steering] rudder_limit_deg: -3 found",
+        ),
         ('unit = "deg/s"', 'unit = "degs"', ": [columns] r: unit 'degs' found"),
         ('unit = "deg/s"', 'unit = "knots"', "'knots' is a unit of speed"),
         ('v = "v"', 'sway = "v"', ": [columns]: unknown channel 'sway'"),
@@ -201,7 +251,11 @@ def test_repair_may_be_asked_for_the_whole_file_or_one_trial(folder):
             'rudder_positive = "left"',
             ": [conventions] rudder_positive: 'left' found",
         ),
-        ('rudder_positive = "port"', "rudder_positive = 1", ": [conventions] rudder_positive: 1 found"),
+        (
+            'rudder_positive = "port"',
+            "rudder_positive = 1",
+            ": [conventions] rudder_positive: 1 found",
+        ),
         (
             'rudder_positive = "port"',
             'rudder = "port"',
@@ -217,14 +271,25 @@ def test_repair_may_be_asked_for_the_whole_file_or_one_trial(folder):
         (
             'structure = "abkowitz"',
             'reference_model = "ship.py"',
-            ": [identify].reference_model: 'ship.py' found, which is code: no file makes shipgym run another",
+            (
+                ": [identify].reference_model: 'ship.py' found, which is code: no file"
+                " makes shipgym run another"
+            ),
         ),
         ('kind = "zigzag"', 'kind = "zig zag"', ": [[trials]] 1 kind: 'zig zag' found"),
         ('use = "validate"', 'use = "valid"', ": [[trials]] 2 use: 'valid' found"),
-        ('use = "validate"', 'used = "validate"', ": [[trials]] 2: unknown key 'used'. Did you mean 'use'?"),
+        (
+            'use = "validate"',
+            'used = "validate"',
+            ": [[trials]] 2: unknown key 'used'. Did you mean 'use'?",
+        ),
         ('file = "a.csv"', "", ": [[trials]] 1: no file found"),
         ('file = "a.csv"', "file = 3", ": [[trials]] 1 file: 3 found"),
-        ('file = "runs/b.csv"', 'file = "./a.csv"', ": [[trials]] 2 file: './a.csv' is listed twice"),
+        (
+            'file = "runs/b.csv"',
+            'file = "./a.csv"',
+            ": [[trials]] 2 file: './a.csv' is listed twice",
+        ),
         ("xg = 0.25", "", ": [[trials]] 2 origin: 'cg' found without xg"),
         ("[ship]", "[ship", ": not valid TOML"),
         ("[ship]", "[ship]\nestimated = []", "unknown key 'estimated'"),
@@ -258,7 +323,9 @@ def test_a_missing_ship_file_a_folder_and_binary_content_are_refused(tmp_path):
     with pytest.raises(InputError, match="this is a folder"):
         ShipFile.load(tmp_path)
     (tmp_path / "ship.toml").write_bytes(b"[ship]\nname = \xff\x00")
-    with pytest.raises(InputError, match=r"line 2 holds byte 0xff, .* expected a ship file \(TOML\)"):
+    with pytest.raises(
+        InputError, match=r"line 2 holds byte 0xff, .* expected a ship file \(TOML\)"
+    ):
         ShipFile.load(tmp_path / "ship.toml")
 
 
@@ -272,7 +339,10 @@ def test_a_missing_trial_is_refused_on_loading(folder, file):
 def test_what_is_wrong_in_a_trial_names_ship_file_and_csv_file(folder):
     message = refusal(folder, 'u = "u"', 'u = "U"', read=True)
     assert message.startswith(": [[trials]] 1: ")
-    assert "a.csv: column 'U' not found. Did you mean 'u'? Columns present: 'time', 'yaw'" in message
+    assert (
+        "a.csv: column 'U' not found. Did you mean 'u'? Columns present: 'time', 'yaw'"
+        in message
+    )
 
 
 def test_a_ship_of_known_length_cannot_spin_faster_than_any_ship(folder):
@@ -290,12 +360,24 @@ def test_rpm_read_as_rps_are_noticed_where_the_propeller_is_known(folder):
     assert 'unit = "rpm"' in message
     write_csv(folder / "runs" / "b.csv", columns(psi_factor=np.pi / 180.0, shaft=190.0))
     message = refusal(folder, read=True)
-    assert "shaft speed up to 190 rps found, expected at most 156 rps for a propeller of 0.204 m" in message
+    assert (
+        "shaft speed up to 190 rps found, expected at most 156 rps for a propeller of"
+        " 0.204 m" in message
+    )
 
 
-@settings(max_examples=100, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
-@given(line=st.integers(0, SHIP.count("\n") - 1), new=st.text('[]{}=".#abfx0127-\n', max_size=12))
-def test_whatever_stands_in_a_ship_file_the_answer_is_a_ship_or_one_message(folder, line, new):
+@settings(
+    max_examples=100,
+    deadline=None,
+    suppress_health_check=[HealthCheck.function_scoped_fixture],
+)
+@given(
+    line=st.integers(0, SHIP.count("\n") - 1),
+    new=st.text('[]{}=".#abfx0127-\n', max_size=12),
+)
+def test_whatever_stands_in_a_ship_file_the_answer_is_a_ship_or_one_message(
+    folder, line, new
+):
     lines = SHIP.split("\n")
     lines[line] = new
     (folder / "ship.toml").write_text("\n".join(lines))
@@ -303,25 +385,34 @@ def test_whatever_stands_in_a_ship_file_the_answer_is_a_ship_or_one_message(fold
         ship: ShipFile | InputError = ShipFile.load(folder / "ship.toml")
     except InputError as error:
         ship = error
-    assert str(folder) in str(ship) if isinstance(ship, InputError) else ship.particulars.length > 0.0
+    assert (
+        str(folder) in str(ship)
+        if isinstance(ship, InputError)
+        else ship.particulars.length > 0.0
+    )
 
 
 # --- real input
 
 
-@pytest.mark.parametrize("path", sorted(SHIPS.glob("*.toml")), ids=lambda path: path.stem)
+@pytest.mark.parametrize(
+    "path", sorted(SHIPS.glob("*.toml")), ids=lambda path: path.stem
+)
 @needs_data
 def test_every_measured_trial_is_imported(path):
     ship = ShipFile.load(path)
     trials = ship.trials()
-    assert [trial.name for trial in trials] == [t["file"] for t in tomllib.loads(path.read_text())["trials"]]
+    assert [trial.name for trial in trials] == [
+        t["file"] for t in tomllib.loads(path.read_text())["trials"]
+    ]
     for trial in trials:
         speed = np.quantile(trial["u"], 0.95)
         assert trial.duration > 60.0
         assert {"psi", "u", "v", "r", "delta", "n"} <= set(trial.channels)
         assert 0.3 < speed / ship.particulars.speed < 1.2
         assert trial.derived == frozenset()
-        # the rudder turns the ship to the side it is laid to: regress the yaw acceleration of a turning ship
+        # the rudder turns the ship to the side it is laid to: regress the yaw
+        # acceleration of a turning ship
         steps = np.arange(0, len(trial), max(1, len(trial) // 200))
         yaw_rate, rudder = trial["r"][steps], trial["delta"][steps]
         change, level = np.diff(yaw_rate), np.column_stack([yaw_rate[:-1], rudder[:-1]])
@@ -339,7 +430,8 @@ def test_the_tank_s_ship_file_fits_three_zigzags_and_predicts_the_others():
 
 @needs_data
 @pytest.mark.parametrize(
-    "run", ["kvlcc2_hsva/Z_05_01.csv", "kvlcc2_hsva/Z_20_05.csv", "kvlcc2_marin/zz_10_m.csv"]
+    "run",
+    ["kvlcc2_hsva/Z_05_01.csv", "kvlcc2_hsva/Z_20_05.csv", "kvlcc2_marin/zz_10_m.csv"],
 )
 def test_earth_fixed_velocities_that_are_not_declared_are_noticed(run):
     columns = {"x": "x0", "y": "y0", "psi": "psi", "u": "dx0", "v": "dy0"}
@@ -353,9 +445,13 @@ def test_earth_fixed_velocities_that_are_not_declared_are_noticed(run):
 
 def test_a_number_without_bound_above_may_be_infinite():
     """C = inf is least squares; a share of the variance is at most 1."""
-    assert check_options({"C": float("inf"), "explained_variance": 1.0}, "[identify]")["C"] == float("inf")
+    assert check_options({"C": float("inf"), "explained_variance": 1.0}, "[identify]")[
+        "C"
+    ] == float("inf")
     for wrong in (float("inf"), 1.05, 0.0):
-        with pytest.raises(InputError, match=r"\[identify\] explained_variance: .* found"):
+        with pytest.raises(
+            InputError, match=r"\[identify\] explained_variance: .* found"
+        ):
             check_options({"explained_variance": wrong}, "[identify]")
     for wrong in (float("nan"), -0.1, -float("inf")):
         with pytest.raises(InputError, match=r"\[identify\] C: .* found"):

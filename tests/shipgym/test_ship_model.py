@@ -28,8 +28,17 @@ def identified(mariner) -> ShipModel:
     """A model with everything that an identified one has."""
     values = np.array(list(mariner.coefficients.values()))
     random = np.random.default_rng(1)
-    root = np.diag(np.abs(values)) @ (np.eye(40) + 0.1 * random.standard_normal((40, 40))) * 0.05
-    samples = random.standard_normal((4, 500)) * [[0.5], [0.3], [0.005], [0.1]] + [[7], [0], [0], [0]]
+    root = (
+        np.diag(np.abs(values))
+        @ (np.eye(40) + 0.1 * random.standard_normal((40, 40)))
+        * 0.05
+    )
+    samples = random.standard_normal((4, 500)) * [[0.5], [0.3], [0.005], [0.1]] + [
+        [7],
+        [0],
+        [0],
+        [0],
+    ]
     return replace(
         mariner,
         covariance=root @ root.T,
@@ -42,11 +51,16 @@ def test_a_body_heading_and_place_do_not_matter(mariner):
     turned = mariner.service_state.copy()
     turned[:3] = 500.0, -800.0, 2.0
     commands = np.full((600, 1), 0.2)
-    here, there = mariner.simulate(commands, 1.0), mariner.simulate(commands, 1.0, turned)
+    here, there = (
+        mariner.simulate(commands, 1.0),
+        mariner.simulate(commands, 1.0, turned),
+    )
     for name in ("u", "v", "r"):
         np.testing.assert_allclose(here[name], there[name], rtol=0, atol=1e-9)
     np.testing.assert_allclose(
-        np.hypot(here["x"], here["y"]), np.hypot(there["x"] - 500.0, there["y"] + 800.0), atol=1e-6
+        np.hypot(here["x"], here["y"]),
+        np.hypot(there["x"] - 500.0, there["y"] + 800.0),
+        atol=1e-6,
     )
 
 
@@ -67,17 +81,24 @@ def test_a_measured_rudder_reproduces_the_simulation(mariner):
     trial = mariner.simulate(commands, 0.1)
     again = open_loop(mariner, trial)
     for name in ("psi", "u", "v", "r"):
-        np.testing.assert_allclose(again[name], trial[name], rtol=0.0, atol=2e-3 * np.ptp(trial[name]))
+        np.testing.assert_allclose(
+            again[name], trial[name], rtol=0.0, atol=2e-3 * np.ptp(trial[name])
+        )
 
 
 def test_open_loop_names_the_missing_channel(mariner):
-    trial = shipgym.Trial([0.0, 1.0, 2.0], {"u": [7.0] * 3, "v": [0.0] * 3, "r": [0.0] * 3, "psi": [0.0] * 3})
+    trial = shipgym.Trial(
+        [0.0, 1.0, 2.0],
+        {"u": [7.0] * 3, "v": [0.0] * 3, "r": [0.0] * 3, "psi": [0.0] * 3},
+    )
     with pytest.raises(InputError, match="'delta' is missing"):
         open_loop(mariner, trial)
 
 
 def test_a_runaway_model_is_an_error_with_time_and_state(mariner):
-    wild = replace(mariner, coefficients={**mariner.coefficients, "N_r": 0.01, "N_vvr": 5.0})
+    wild = replace(
+        mariner, coefficients={**mariner.coefficients, "N_r": 0.01, "N_vvr": 5.0}
+    )
     with pytest.raises(UnstableModelError, match="runs away after") as caught:
         wild.simulate(np.full((5000, 1), 0.5), 0.1)
     assert 0.0 < caught.value.time_s < 500.0
@@ -85,11 +106,15 @@ def test_a_runaway_model_is_an_error_with_time_and_state(mariner):
 
 
 def test_draws_have_the_covariance(identified):
-    draws = np.array([list(model.coefficients.values()) for model in identified.sample(4000, seed=0)])
+    draws = np.array(
+        [list(model.coefficients.values()) for model in identified.sample(4000, seed=0)]
+    )
     scale = np.sqrt(np.diag(identified.covariance))
     mean = np.array(list(identified.coefficients.values()))
     np.testing.assert_allclose((draws.mean(axis=0) - mean) / scale, 0.0, atol=0.08)
-    difference = np.cov(draws.T) / np.outer(scale, scale) - identified.covariance / np.outer(scale, scale)
+    difference = np.cov(draws.T) / np.outer(
+        scale, scale
+    ) - identified.covariance / np.outer(scale, scale)
     assert np.abs(difference).max() < 0.1
     again = identified.sample(2, seed=0)[1].coefficients
     np.testing.assert_allclose(list(again.values()), draws[1], rtol=1e-12)
@@ -124,37 +149,89 @@ def broken(change):
 
 CASES = [
     (lambda fields: json.dumps(fields)[:5000], "broken JSON"),
-    (broken(lambda f: f["coefficients"].pop("Y_v")), r"39 found, expected 40.*missing: 'Y_v'"),
-    (broken(lambda f: f["coefficients"].update(Y_w=f["coefficients"].pop("Y_v"))), "unknown key 'Y_w'"),
-    (broken(lambda f: f["coefficients"].update(Y_v="much")), r"coefficients\.Y_v: 'much'"),
+    (
+        broken(lambda f: f["coefficients"].pop("Y_v")),
+        r"39 found, expected 40.*missing: 'Y_v'",
+    ),
+    (
+        broken(lambda f: f["coefficients"].update(Y_w=f["coefficients"].pop("Y_v"))),
+        "unknown key 'Y_w'",
+    ),
+    (
+        broken(lambda f: f["coefficients"].update(Y_v="much")),
+        r"coefficients\.Y_v: 'much'",
+    ),
     (broken(lambda f: f.update(format=7)), "format 7 found"),
     (broken(lambda f: f.pop("steering")), "field 'steering' is missing"),
-    (broken(lambda f: f["steering"].update(rudder_limit_deg=-5)), "rudder_limit_deg: -5 found"),
-    (broken(lambda f: f["covariance"].pop()), "covariance: 39 entries found, expected a list of 40 lists"),
-    (broken(lambda f: f["covariance"][3].pop()), r"covariance\[3\]: 39 entries found, expected a list of 40"),
-    (broken(lambda f: f["covariance"][3].__setitem__(2, "1.0")), r"covariance\[3\]\[2\]: '1.0' found"),
-    (broken(lambda f: f["covariance"][3].__setitem__(2, 1.0)), "covariance: not symmetric"),
-    (broken(lambda f: f["covariance"][3].__setitem__(3, -1.0)), "covariance: a variance .* is negative"),
-    (broken(lambda f: f["envelope"].update(channels=["u"])), r"envelope\.channels: \['u'\] found, expected"),
-    (broken(lambda f: f.update(normalisation="bis")), "normalisation 'bis' found, expected 'prime'"),
+    (
+        broken(lambda f: f["steering"].update(rudder_limit_deg=-5)),
+        "rudder_limit_deg: -5 found",
+    ),
+    (
+        broken(lambda f: f["covariance"].pop()),
+        "covariance: 39 entries found, expected a list of 40 lists",
+    ),
+    (
+        broken(lambda f: f["covariance"][3].pop()),
+        r"covariance\[3\]: 39 entries found, expected a list of 40",
+    ),
+    (
+        broken(lambda f: f["covariance"][3].__setitem__(2, "1.0")),
+        r"covariance\[3\]\[2\]: '1.0' found",
+    ),
+    (
+        broken(lambda f: f["covariance"][3].__setitem__(2, 1.0)),
+        "covariance: not symmetric",
+    ),
+    (
+        broken(lambda f: f["covariance"][3].__setitem__(3, -1.0)),
+        "covariance: a variance .* is negative",
+    ),
+    (
+        broken(lambda f: f["envelope"].update(channels=["u"])),
+        r"envelope\.channels: \['u'\] found, expected",
+    ),
+    (
+        broken(lambda f: f.update(normalisation="bis")),
+        "normalisation 'bis' found, expected 'prime'",
+    ),
     (
         broken(lambda f: f["coefficients"].update(Y_v=f["coefficients"]["Y_v"] * 1.01)),
         "leave out the field sha",
     ),
     (
-        broken(lambda f: f["structure"]["equations"]["u"].extend(f["structure"]["equations"]["u"] * 200)),
+        broken(
+            lambda f: f["structure"]["equations"]["u"].extend(
+                f["structure"]["equations"]["u"] * 200
+            )
+        ),
         "1 to 200",
     ),
-    (broken(lambda f: f["structure"]["equations"]["u"][0]["powers"].update(w=1)), "unknown key 'w'"),
+    (
+        broken(lambda f: f["structure"]["equations"]["u"][0]["powers"].update(w=1)),
+        "unknown key 'w'",
+    ),
     (broken(lambda f: f.update(pickle="gASV")), "unknown key 'pickle'"),
     (broken(lambda f: f["particulars"].update(length=-3)), "length"),
     (broken(lambda f: f["envelope"].update(low=[0, 1])), r"envelope\.low"),
-    (broken(lambda f: f["particulars"].update(speed=None)), "speed is needed and not known"),
+    (
+        broken(lambda f: f["particulars"].update(speed=None)),
+        "speed is needed and not known",
+    ),
     (broken(lambda f: f["particulars"].update(estimated=3)), "estimated: 3 found"),
-    (broken(lambda f: f["structure"].update(normalisation="si")), "forces in 'si' found"),
-    (broken(lambda f: f["structure"].update(quantity="power")), "quantity: 'power' found"),
+    (
+        broken(lambda f: f["structure"].update(normalisation="si")),
+        "forces in 'si' found",
+    ),
+    (
+        broken(lambda f: f["structure"].update(quantity="power")),
+        "quantity: 'power' found",
+    ),
     (broken(lambda f: f["structure"]["equations"].update(w=[])), "unknown key 'w'"),
-    (broken(lambda f: f["structure"]["equations"]["r"].reverse()), "'v' and 'r' differ"),
+    (
+        broken(lambda f: f["structure"]["equations"]["r"].reverse()),
+        "'v' and 'r' differ",
+    ),
     (lambda _: "[1, 2]", "expected a table"),
     (lambda _: "[" * 100_000, "nest deeper than 20"),
     (lambda _: "9" * 5000, "a whole number of more than 64 bits"),
@@ -165,7 +242,9 @@ CASES = [
 ]
 
 
-@pytest.mark.parametrize(("content", "message"), CASES, ids=[message for _, message in CASES])
+@pytest.mark.parametrize(
+    ("content", "message"), CASES, ids=[message for _, message in CASES]
+)
 def test_a_wrong_file_is_refused_by_field(identified, tmp_path, content, message):
     path = tmp_path / "model.json"
     identified.save(path)
@@ -219,7 +298,9 @@ def test_the_smallest_ellipsoid_holds_its_points_within_the_tolerance():
     points = np.random.default_rng(5).standard_normal((200, 4))
     centre, form = smallest_ellipsoid(points, 0.01)
     distances = np.einsum("ij,jk,ik->i", points - centre, form, points - centre)
-    assert 1.0 <= distances.max() <= 1.0 + 5 / 4 * 0.01  # of lifted points it is (n + 1) / n times
+    assert (
+        1.0 <= distances.max() <= 1.0 + 5 / 4 * 0.01
+    )  # of lifted points it is (n + 1) / n times
 
 
 def test_what_cannot_be_simulated_or_sampled_is_refused():
@@ -228,14 +309,18 @@ def test_what_cannot_be_simulated_or_sampled_is_refused():
         with pytest.raises(InputError, match="expected a step in s above 0"):
             mariner.simulate(np.zeros((5, 1)), dt)
     for state in (np.zeros(3), np.full(len(mariner.state_names), np.nan)):
-        with pytest.raises(InputError, match="finite numbers for x, y, psi, u, v, r, delta"):
+        with pytest.raises(
+            InputError, match="finite numbers for x, y, psi, u, v, r, delta"
+        ):
             mariner.simulate(np.zeros((5, 1)), 1.0, state)
     with pytest.raises(InputError, match="'mariner' has no covariance"):
         mariner.sample(2, 0)
     trial = mariner.simulate(np.zeros((5, 1)), 1.0)
     for name in ("psi", "u", "v", "r", "delta"):
         rest = {one: trial[one] for one in trial.channels if one != name}
-        with pytest.raises(InputError, match=f"channel '{name}' is missing, it is needed to predict"):
+        with pytest.raises(
+            InputError, match=f"channel '{name}' is missing, it is needed to predict"
+        ):
             open_loop(mariner, shipgym.Trial(trial.t, rest))
 
 
@@ -243,10 +328,16 @@ corner = st.tuples(*[st.floats(-2.0, 2.0)] * 4)
 
 
 @given(corner, st.lists(st.floats(-1.0, 1.0), min_size=10, max_size=10))
-def test_distance_and_range_of_a_state_are_those_of_the_matrix_and_of_the_box(state, numbers):
+def test_distance_and_range_of_a_state_are_those_of_the_matrix_and_of_the_box(
+    state, numbers
+):
     W = np.zeros((4, 4))
     W[np.triu_indices(4)] = numbers
-    centre, low, high = (0.1, -0.2, 0.3, 0.0), (-1.0, -0.5, -1.5, -0.7), (1.0, 0.5, 1.5, 0.7)
+    centre, low, high = (
+        (0.1, -0.2, 0.3, 0.0),
+        (-1.0, -0.5, -1.5, -0.7),
+        (1.0, 0.5, 1.5, 0.7),
+    )
     data = EngineEnvelope(Four(*low), Four(*high), Four(*centre), Triangle(*numbers))
     u, v, r, delta = state
     motion = Motion(0.0, 0.0, 0.0, u, v, r, 0.0, 0.0, 0.0, delta, 0.0)
@@ -259,8 +350,14 @@ def test_distance_and_range_of_a_state_are_those_of_the_matrix_and_of_the_box(st
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"coefficients": {}}, r"structure 'abkowitz' has \d+; missing: .*X_u.*; unknown: none"),
-        ({"covariance": np.eye(3)}, r"covariance of 'mariner': shape \(3, 3\), expected \(\d+, \d+\)"),
+        (
+            {"coefficients": {}},
+            r"structure 'abkowitz' has \d+; missing: .*X_u.*; unknown: none",
+        ),
+        (
+            {"covariance": np.eye(3)},
+            r"covariance of 'mariner': shape \(3, 3\), expected \(\d+, \d+\)",
+        ),
     ],
 )
 def test_models_that_do_not_fit_together_are_refused(changes, message):
@@ -275,24 +372,43 @@ def test_coefficients_are_numbers_and_known():
     with pytest.raises(InputError, match="missing: none; unknown: Z_u"):
         replace(mariner, coefficients=mariner.coefficients | {"Z_u": 1.0})
     backwards = dict(reversed(mariner.coefficients.items()))
-    assert list(replace(mariner, coefficients=backwards).coefficients) == list(mariner.coefficients)
+    assert list(replace(mariner, coefficients=backwards).coefficients) == list(
+        mariner.coefficients
+    )
 
 
 def test_states_and_commands_that_are_none_are_refused():
     mariner, tanker = shipgym.load_model("mariner"), shipgym.load_model("tanker")
     state = mariner.service_state
     for states, commands, message in (
-        (state[:-1], [0.0], r"state: shape \(6,\) found, expected \(..., 7\) for x, y, psi"),
+        (
+            state[:-1],
+            [0.0],
+            r"state: shape \(6,\) found, expected \(..., 7\) for x, y, psi",
+        ),
         (0.0, [0.0], r"state: shape \(\) found"),
-        (state, [0.0, 0.0], r"command: shape \(2,\) found, expected \(..., 1\) for delta"),
-        (np.where(state > 0.0, np.inf, state), [0.0], "state: inf found, expected finite numbers"),
+        (
+            state,
+            [0.0, 0.0],
+            r"command: shape \(2,\) found, expected \(..., 1\) for delta",
+        ),
+        (
+            np.where(state > 0.0, np.inf, state),
+            [0.0],
+            "state: inf found, expected finite numbers",
+        ),
         (state, [10.0], "command: row 0: rudder 10 found, expected rad .not degrees."),
     ):
         with pytest.raises(InputError, match=message):
             mariner.derivatives(states, commands)
-    with pytest.raises(InputError, match=r"command: row 1: shaft speed 80 found, expected 1/s \(not rpm\)"):
+    with pytest.raises(
+        InputError,
+        match=r"command: row 1: shaft speed 80 found, expected 1/s \(not rpm\)",
+    ):
         tanker.derivatives(tanker.service_state, [[0.0, 1.0], [0.0, 80.0]])
-    with pytest.raises(InputError, match="water_depth: 18 m found, expected more than the draught"):
+    with pytest.raises(
+        InputError, match="water_depth: 18 m found, expected more than the draught"
+    ):
         tanker.derivatives(tanker.service_state, tanker.service_command, 18.0)
     many = mariner.derivatives(np.tile(state, (2, 3, 1)), np.zeros((3, 1)))
     assert many.shape == (2, 3, 7)
@@ -308,27 +424,39 @@ def test_states_and_commands_that_are_none_are_refused():
         ([[1.0, 0.0], [0.0, -1e-30]], "a variance on the diagonal is negative"),
     ],
 )
-def test_a_covariance_is_symmetric_to_nine_digits_and_has_no_negative_variance(matrix, fault):
+def test_a_covariance_is_symmetric_to_nine_digits_and_has_no_negative_variance(
+    matrix, fault
+):
     if not fault:
-        np.testing.assert_array_equal(model_file._matrix(matrix, 2, "model.json"), matrix)
+        np.testing.assert_array_equal(
+            model_file._matrix(matrix, 2, "model.json"), matrix
+        )
         return
     with pytest.raises(InputError, match=f"model.json: covariance: {fault}"):
         model_file._matrix(matrix, 2, "model.json")
 
 
-@pytest.mark.parametrize(("count", "fits"), [(0, False), (1, True), (200, True), (201, False)])
+@pytest.mark.parametrize(
+    ("count", "fits"), [(0, False), (1, True), (200, True), (201, False)]
+)
 def test_an_equation_in_a_file_has_up_to_200_terms(count, fits):
     listed = {"r": [{"name": "r", "powers": {"r": 1}}] * count}
     if fits:
         model_file._check_lists(listed, "uvr", ("r",), "equations")
         return
-    with pytest.raises(InputError, match=r"equations\.r: expected a list of terms, 1 to 200"):
+    with pytest.raises(
+        InputError, match=r"equations\.r: expected a list of terms, 1 to 200"
+    ):
         model_file._check_lists(listed, "uvr", ("r",), "equations")
 
 
-@pytest.mark.parametrize(("sign", "fits"), [(-1.0, True), (1.0, True), (1.05, False), (-1.05, False)])
+@pytest.mark.parametrize(
+    ("sign", "fits"), [(-1.0, True), (1.0, True), (1.05, False), (-1.05, False)]
+)
 def test_a_share_in_a_file_has_a_sign(sign, fits):
-    listed = {"v": [{"coefficient": "Y_v", "name": "v", "powers": {"v": 1}, "sign": sign}]}
+    listed = {
+        "v": [{"coefficient": "Y_v", "name": "v", "powers": {"v": 1}, "sign": sign}]
+    }
     if fits:
         model_file._check_lists(listed, "uvr", ("v",), "shares", "shares")
         return

@@ -14,7 +14,13 @@ import numpy as np
 import pytest
 
 import shipgym
-from shipgym import InputError, check_ship_model, load_model, manoeuvres, register_ship_equations
+from shipgym import (
+    InputError,
+    check_ship_model,
+    load_model,
+    manoeuvres,
+    register_ship_equations,
+)
 from shipgym.engine.motion import Motion, Ship
 from shipgym.errors import UnstableModelError
 from shipgym.ships.linear import nomoto
@@ -43,10 +49,15 @@ def test_one_file_makes_a_sound_ship_that_manoeuvres(tug: Path) -> None:
     zigzag = manoeuvres.zigzag(model, 20.0, 20.0, duration=200.0)
     assert manoeuvres.zigzag_indices(zigzag).overshoot_1_deg > 0.0
     assert nomoto(model).K > 0.0
-    assert np.ptp(manoeuvres.zigzag(model, duration=60.0, weather="moderate")["psi_wave"]) > 0.0
+    assert (
+        np.ptp(manoeuvres.zigzag(model, duration=60.0, weather="moderate")["psi_wave"])
+        > 0.0
+    )
 
 
-def test_she_is_known_by_name_in_files_and_in_other_processes(tug: Path, tmp_path: Path) -> None:
+def test_she_is_known_by_name_in_files_and_in_other_processes(
+    tug: Path, tmp_path: Path
+) -> None:
     register_ship_equations(tug)
     assert "tug" in shipgym.list_models()
     model = load_model("tug")
@@ -60,7 +71,10 @@ def test_she_is_known_by_name_in_files_and_in_other_processes(tug: Path, tmp_pat
         "print(tug.simulate([[0.1, 2.3]] * 20, 0.5)['r'][-1])"
     )
     told = subprocess.run(
-        [sys.executable, "-c", code, tmp_path / "tug.pickle"], capture_output=True, text=True, check=True
+        [sys.executable, "-c", code, tmp_path / "tug.pickle"],
+        capture_output=True,
+        text=True,
+        check=True,
     )
     assert float(told.stdout) == model.simulate([[0.1, 2.3]] * 20, 0.5)["r"][-1]
 
@@ -68,11 +82,18 @@ def test_she_is_known_by_name_in_files_and_in_other_processes(tug: Path, tmp_pat
 def test_her_annotations_may_be_texts(tug: Path, tmp_path: Path) -> None:
     head, end, rest = TUG.replace('"tug"', '"towboat"').partition('"""\n\n')
     path = tmp_path / "towboat.py"
-    path.write_text(f"{head}{end}from __future__ import annotations\n{rest}", encoding="utf-8")
+    path.write_text(
+        f"{head}{end}from __future__ import annotations\n{rest}", encoding="utf-8"
+    )
     own, texts = load_model(tug), load_model(path)
-    read = [ship.dynamics.coefficients_record.__annotations__["T_shaft"] is float for ship in (own, texts)]  # type: ignore[union-attr]
+    read = [
+        ship.dynamics.coefficients_record.__annotations__["T_shaft"] is float
+        for ship in (own, texts)
+    ]  # type: ignore[union-attr]
     assert read == [True, False]
-    np.testing.assert_array_equal(*(ship.derivatives(own.service_state, [0.1, 2.0]) for ship in (own, texts)))
+    np.testing.assert_array_equal(
+        *(ship.derivatives(own.service_state, [0.1, 2.0]) for ship in (own, texts))
+    )
 
 
 def test_changed_coefficients_compile_nothing_anew(tug: Path) -> None:
@@ -96,35 +117,89 @@ def test_changed_coefficients_compile_nothing_anew(tug: Path) -> None:
             "line .*: cannot be executed: ModuleNotFoundError",
         ),
         ("= 5.0  # s", "= 'slow'", "coefficient 'T_shaft'.*'slow'"),
-        ("T_shaft: float = 5.0", "T_shaft: str = '5'", "expected a NamedTuple of floats"),
+        (
+            "T_shaft: float = 5.0",
+            "T_shaft: str = '5'",
+            "expected a NamedTuple of floats",
+        ),
         ("= 5.0  # s", "= [5.0]", r"coefficient 'T_shaft'.*\[5\.0\]"),
         pytest.param(
             "fabs(u) * u",
             "fabs(u) * u / (fabs(motion.delta) < 0.5)",
-            r"-inf found for the acceleration of 'u' .*look at .*tug\.py, line 25, in accelerations: ZeroDiv",
+            r"-inf found for the acceleration of 'u' .*look at .*tug\.py, line 25, in"
+            r" accelerations: ZeroDiv",
             marks=pytest.mark.compiled,
         ),
-        ("    accelerations,\n", "    (lambda k: lambda m, c, s: 5 * (k,))(1.0),\n", r"around it \(k\)"),
-        ("=shaft_acceleration", "=(lambda k: lambda n, m, c, s: k * (m - n))(0.2)", r"around it \(k\)"),
-        ('"tug",\n', '"mariner",\n', "tug.py: name 'mariner' found, which is another ship's"),
+        (
+            "    accelerations,\n",
+            "    (lambda k: lambda m, c, s: 5 * (k,))(1.0),\n",
+            r"around it \(k\)",
+        ),
+        (
+            "=shaft_acceleration",
+            "=(lambda k: lambda n, m, c, s: k * (m - n))(0.2)",
+            r"around it \(k\)",
+        ),
+        (
+            '"tug",\n',
+            '"mariner",\n',
+            "tug.py: name 'mariner' found, which is another ship's",
+        ),
         ('"tug",\n', '"container",\n', "'container' found, which is another ship's"),
-        ("service_shaft_speed=2.357", "service_shaft_speed=0.0", "service_shaft_speed: 0"),
+        (
+            "service_shaft_speed=2.357",
+            "service_shaft_speed=0.0",
+            "service_shaft_speed: 0",
+        ),
         ("speed=6.0)", "speed=None)", "speed is needed"),
-        ("fabs(u) * u", "fabs(w) * u", r"tug\.py, line 25, in accelerations: .*name 'w' is not defined"),
+        (
+            "fabs(u) * u",
+            "fabs(w) * u",
+            r"tug\.py, line 25, in accelerations: .*name 'w' is not defined",
+        ),
         ("rdot, 0.0, 0.0\n", "rdot\n", "accelerations returns .*expected five numbers"),
-        ("return udot, vdot, rdot, 0.0, 0.0", "return [udot, vdot, rdot, 0.0, 0.0]", "five numbers, a tuple"),
-        ("(motion, c, ship)", "(motion, c)", "accelerations: 2 arguments found, expected a function"),
-        ("return (command - n) / c.T_shaft", "pass", "shaft_acceleration is None, expected a number"),
+        (
+            "return udot, vdot, rdot, 0.0, 0.0",
+            "return [udot, vdot, rdot, 0.0, 0.0]",
+            "five numbers, a tuple",
+        ),
+        (
+            "(motion, c, ship)",
+            "(motion, c)",
+            "accelerations: 2 arguments found, expected a function",
+        ),
+        (
+            "return (command - n) / c.T_shaft",
+            "pass",
+            "shaft_acceleration is None, expected a number",
+        ),
         pytest.param(
             "def accelerations",
             "import numba\n\n\n@numba.njit\ndef accelerations",
-            r"tug\.py: equations of 'tug': accelerations: no plain function found, expected a function",
+            r"tug\.py: equations of 'tug': accelerations: no plain function found,"
+            r" expected a function",
             marks=pytest.mark.compiled,
         ),
-        ("speed=2.357,", "speed=2.357, switches=('FORM',),", "switches: 'FORM' found, expected a tuple"),
-        ("speed=2.357,", "speed=2.357, switches='FORM',", "switches: 'FORM' found, expected a tuple"),
-        ("speed=2.357,", "speed=2.357, rolls='yes',", "rolls: 'yes' found, expected true or false"),
-        ("c.N_v * U", "c.N_w * U", r"tug\.py, line 27, in accelerations: .*no attribute 'N_w'"),
+        (
+            "speed=2.357,",
+            "speed=2.357, switches=('FORM',),",
+            "switches: 'FORM' found, expected a tuple",
+        ),
+        (
+            "speed=2.357,",
+            "speed=2.357, switches='FORM',",
+            "switches: 'FORM' found, expected a tuple",
+        ),
+        (
+            "speed=2.357,",
+            "speed=2.357, rolls='yes',",
+            "rolls: 'yes' found, expected true or false",
+        ),
+        (
+            "c.N_v * U",
+            "c.N_w * U",
+            r"tug\.py, line 27, in accelerations: .*no attribute 'N_w'",
+        ),
         pytest.param(
             "c.X_nn * fabs(n) * n",
             "c.X_nn * motion._replace(n=n).n",
@@ -134,7 +209,9 @@ def test_changed_coefficients_compile_nothing_anew(tug: Path) -> None:
         ("c.N_d * U * U", "-c.N_d * U * U", "a positive rudder turns to starboard"),
     ],
 )
-def test_what_is_wrong_with_her_is_said(tug: Path, wrong: str, right: str, message: str) -> None:
+def test_what_is_wrong_with_her_is_said(
+    tug: Path, wrong: str, right: str, message: str
+) -> None:
     tug.write_text(TUG.replace(wrong, right), encoding="utf-8")
     found = check_ship_model(tug)
     assert not found.ok
@@ -144,16 +221,25 @@ def test_what_is_wrong_with_her_is_said(tug: Path, wrong: str, right: str, messa
 
 @pytest.mark.compiled
 def test_a_ship_that_runs_away_may_have_equations_without_a_result(tug: Path) -> None:
-    tug.write_text(TUG.replace("fabs(u) * u", "fabs(u) * u / (fabs(motion.delta) < 0.2)"), encoding="utf-8")
+    tug.write_text(
+        TUG.replace("fabs(u) * u", "fabs(u) * u / (fabs(motion.delta) < 0.2)"),
+        encoding="utf-8",
+    )
     model = load_model(tug)
-    with pytest.raises(UnstableModelError, match=r"or her equations give no number .check_ship_model says"):
+    with pytest.raises(
+        UnstableModelError,
+        match=r"or her equations give no number .check_ship_model says",
+    ):
         model.simulate([[0.5, 2.3]] * 40, 0.5)
 
 
 def test_a_file_that_is_not_there(tmp_path: Path) -> None:
     with pytest.raises(
         InputError,
-        match=r"barge\.py: no such file, expected a Python file that defines SHIP = ShipEquations\(\.\.\.\)",
+        match=(
+            r"barge\.py: no such file, expected a Python file that defines SHIP ="
+            r" ShipEquations\(\.\.\.\)"
+        ),
     ):
         load_model(tmp_path / "barge.py")
 
@@ -164,7 +250,9 @@ def test_her_equations_are_tried_in_a_turn_in_deep_water(tug: Path) -> None:
     seen: list[tuple[Motion, Ship]] = []
     shafts: list[tuple[float, float]] = []
 
-    def accelerations(motion: Motion, c: Any, ship: Ship) -> tuple[float, float, float, float, float]:
+    def accelerations(
+        motion: Motion, c: Any, ship: Ship
+    ) -> tuple[float, float, float, float, float]:
         seen.append((motion, ship))
         return 0.0, 0.0, 0.0, 0.0, 0.0
 
@@ -174,8 +262,24 @@ def test_her_equations_are_tried_in_a_turn_in_deep_water(tug: Path) -> None:
 
     replace(ship, accelerations=accelerations, shaft_acceleration=shaft)
     ((motion, her),) = seen
-    length, speed, n = ship.particulars["length"], ship.particulars["speed"], ship.service_shaft_speed
-    assert her == Ship(length, speed, ship.steering.limit, ship.steering.rate, 0.0, n, math.inf, speed)
-    assert (motion.u, motion.v, motion.r) == (0.9 * speed, 0.1 * speed, 0.1 * speed / length)
-    assert (motion.psi, motion.delta, motion.p, motion.phi, motion.n) == (0.1, 0.1, 0.01, 0.01, n)
+    length, speed, n = (
+        ship.particulars["length"],
+        ship.particulars["speed"],
+        ship.service_shaft_speed,
+    )
+    assert her == Ship(
+        length, speed, ship.steering.limit, ship.steering.rate, 0.0, n, math.inf, speed
+    )
+    assert (motion.u, motion.v, motion.r) == (
+        0.9 * speed,
+        0.1 * speed,
+        0.1 * speed / length,
+    )
+    assert (motion.psi, motion.delta, motion.p, motion.phi, motion.n) == (
+        0.1,
+        0.1,
+        0.01,
+        0.01,
+        n,
+    )
     assert shafts == [(n, 0.9 * n)]

@@ -23,16 +23,18 @@ def test_limit_and_rate_are_in_radians():
 def test_solas_asks_for_the_default_rate():
     gear = SteeringGear()
     assert (
-        35.0 + 30.0
-    ) / gear.rudder_rate_deg_s <= 28.0  # from 35 deg to 30 deg on the other side, SOLAS II-1/29
+        (35.0 + 30.0) / gear.rudder_rate_deg_s <= 28.0
+    )  # from 35 deg to 30 deg on the other side, SOLAS II-1/29
     assert gear.time_constant == 0.0
 
 
 def test_numbers_of_numpy_are_plain_ones_in_files():
     gear = SteeringGear(np.float32(35.0), np.int64(3), np.float32(0.5))
     assert json.loads(json.dumps(gear.to_dict())) == {
-        "rudder_limit_deg": 35.0, "rudder_rate_deg_s": 3.0, "time_constant": 0.5
-    }  # fmt: skip
+        "rudder_limit_deg": 35.0,
+        "rudder_rate_deg_s": 3.0,
+        "time_constant": 0.5,
+    }
 
 
 def kvlcc2_with(lag):
@@ -65,7 +67,8 @@ def test_an_environment_follows_a_short_lag():
 
 
 @pytest.mark.parametrize(
-    ("step", "frequency"), [(0.0, 2.0), (0.9, 2.0), (1.1, 2.0), (1.2, 1 / 0.54), (10.0, 1 / 4.5)]
+    ("step", "frequency"),
+    [(0.0, 2.0), (0.9, 2.0), (1.1, 2.0), (1.2, 1 / 0.54), (10.0, 1 / 4.5)],
 )
 def test_a_lag_is_at_least_nine_twentieths_of_a_step(step, frequency):
     assert SteeringGear(time_constant=0.5).frequency(step) == pytest.approx(frequency)
@@ -75,14 +78,23 @@ def test_a_lag_is_at_least_nine_twentieths_of_a_step(step, frequency):
 @pytest.mark.parametrize(
     ("values", "message"),
     [
-        ({"rudder_limit_deg": -3.0}, "rudder_limit_deg: -3 found, expected a number > 0"),
-        ({"rudder_limit_deg": 120}, "rudder_limit_deg: 120 found, expected a number > 0 and <= 90"),
+        (
+            {"rudder_limit_deg": -3.0},
+            "rudder_limit_deg: -3 found, expected a number > 0",
+        ),
+        (
+            {"rudder_limit_deg": 120},
+            "rudder_limit_deg: 120 found, expected a number > 0 and <= 90",
+        ),
         ({"rudder_rate_deg_s": 0}, "rudder_rate_deg_s: 0 found, expected a number > 0"),
         ({"time_constant": -1}, "time_constant: -1 found, expected a number >= 0"),
         ({"time_constant": math.nan}, "time_constant: nan found"),
         ({"time_constant": True}, "time_constant: True found"),
         ({"rudder_rate_deg_s": "2.5"}, "write the number without quotes"),
-        ({"rudder_limit": 35}, "unknown key 'rudder_limit'. Did you mean 'rudder_limit_deg'?"),
+        (
+            {"rudder_limit": 35},
+            "unknown key 'rudder_limit'. Did you mean 'rudder_limit_deg'?",
+        ),
     ],
 )
 def test_impossible_gears_are_refused(values, message):

@@ -4,7 +4,12 @@ import numpy as np
 import pytest
 
 from shipgym import InputError, ManoeuvreError, Trial, load_model
-from shipgym.manoeuvres import acceleration, acceleration_indices, stopping, stopping_indices
+from shipgym.manoeuvres import (
+    acceleration,
+    acceleration_indices,
+    stopping,
+    stopping_indices,
+)
 from shipgym.manoeuvres.stopping import _stopping_order
 
 FULL_ASTERN = -80.0 / 60.0  # 1/s
@@ -34,7 +39,9 @@ def test_a_container_ship_without_thrust_halves_its_speed_in_13_lengths():
     """udot = X_uu u^2 / L / (m + mx), so each halving takes ln 2 (m + mx) / -X_uu ship lengths."""
     model = load_model("container")
     trial, numbers = stopping(model), model.coefficients
-    quarter, eighth = (stopping_indices(trial, ratio).track_reach_lengths for ratio in (0.25, 0.125))
+    quarter, eighth = (
+        stopping_indices(trial, ratio).track_reach_lengths for ratio in (0.25, 0.125)
+    )
     halving = np.log(2.0) * (numbers["m"] + numbers["mx"]) / -numbers["X_uu"]
     assert eighth - quarter == pytest.approx(halving, rel=1e-3)
 
@@ -43,13 +50,16 @@ def test_a_container_ship_without_thrust_halves_its_speed_in_13_lengths():
 def test_coasting_straight_needs_no_sideways_room(name):
     indices = stopping_indices(stopping(load_model(name)))
     assert indices.side_reach_lengths == pytest.approx(0.0, abs=1e-9)
-    assert indices.head_reach_lengths == pytest.approx(indices.track_reach_lengths, rel=1e-5)
+    assert indices.head_reach_lengths == pytest.approx(
+        indices.track_reach_lengths, rel=1e-5
+    )
 
 
 def test_full_scale_and_model_coast_alike():
     """By Froude's law the same in ship lengths, but for the wake fraction, 0.35 against 0.40."""
     full, small = (
-        stopping_indices(stopping(load_model(name))).track_reach_lengths for name in ("kvlcc2", "kvlcc2-l7")
+        stopping_indices(stopping(load_model(name))).track_reach_lengths
+        for name in ("kvlcc2", "kvlcc2-l7")
     )
     assert small == pytest.approx(full, rel=0.01)
 
@@ -59,7 +69,13 @@ def test_stopping_distance_of_a_stop_drawn_by_hand():
     t = np.arange(101.0)
     ahead = 10.0 * t - 0.05 * t**2
     still = np.zeros(101)
-    channels = {"x": still, "y": ahead, "psi": still + np.pi / 2, "u": 10.0 - 0.1 * t, "v": still}
+    channels = {
+        "x": still,
+        "y": ahead,
+        "psi": still + np.pi / 2,
+        "u": 10.0 - 0.1 * t,
+        "v": still,
+    }
     trial = Trial(t, channels, length=50.0)
     assert stopping_indices(trial).track_reach_lengths == pytest.approx(10.0)
     half = stopping_indices(trial, 0.5)
@@ -69,7 +85,8 @@ def test_stopping_distance_of_a_stop_drawn_by_hand():
 
 
 @pytest.mark.parametrize(
-    ("name", "lengths"), [("container", 8.27), ("tanker", 15.86), ("kvlcc2", 10.28), ("kvlcc2-l7", 10.43)]
+    ("name", "lengths"),
+    [("container", 8.27), ("tanker", 15.86), ("kvlcc2", 10.28), ("kvlcc2-l7", 10.43)],
 )
 def test_acceleration_to_service_speed(name, lengths):
     """Ship lengths from a quarter of service speed until nine tenths of the rest are gained."""
@@ -83,7 +100,9 @@ def test_acceleration_to_service_speed(name, lengths):
 
 def test_a_ship_without_shaft_neither_stops_nor_accelerates():
     for call in (stopping, acceleration):
-        with pytest.raises(InputError, match="'mariner': no shaft speed among its commands"):
+        with pytest.raises(
+            InputError, match="'mariner': no shaft speed among its commands"
+        ):
             call(load_model("mariner"))
 
 
@@ -100,14 +119,26 @@ def test_a_ship_that_does_not_stop_says_so_with_its_trial():
 @pytest.mark.parametrize(
     ("name", "call", "message"),
     [
-        ("container", lambda m: stopping(m, -0.5), "'container' holds for a shaft turning ahead only"),
-        ("kvlcc2", lambda m: stopping(m, -0.5), "'kvlcc2' holds for a shaft turning ahead only"),
+        (
+            "container",
+            lambda m: stopping(m, -0.5),
+            "'container' holds for a shaft turning ahead only",
+        ),
+        (
+            "kvlcc2",
+            lambda m: stopping(m, -0.5),
+            "'kvlcc2' holds for a shaft turning ahead only",
+        ),
         ("tanker", lambda m: stopping(m, 5.0), "shaft_speed: 5 found"),
         ("tanker", lambda m: stopping(m, speed_ratio=0.0), "never dead in the water"),
         ("tanker", lambda m: stopping(m, speed_ratio=1.5), "speed_ratio: 1.5 found"),
         ("tanker", lambda m: acceleration(m, 0.0), "start_ratio: 0 found"),
         ("tanker", lambda m: acceleration(m, duration=-5.0), "duration: -5 found"),
-        ("tanker", lambda m: acceleration_indices(stopping(m)), "expected an acceleration"),
+        (
+            "tanker",
+            lambda m: acceleration_indices(stopping(m)),
+            "expected an acceleration",
+        ),
         ("tanker", lambda m: acceleration_indices(stopping(m), 0.0), "part: 0 found"),
         ("tanker", lambda m: acceleration_indices(stopping(m), 1.0), "part: 1 found"),
     ],
@@ -119,7 +150,10 @@ def test_wrong_arguments(name, call, message):
 
 @pytest.mark.parametrize(
     ("indices", "needed"),
-    [(stopping_indices, ("u", "v", "x", "y", "psi")), (acceleration_indices, ("u", "v"))],
+    [
+        (stopping_indices, ("u", "v", "x", "y", "psi")),
+        (acceleration_indices, ("u", "v")),
+    ],
 )
 def test_what_a_trial_lacks_is_named(indices, needed):
     t = np.arange(5.0)
@@ -135,7 +169,9 @@ def test_a_shaft_is_ordered_astern_by_half_as_much_again_as_ahead():
     for share in (-1.5, -0.1, 0.0, 0.99):
         assert _stopping_order(tanker, share * service, 0.1) == share * service
     for share in (-1.51, 1.0):
-        with pytest.raises(InputError, match=r"shaft_speed: .* found, .*less than at service speed"):
+        with pytest.raises(
+            InputError, match=r"shaft_speed: .* found, .*less than at service speed"
+        ):
             _stopping_order(tanker, share * service, 0.1)
     assert _stopping_order(tanker, -0.1, 0.0) == -0.1
     with pytest.raises(InputError, match="never dead in the water"):

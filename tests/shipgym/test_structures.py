@@ -29,7 +29,9 @@ FREE = [name for name, table in STRUCTURES.items() if not table.captive]
 @given(speeds, st.floats(-3.0, 3.0), st.floats(-0.02, 0.02), st.floats(-0.7, 0.7))
 def test_features_times_coefficients_are_the_simulated_accelerations(u, v, r, delta):
     model = shipgym.load_model("mariner")
-    theta = ABKOWITZ.acceleration_matrix(model.particulars) @ list(model.coefficients.values())
+    theta = ABKOWITZ.acceleration_matrix(model.particulars) @ list(
+        model.coefficients.values()
+    )
     expected, row = [], 0
     for equation in ("u", "v", "r"):
         channels = {"u": [u], "v": [v], "r": [r], "delta": [delta]}
@@ -43,7 +45,9 @@ def test_features_times_coefficients_are_the_simulated_accelerations(u, v, r, de
 def test_abkowitz_has_the_terms_of_the_paper():
     """Cao 2015, tables 2 to 4: 10 coefficients of surge, 15 of sway, 15 of yaw."""
     assert len(ABKOWITZ.coefficient_names) == 40
-    assert {"X_uvd", "Y_0uu", "Y_vdd", "N_uud", "N_vvr"} <= set(ABKOWITZ.coefficient_names)
+    assert {"X_uvd", "Y_0uu", "Y_vdd", "N_uud", "N_vvr"} <= set(
+        ABKOWITZ.coefficient_names
+    )
     assert ABKOWITZ.required_channels == ("u", "v", "r", "delta")
 
 
@@ -51,7 +55,10 @@ def test_a_force_along_one_axis_meets_the_coupled_inertia():
     """M a = F in the prime system with Mariner's inertia (Chislett & Strom-Tejsen 1965)."""
     p = shipgym.load_model("mariner").particulars
     matrix = ABKOWITZ.acceleration_matrix(p)
-    y_v, n_v = ABKOWITZ.coefficient_names.index("Y_v"), ABKOWITZ.coefficient_names.index("N_v")
+    y_v, n_v = (
+        ABKOWITZ.coefficient_names.index("Y_v"),
+        ABKOWITZ.coefficient_names.index("N_v"),
+    )
     inertia = 1e-5 * np.array([[1546.0, -9.0], [-23.0, 83.0]])
     length = p["length"]
     sway = matrix[np.ix_([y_v, n_v], [y_v, n_v])] * [[length], [length**2]]
@@ -80,7 +87,11 @@ def virtual_ship(name: str, **coefficients: float) -> ShipModel:
     return ShipModel(
         name="virtual",
         structure=name,
-        particulars=mariner if table.quantity == "force" else Particulars(length=160.93, speed=7.7175),
+        particulars=(
+            mariner
+            if table.quantity == "force"
+            else Particulars(length=160.93, speed=7.7175)
+        ),
         steering=SteeringGear(35.0, 5.0, 1.0),
         coefficients=dict.fromkeys(table.coefficient_names, 0.0) | coefficients,
         service_shaft_speed=1.2 if "n" in table.command_names else 0.0,
@@ -92,21 +103,43 @@ def test_accelerations_of_every_structure_are_written_from_its_features(name):
     table = get_structure(name)
     random = np.random.default_rng(0)
     model = virtual_ship(name, **{c: random.normal() for c in table.coefficient_names})
-    theta = table.numbers(model.coefficients, model.particulars, model.service_shaft_speed)
-    state = {"u": 6.0, "v": -0.9, "r": -0.01, "p": 0.02, "phi": -0.1, "q": 1e-3, "delta": 0.2, "n": 1.1}
+    theta = table.numbers(
+        model.coefficients, model.particulars, model.service_shaft_speed
+    )
+    state = {
+        "u": 6.0,
+        "v": -0.9,
+        "r": -0.01,
+        "p": 0.02,
+        "phi": -0.1,
+        "q": 1e-3,
+        "delta": 0.2,
+        "n": 1.1,
+    }
     channels = {symbol: [value] for symbol, value in state.items()}
-    expected, row = {"u": 0.0, "v": 0.9 * 7.7175 / 160.93, "r": 0.01 * 7.7175 / 160.93}, 0
+    expected, row = (
+        {"u": 0.0, "v": 0.9 * 7.7175 / 160.93, "r": 0.01 * 7.7175 / 160.93},
+        0,
+    )
     for equation, terms in table.equations.items():
-        features = table.features(equation, channels, model.particulars, model.service_shaft_speed)[0]
+        features = table.features(
+            equation, channels, model.particulars, model.service_shaft_speed
+        )[0]
         expected[equation] = features @ theta[row : row + len(terms)]
         row += len(terms)
     u, v, r, delta = (float(channels[symbol][0]) for symbol in ("u", "v", "r", "delta"))
     expected["r"] += state["q"] if "q" in table.equations else 0.0
-    motion = Motion(0.0, 0.0, 0.0, u, v, r, state["p"], state["phi"], state["q"], delta, 1.1)
-    ship = Ship(160.93, 7.7175, 0.6, 0.1, 1.0, model.service_shaft_speed, np.inf, 7.7175)
+    motion = Motion(
+        0.0, 0.0, 0.0, u, v, r, state["p"], state["phi"], state["q"], delta, 1.1
+    )
+    ship = Ship(
+        160.93, 7.7175, 0.6, 0.1, 1.0, model.service_shaft_speed, np.inf, 7.7175
+    )
     plain = model.vessel.functions["accelerations"].function
     found = plain(motion, model.vessel.coefficients(*theta), ship)
-    np.testing.assert_allclose(found, [expected.get(q, 0.0) for q in "uvrpq"], rtol=1e-12)
+    np.testing.assert_allclose(
+        found, [expected.get(q, 0.0) for q in "uvrpq"], rtol=1e-12
+    )
 
 
 def test_nomoto_turns_at_the_rate_k_delta_after_some_time_constants():
@@ -115,23 +148,33 @@ def test_nomoto_turns_at_the_rate_k_delta_after_some_time_constants():
     ship = virtual_ship("nomoto", c_r=-1.0 / T, c_d=K / T)
     start = [0.0, 0.0, 0.0, 7.0, 0.5, 0.0, 0.1]
     trial = ship.simulate(np.full((600, 1), 0.1), 0.5, start)
-    np.testing.assert_allclose(trial["r"], K * 0.1 * (1.0 - np.exp(-trial.t / T)), rtol=1e-6, atol=1e-12)
+    np.testing.assert_allclose(
+        trial["r"], K * 0.1 * (1.0 - np.exp(-trial.t / T)), rtol=1e-6, atol=1e-12
+    )
     assert np.all(trial["u"] == 7.0)  # no surge: the speed stays
-    np.testing.assert_allclose(trial["v"], 0.5 * np.exp(-trial.t * 7.7175 / 160.93), rtol=1e-6)
-    assert np.all(ship.simulate(np.full((600, 1), 0.1), 0.5)["v"] == 0.0)  # no sway: no drift
+    np.testing.assert_allclose(
+        trial["v"], 0.5 * np.exp(-trial.t * 7.7175 / 160.93), rtol=1e-6
+    )
+    assert np.all(
+        ship.simulate(np.full((600, 1), 0.1), 0.5)["v"] == 0.0
+    )  # no sway: no drift
 
 
 def test_norrbin_turns_at_the_root_of_its_cubic():
     """n1 r + n3 r^3 = K delta: r = 0.01 1/s for delta = 0.2, n1 = 1, n3 = 5000, K = 0.075."""
     T, K, n3 = 20.0, 0.075, 5000.0
     ship = virtual_ship("norrbin", c_r=-1.0 / T, c_r3=-n3 / T, c_d=K / T)
-    assert ship.simulate(np.full((800, 1), 0.2), 0.5)["r"][-1] == pytest.approx(0.01, rel=1e-6)
+    assert ship.simulate(np.full((800, 1), 0.2), 0.5)["r"][-1] == pytest.approx(
+        0.01, rel=1e-6
+    )
 
 
 def test_linear_steering_has_the_form_of_astrom_and_kallstrom():
     """The Mariner of Zhu 2018, equation A.9 and table 7.3.1, rudder turned positive to starboard."""
     a11, a12, a21, a22, b11, b21 = -0.693, -0.304, -3.41, -2.17, -0.207, 1.63
-    ship = virtual_ship("linear-steering", b_v=a11, b_r=a12, b_d=b11, c_v=a21, c_r=a22, c_d=b21)
+    ship = virtual_ship(
+        "linear-steering", b_v=a11, b_r=a12, b_d=b11, c_v=a21, c_r=a22, c_d=b21
+    )
     v, r, delta, U, L = 0.3, 0.004, 0.1, np.hypot(7.0, 0.3), 160.93
     expected = [
         a11 * v * U / L + a12 * r * U + b11 * delta * U**2 / L,
@@ -146,7 +189,9 @@ def test_surge_reaches_the_speed_at_which_thrust_meets_resistance():
     ship = virtual_ship("surge", **{"a_|u|u": -4e-4, "a_|n|n": 0.0165})
     speed = np.sqrt(0.0165 / 4e-4)
     ahead = ship.simulate(np.tile([0.0, 1.0], (4000, 1)), 0.5, np.zeros(7))
-    np.testing.assert_allclose(ahead["u"], speed * np.tanh(np.sqrt(4e-4 * 0.0165) * ahead.t), rtol=1e-8)
+    np.testing.assert_allclose(
+        ahead["u"], speed * np.tanh(np.sqrt(4e-4 * 0.0165) * ahead.t), rtol=1e-8
+    )
     stop = ship.simulate(np.tile([0.0, -1.0], (40, 1)), 0.5)
     assert np.all(np.diff(stop["u"]) < 0.0)
     np.testing.assert_array_equal(ahead["psi"], 0.0)
@@ -160,7 +205,9 @@ def test_perturbed_surge_holds_service_speed_at_service_revolutions():
 
 def test_cubic_at_service_is_in_parts_of_service():
     """udot L / U0^2 is the sum of the coefficients of n2, nu, u2 at service speed and revolutions."""
-    ship = virtual_ship("cubic", a_n2=0.03, a_nu=-0.01, a_u2=-0.005, b_Uv=-0.4, **{"c_v3/U": 2.0})
+    ship = virtual_ship(
+        "cubic", a_n2=0.03, a_nu=-0.01, a_u2=-0.005, b_Uv=-0.4, **{"c_v3/U": 2.0}
+    )
     udot = ship.derivatives(ship.service_state, ship.service_command)[3]
     assert udot * 160.93 / 7.7175**2 == pytest.approx(0.015)
     U0, v = 7.7175, 0.1 * 7.7175
@@ -172,10 +219,23 @@ def test_cubic_at_service_is_in_parts_of_service():
 
 def test_printed_structures_have_the_terms_of_their_papers():
     assert get_structure("steering7").coefficient_names[:7] == (
-        "b_v", "b_|v|v", "b_|r|v", "b_r", "b_|v|r", "b_|r|r", "b_d",
-    )  # fmt: skip
+        "b_v",
+        "b_|v|v",
+        "b_|r|v",
+        "b_r",
+        "b_|v|r",
+        "b_|r|r",
+        "b_d",
+    )
     assert get_structure("zhu-6").equations == get_structure("steering5").equations
-    assert get_structure("zhu-8").coefficient_names == ("b_v", "b_|v|v", "b_d", "c_r", "c_|r|r", "c_d")
+    assert get_structure("zhu-8").coefficient_names == (
+        "b_v",
+        "b_|v|v",
+        "b_d",
+        "c_r",
+        "c_|r|r",
+        "c_d",
+    )
     assert [term.name for term in get_structure("cubic").terms("u")] == [
         *("n2", "nu", "u2", "v2", "vr", "r2", "n2d2")
     ]
@@ -201,53 +261,98 @@ def test_forces_in_units_of_service_speed_meet_the_inertia_of_their_axis():
     p = shipgym.load_model("mariner").particulars
     matrix = table.acceleration_matrix(p)
     np.testing.assert_allclose(
-        matrix * 83e-5, np.diag([p["speed"] / p["length"], (p["speed"] / p["length"]) ** 2]), rtol=2e-4
+        matrix * 83e-5,
+        np.diag([p["speed"] / p["length"], (p["speed"] / p["length"]) ** 2]),
+        rtol=2e-4,
     )
     assert table.coefficient_names == ("N_r", "N_d")
 
 
-def test_a_table_is_registered_in_a_line_and_saved_with_its_models(tmp_path, monkeypatch):
+def test_a_table_is_registered_in_a_line_and_saved_with_its_models(
+    tmp_path, monkeypatch
+):
     monkeypatch.setattr("shipgym.ships.structures.STRUCTURES", dict(STRUCTURES))
-    table = shipgym.register_structure("mine", {"v": "v, |v| v, delta", "r": "v, r, r^2 v/U, delta"})
-    assert shipgym.register_structure("mine", {"v": "v, |v| v, delta", "r": "v, r, r^2 v/U, delta"}) == table
-    ship = virtual_ship("mine", **{"b_v": -0.05, "c_r": -0.1, "c_d": 0.002, "c_r2v/U": 0.1})
+    table = shipgym.register_structure(
+        "mine", {"v": "v, |v| v, delta", "r": "v, r, r^2 v/U, delta"}
+    )
+    assert (
+        shipgym.register_structure(
+            "mine", {"v": "v, |v| v, delta", "r": "v, r, r^2 v/U, delta"}
+        )
+        == table
+    )
+    ship = virtual_ship(
+        "mine", **{"b_v": -0.05, "c_r": -0.1, "c_d": 0.002, "c_r2v/U": 0.1}
+    )
     ship.save(tmp_path / "mine.json")
     monkeypatch.undo()
     with pytest.raises(InputError, match="structure: 'mine' found"):
         get_structure("mine")
-    for elsewhere in (shipgym.load_model(tmp_path / "mine.json"), pickle.loads(pickle.dumps(ship))):
+    for elsewhere in (
+        shipgym.load_model(tmp_path / "mine.json"),
+        pickle.loads(pickle.dumps(ship)),
+    ):
         assert elsewhere.simulate([[0.2]] * 20, 1.0)["r"][-1] > 0.0
 
 
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ({"equations": {"r": "r, delat"}}, "'delat' found in 'delat'.*Did you mean 'delta'"),
+        (
+            {"equations": {"r": "r, delat"}},
+            "'delat' found in 'delat'.*Did you mean 'delta'",
+        ),
         ({"equations": {"r": "r,, delta"}}, "nothing found between two commas"),
         ({"equations": {"r": "r^10"}}, "'r\\^10' found"),
         ({"equations": {"r": "1/v"}}, "equations.r: term '1/v': power -1 of 'v'"),
-        ({"equations": {"w": "u"}}, "equations 'w' found, expected some of 'u', 'v', 'r', 'p', 'q'"),
-        ({"equations": {"r": "r, phi"}}, "symbol 'phi' found, expected an equation of roll 'p'"),
-        ({"equations": {"q": "r, delta"}}, "expected the memory 'q' of yaw beside an equation 'r'"),
+        (
+            {"equations": {"w": "u"}},
+            "equations 'w' found, expected some of 'u', 'v', 'r', 'p', 'q'",
+        ),
+        (
+            {"equations": {"r": "r, phi"}},
+            "symbol 'phi' found, expected an equation of roll 'p'",
+        ),
+        (
+            {"equations": {"q": "r, delta"}},
+            "expected the memory 'q' of yaw beside an equation 'r'",
+        ),
         ({"equations": {"r": "r", "p": "p", "q": "r"}}, "without one of roll 'p'"),
         (
-            {"equations": {"r": "r", "p": "p, phi"}, "normalisation": "prime", "quantity": "force"},
+            {
+                "equations": {"r": "r", "p": "p, phi"},
+                "normalisation": "prime",
+                "quantity": "force",
+            },
             "forces found, expected accelerations in a table with roll",
         ),
         ({"equations": {"r": "v r, r v"}}, "appears twice in one equation: 'rv'"),
         ({"equations": {"r": ()}}, "no terms found"),
-        ({"equations": {"r": ["v", "r"]}}, "equations.r: 'v' found, expected a formula"),
+        (
+            {"equations": {"r": ["v", "r"]}},
+            "equations.r: 'v' found, expected a formula",
+        ),
         ({"equations": {"r": 3}}, "equations.r: 3 found, expected formulas"),
         ({"equations": "r, delta"}, "expected a table of keys and values"),
-        ({"equations": {"r": "U r"}, "normalisation": "prime"}, "'U' found, which is 1 in the prime system"),
+        (
+            {"equations": {"r": "U r"}, "normalisation": "prime"},
+            "'U' found, which is 1 in the prime system",
+        ),
         ({"equations": {"r": "r"}, "normalisation": "prim"}, "Did you mean 'prime'"),
         ({"equations": {"r": "r"}, "quantity": "force"}, "forces in 'si' found"),
         (
-            {"equations": {"v": "v", "r": "r"}, "quantity": "force", "normalisation": "prime"},
+            {
+                "equations": {"v": "v", "r": "r"},
+                "quantity": "force",
+                "normalisation": "prime",
+            },
             "'v' and 'r' differ, expected the same terms",
         ),
         ({"equations": {"r": "r"}, "source": ""}, "source: '' found"),
-        ({"equations": {"r": "r"}, "name": "nomoto"}, "name 'nomoto' found, which is another structure's"),
+        (
+            {"equations": {"r": "r"}, "name": "nomoto"},
+            "name 'nomoto' found, which is another structure's",
+        ),
         ({"equations": {"r": "r"}, "name": "container"}, "name 'container' found"),
     ],
 )
@@ -260,7 +365,9 @@ def test_a_shaft_speed_is_asked_for_where_the_terms_have_one():
     with pytest.raises(InputError, match="service_shaft_speed of 'virtual': 0 found"):
         replace(virtual_ship("cubic"), service_shaft_speed=0.0)
     with pytest.raises(InputError, match="service_shaft_speed: 0 found"):
-        get_structure("surge-perturbed").acceleration_matrix(Particulars(length=100.0, speed=5.0))
+        get_structure("surge-perturbed").acceleration_matrix(
+            Particulars(length=100.0, speed=5.0)
+        )
 
 
 def test_nomoto_is_recovered_from_its_own_linear_form():
@@ -275,17 +382,35 @@ def test_the_terms_of_a_memory_belong_to_the_regression_of_yaw():
     assert table.regressed == ("r",)
     assert table.regression_names("r") == table.names("r") + table.names("q")
     assert table.state_names == ("x", "y", "psi", "u", "v", "r", "q", "delta")
-    assert get_structure("nomoto").regression_names("r") == get_structure("nomoto").names("r")
+    assert get_structure("nomoto").regression_names("r") == get_structure(
+        "nomoto"
+    ).names("r")
 
 
 @pytest.mark.parametrize(
     ("name", "equations", "message"),
     [
-        ("nomoto", {"r": "r, delta"}, "name 'nomoto' found, which is another structure's"),
-        ("kvlcc2", {"r": "r, delta"}, "name 'kvlcc2' found, which is another structure's"),
-        ("grey-box", {"r": "r, delta"}, "name 'grey-box' found, which is another structure's"),
+        (
+            "nomoto",
+            {"r": "r, delta"},
+            "name 'nomoto' found, which is another structure's",
+        ),
+        (
+            "kvlcc2",
+            {"r": "r, delta"},
+            "name 'kvlcc2' found, which is another structure's",
+        ),
+        (
+            "grey-box",
+            {"r": "r, delta"},
+            "name 'grey-box' found, which is another structure's",
+        ),
         ("mine", {"r": 3}, "equations.r: 3 found, expected formulas such as"),
-        ("mine", {"r": ["r", "delta"]}, "equations.r: 'r' found, expected a formula in one text, or Terms"),
+        (
+            "mine",
+            {"r": ["r", "delta"]},
+            "equations.r: 'r' found, expected a formula in one text, or Terms",
+        ),
     ],
 )
 def test_names_of_others_and_what_is_no_formula_are_refused(name, equations, message):
@@ -295,18 +420,33 @@ def test_names_of_others_and_what_is_no_formula_are_refused(name, equations, mes
 
 
 def test_a_grey_box_is_no_structure_by_itself():
-    with pytest.raises(InputError, match="'grey-box' found, which is a reference ship and a table of terms"):
+    with pytest.raises(
+        InputError,
+        match="'grey-box' found, which is a reference ship and a table of terms",
+    ):
         get_structure("grey-box")
 
 
 def test_structures_are_listed_by_the_names_of_their_sources():
     names = set(shipgym.ships.list_structures())
     assert {f"zhu-{k}" for k in range(1, 11)} <= names
-    assert {"abkowitz", "cubic", "nomoto", "nomoto2", "norrbin", "surge", "steering5", "steering7"} <= names
+    assert {
+        "abkowitz",
+        "cubic",
+        "nomoto",
+        "nomoto2",
+        "norrbin",
+        "surge",
+        "steering5",
+        "steering7",
+    } <= names
     assert {"linear-steering", "mmg4dof", "pmm18", "pmm38", "surge-perturbed"} <= names
     assert "zhu-11" not in names
 
 
 def test_a_source_that_nobody_wrote_is_refused_with_its_beginning():
-    with pytest.raises(ValueError, match=f"accelerations: '{'x' * 200}' found, expected sums of products"):
+    with pytest.raises(
+        ValueError,
+        match=f"accelerations: '{'x' * 200}' found, expected sums of products",
+    ):
         accelerations_function("x" * 300)

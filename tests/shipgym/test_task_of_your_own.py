@@ -20,7 +20,14 @@ from shipgym.envs.engine import Engine
 from shipgym.python_files import load_file
 from shipgym.tasks.contract import NO_NUMBERS, Numbers, Seen, Setting
 from shipgym.tasks.definition import no_worst_cost, read_definition
-from shipgym.tasks.source import annotated, check_namespace, kept_source, keywords, make_settings, read_source
+from shipgym.tasks.source import (
+    annotated,
+    check_namespace,
+    kept_source,
+    keywords,
+    make_settings,
+    read_source,
+)
 from shipgym.tasks.task import Task
 
 ROOT = Path(__file__).parents[2]
@@ -43,7 +50,9 @@ def written(folder, name, text):
 @pytest.fixture
 def fairway(tmp_path):
     known = set(gymnasium.registry)
-    register_task("harbour/Fairway-v0", written(tmp_path, "fairway.py", FAIRWAY), **SHIP)
+    register_task(
+        "harbour/Fairway-v0", written(tmp_path, "fairway.py", FAIRWAY), **SHIP
+    )
     yield "harbour/Fairway-v0"
     for name in set(gymnasium.registry) - known:
         del gymnasium.registry[name]
@@ -60,7 +69,13 @@ def test_a_task_works_everywhere(fairway):
     check_env(env)
     assert env.observation_names[-1] == "to_zone"
     seen, info = env.reset(seed=70)
-    assert {"speeding", "cross_track", "reward_delay", "reward_over_speed", "reward_end"} <= info.keys()
+    assert {
+        "speeding",
+        "cross_track",
+        "reward_delay",
+        "reward_over_speed",
+        "reward_end",
+    } <= info.keys()
     assert env.render().shape == (600, 600, 3)
     many = gymnasium.make_vec(fairway, num_envs=71, episode_steps=60)
     check_vector_env(
@@ -73,7 +88,11 @@ def test_a_task_works_everywhere(fairway):
         seen, reward, *_, info = env.step(action)
         all_seen, rewards, *_ = many.step(np.tile(action, (71, 1)))
         np.testing.assert_array_equal(all_seen[70], seen)
-        assert rewards[70] == reward == pytest.approx(sum(info[name] for name in env.task.reward_parts))
+        assert (
+            rewards[70]
+            == reward
+            == pytest.approx(sum(info[name] for name in env.task.reward_parts))
+        )
 
 
 def test_the_limit_is_what_it_says(fairway):
@@ -91,7 +110,13 @@ def test_the_limit_is_what_it_says(fairway):
 
 
 def test_an_agent_is_trained_for_it(fairway):
-    agent = PPO("MlpPolicy", ShipVecEnv(fairway, num_envs=4, seed=0), n_steps=16, batch_size=32, n_epochs=1)
+    agent = PPO(
+        "MlpPolicy",
+        ShipVecEnv(fairway, num_envs=4, seed=0),
+        n_steps=16,
+        batch_size=32,
+        n_epochs=1,
+    )
     agent.learn(128)
     assert agent.num_timesteps == 128
 
@@ -132,14 +157,19 @@ def test_a_reward_of_ones_own_is_paid_for_the_same_voyage(tmp_path):
         assert reward == pytest.approx(-(info["heading_error"] ** 2) - 0.5 * rudder**2)
     many = gymnasium.make_vec(COURSE, num_envs=3, reward=path)
     many.reset(seed=5)
-    assert set(many.step(np.zeros((3, 1), dtype=np.float32))[4]) >= {"reward_heading", "reward_end"}
+    assert set(many.step(np.zeros((3, 1), dtype=np.float32))[4]) >= {
+        "reward_heading",
+        "reward_end",
+    }
 
 
 def test_sensors_of_ones_own_show_the_same_voyage_otherwise(tmp_path):
     path = written(tmp_path, "my_sensors.py", SENSORS)
     assert check_task("CourseKeeping", sensors=path).problems == ()
     plain = gymnasium.make(COURSE, model="mariner").unwrapped
-    env = gymnasium.make(COURSE, model="mariner", sensors=str(path), compass_error=0.2).unwrapped
+    env = gymnasium.make(
+        COURSE, model="mariner", sensors=str(path), compass_error=0.2
+    ).unwrapped
     for one in (plain, env):
         one.reset(seed=5)
     lagged, part = env.physical_state()["u"], env.dt / (20.0 + env.dt)
@@ -152,19 +182,28 @@ def test_sensors_of_ones_own_show_the_same_voyage_otherwise(tmp_path):
         assert error == pytest.approx(0.2, abs=1e-5)
         lagged += part * (env.physical_state()["u"] - lagged)
         assert seen[4] * env.observation_scales[4] == pytest.approx(lagged, rel=1e-6)
-    with pytest.raises(InputError, match=r"sensors: .*my_sensors.py and noise or measurement found"):
+    with pytest.raises(
+        InputError, match=r"sensors: .*my_sensors.py and noise or measurement found"
+    ):
         gymnasium.make(COURSE, sensors=path, noise=1.0)
     with pytest.raises(InputError, match="log_time_constant: 0 found"):
         gymnasium.make(COURSE, sensors=path, log_time_constant=0.0)
-    path = written(tmp_path, "my_sensors.py", SENSORS.replace("log_time_constant", "rudder_weight"))
-    with pytest.raises(InputError, match=r"my_sensors.py: Settings.rudder_weight found, which is a keyword"):
+    path = written(
+        tmp_path, "my_sensors.py", SENSORS.replace("log_time_constant", "rudder_weight")
+    )
+    with pytest.raises(
+        InputError,
+        match=r"my_sensors.py: Settings.rudder_weight found, which is a keyword",
+    ):
         gymnasium.make(COURSE, sensors=path)
 
 
 def test_a_file_that_was_changed_is_read_and_compiled_anew(tmp_path):
     path = written(tmp_path, "my_reward.py", REWARD)
     first = gymnasium.make(COURSE, reward=path).unwrapped
-    more = REWARD.replace("    rudder: float\n", "    rudder: float\n    bonus: float\n")
+    more = REWARD.replace(
+        "    rudder: float\n", "    rudder: float\n    bonus: float\n"
+    )
     written(tmp_path, "my_reward.py", more.replace("** 2)", "** 2, 7.0)"))
     second = gymnasium.make(COURSE, reward=path).unwrapped
     assert [len(env.task.definition.reward_names) for env in (first, second)] == [2, 3]
@@ -176,52 +215,194 @@ def test_a_file_that_was_changed_is_read_and_compiled_anew(tmp_path):
 
 
 WRONG = [
-    ("class State", "class Sate", "fairway.py: no 'State' found, expected a NamedTuple"),
-    ("def observe", "def obsrve", r"no 'observe' found, expected a function observe\(readings, state"),
-    ("def begin(ship, settings,", "def begin(ship,", "begin: 3 arguments found, expected a function begin"),
-    ("g_sin: Annotated[float, Seen(-1.0, 1.0)]", "g_sin: float", "Observation.heading_sin: no bounds"),
+    (
+        "class State",
+        "class Sate",
+        "fairway.py: no 'State' found, expected a NamedTuple",
+    ),
+    (
+        "def observe",
+        "def obsrve",
+        r"no 'observe' found, expected a function observe\(readings, state",
+    ),
+    (
+        "def begin(ship, settings,",
+        "def begin(ship,",
+        "begin: 3 arguments found, expected a function begin",
+    ),
+    (
+        "g_sin: Annotated[float, Seen(-1.0, 1.0)]",
+        "g_sin: float",
+        "Observation.heading_sin: no bounds",
+    ),
     ('"speeding", ', '"speding", ', "REPORTED: 'speding' found"),
-    ("at_most=1.0)] = 0.7", "at_most=1.0)]", "[Nn]on-default namedtuple field|no default found"),
-    ("    speeding: Flag", "    speeding: str", "State.speeding: .* found, expected a float"),
+    (
+        "at_most=1.0)] = 0.7",
+        "at_most=1.0)]",
+        "[Nn]on-default namedtuple field|no default found",
+    ),
+    (
+        "    speeding: Flag",
+        "    speeding: str",
+        "State.speeding: .* found, expected a float",
+    ),
     ("    delay: float", "    end: float", "Reward: two fields named 'end'"),
-    ("half_width: Annotated", "dt: Annotated", "Settings.dt found, which is a keyword already"),
-    ("class Reward", "class Reward(", "fairway.py, line .*: cannot be executed: SyntaxError"),
+    (
+        "half_width: Annotated",
+        "dt: Annotated",
+        "Settings.dt found, which is a keyword already",
+    ),
+    (
+        "class Reward",
+        "class Reward(",
+        "fairway.py, line .*: cannot be executed: SyntaxError",
+    ),
     ("drawn(random, 1,", "drwn(random, 1,", "in begin.*drwn"),
-    ("return 2.0 + settings", "return settings.weight + settings", "in worst_cost.*weight"),
-    ("return 2.0 + settings.over_speed_weight", "pass", "in worst_cost: .*nothing, expected a number"),
-    ("return 2.0 + ", "return -2.0 - ", "fairway.py: worst_cost: -52 found, expected a number >= 0"),
-    ("] = 50.0", "] = [50.0]", r"Settings.over_speed_weight: \[50.0\] found, expected a number, or"),
+    (
+        "return 2.0 + settings",
+        "return settings.weight + settings",
+        "in worst_cost.*weight",
+    ),
+    (
+        "return 2.0 + settings.over_speed_weight",
+        "pass",
+        "in worst_cost: .*nothing, expected a number",
+    ),
+    (
+        "return 2.0 + ",
+        "return -2.0 - ",
+        "fairway.py: worst_cost: -52 found, expected a number >= 0",
+    ),
+    (
+        "] = 50.0",
+        "] = [50.0]",
+        r"Settings.over_speed_weight: \[50.0\] found, expected a number, or",
+    ),
     ('5.0, "rad/s"', "5.0, 3", "Observation.yaw_rate: unit: 3 found, expected a text"),
     ("max(motion.u", "mox(motion.u", "line 52, in step: NameError: name 'mox'"),
     ("Reward(-off * off, ", "Reward(", "line 54, in step: TypeError: .*'over_speed'"),
-    ("Reward(-off", "(-off", r"in step: result 2 is \(a number, a number, a number\), expected Reward"),
-    ("Reward(-off", "(0.0, -off", r"in step: result 2 is \(a number, a number, a number, a number\), "),
-    ("after, reward", "after, after", "line 48, in step: result 2 is State, expected Reward.*"),
-    ("    return Observation(", "    return readings\n    (", "in observe: what it returns is Readings, "),
-    ("    return Observation(", "    return [sine]\n    (", "line 63, in observe: what it returns is list, "),
-    ("delay = 1.0", "state.limit = delay = 1.0", "line 53, in step: AttributeError: can't set attribute"),
-    ("fabs(off) > 1.0, ", "", r"line 48, in step: what it returns is \(State, Reward, true or false\), "),
+    (
+        "Reward(-off",
+        "(-off",
+        r"in step: result 2 is \(a number, a number, a number\), expected Reward",
+    ),
+    (
+        "Reward(-off",
+        "(0.0, -off",
+        r"in step: result 2 is \(a number, a number, a number, a number\), ",
+    ),
+    (
+        "after, reward",
+        "after, after",
+        "line 48, in step: result 2 is State, expected Reward.*",
+    ),
+    (
+        "    return Observation(",
+        "    return readings\n    (",
+        "in observe: what it returns is Readings, ",
+    ),
+    (
+        "    return Observation(",
+        "    return [sine]\n    (",
+        "line 63, in observe: what it returns is list, ",
+    ),
+    (
+        "delay = 1.0",
+        "state.limit = delay = 1.0",
+        "line 53, in step: AttributeError: can't set attribute",
+    ),
+    (
+        "fabs(off) > 1.0, ",
+        "",
+        r"line 48, in step: what it returns is \(State, Reward, true or false\), ",
+    ),
     ("fabs(off) > 1.0", "off", "in step: result 3 is a number, expected true or false"),
-    ("motion.y, limit", "motion.y, (limit, 1.0)", r"State.limit is \(a number, a number\), exp"),
-    ("return motion, State", "return State", "in begin: what it returns is State, expected .Motion, State."),
-    ("def begin", "def plan_length(_):\n    return -1\n\n\ndef begin", "plan_length: -1 found, expected"),
-    ("def begin", "def plan_length(s):\n    return s.w\n\n\ndef begin", "line 43, in plan_length: Attr"),
-    ("def begin", "def check(s, m):\n    1 / 0\n\n\ndef begin", "line 43, in check: ZeroDivisionError"),
-    ("    aside = 0.5", "    plan[40] = 1.0\n    aside = 0.5", "line 43, in begin: IndexError: index 40"),
-    ("def worst_cost(settings)", "def worst_cost(*settings)", "0 arguments or more, a generator or a co"),
-    ("def step", "import numba\n\n\n@numba.njit\ndef step", "step: no plain function found, expected a"),
-    ("return 2.0 + ", "return worst_cost(settings) + ", "line 59, in worst_cost: calls itself, expected a"),
-    ("] = 50.0", "] = -50.0", "Settings.over_speed_weight: default: -50 found, expected a number >= 0"),
-    ("half_width: Annotated", "autoreset_mode: Annotated", "Settings.autoreset_mode found, which is a keyw"),
-    ('REPORTED = (', 'REPORTED = "speeding" or (', "REPORTED: 'speeding' found, expected a tuple of fields"),
-    ('REPORTED = (', 'REPORTED = 3 or (', "REPORTED: 3 found, expected a tuple of fields"),
-    ('REPORTED = (', 'NAME = ["a"]\nREPORTED = (', r"NAME: \['a'\] found, expected a text"),
-    ('REPORTED = (', 'EPISODE_STEPS = -1\nREPORTED = (', "fairway.py: EPISODE_STEPS: -1 found"),
-    ('REPORTED = (', 'raise SystemExit(3)\nREPORTED = (', "line 8: cannot be executed: SystemExit: 3"),
-]  # fmt: skip
+    (
+        "motion.y, limit",
+        "motion.y, (limit, 1.0)",
+        r"State.limit is \(a number, a number\), exp",
+    ),
+    (
+        "return motion, State",
+        "return State",
+        "in begin: what it returns is State, expected .Motion, State.",
+    ),
+    (
+        "def begin",
+        "def plan_length(_):\n    return -1\n\n\ndef begin",
+        "plan_length: -1 found, expected",
+    ),
+    (
+        "def begin",
+        "def plan_length(s):\n    return s.w\n\n\ndef begin",
+        "line 43, in plan_length: Attr",
+    ),
+    (
+        "def begin",
+        "def check(s, m):\n    1 / 0\n\n\ndef begin",
+        "line 43, in check: ZeroDivisionError",
+    ),
+    (
+        "    aside = 0.5",
+        "    plan[40] = 1.0\n    aside = 0.5",
+        "line 43, in begin: IndexError: index 40",
+    ),
+    (
+        "def worst_cost(settings)",
+        "def worst_cost(*settings)",
+        "0 arguments or more, a generator or a co",
+    ),
+    (
+        "def step",
+        "import numba\n\n\n@numba.njit\ndef step",
+        "step: no plain function found, expected a",
+    ),
+    (
+        "return 2.0 + ",
+        "return worst_cost(settings) + ",
+        "line 59, in worst_cost: calls itself, expected a",
+    ),
+    (
+        "] = 50.0",
+        "] = -50.0",
+        "Settings.over_speed_weight: default: -50 found, expected a number >= 0",
+    ),
+    (
+        "half_width: Annotated",
+        "autoreset_mode: Annotated",
+        "Settings.autoreset_mode found, which is a keyw",
+    ),
+    (
+        "REPORTED = (",
+        'REPORTED = "speeding" or (',
+        "REPORTED: 'speeding' found, expected a tuple of fields",
+    ),
+    (
+        "REPORTED = (",
+        "REPORTED = 3 or (",
+        "REPORTED: 3 found, expected a tuple of fields",
+    ),
+    (
+        "REPORTED = (",
+        'NAME = ["a"]\nREPORTED = (',
+        r"NAME: \['a'\] found, expected a text",
+    ),
+    (
+        "REPORTED = (",
+        "EPISODE_STEPS = -1\nREPORTED = (",
+        "fairway.py: EPISODE_STEPS: -1 found",
+    ),
+    (
+        "REPORTED = (",
+        "raise SystemExit(3)\nREPORTED = (",
+        "line 8: cannot be executed: SystemExit: 3",
+    ),
+]
 
 
-@pytest.mark.parametrize(("old", "new", "message"), WRONG, ids=[new for _, new, _ in WRONG])
+@pytest.mark.parametrize(
+    ("old", "new", "message"), WRONG, ids=[new for _, new, _ in WRONG]
+)
 def test_what_is_wrong_is_named_and_nothing_is_registered(tmp_path, old, new, message):
     assert old in FAIRWAY
     path = written(tmp_path, "fairway.py", FAIRWAY.replace(old, new, 1))
@@ -239,11 +420,26 @@ def test_what_is_wrong_is_named_and_nothing_is_registered(tmp_path, old, new, me
 @pytest.mark.parametrize(
     ("new", "message"),
     [
-        ("    if x > 3.0:\n        fathom\n", r"in step \(.*fairway.py, line 51\): NameError: name 'fathom'"),
-        ("    if x > 3.0:\n        return 1.0, 2.0\n", r"in step \(.*fairway.py, line 5[18]\): Can't unify"),
-        ("    global N\n    N = 1\n", r"\(.*fairway.py, line 51\): .*STORE_GLOBAL. found.$"),
-        ("    if x > 3.0:\n        Reward(1.0)\n", r"compiled \(.*fairway.py, line 51\): .*'delay'"),
-        ("    assert x < 1e9, f'{x}'\n", r"line 50\): the text of an error is put together"),
+        (
+            "    if x > 3.0:\n        fathom\n",
+            r"in step \(.*fairway.py, line 51\): NameError: name 'fathom'",
+        ),
+        (
+            "    if x > 3.0:\n        return 1.0, 2.0\n",
+            r"in step \(.*fairway.py, line 5[18]\): Can't unify",
+        ),
+        (
+            "    global N\n    N = 1\n",
+            r"\(.*fairway.py, line 51\): .*STORE_GLOBAL. found.$",
+        ),
+        (
+            "    if x > 3.0:\n        Reward(1.0)\n",
+            r"compiled \(.*fairway.py, line 51\): .*'delay'",
+        ),
+        (
+            "    assert x < 1e9, f'{x}'\n",
+            r"line 50\): the text of an error is put together",
+        ),
     ],
 )
 def test_what_only_numba_finds_is_told_with_function_and_line(tmp_path, new, message):
@@ -264,33 +460,74 @@ def assert_refused(path, message):
 @pytest.mark.parametrize(
     ("head", "new", "message"),
     [
-        ("W = [1.0]", "W[0]", "in step: the global 'W' is a list, expected a tuple or an array of numbers"),
-        ("W = {'a': 1.0}", "W['a']", "in step: the global 'W' is a dict, expected a tuple or an array"),
-        ("import numpy as np", "np.clip(x, 0.0, 9.0)", r"fairway.py, line 51\): No implementation .*clip"),
-        ("from numpy import ones\nW = ones(3)", "W[0]; W[0] = x", r"line 52\): a global array is written"),
-        ("import calendar", "calendar.isleap(x)", "by name: from calendar import isleap"),
-        ("def k(x, *, n=1.0):\n    return x", "k(x)", "in k: keyword-only arguments found"),
+        (
+            "W = [1.0]",
+            "W[0]",
+            (
+                "in step: the global 'W' is a list, expected a tuple or an array of"
+                " numbers"
+            ),
+        ),
+        (
+            "W = {'a': 1.0}",
+            "W['a']",
+            "in step: the global 'W' is a dict, expected a tuple or an array",
+        ),
+        (
+            "import numpy as np",
+            "np.clip(x, 0.0, 9.0)",
+            r"fairway.py, line 51\): No implementation .*clip",
+        ),
+        (
+            "from numpy import ones\nW = ones(3)",
+            "W[0]; W[0] = x",
+            r"line 52\): a global array is written",
+        ),
+        (
+            "import calendar",
+            "calendar.isleap(x)",
+            "by name: from calendar import isleap",
+        ),
+        (
+            "def k(x, *, n=1.0):\n    return x",
+            "k(x)",
+            "in k: keyword-only arguments found",
+        ),
     ],
 )
-def test_what_a_function_takes_from_its_file_is_fit_for_the_compiler(tmp_path, head, new, message):
-    text = FAIRWAY.replace("from math import fabs\n", f"from math import fabs\n{head}\n")
+def test_what_a_function_takes_from_its_file_is_fit_for_the_compiler(
+    tmp_path, head, new, message
+):
+    text = FAIRWAY.replace(
+        "from math import fabs\n", f"from math import fabs\n{head}\n"
+    )
     text = text.replace("    inside =", f"    x += {new}\n    inside =")
     assert_refused(written(tmp_path, "fairway.py", text), message)
 
 
 def test_an_observation_that_is_no_number_before_the_first_step_is_a_problem(tmp_path):
-    text = FAIRWAY.replace("to_zone = max(", "to_zone = readings.x / interval.steps + max(")
+    text = FAIRWAY.replace(
+        "to_zone = max(", "to_zone = readings.x / interval.steps + max("
+    )
     found = check_task(written(tmp_path, "fairway.py", text), **SHIP)
-    assert any("Observation.to_zone is nan in lane 0 at step 0" in problem for problem in found.problems)
-    assert not any("nan found" in remark for remark in found.remarks)  # of what is clipped
+    assert any(
+        "Observation.to_zone is nan in lane 0 at step 0" in problem
+        for problem in found.problems
+    )
+    assert not any(
+        "nan found" in remark for remark in found.remarks
+    )  # of what is clipped
 
 
-def test_what_fails_in_a_file_that_is_imported_is_told_with_both_places(tmp_path, monkeypatch):
+def test_what_fails_in_a_file_that_is_imported_is_told_with_both_places(
+    tmp_path, monkeypatch
+):
     monkeypatch.syspath_prepend(tmp_path)
     written(tmp_path, "harbour_tools.py", "depth = 7\n1 / 0\n")
     path = written(tmp_path, "own.py", "import math\nimport harbour_tools\n")
     with pytest.raises(
-        InputError, match=r"own.py, line 2: .*ZeroDivisionError.* \(.*harbour_tools.py, line 2\)$"
+        InputError,
+        match=r"own.py, line 2: .*ZeroDivisionError.* \(.*harbour_tools.py, line 2\)$",
     ):
         load_file(path)
 
@@ -303,27 +540,54 @@ def test_what_is_interrupted_while_it_is_read_is_read_anew(tmp_path):
 
 
 AS_TEXT = "from __future__ import annotations\n"
-RECORD = "from typing import NamedTuple\n\n\nclass Settings(NamedTuple):\n    weight: float = 1.0\n\n\n"
+RECORD = (
+    "from typing import NamedTuple\n\n\nclass Settings(NamedTuple):\n    weight: float"
+    " = 1.0\n\n\n"
+)
 
 
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("", r"own.py: no 'Settings' found, expected a NamedTuple 'Settings' of floats"),
-        ("Settings = 3\n", "Settings is no NamedTuple, expected a NamedTuple 'Settings' of floats"),
-        (RECORD.replace("float", "flaot"), "own.py, line 5: cannot be executed: NameError: name 'flaot'"),
-        (AS_TEXT + RECORD.replace("float", "flaot"), "Settings: an annotation cannot be read: name 'flaot'"),
         (
-            "from collections import namedtuple\nSettings = namedtuple('Settings', '')\n",
+            "",
+            r"own.py: no 'Settings' found, expected a NamedTuple 'Settings' of floats",
+        ),
+        (
+            "Settings = 3\n",
+            "Settings is no NamedTuple, expected a NamedTuple 'Settings' of floats",
+        ),
+        (
+            RECORD.replace("float", "flaot"),
+            "own.py, line 5: cannot be executed: NameError: name 'flaot'",
+        ),
+        (
+            AS_TEXT + RECORD.replace("float", "flaot"),
+            "Settings: an annotation cannot be read: name 'flaot'",
+        ),
+        (
+            (
+                "from collections import namedtuple\nSettings = namedtuple('Settings',"
+                " '')\n"
+            ),
             "no annotated fields found",
         ),
-        (RECORD.replace(" = 1.0", ""), "Settings.weight: no default found, expected one"),
+        (
+            RECORD.replace(" = 1.0", ""),
+            "Settings.weight: no default found, expected one",
+        ),
         (
             RECORD.replace("1.0", "'1'"),
             "Settings.weight: '1' found, expected a number, or a list as the last",
         ),
-        (RECORD + "begin = 3\n", "begin: no plain function found, expected a function begin\\(ship\\)"),
-        (RECORD + "def begin(ship, more): ...\n", "begin: 2 arguments found, expected a function begin"),
+        (
+            RECORD + "begin = 3\n",
+            "begin: no plain function found, expected a function begin\\(ship\\)",
+        ),
+        (
+            RECORD + "def begin(ship, more): ...\n",
+            "begin: 2 arguments found, expected a function begin",
+        ),
         (RECORD + "def begin(ship): ...\n", None),
         (RECORD, "no 'begin' found, expected a function begin"),
         ("1 / 0", r"own.py, line 1: cannot be executed: ZeroDivisionError"),
@@ -345,15 +609,24 @@ def test_a_file_lacks_nothing_that_is_asked_of_it(text, message, tmp_path):
 
 
 @pytest.mark.parametrize(("before", "annotation"), [("", float), (AS_TEXT, "float")])
-def test_annotations_are_texts_only_where_a_file_asks_for_it(tmp_path, before, annotation):
-    file, _ = read_source(written(tmp_path, "own.py", f"{before}def scale(x: float): ...\n"))
+def test_annotations_are_texts_only_where_a_file_asks_for_it(
+    tmp_path, before, annotation
+):
+    file, _ = read_source(
+        written(tmp_path, "own.py", f"{before}def scale(x: float): ...\n")
+    )
     assert file.scale.__annotations__ == {"x": annotation}
 
 
 def test_a_reward_of_another_form_is_told_as_what_its_function_returns(tmp_path):
-    path = written(tmp_path, "my_reward.py", re.sub(r"return Reward\((.*)\)", r"return [\1]", REWARD))
+    path = written(
+        tmp_path,
+        "my_reward.py",
+        re.sub(r"return Reward\((.*)\)", r"return [\1]", REWARD),
+    )
     with pytest.raises(
-        InputError, match=r"my_reward.py, line \d+, in reward: what it returns is list, expected"
+        InputError,
+        match=r"my_reward.py, line \d+, in reward: what it returns is list, expected",
     ):
         register_task("harbour/Wrong-v0", "CourseKeeping", reward=path)
 
@@ -385,22 +658,34 @@ def test_a_record_with_a_note_of_its_own_is_a_record_all_the_same():
         plain: Annotated[float, "likewise"] = 3.0
 
     assert [(name, kind) for name, kind, _ in annotated(Outer, Setting)] == [
-        ("inner", Inner), ("plain", float),
-    ]  # fmt: skip
+        ("inner", Inner),
+        ("plain", float),
+    ]
     assert [name for name, *_ in keywords(Outer)] == ["weight", "plain"]
     assert make_settings(Outer, {"weight": 5.0}, np.asarray) == Outer(Inner(5.0), 3.0)
 
 
 def test_a_file_that_is_not_there_is_named(tmp_path):
-    with pytest.raises(InputError, match=r"none.py: no such file, expected a Python file"):
+    with pytest.raises(
+        InputError, match=r"none.py: no such file, expected a Python file"
+    ):
         read_source(tmp_path / "none.py")
 
 
 def test_a_reward_that_is_not_finite_is_named(tmp_path):
-    text = REWARD.replace("** 2)", "** 2 + (interval.steps >= 3.0) * (interval.dt - interval.dt) / 0.0)")
-    path = written(tmp_path, "my_reward.py", text.replace("/ 0.0", "/ (state.course - state.course)"))
+    text = REWARD.replace(
+        "** 2)", "** 2 + (interval.steps >= 3.0) * (interval.dt - interval.dt) / 0.0)"
+    )
+    path = written(
+        tmp_path,
+        "my_reward.py",
+        text.replace("/ 0.0", "/ (state.course - state.course)"),
+    )
     message = r"reward_rudder is nan in lane 0 at step 1"
-    for env in (gymnasium.make(COURSE, reward=path), gymnasium.make_vec(COURSE, num_envs=2, reward=path)):
+    for env in (
+        gymnasium.make(COURSE, reward=path),
+        gymnasium.make_vec(COURSE, num_envs=2, reward=path),
+    ):
         env.reset(seed=0)
         with pytest.raises(InputError, match=message):
             env.step(env.action_space.sample())
@@ -409,20 +694,27 @@ def test_a_reward_that_is_not_finite_is_named(tmp_path):
 
 
 def test_what_fails_in_plain_python_is_told_with_its_line_and_step(tmp_path):
-    text = "from math import acos\n\n" + REWARD.replace("** 2)", "** 2 + acos(2.0 + interval.dt))")
+    text = "from math import acos\n\n" + REWARD.replace(
+        "** 2)", "** 2 + acos(2.0 + interval.dt))"
+    )
     path = written(tmp_path, "my_reward.py", text)
     line = next(k for k, one in enumerate(text.splitlines(), 1) if "interval.dt" in one)
     (problem,) = check_task("CourseKeeping", reward=path).problems
-    assert re.search(rf"line {line}, in \w+: ValueError: .*, at step 1 in plain Python", problem)
+    assert re.search(
+        rf"line {line}, in \w+: ValueError: .*, at step 1 in plain Python", problem
+    )
 
 
 def test_what_is_often_clipped_is_remarked(tmp_path):
-    path = written(tmp_path, "my_sensors.py", SENSORS.replace("r=motion.r", "r=1000.0 * motion.r"))
+    path = written(
+        tmp_path, "my_sensors.py", SENSORS.replace("r=motion.r", "r=1000.0 * motion.r")
+    )
     found = check_task("CourseKeeping", sensors=path)
     assert found.problems == ()
     (remark,) = found.remarks
     shown = (
-        r"Observation.helm.(\w+): (\S+) found in units of its scale, beyond its bounds (\S+) to (\S+) in "
+        r"Observation.helm.(\w+): (\S+) found in units of its scale, beyond its bounds"
+        r" (\S+) to (\S+) in "
         r"(\d+) %"
     )
     _, furthest, low, high, part = re.match(shown, remark).groups()
@@ -432,35 +724,53 @@ def test_what_is_often_clipped_is_remarked(tmp_path):
 
 def test_ids_are_texts():
     for one in (None, 3, ""):
-        with pytest.raises(InputError, match=r"env_id: .* found, expected a text that is not empty"):
+        with pytest.raises(
+            InputError, match=r"env_id: .* found, expected a text that is not empty"
+        ):
             register_task(one, "CourseKeeping")
 
 
 def test_ids_are_taken_once(fairway, tmp_path):
-    register_task(fairway, tmp_path / "fairway.py", **SHIP)  # the same again changes nothing
-    with pytest.raises(InputError, match=r"harbour/Fairway-v0: registered already, for .*fairway.py"):
+    register_task(
+        fairway, tmp_path / "fairway.py", **SHIP
+    )  # the same again changes nothing
+    with pytest.raises(
+        InputError, match=r"harbour/Fairway-v0: registered already, for .*fairway.py"
+    ):
         register_task(fairway, "PathFollowing")
-    with pytest.raises(InputError, match="'Fair way' found, expected an id such as 'harbour/fairway-v0'"):
+    with pytest.raises(
+        InputError,
+        match="'Fair way' found, expected an id such as 'harbour/fairway-v0'",
+    ):
         register_task("Fair way", tmp_path / "fairway.py", **SHIP)
     with pytest.raises(InputError, match="Did you mean 'speed_limit'"):
-        register_task("harbour/Other-v0", tmp_path / "fairway.py", speed_limt=0.5, **SHIP)
+        register_task(
+            "harbour/Other-v0", tmp_path / "fairway.py", speed_limt=0.5, **SHIP
+        )
     assert "harbour/Other-v0" not in gymnasium.registry
     with pytest.raises(
-        InputError, match="'harbour/Fairway' found, expected an id such as 'harbour/fairway-v0'"
+        InputError,
+        match="'harbour/Fairway' found, expected an id such as 'harbour/fairway-v0'",
     ):
         register_task("harbour/Fairway", tmp_path / "fairway.py", **SHIP)
     with pytest.raises(InputError, match="render_mode: 'film' found"):
-        register_task("harbour/Film-v0", tmp_path / "fairway.py", render_mode="film", **SHIP)
+        register_task(
+            "harbour/Film-v0", tmp_path / "fairway.py", render_mode="film", **SHIP
+        )
     written(tmp_path, "fairway.py", FAIRWAY.replace("max(motion.u", "mox(motion.u"))
     with pytest.raises(InputError, match="name 'mox' is not defined"):
         register_task(fairway, tmp_path / "fairway.py", **SHIP)
 
 
 def test_lanes_of_a_task_are_equal_bit_for_bit(tmp_path):
-    task = Task.of(written(tmp_path, "fairway.py", FAIRWAY), action="rudder-shaft", sea="rough")
+    task = Task.of(
+        written(tmp_path, "fairway.py", FAIRWAY), action="rudder-shaft", sea="rough"
+    )
     ship = shipgym.load_model("kvlcc2")
     small, large = Engine(ship, 3, task), Engine(ship, 130, task, threads=2)
-    np.testing.assert_array_equal(small.reset([127, 128, 129]), large.reset(np.arange(130))[127:])
+    np.testing.assert_array_equal(
+        small.reset([127, 128, 129]), large.reset(np.arange(130))[127:]
+    )
     for k in range(40):
         order = [0.3 * np.sin(k), 0.7]
         seen, rewards, *_ = small.step(np.tile(order, (3, 1)))
@@ -469,7 +779,9 @@ def test_lanes_of_a_task_are_equal_bit_for_bit(tmp_path):
         np.testing.assert_array_equal(rewards, earned[127:])
 
 
-def test_an_error_of_a_file_is_told_with_its_last_line_in_it_and_the_file_may_be_mended(tmp_path):
+def test_an_error_of_a_file_is_told_with_its_last_line_in_it_and_the_file_may_be_mended(
+    tmp_path,
+):
     def refused(text):
         with pytest.raises(InputError) as caught:
             load_file(written(tmp_path, "own.py", text))
@@ -477,9 +789,14 @@ def test_an_error_of_a_file_is_told_with_its_last_line_in_it_and_the_file_may_be
 
     calls = "import json\n\n\ndef read():\n    json.loads('{')\n\n\nread()\n"
     for _ in range(2):  # what failed is not taken for read
-        assert refused(calls).startswith(", line 5: cannot be executed: JSONDecodeError: ")
+        assert refused(calls).startswith(
+            ", line 5: cannot be executed: JSONDecodeError: "
+        )
     assert refused("x = (\n").startswith(", line 1: cannot be executed: SyntaxError: ")
-    assert refused("from shipgym import InputError\nraise InputError('no such tide')\n") == ": no such tide"
+    assert (
+        refused("from shipgym import InputError\nraise InputError('no such tide')\n")
+        == ": no such tide"
+    )
     assert refused("\0").startswith(": cannot be executed: ")
     own = load_file(written(tmp_path, "own.py", "x = 3\n"))
     assert (own.x, own.__file__) == (3, str((tmp_path / "own.py").resolve()))
@@ -495,7 +812,8 @@ def test_what_a_ship_shows_alone_is_compared_to_the_last_digit(monkeypatch):
     monkeypatch.setattr(task_checker, "Engine", Shifted)
     (problem,) = check_task("CourseKeeping", model="mariner").problems
     assert re.match(
-        r"Observation.helm.heading_error_sin is \S+ among many ships and \S+ alone in lane 69 at step 0; ",
+        r"Observation.helm.heading_error_sin is \S+ among many ships and \S+ alone in"
+        r" lane 69 at step 0; ",
         problem,
     )
 
@@ -514,7 +832,10 @@ def test_a_beginner_steers_each_lane_the_same_however_many_there_are():
     three, seventy = (
         np.stack(
             [
-                task_checker._orders(SimpleNamespace(num_envs=n, task=SimpleNamespace(n_commands=2)), step)
+                task_checker._orders(
+                    SimpleNamespace(num_envs=n, task=SimpleNamespace(n_commands=2)),
+                    step,
+                )
                 for step in range(200)
             ]
         )
@@ -539,9 +860,16 @@ class Shown:
 
     def __init__(self, seen, rewards=None, episode_steps=9):
         self.seen = np.asarray(seen, dtype=float)
-        self.rewards = np.zeros(self.seen.shape[:2]) if rewards is None else np.asarray(rewards, dtype=float)
+        self.rewards = (
+            np.zeros(self.seen.shape[:2])
+            if rewards is None
+            else np.asarray(rewards, dtype=float)
+        )
         self.num_envs = self.seen.shape[1]
-        observed = [SimpleNamespace(path=path) for path in ("helm.sway", "extras.roll")[: self.seen.shape[2]]]
+        observed = [
+            SimpleNamespace(path=path)
+            for path in ("helm.sway", "extras.roll")[: self.seen.shape[2]]
+        ]
         self.task = SimpleNamespace(
             n_commands=1, episode_steps=episode_steps, observed=lambda model: observed
         )
@@ -557,7 +885,9 @@ class Shown:
 
 
 def differences(one, other, lanes=slice(None), steps=3, agreement=1e-5):
-    return list(task_checker._differ(one, other, lanes, steps, agreement, ("here", "there")))
+    return list(
+        task_checker._differ(one, other, lanes, steps, agreement, ("here", "there"))
+    )
 
 
 def test_the_first_difference_of_two_engines_is_told_with_lane_and_step():
@@ -569,8 +899,8 @@ def test_the_first_difference_of_two_engines_is_told_with_lane_and_step():
     assert differences(Shown(close), Shown(seen)) == []
     other[3, 2, 1] = 0.25
     assert differences(Shown(other), Shown(seen)) == [
-        f"Observation.extras.roll is 0.25 here and {seen[3, 2, 1]} there in lane 2 at step 3; look for what "
-        "differs, such as a global that changes"
+        f"Observation.extras.roll is 0.25 here and {seen[3, 2, 1]} there in lane 2 at"
+        " step 3; look for what differs, such as a global that changes"
     ]
     assert differences(Shown(other), Shown(seen), steps=2) == []
     assert differences(Shown(other, episode_steps=2), Shown(seen)) == []
@@ -579,7 +909,9 @@ def test_the_first_difference_of_two_engines_is_told_with_lane_and_step():
     (found,) = differences(Shown(other, rewards), Shown(seen))
     assert found.startswith("reward is -1.0 here and 0.0 there in lane 1 at step 1; ")
     other[0, 0, 0] = 0.25
-    assert " in lane 0 at step 0; " in differences(Shown(other, rewards), Shown(seen))[0]
+    assert (
+        " in lane 0 at step 0; " in differences(Shown(other, rewards), Shown(seen))[0]
+    )
 
 
 def test_the_last_lane_of_many_is_compared_with_one_alone():
@@ -598,17 +930,28 @@ def test_what_is_beyond_its_bounds_in_more_than_a_twentieth_of_the_steps_is_rema
     inside = [2.0 + 5e-7, -2.0 - 5e-7] * 47 + [0.0]  # rounding makes no remark
     often, seldom = [2.1, -4.0, 2.1, 2.1, 2.1, 2.1], [2.1] * 5
     assert list(task_checker._often_clipped(task, {"helm.sway": inside + seldom})) == []
-    found = list(task_checker._often_clipped(task, {"helm.sway": inside[1:] + often, "extras.roll": inside}))
+    found = list(
+        task_checker._often_clipped(
+            task, {"helm.sway": inside[1:] + often, "extras.roll": inside}
+        )
+    )
     assert found == [
-        "Observation.helm.sway: -4 found in units of its scale, beyond its bounds -2 to 2 in 6 % of the "
-        "steps, and clipped; give it wider bounds or a larger scale if more is to be seen"
+        "Observation.helm.sway: -4 found in units of its scale, beyond its bounds -2 to"
+        " 2 in 6 % of the steps, and clipped; give it wider bounds or a larger scale if"
+        " more is to be seen"
     ]
 
 
 def test_options_of_a_task_are_kept_as_given_in_absolute_paths(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    assert kept_source("own.py") == kept_source(Path("own.py")) == str(tmp_path / "own.py")
-    assert [kept_source(one) for one in ("PathFollowing", None, shipgym)] == ["PathFollowing", None, shipgym]
+    assert (
+        kept_source("own.py") == kept_source(Path("own.py")) == str(tmp_path / "own.py")
+    )
+    assert [kept_source(one) for one in ("PathFollowing", None, shipgym)] == [
+        "PathFollowing",
+        None,
+        shipgym,
+    ]
 
 
 class Least(NamedTuple):
@@ -626,11 +969,16 @@ class Choices(NamedTuple):
 
 def test_settings_are_given_by_keyword_the_others_are_their_defaults():
     assert make_settings(Choices, {}, np.asarray) == Choices()
-    found = make_settings(Choices, {"count": 100, "lengths": [3, 4.5], "listed": [1, -1.0]}, np.asarray)
+    found = make_settings(
+        Choices, {"count": 100, "lengths": [3, 4.5], "listed": [1, -1.0]}, np.asarray
+    )
     assert found[:4] == (100, 0.5, Least(3.0, 4.5), 0.0)
     assert found.listed.tolist() == [1.0, -1.0]
     assert make_settings(Choices, {"listed": None}, np.asarray).listed.tolist() == []
-    assert make_settings(Choices, {"free": -1e9, "share": 1.0}, np.asarray)[1:4:2] == (1.0, -1e9)
+    assert make_settings(Choices, {"free": -1e9, "share": 1.0}, np.asarray)[1:4:2] == (
+        1.0,
+        -1e9,
+    )
 
 
 @pytest.mark.parametrize(
@@ -640,12 +988,21 @@ def test_settings_are_given_by_keyword_the_others_are_their_defaults():
         ({"count": 2.0}, "count: 2.0 found, expected a whole number of at least 1"),
         ({"count": 101}, "count: 101 found, expected a number >= 1 and <= 100"),
         ({"share": 0.0}, "share: 0 found, expected a number > 0 and <= 1"),
-        ({"lengths": (3.0, 0.0)}, "lengths: the largest: 0 found, expected a number > 0"),
+        (
+            {"lengths": (3.0, 0.0)},
+            "lengths: the largest: 0 found, expected a number > 0",
+        ),
         ({"lengths": (0.0, 3.0)}, "lengths: the least: 0 found, expected a number > 0"),
-        ({"lengths": (1.0,)}, r"lengths: \(1.0,\) found, expected the least and the largest"),
+        (
+            {"lengths": (1.0,)},
+            r"lengths: \(1.0,\) found, expected the least and the largest",
+        ),
         ({"lengths": "12"}, "lengths: '12' found, expected the least and the largest"),
         ({"lengths": 3.0}, "lengths: 3.0 found, expected the least and the largest"),
-        ({"listed": [0.0, -1.5]}, "listed: number 1: -1.5 found, expected a number >= -1"),
+        (
+            {"listed": [0.0, -1.5]},
+            "listed: number 1: -1.5 found, expected a number >= -1",
+        ),
         ({"listed": 3.0}, "listed: 3.0 found, expected a list"),
         ({"listed": [[1.0]]}, r"listed: \[\[1.0\]\] found, expected a list"),
         ({"listed": []}, "listed: none found, expected one at least, or None"),
@@ -672,14 +1029,17 @@ class WithInner(NamedTuple):
 
 def test_a_list_stands_last_and_in_settings_alone():
     with pytest.raises(
-        InputError, match=r"^own: Settings.listed: .* expected a number, or a list as the last"
+        InputError,
+        match=r"^own: Settings.listed: .* expected a number, or a list as the last",
     ):
         check_namespace(SimpleNamespace(Settings=ListBefore), "own", ("Settings",), {})
-    with pytest.raises(InputError, match=r"^own: State.inner.listed: .* found, expected a float$"):
+    with pytest.raises(
+        InputError, match=r"^own: State.inner.listed: .* found, expected a float$"
+    ):
         check_namespace(SimpleNamespace(State=WithInner), "own", ("State",), {})
-    assert check_namespace(SimpleNamespace(Settings=Choices), "own", ("Settings",), {}) == {
-        "Settings": Choices
-    }
+    assert check_namespace(
+        SimpleNamespace(Settings=Choices), "own", ("Settings",), {}
+    ) == {"Settings": Choices}
     assert check_namespace(SimpleNamespace(), "own", (), {"due": ()}, ("due",)) == {}
 
 
@@ -692,7 +1052,11 @@ def test_a_task_without_events_and_plan_is_complete():
     assert task.plan_length(settings) == 0
     assert task.check(settings, None) is None
     assert no_worst_cost(settings) == 0.0
-    assert (task.name, task.episode_steps, task.flags) == ("fairway", 600, ("speeding",))
+    assert (task.name, task.episode_steps, task.flags) == (
+        "fairway",
+        600,
+        ("speeding",),
+    )
     assert task.reported == ("speeding", "cross_track")
     assert task.reward_names == ("cross_track", "delay", "over_speed")
     assert not task.shipped
@@ -709,35 +1073,59 @@ def test_bounds_of_an_observation_are_finite_and_in_order(tmp_path):
         "1.0, 1.0": "upper bound: 1 found, expected a number > 1",
         "-float('inf'), 1.0": "lower bound: -inf found, expected a number",
         "-1.0, float('nan')": "upper bound: nan found, expected a number > -1",
-        "'0', 1.0": "lower bound: '0' (a text; write the number without quotes) found, expected a number",
+        "'0', 1.0": (
+            "lower bound: '0' (a text; write the number without quotes) found, expected"
+            " a number"
+        ),
         "-1.0, None": "upper bound: None found, expected a number > -1",
-        "-1.0, 1.0, option='rol'": "option: 'rol' found, expected one of '', 'roll', 'shaft', 'shaft speed'",
+        "-1.0, 1.0, option='rol'": (
+            "option: 'rol' found, expected one of '', 'roll', 'shaft', 'shaft speed'"
+        ),
         "-1.0, 1.0, scale=0.0": "scale: 0 found, expected a number > 0",
         "-1.0, 1.0, scale=-2.0": "scale: -2 found, expected a number > 0",
         "-1.0, 1.0, scale=float('nan')": "scale: nan found, expected a number > 0",
-        "-1.0, 1.0, scale='8'": "scale: '8' (a text; write the number without quotes) found",
-        "-1.0, 1.0, scale=lambda ship: 1.0": "scale: 1 arguments found, expected a function of ship and sett",
-        "-1.0, 1.0, scale=lambda ship, _: 0.0": "scale for 'mariner-tls-svm': 0 found, expected a number > 0",
-        "-1.0, 1.0, scale=lambda ship, _: ship.w": "AttributeError: 'Ship' object has no attribute 'w'",
+        "-1.0, 1.0, scale='8'": (
+            "scale: '8' (a text; write the number without quotes) found"
+        ),
+        "-1.0, 1.0, scale=lambda ship: 1.0": (
+            "scale: 1 arguments found, expected a function of ship and sett"
+        ),
+        "-1.0, 1.0, scale=lambda ship, _: 0.0": (
+            "scale for 'mariner-tls-svm': 0 found, expected a number > 0"
+        ),
+        "-1.0, 1.0, scale=lambda ship, _: ship.w": (
+            "AttributeError: 'Ship' object has no attribute 'w'"
+        ),
     }.items():
         text = FAIRWAY.replace(
-            "g_sin: Annotated[float, Seen(-1.0, 1.0)]", f"g_sin: Annotated[float, Seen({bounds})]"
+            "g_sin: Annotated[float, Seen(-1.0, 1.0)]",
+            f"g_sin: Annotated[float, Seen({bounds})]",
         )
         path = written(tmp_path, "fairway.py", text)
         (problem,) = check_task(path).problems
         assert problem.startswith(str(path)), problem
         assert wrong in problem, problem
     path = written(
-        tmp_path, "fairway.py", FAIRWAY.replace("g_sin: Annotated[float, Seen(-1.0, 1.0)]", "g_sin: float")
+        tmp_path,
+        "fairway.py",
+        FAIRWAY.replace("g_sin: Annotated[float, Seen(-1.0, 1.0)]", "g_sin: float"),
     )
-    with pytest.raises(InputError, match=r"Observation.heading_sin: no bounds found, expected Annotated\[f"):
+    with pytest.raises(
+        InputError,
+        match=r"Observation.heading_sin: no bounds found, expected Annotated\[f",
+    ):
         read_definition(path)
 
 
 def test_names_that_the_engine_has_in_info_are_not_reported(tmp_path):
-    text = FAIRWAY.replace("speeding: Flag", "truncated: Flag").replace('"speeding", ', '"truncated", ')
+    text = FAIRWAY.replace("speeding: Flag", "truncated: Flag").replace(
+        '"speeding", ', '"truncated", '
+    )
     with pytest.raises(
-        InputError, match=r"REPORTED: 'truncated' found, expected a tuple of fields of State, none of"
+        InputError,
+        match=(
+            r"REPORTED: 'truncated' found, expected a tuple of fields of State, none of"
+        ),
     ):
         read_definition(written(tmp_path, "fairway.py", text))
 
@@ -758,7 +1146,10 @@ def test_names_that_the_engine_has_in_info_are_not_reported(tmp_path):
     ],
 )
 def test_two_fields_of_one_name_are_refused(tmp_path, old, new, message):
-    inner = "class Inner(NamedTuple):\n    limit: Annotated[float, Seen(0.0, 1.0)]\n\n\nclass Observation("
+    inner = (
+        "class Inner(NamedTuple):\n    limit: Annotated[float, Seen(0.0,"
+        " 1.0)]\n\n\nclass Observation("
+    )
     text = FAIRWAY.replace("class Observation(", inner).replace(old, new, 1)
     with pytest.raises(InputError, match=message):
         read_definition(written(tmp_path, "fairway.py", text))

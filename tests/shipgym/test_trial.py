@@ -32,7 +32,10 @@ def manoeuvre(t=T):
     f_psi = 0.4 * np.sin(0.2 * fine)
     f_u, f_v = 1.1 + 0.05 * np.cos(0.4 * fine), -0.08 * np.cos(0.2 * fine + 0.3)
     paths = []
-    for speed in (f_u * np.cos(f_psi) - f_v * np.sin(f_psi), f_u * np.sin(f_psi) + f_v * np.cos(f_psi)):
+    for speed in (
+        f_u * np.cos(f_psi) - f_v * np.sin(f_psi),
+        f_u * np.sin(f_psi) + f_v * np.cos(f_psi),
+    ):
         steps = 0.5 * np.diff(fine) * (speed[1:] + speed[:-1])
         paths.append(np.interp(t, fine, np.concatenate([[0.0], np.cumsum(steps)])))
     channels = {
@@ -49,8 +52,13 @@ def manoeuvre(t=T):
 
 def write(path, columns):
     """Write columns to a CSV file, numbers to the last digit."""
-    rows = zip(*(np.asarray(values).tolist() for values in columns.values()), strict=True)
-    path.write_text("\n".join([",".join(columns), *(",".join(map(repr, row)) for row in rows)]) + "\n")
+    rows = zip(
+        *(np.asarray(values).tolist() for values in columns.values()), strict=True
+    )
+    path.write_text(
+        "\n".join([",".join(columns), *(",".join(map(repr, row)) for row in rows)])
+        + "\n"
+    )
     return path
 
 
@@ -62,7 +70,9 @@ def edited(tmp_path, line, old_new=None, text=None):
     lines[line - 1] = (
         text
         if text is not None
-        else ",".join(old_new.get(k, cell) for k, cell in enumerate(lines[line - 1].split(",")))
+        else ",".join(
+            old_new.get(k, cell) for k, cell in enumerate(lines[line - 1].split(","))
+        )
     )
     path.write_text("\n".join(lines) + "\n")
     return path
@@ -82,7 +92,11 @@ def refusal(path, *args, **kwargs):
 
 def test_a_trial_gives_its_channels_read_only():
     trial = Trial(
-        [0.0, 0.1, 0.3], {"r": [1, 2, 3], "psi": [0, 0, 0]}, name="run", kind="zigzag", use="validate"
+        [0.0, 0.1, 0.3],
+        {"r": [1, 2, 3], "psi": [0, 0, 0]},
+        name="run",
+        kind="zigzag",
+        use="validate",
     )
     assert (trial.name, trial.kind, trial.use, len(trial), trial.duration) == (
         "run",
@@ -111,7 +125,8 @@ def test_a_trial_lasts_from_its_first_to_its_last_sample():
 def test_a_missing_channel_is_named_with_those_present():
     trial = Trial([0.0, 1.0, 2.0], {"delta": np.zeros(3)})
     with pytest.raises(
-        InputError, match=r"no channel 'delt'\. Did you mean 'delta'\? Channels present: 'delta'"
+        InputError,
+        match=r"no channel 'delt'\. Did you mean 'delta'\? Channels present: 'delta'",
     ):
         trial["delt"]
 
@@ -136,7 +151,9 @@ def test_unsound_arrays_are_refused(t, channels, message):
 
 
 def test_words_that_are_not_known_are_refused():
-    with pytest.raises(InputError, match=r"kind: 'zig-zag' found.*Did you mean 'zigzag'"):
+    with pytest.raises(
+        InputError, match=r"kind: 'zig-zag' found.*Did you mean 'zigzag'"
+    ):
         Trial([0, 1, 2], {"r": [0, 0, 0]}, kind="zig-zag")
     with pytest.raises(InputError, match="use: 'test' found"):
         Trial([0, 1, 2], {"r": [0, 0, 0]}, use="test")
@@ -147,7 +164,12 @@ def test_words_that_are_not_known_are_refused():
 def test_a_copy_may_change_name_kind_and_use_but_not_the_data():
     trial = Trial([0, 1, 2], {"r": [0, 1, 0]}, derived=["r"])
     other = trial.with_(use="skip", name="other", kind="random")
-    assert (other.use, other.name, other.kind, other.derived) == ("skip", "other", "random", frozenset({"r"}))
+    assert (other.use, other.name, other.kind, other.derived) == (
+        "skip",
+        "other",
+        "random",
+        frozenset({"r"}),
+    )
     assert other.sha256 == trial.sha256
     with pytest.raises(InputError, match="cannot change 't'"):
         trial.with_(t=[0, 1, 2])
@@ -155,7 +177,9 @@ def test_a_copy_may_change_name_kind_and_use_but_not_the_data():
 
 def test_the_hash_follows_the_contents_only():
     a = Trial([0, 1, 2], {"r": [0, 1, 0], "u": [1, 1, 1]})
-    assert a.sha256 == Trial([0, 1, 2], {"u": [1, 1, 1], "r": [0, 1, 0]}, name="b").sha256
+    assert (
+        a.sha256 == Trial([0, 1, 2], {"u": [1, 1, 1], "r": [0, 1, 0]}, name="b").sha256
+    )
     assert a.sha256 != Trial([0, 1, 2], {"r": [0, 1, 1e-17], "u": [1, 1, 1]}).sha256
     assert a.sha256 != Trial([0, 1, 2], {"v": [0, 1, 0], "u": [1, 1, 1]}).sha256
 
@@ -163,7 +187,12 @@ def test_the_hash_follows_the_contents_only():
 def test_a_trial_survives_a_pickle_immutable():
     trial = Trial([0, 1, 2], {"r": [0, 1, 0]}, name="run", use="skip", derived=["r"])
     copy = pickle.loads(pickle.dumps(trial))
-    assert (copy.sha256, copy.name, copy.use, copy.derived) == (trial.sha256, "run", "skip", trial.derived)
+    assert (copy.sha256, copy.name, copy.use, copy.derived) == (
+        trial.sha256,
+        "run",
+        "skip",
+        trial.derived,
+    )
     assert not copy["r"].flags.writeable
 
 
@@ -172,7 +201,9 @@ def test_a_trial_survives_a_pickle_immutable():
 
 def test_a_file_with_the_project_s_names_needs_no_further_words(tmp_path):
     channels, _ = manoeuvre()
-    trial = Trial.from_csv(write(tmp_path / "run.csv", {"t": T, **channels, "thrust": T}))
+    trial = Trial.from_csv(
+        write(tmp_path / "run.csv", {"t": T, **channels, "thrust": T})
+    )
     assert trial.name == "run.csv"
     assert trial.derived == frozenset()
     assert set(trial.channels) == set(channels)
@@ -180,7 +211,11 @@ def test_a_file_with_the_project_s_names_needs_no_further_words(tmp_path):
         np.testing.assert_array_equal(trial[name], values)
 
 
-@settings(max_examples=25, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(
+    max_examples=25,
+    deadline=None,
+    suppress_health_check=[HealthCheck.function_scoped_fixture],
+)
 @given(data=st.data(), n=st.integers(3, 20))
 def test_csv_out_and_in_again_loses_nothing(tmp_path, data, n):
     def numbers(bound):
@@ -188,7 +223,9 @@ def test_csv_out_and_in_again_loses_nothing(tmp_path, data, n):
 
     steps = data.draw(st.lists(st.floats(1e-3, 10.0), min_size=n, max_size=n))
     bounds = {"x": 1e5, "u": 40.0, "delta": 1.5, "phi": 1.0, "n": 150.0}
-    trial = Trial(np.cumsum(steps), {name: numbers(bound) for name, bound in bounds.items()})
+    trial = Trial(
+        np.cumsum(steps), {name: numbers(bound) for name, bound in bounds.items()}
+    )
     trial.to_csv(tmp_path / "out.csv")
     again = Trial.from_csv(tmp_path / "out.csv")
     for name in ("t", *trial.channels):
@@ -209,11 +246,15 @@ def test_writing_replaces_the_file_as_a_whole_or_says_why_not(tmp_path):
 
 
 @pytest.mark.parametrize("delimiter", [",", ";", "\t"])
-def test_semicolons_tabs_quotes_blank_lines_and_byte_order_marks_are_read(tmp_path, delimiter):
+def test_semicolons_tabs_quotes_blank_lines_and_byte_order_marks_are_read(
+    tmp_path, delimiter
+):
     lines = ['"t","u"', "0,1.5", "", "1,2.5", '"2",3.5', " , "]
     text = "\ufeff" + "\r\n".join(line.replace(",", delimiter) for line in lines)
     (tmp_path / "run.csv").write_text(text, encoding="utf-8", newline="")
-    np.testing.assert_array_equal(Trial.from_csv(tmp_path / "run.csv")["u"], [1.5, 2.5, 3.5])
+    np.testing.assert_array_equal(
+        Trial.from_csv(tmp_path / "run.csv")["u"], [1.5, 2.5, 3.5]
+    )
 
 
 def test_decimal_commas_are_read_where_the_delimiter_leaves_no_doubt(tmp_path):
@@ -224,7 +265,9 @@ def test_decimal_commas_are_read_where_the_delimiter_leaves_no_doubt(tmp_path):
 
 
 def test_text_in_a_column_that_is_not_asked_for_does_no_harm(tmp_path):
-    (tmp_path / "run.csv").write_text('t,remark,u\n0,start,1\n1,,1\n2,"end, at last",1\n')
+    (tmp_path / "run.csv").write_text(
+        't,remark,u\n0,start,1\n1,,1\n2,"end, at last",1\n'
+    )
     np.testing.assert_array_equal(Trial.from_csv(tmp_path / "run.csv")["u"], [1, 1, 1])
 
 
@@ -259,7 +302,8 @@ def test_units_are_converted(tmp_path):
 
 def test_every_quantity_has_its_si_unit_first():
     assert {
-        quantity: si_factor(channel, next(iter(UNITS[quantity]))) for channel, quantity in QUANTITIES.items()
+        quantity: si_factor(channel, next(iter(UNITS[quantity])))
+        for channel, quantity in QUANTITIES.items()
     } == dict.fromkeys(UNITS, 1.0)
     assert si_factor("r", "deg/min") * 60.0 * 180.0 == pytest.approx(math.pi)
     assert si_factor("u", "km/h") * 3.6 == pytest.approx(1.0)
@@ -267,7 +311,12 @@ def test_every_quantity_has_its_si_unit_first():
 
 def test_a_port_positive_rudder_is_turned_round(tmp_path):
     channels, _ = manoeuvre()
-    port = {"t": T, "r": channels["r"], "delta": -channels["delta"], "delta_command": -channels["delta"]}
+    port = {
+        "t": T,
+        "r": channels["r"],
+        "delta": -channels["delta"],
+        "delta_command": -channels["delta"],
+    }
     trial = Trial.from_csv(write(tmp_path / "run.csv", port), rudder_positive="port")
     np.testing.assert_array_equal(trial["delta"], channels["delta"])
     np.testing.assert_array_equal(trial["delta_command"], channels["delta"])
@@ -277,7 +326,8 @@ def test_a_port_positive_rudder_is_turned_round(tmp_path):
 def test_earth_fixed_velocities_are_rotated_to_the_body(tmp_path):
     channels, earth = manoeuvre()
     path = write(
-        tmp_path / "run.csv", {"t": T, "psi": channels["psi"], "u": earth["north"], "v": earth["east"]}
+        tmp_path / "run.csv",
+        {"t": T, "psi": channels["psi"], "u": earth["north"], "v": earth["east"]},
     )
     trial = Trial.from_csv(path, velocity_frame="earth")
     np.testing.assert_allclose(trial["u"], channels["u"], atol=1e-14)
@@ -286,7 +336,10 @@ def test_earth_fixed_velocities_are_rotated_to_the_body(tmp_path):
 
 @given(u=st.floats(-20, 20), v=st.floats(-20, 20), psi=st.floats(-50, 50))
 def test_rotating_to_the_earth_and_back_changes_nothing(u, v, psi):
-    north, east = u * math.cos(psi) - v * math.sin(psi), u * math.sin(psi) + v * math.cos(psi)
+    north, east = (
+        u * math.cos(psi) - v * math.sin(psi),
+        u * math.sin(psi) + v * math.cos(psi),
+    )
     back = rotate_to_body(np.array([north]), np.array([east]), np.array([psi]))
     np.testing.assert_allclose(np.ravel(back), [u, v], atol=1e-12)
 
@@ -317,12 +370,15 @@ def test_a_heading_that_jumps_at_north_becomes_continuous(tmp_path):
 
 
 @pytest.mark.parametrize(
-    "t", [T, np.sort(np.random.default_rng(1).uniform(0.0, 60.0, 400))], ids=["even", "uneven"]
+    "t",
+    [T, np.sort(np.random.default_rng(1).uniform(0.0, 60.0, 400))],
+    ids=["even", "uneven"],
 )
 def test_yaw_rate_surge_and_sway_follow_from_position_and_heading(tmp_path, t):
     channels, _ = manoeuvre(t)
     path = write(
-        tmp_path / "run.csv", {"t": t, **{name: channels[name] for name in ("x", "y", "psi", "delta")}}
+        tmp_path / "run.csv",
+        {"t": t, **{name: channels[name] for name in ("x", "y", "psi", "delta")}},
     )
     trial = Trial.from_csv(path)
     assert trial.derived == {"r", "u", "v"}
@@ -347,7 +403,11 @@ def quintic(values, spacing):
     above = np.clip((s[:, None] - knots) / s.size, 0.0, None)
     terms = np.column_stack([*((s / s.size) ** k for k in range(6)), above**5])
     slopes = np.column_stack(
-        [np.zeros(s.size), *(k * (s / s.size) ** (k - 1) for k in range(1, 6)), 5 * above**4]
+        [
+            np.zeros(s.size),
+            *(k * (s / s.size) ** (k - 1) for k in range(1, 6)),
+            5 * above**4,
+        ]
     )
     weights = np.linalg.lstsq(terms, values, rcond=None)[0]
     noise = np.linalg.norm(values - terms @ weights) / (s.size - terms.shape[1])
@@ -363,15 +423,21 @@ def test_noise_grows_by_less_than_the_power_of_eight_tenths_of_the_distance_of_k
         return math.log(quintic(values, 3)[1] / quintic(values, 2)[1]) / math.log(1.5)
 
     for power, smoothed in ((0.78, True), (0.82, False)):
-        values = noise + brentq(lambda motion, at=power: growth(motion) - at, 0.0, 5.0) * np.sin(1.2 * t)
+        values = noise + brentq(
+            lambda motion, at=power: growth(motion) - at, 0.0, 5.0
+        ) * np.sin(1.2 * t)
         through_all = make_interp_spline(t, values).derivative()(t)
         expected = quintic(values, 3)[0] if smoothed else through_all
-        np.testing.assert_allclose(time_derivative(0.5 * t, values), 2.0 * expected, rtol=1e-6)
+        np.testing.assert_allclose(
+            time_derivative(0.5 * t, values), 2.0 * expected, rtol=1e-6
+        )
     through_all = make_interp_spline(t[:-1], noise[:-1]).derivative()(t[:-1])
     np.testing.assert_allclose(time_derivative(t[:-1], noise[:-1]), through_all)
 
 
-def test_heading_from_the_start_follows_from_the_yaw_rate_where_no_position_is_known(tmp_path):
+def test_heading_from_the_start_follows_from_the_yaw_rate_where_no_position_is_known(
+    tmp_path,
+):
     channels, _ = manoeuvre()
     trial = Trial.from_csv(write(tmp_path / "run.csv", {"t": T, "r": channels["r"]}))
     assert trial.derived == {"psi"}
@@ -397,7 +463,9 @@ def test_channels_of_the_centre_of_gravity_are_derived_at_midship(tmp_path):
 
 
 @pytest.mark.parametrize("cell", ["", "nan", "NaN", "NA", " ", "inf"])
-def test_a_missing_value_is_refused_with_its_line_and_the_option_that_repairs(tmp_path, cell):
+def test_a_missing_value_is_refused_with_its_line_and_the_option_that_repairs(
+    tmp_path, cell
+):
     message = refusal(edited(tmp_path, 12, {6: cell}))
     assert "line 12 (data row 11), column 'r'" in message
     assert 'repair = "interpolate"' in message
@@ -423,20 +491,28 @@ def test_rows_that_lack_a_value_at_either_end_are_left_out_not_invented(tmp_path
     channels, _ = manoeuvre()
     r = channels["r"].copy()
     r[[0, 1, -1]] = np.nan
-    trial = Trial.from_csv(write(tmp_path / "run.csv", {"t": T, "r": r}), repair="interpolate")
+    trial = Trial.from_csv(
+        write(tmp_path / "run.csv", {"t": T, "r": r}), repair="interpolate"
+    )
     np.testing.assert_array_equal(trial.t, T[2:-1])
 
 
 def test_time_cannot_be_repaired_nor_a_column_that_is_mostly_empty(tmp_path):
-    assert "time cannot be interpolated" in refusal(edited(tmp_path, 5, {0: ""}), repair="interpolate")
+    assert "time cannot be interpolated" in refusal(
+        edited(tmp_path, 5, {0: ""}), repair="interpolate"
+    )
     r = np.where(np.arange(T.size) % 3 == 0, 0.01, np.nan)
     path = write(tmp_path / "run.csv", {"t": T, "r": r})
     assert "only 101 of 301 rows" in refusal(path, repair="interpolate")
-    assert "repair: 'drop' found, expected one of 'interpolate'" in refusal(path, repair="drop")
+    assert "repair: 'drop' found, expected one of 'interpolate'" in refusal(
+        path, repair="drop"
+    )
 
 
 @pytest.mark.parametrize("rows", [10, 15, 60])
-def test_a_hole_too_long_to_interpolate_is_refused_with_its_line_and_length(tmp_path, rows):
+def test_a_hole_too_long_to_interpolate_is_refused_with_its_line_and_length(
+    tmp_path, rows
+):
     channels, _ = manoeuvre()
     r = channels["r"].copy()
     r[5] = np.nan
@@ -447,7 +523,10 @@ def test_a_hole_too_long_to_interpolate_is_refused_with_its_line_and_length(tmp_
         return
     message = refusal(path, repair="interpolate")
     length = T[100 + rows] - T[99]
-    assert f"line 102 (data row 101), column 'r': {rows} rows without a value, over {length:g} s" in message
+    assert (
+        f"line 102 (data row 101), column 'r': {rows} rows without a value, over"
+        f" {length:g} s" in message
+    )
     assert "split the file there" in message
 
 
@@ -465,11 +544,15 @@ def test_a_few_rows_over_a_long_time_are_no_hole(tmp_path):
 
 def test_text_in_a_number_is_named_with_line_column_and_value(tmp_path):
     message = refusal(edited(tmp_path, 7, {4: "1,1".replace(",", ".1.")}))
-    assert "line 7 (data row 6), column 'u': '1.1.1' found, expected a number" in message
+    assert (
+        "line 7 (data row 6), column 'u': '1.1.1' found, expected a number" in message
+    )
 
 
 def test_a_ragged_row_is_named_with_its_number_of_cells(tmp_path):
-    assert "line 9 (data row 8) has 3 cells, expected 8" in refusal(edited(tmp_path, 9, text="1,2,3"))
+    assert "line 9 (data row 8) has 3 cells, expected 8" in refusal(
+        edited(tmp_path, 9, text="1,2,3")
+    )
     assert "line 9 (data row 8) has 9 cells, expected 8" in refusal(
         edited(tmp_path, 9, text="1,2,3,4,5,6,7,8,9")
     )
@@ -477,7 +560,9 @@ def test_a_ragged_row_is_named_with_its_number_of_cells(tmp_path):
 
 def test_time_that_goes_back_or_stands_still_is_named_with_both_values(tmp_path):
     message = refusal(edited(tmp_path, 20, {0: "1.5"}))
-    assert "line 20 (data row 19), column 't': time goes back from 3.4 to 1.5 s" in message
+    assert (
+        "line 20 (data row 19), column 't': time goes back from 3.4 to 1.5 s" in message
+    )
     assert "line 20 (data row 19), column 't': time stands still at 3.4 s" in refusal(
         edited(tmp_path, 20, {0: repr(float(T[17]))})
     )
@@ -490,7 +575,9 @@ def test_blank_lines_do_not_shift_the_line_numbers(tmp_path):
 
 @pytest.mark.parametrize("rows", [0, 1, 2])
 def test_fewer_than_three_samples_are_refused(tmp_path, rows):
-    (tmp_path / "run.csv").write_text("t,u\n" + "".join(f"{k},1\n" for k in range(rows)))
+    (tmp_path / "run.csv").write_text(
+        "t,u\n" + "".join(f"{k},1\n" for k in range(rows))
+    )
     assert f"{rows} samples found, expected at least 3" in refusal(tmp_path / "run.csv")
 
 
@@ -509,16 +596,37 @@ def test_fewer_than_three_samples_are_refused(tmp_path, rows):
         (b"time,speed\n0,1\n", "no column is named like a channel"),
         (b"t,speed\n0,1\n", "no column is named like a channel"),
         (b"u,v\n0,1\n", "column 't' not found"),
-        (b"t," + b'"' + b"x" * 200_000 + b"\n0,1\n", "200003 characters found, expected at most 100000"),
-        (b",".join(b"c%d" % i for i in range(1001)), "line 1 names 1001 columns, expected at most 1000"),
+        (
+            b"t," + b'"' + b"x" * 200_000 + b"\n0,1\n",
+            "200003 characters found, expected at most 100000",
+        ),
+        (
+            b",".join(b"c%d" % i for i in range(1001)),
+            "line 1 names 1001 columns, expected at most 1000",
+        ),
         (b"t,u\n" + b"\n" * 1_000_000, "1000002 lines found, expected at most 1000000"),
-        (b't\tu\tv\n0\t"1\t2\nx\t1\t2\n', "line 2 (data row 1) has 2 cells, expected 3"),
-        (b't,u,c\n0,1,"\n5",3,4\n2,1,0\n3,1,0\n', "line 3 (data row 2), column 't': '5\"' found"),
+        (
+            b't\tu\tv\n0\t"1\t2\nx\t1\t2\n',
+            "line 2 (data row 1) has 2 cells, expected 3",
+        ),
+        (
+            b't,u,c\n0,1,"\n5",3,4\n2,1,0\n3,1,0\n',
+            "line 3 (data row 2), column 't': '5\"' found",
+        ),
         (b"t,x\n0,1\n1,1e150\n2,1\n", "x = 1e+150 m found, expected at most 1e+08 m"),
-        (b"t,u\n0,1\n1e200,1\n2e200,1\n", "t = 1e+200 s found, expected at most 1e+10 s"),
+        (
+            b"t,u\n0,1\n1e200,1\n2e200,1\n",
+            "t = 1e+200 s found, expected at most 1e+10 s",
+        ),
         (b"t,u\n0,1\n1e-300,1\n1,1\n", "time stands still at 1e-300 s"),
-        (b"t,u\n0,1\n1,1_0\n2,1\n", "line 3 (data row 2), column 'u': '1_0' found, expected a number"),
-        (b"t;u\n0;1\n1;1_0,5\n2;1\n", "line 3 (data row 2), column 'u': '1_0,5' found, expected a number"),
+        (
+            b"t,u\n0,1\n1,1_0\n2,1\n",
+            "line 3 (data row 2), column 'u': '1_0' found, expected a number",
+        ),
+        (
+            b"t;u\n0;1\n1;1_0,5\n2;1\n",
+            "line 3 (data row 2), column 'u': '1_0,5' found, expected a number",
+        ),
     ],
 )
 def test_what_is_not_a_table_of_numbers_is_refused(tmp_path, content, message):
@@ -527,13 +635,17 @@ def test_what_is_not_a_table_of_numbers_is_refused(tmp_path, content, message):
 
 
 def test_a_heading_of_the_smallest_numbers_is_differentiated(tmp_path):
-    (tmp_path / "run.csv").write_text("t,psi\n" + "".join(f"{k},5e-324\n" for k in range(70)))
+    (tmp_path / "run.csv").write_text(
+        "t,psi\n" + "".join(f"{k},5e-324\n" for k in range(70))
+    )
     assert np.abs(Trial.from_csv(tmp_path / "run.csv")["r"]).max() < 1e-300
 
 
 def test_a_missing_file_and_a_folder_are_refused(tmp_path):
     (tmp_path / "run_1.csv").write_text("t,u\n")
-    assert "there is no such CSV file. Did you mean 'run_1.csv'?" in refusal(tmp_path / "run1.csv")
+    assert "there is no such CSV file. Did you mean 'run_1.csv'?" in refusal(
+        tmp_path / "run1.csv"
+    )
     assert "no such CSV file" in refusal(tmp_path / "nowhere" / "run.csv")
     assert "this is a folder" in refusal(tmp_path)
 
@@ -542,8 +654,8 @@ def test_a_missing_column_is_named_with_those_present(tmp_path):
     (tmp_path / "run.csv").write_text("t,yaw_rate,speed\n0,0,1\n1,0,1\n2,0,1\n")
     message = refusal(tmp_path / "run.csv", {"r": "yawrate"})
     assert (
-        "column 'yawrate' not found. Did you mean 'yaw_rate'? Columns present: 't', 'yaw_rate', 'speed'"
-        in message
+        "column 'yawrate' not found. Did you mean 'yaw_rate'? Columns present: 't',"
+        " 'yaw_rate', 'speed'" in message
     )
 
 
@@ -552,11 +664,17 @@ def test_a_missing_column_is_named_with_those_present(tmp_path):
     [
         ({"rudder": "u"}, "unknown channel 'rudder'"),
         ({"Delta": "u"}, "Did you mean 'delta'?"),
-        ({"r": {"column": "u", "unit": "knots"}}, "unit 'knots' found, expected a unit of angular rate"),
+        (
+            {"r": {"column": "u", "unit": "knots"}},
+            "unit 'knots' found, expected a unit of angular rate",
+        ),
         ({"r": {"column": "u", "unit": "knots"}}, "'knots' is a unit of speed"),
         ({"u": {"column": "u", "unit": "knot"}}, "Did you mean 'knots'?"),
         ({"u": {"column": "u", "unit": 3}}, "unit 3 found"),
-        ({"u": {"column": "u", "units": "m/s"}}, "unknown key 'units'. Did you mean 'unit'?"),
+        (
+            {"u": {"column": "u", "units": "m/s"}},
+            "unknown key 'units'. Did you mean 'unit'?",
+        ),
         ({"u": {"unit": "m/s"}}, "expected the name of a column"),
         ({"u": 3}, "3 found, expected the name of a column"),
         ({"u": " "}, "expected a text that is not empty"),
@@ -571,7 +689,10 @@ def test_columns_that_make_no_sense_are_refused(tmp_path, columns, message):
 @pytest.mark.parametrize(
     ("argument", "message"),
     [
-        ({"rudder_positive": "left"}, "rudder_positive: 'left' found, expected one of 'starboard', 'port'"),
+        (
+            {"rudder_positive": "left"},
+            "rudder_positive: 'left' found, expected one of 'starboard', 'port'",
+        ),
         ({"rudder_positive": "starbord"}, "Did you mean 'starboard'?"),
         ({"velocity_frame": "ground"}, "velocity_frame: 'ground' found"),
         ({"origin": "bow"}, "origin: 'bow' found"),
@@ -585,13 +706,26 @@ def test_conventions_that_are_not_known_are_refused(tmp_path, argument, message)
 
 def test_earth_fixed_velocities_need_a_recorded_heading(tmp_path):
     (tmp_path / "run.csv").write_text("t,u,v\n0,1,0\n1,1,0\n2,1,0\n")
-    assert "without a recorded psi" in refusal(tmp_path / "run.csv", velocity_frame="earth")
+    assert "without a recorded psi" in refusal(
+        tmp_path / "run.csv", velocity_frame="earth"
+    )
     (tmp_path / "run.csv").write_text("t,u,psi\n0,1,0\n1,1,0\n2,1,0\n")
-    assert "without a recorded v" in refusal(tmp_path / "run.csv", velocity_frame="earth")
+    assert "without a recorded v" in refusal(
+        tmp_path / "run.csv", velocity_frame="earth"
+    )
 
 
-@settings(max_examples=200, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
-@given(st.one_of(st.binary(max_size=60), st.text('t,u0123.eE-+;"\n\r\t nax', max_size=60).map(str.encode)))
+@settings(
+    max_examples=200,
+    deadline=None,
+    suppress_health_check=[HealthCheck.function_scoped_fixture],
+)
+@given(
+    st.one_of(
+        st.binary(max_size=60),
+        st.text('t,u0123.eE-+;"\n\r\t nax', max_size=60).map(str.encode),
+    )
+)
 def test_whatever_a_file_holds_the_answer_is_a_trial_or_one_message(tmp_path, content):
     (tmp_path / "run.csv").write_bytes(b"t,u\n" * (len(content) % 2) + content)
     try:
@@ -610,12 +744,18 @@ def test_whatever_a_file_holds_the_answer_is_a_trial_or_one_message(tmp_path, co
 @pytest.mark.parametrize(
     ("channel", "factor", "expected"),
     [
-        ("r", 180 / np.pi, 'likely a wrong unit: declare r = { column = "r", unit = "deg/s" }'),
+        (
+            "r",
+            180 / np.pi,
+            'likely a wrong unit: declare r = { column = "r", unit = "deg/s" }',
+        ),
         ("delta", 180 / np.pi, 'declare delta = { column = "delta", unit = "deg" }'),
         ("u", 100.0, "expected at most 50 m/s"),
     ],
 )
-def test_values_beyond_any_ship_are_refused_with_the_likely_unit(tmp_path, channel, factor, expected):
+def test_values_beyond_any_ship_are_refused_with_the_likely_unit(
+    tmp_path, channel, factor, expected
+):
     channels, _ = manoeuvre()
     path = write(tmp_path / "run.csv", {"t": T, channel: channels[channel] * factor})
     message = refusal(path)
@@ -625,7 +765,10 @@ def test_values_beyond_any_ship_are_refused_with_the_likely_unit(tmp_path, chann
 
 def test_a_ship_turning_400_deg_s_is_refused(tmp_path):
     message = refusal(edited(tmp_path, 30, {6: repr(math.radians(400.0))}))
-    assert "line 30 (data row 29), column 'r': r = 6.98132 rad/s (400 deg/s) found" in message
+    assert (
+        "line 30 (data row 29), column 'r': r = 6.98132 rad/s (400 deg/s) found"
+        in message
+    )
     assert "expected at most 1.0472 rad/s (60 deg/s)" in message
 
 
@@ -652,20 +795,33 @@ def test_heading_and_yaw_rate_that_disagree_are_refused(tmp_path):
     message = refusal(path)
     assert "0.0175 times as fast as the yaw rate says" in message
     assert 'r = { column = "r", unit = "deg/s" }' in message
-    assert Trial.from_csv(path, {"psi": "psi", "r": {"column": "r", "unit": "deg/s"}}).duration == 600.0
-    assert "opposite signs" in refusal(write(tmp_path / "run.csv", {"t": t, "psi": psi, "r": -r}))
+    assert (
+        Trial.from_csv(
+            path, {"psi": "psi", "r": {"column": "r", "unit": "deg/s"}}
+        ).duration
+        == 600.0
+    )
+    assert "opposite signs" in refusal(
+        write(tmp_path / "run.csv", {"t": t, "psi": psi, "r": -r})
+    )
 
 
 def test_a_biased_rate_sensor_on_a_straight_run_is_no_contradiction(tmp_path):
     rng = np.random.default_rng(3)
     psi = rng.normal(0.0, 1e-3, T.size) + 1e-4 * T
     r = rng.normal(0.0, 1e-3, T.size) - 5e-3
-    assert len(Trial.from_csv(write(tmp_path / "run.csv", {"t": T, "psi": psi, "r": r}))) == T.size
+    assert (
+        len(Trial.from_csv(write(tmp_path / "run.csv", {"t": T, "psi": psi, "r": r})))
+        == T.size
+    )
 
 
 def test_velocities_in_the_wrong_frame_or_unit_are_refused(tmp_path):
     channels, earth = manoeuvre()
-    path = write(tmp_path / "run.csv", {"t": T, **channels, "u": earth["north"], "v": earth["east"]})
+    path = write(
+        tmp_path / "run.csv",
+        {"t": T, **channels, "u": earth["north"], "v": earth["east"]},
+    )
     assert 'declare velocity_frame = "earth"' in refusal(path)
     path = write(tmp_path / "run.csv", {"t": T, **channels})
     assert 'declare velocity_frame = "body"' in refusal(path, velocity_frame="earth")
@@ -678,7 +834,8 @@ def test_velocities_in_the_wrong_frame_or_unit_are_refused(tmp_path):
 
 DATA = Path(__file__).parents[2].parent / "shared" / "data"
 needs_data = pytest.mark.skipif(
-    not DATA.is_dir(), reason="the measured trials lie beside the checkout and are absent here"
+    not DATA.is_dir(),
+    reason="the measured trials lie beside the checkout and are absent here",
 )
 
 
@@ -687,26 +844,42 @@ def test_channels_derived_from_the_tank_s_positions_agree_with_its_own(tmp_path)
     columns = {"x": "x0", "y": "y0", "psi": "psi", "delta": "delta"}
     path = DATA / "kvlcc2_hsva" / "Z_20_05.csv"
     derived = Trial.from_csv(path, columns, rudder_positive="port")
-    measured = Trial.from_csv(path, columns | {"u": "u", "v": "v", "r": "r"}, rudder_positive="port")
+    measured = Trial.from_csv(
+        path, columns | {"u": "u", "v": "v", "r": "r"}, rudder_positive="port"
+    )
     assert derived.derived == {"u", "v", "r"}
-    for name, tolerance in {"u": 1e-3, "v": 1e-3, "r": 4e-4}.items():  # 0.1 % of u, 1 % of v and r
+    for name, tolerance in {
+        "u": 1e-3,
+        "v": 1e-3,
+        "r": 4e-4,
+    }.items():  # 0.1 % of u, 1 % of v and r
         assert np.sqrt(np.mean((derived[name] - measured[name]) ** 2)) < tolerance
 
 
 @pytest.mark.parametrize(
     ("channel", "unit", "largest"),
     [
-        ("u", "m/s", 50.0), ("v", "m/s", 50.0), ("r", "deg/s", 60.0), ("p", "deg/s", 360.0),
-        ("phi", "deg", 180.0), ("delta", "deg", 90.0), ("delta_command", "deg", 90.0), ("n", "rps", 200.0),
+        ("u", "m/s", 50.0),
+        ("v", "m/s", 50.0),
+        ("r", "deg/s", 60.0),
+        ("p", "deg/s", 360.0),
+        ("phi", "deg", 180.0),
+        ("delta", "deg", 90.0),
+        ("delta_command", "deg", 90.0),
+        ("n", "rps", 200.0),
         ("n_command", "rps", 200.0),
     ],
-)  # fmt: skip
+)
 def test_what_no_ship_does_begins_at_its_limit(tmp_path, channel, unit, largest):
     """In the unit of the limit: up to it a value passes, 1 % more does not."""
     columns = {"t": "t", channel: {"column": channel, "unit": unit}}
     path = write(tmp_path / "run.csv", {"t": T, channel: np.full(T.size, -largest)})
-    assert Trial.from_csv(path, columns)[channel][0] == pytest.approx(-largest * si_factor(channel, unit))
-    path = write(tmp_path / "more.csv", {"t": T, channel: np.full(T.size, 1.01 * largest)})
+    assert Trial.from_csv(path, columns)[channel][0] == pytest.approx(
+        -largest * si_factor(channel, unit)
+    )
+    path = write(
+        tmp_path / "more.csv", {"t": T, channel: np.full(T.size, 1.01 * largest)}
+    )
     with pytest.raises(InputError, match=rf"{channel} = .* found, expected at most"):
         Trial.from_csv(path, columns)
 
@@ -716,9 +889,14 @@ def test_velocities_derived_from_positions_are_over_ground(tmp_path):
     whole = Trial(T, manoeuvre()[0])
     whole.to_csv(tmp_path / "log.csv")
     assert not Trial.from_csv(tmp_path / "log.csv").over_ground
-    Trial(T, {name: whole[name] for name in ("x", "y", "psi")}).to_csv(tmp_path / "gnss.csv")
+    Trial(T, {name: whole[name] for name in ("x", "y", "psi")}).to_csv(
+        tmp_path / "gnss.csv"
+    )
     gnss = Trial.from_csv(tmp_path / "gnss.csv")
-    assert all(copy.over_ground for copy in (gnss, gnss.with_(name="a"), pickle.loads(pickle.dumps(gnss))))
+    assert all(
+        copy.over_ground
+        for copy in (gnss, gnss.with_(name="a"), pickle.loads(pickle.dumps(gnss)))
+    )
     assert not gnss.with_(over_ground=False).with_channels({"u": gnss["u"]}).over_ground
 
 

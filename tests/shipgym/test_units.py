@@ -4,17 +4,57 @@ import pytest
 from scipy import constants
 
 from shipgym.errors import InputError
-from shipgym.trials.units import CHANNELS, INPUTS, QUANTITIES, UNITS, check_channel, si_factor, si_unit
+from shipgym.trials.units import (
+    CHANNELS,
+    INPUTS,
+    QUANTITIES,
+    UNITS,
+    check_channel,
+    si_factor,
+    si_unit,
+)
 
 
 @pytest.mark.parametrize(
     ("channel", "units"),
     [
-        ("t", {"s": 1, "ms": constants.milli, "min": constants.minute, "h": constants.hour, "unix": 1}),
-        ("x", {"m": 1, "km": constants.kilo, "ft": constants.foot, "nm": constants.nautical_mile}),
+        (
+            "t",
+            {
+                "s": 1,
+                "ms": constants.milli,
+                "min": constants.minute,
+                "h": constants.hour,
+                "unix": 1,
+            },
+        ),
+        (
+            "x",
+            {
+                "m": 1,
+                "km": constants.kilo,
+                "ft": constants.foot,
+                "nm": constants.nautical_mile,
+            },
+        ),
         ("psi", {"rad": 1, "deg": constants.degree}),
-        ("r", {"rad/s": 1, "deg/s": constants.degree, "deg/min": constants.degree / constants.minute}),
-        ("u", {"m/s": 1, "knots": constants.knot, "kn": constants.knot, "km/h": constants.kmh}),
+        (
+            "r",
+            {
+                "rad/s": 1,
+                "deg/s": constants.degree,
+                "deg/min": constants.degree / constants.minute,
+            },
+        ),
+        (
+            "u",
+            {
+                "m/s": 1,
+                "knots": constants.knot,
+                "kn": constants.knot,
+                "km/h": constants.kmh,
+            },
+        ),
         ("n", {"rps": 1, "rpm": 1 / constants.minute}),
         ("X", {"N": 1, "kN": constants.kilo}),
         ("N", {"N m": 1, "kN m": constants.kilo}),
@@ -29,15 +69,22 @@ def test_units_are_what_they_are_by_definition(channel, units):
     assert known.keys() - units.keys() <= {"unix ms"}
     assert si_unit(channel) == next(iter(units))
     with pytest.raises(
-        InputError, match=f"columns: unit 'furlong' found, expected a unit of {QUANTITIES[channel]}"
+        InputError,
+        match=(
+            f"columns: unit 'furlong' found, expected a unit of {QUANTITIES[channel]}"
+        ),
     ):
         si_factor(channel, "furlong", "columns")
 
 
 def test_a_unit_of_another_quantity_is_told():
-    with pytest.raises(InputError, match=r"unit 'deg/s' found, .*'deg/s' is a unit of angular rate"):
+    with pytest.raises(
+        InputError, match=r"unit 'deg/s' found, .*'deg/s' is a unit of angular rate"
+    ):
         si_factor("psi", "deg/s")
-    with pytest.raises(InputError, match=r"unit 'knot' found, .*Did you mean 'knots'\?"):
+    with pytest.raises(
+        InputError, match=r"unit 'knot' found, .*Did you mean 'knots'\?"
+    ):
         si_factor("u", "knot")
 
 
@@ -48,5 +95,7 @@ def test_a_trial_has_no_time_among_its_channels_and_nothing_that_only_files_have
     for name in ("t", "sog"):
         with pytest.raises(InputError, match=f"trial: unknown channel '{name}'"):
             check_channel(name, "trial", time=False)
-    with pytest.raises(InputError, match=r"unknown channel 'deltta'. Did you mean 'delta'\?"):
+    with pytest.raises(
+        InputError, match=r"unknown channel 'deltta'. Did you mean 'delta'\?"
+    ):
         check_channel("deltta", "columns")

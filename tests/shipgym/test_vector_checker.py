@@ -10,7 +10,9 @@ from shipgym.envs.checker import _check_rows
 
 
 def single():
-    return gymnasium.make("shipgym/CourseKeeping-v0", episode_steps=30, disable_env_checker=True)
+    return gymnasium.make(
+        "shipgym/CourseKeeping-v0", episode_steps=30, disable_env_checker=True
+    )
 
 
 class Right(SyncVectorEnv):
@@ -52,7 +54,9 @@ class TakesAnything(Right):
 class MasksNothing(Right):
     def step(self, actions):
         *outcome, infos = super().step(actions)
-        return *outcome, {key: value for key, value in infos.items() if not key.startswith("_")}
+        return *outcome, {
+            key: value for key, value in infos.items() if not key.startswith("_")
+        }
 
 
 class SameStep(Right):
@@ -62,7 +66,9 @@ class SameStep(Right):
 class HidesTheEnd(SameStep):
     def step(self, actions):
         *outcome, infos = super().step(actions)
-        return *outcome, {key: value for key, value in infos.items() if "final" not in key}
+        return *outcome, {
+            key: value for key, value in infos.items() if "final" not in key
+        }
 
 
 class Disabled(Right):
@@ -99,7 +105,9 @@ def test_what_is_wrong_is_named(kind, fault):
 
 def test_rows_that_are_other_ships_are_named():
     def tanker():
-        return gymnasium.make("shipgym/CourseKeeping-v0", model="tanker", disable_env_checker=True)
+        return gymnasium.make(
+            "shipgym/CourseKeeping-v0", model="tanker", disable_env_checker=True
+        )
 
     with pytest.raises(InputError, match="row 0 shows"):
         check_vector_env(Right, tanker, n_steps=5)
@@ -121,7 +129,11 @@ class Walker(gymnasium.Env):
 
     def reset(self, *, seed=None, options=None):
         super().reset(seed=seed)
-        self.x, self.k, self.last = self.np_random.random(), 0, 3 + self.np_random.integers(4)
+        self.x, self.k, self.last = (
+            self.np_random.random(),
+            0,
+            3 + self.np_random.integers(4),
+        )
         return self.seen(), {}
 
     def seen(self):
@@ -136,7 +148,10 @@ class Walkers(VectorEnv):
     """Two walkers, as promised."""
 
     mode = AutoresetMode.NEXT_STEP
-    single_observation_space, single_action_space = Walker.observation_space, Walker.action_space
+    single_observation_space, single_action_space = (
+        Walker.observation_space,
+        Walker.action_space,
+    )
     num_envs = 2
 
     def __init__(self):
@@ -146,7 +161,11 @@ class Walkers(VectorEnv):
         self.walkers = [Walker() for _ in range(2)]
 
     def reset(self, *, seed=None, options=None):
-        seeds = [seed + k for k in range(2)] if isinstance(seed, int) else seed or [None, None]
+        seeds = (
+            [seed + k for k in range(2)]
+            if isinstance(seed, int)
+            else seed or [None, None]
+        )
         mask = (options or {}).get("reset_mask", np.ones(2, np.bool_))
         for walker, one, asked in zip(self.walkers, seeds, mask, strict=True):
             if asked:
@@ -159,9 +178,11 @@ class Walkers(VectorEnv):
 
     def infos(self):
         k = np.array([walker.k for walker in self.walkers])
-        return {"k": k, "_k": np.ones(2, np.bool_), "more": {"k": k, "_k": np.ones(2, np.bool_)}} | {
-            "_more": np.ones(2, np.bool_)
-        }
+        return {
+            "k": k,
+            "_k": np.ones(2, np.bool_),
+            "more": {"k": k, "_k": np.ones(2, np.bool_)},
+        } | {"_more": np.ones(2, np.bool_)}
 
     def step(self, actions):
         if actions.shape != (2, 1) or not np.isfinite(actions).all():
@@ -205,7 +226,12 @@ def changed_step(**changes):
     def step(self, actions):
         names = ("seen", "rewards", "terminated", "truncated", "infos")
         answer = dict(zip(names, Walkers.step(self, actions), strict=True))
-        return tuple((answer | {name: change(answer[name]) for name, change in changes.items()}).values())
+        return tuple(
+            (
+                answer
+                | {name: change(answer[name]) for name, change in changes.items()}
+            ).values()
+        )
 
     return {"step": step}
 
@@ -234,48 +260,142 @@ def takes_one_seed(self, seed=None, options=None):
 def ended(**changes):
     """Infos of episodes that ended are others."""
     return changed_step(
-        infos=lambda one: one | {k: f(one[k]) for k, f in changes.items()} if "final_obs" in one else one
+        infos=lambda one: (
+            one | {k: f(one[k]) for k, f in changes.items()}
+            if "final_obs" in one
+            else one
+        )
     )
 
 
 WIDE = {"single_observation_space": Box(-9.0, 9.0, (3,), np.float32)}
 FOUR = {"step": lambda self, actions: Walkers.step(self, actions)[:4]}
-ONE_EPISODE = {"reset": lambda self, seed=None, options=None: Walkers.reset(self, seed=5)}
+ONE_EPISODE = {
+    "reset": lambda self, seed=None, options=None: Walkers.reset(self, seed=5)
+}
 UNMASKED = changed_step(infos=lambda one: one | {"more": {"l": one["k"]}})
-NO_INFO = changed_step(infos=lambda one: {k: v for k, v in one.items() if "final_info" not in k})
+NO_INFO = changed_step(
+    infos=lambda one: {k: v for k, v in one.items() if "final_info" not in k}
+)
 WRONG = [
     (Walkers, {"num_envs": 0}, "num_envs is 0, expected >= 1"),
     (Walkers, {"num_envs": 2.0}, "num_envs is 2.0, expected >= 1"),
     (Walkers, WIDE, "observation_space is Box.*: single_observation_space batched"),
-    (Walkers, {"single_action_space": Discrete(3)}, "action_space is Box.* expected MultiDiscrete"),
-    (Walkers, changed_reset(lambda given: given[0]), r"reset returned <class 'numpy.ndarray'>, expected"),
-    (Walkers, changed_reset(lambda given: given * 2), "reset returned <class 'tuple'>, expected"),
-    (Walkers, changed_reset(lambda given: (given[0] + 999, {})), "reset: observations .* are not in Box"),
-    (Walkers, changed_reset(lambda given: (given[0], [])), "reset: infos are <class 'list'>, expected a di"),
+    (
+        Walkers,
+        {"single_action_space": Discrete(3)},
+        "action_space is Box.* expected MultiDiscrete",
+    ),
+    (
+        Walkers,
+        changed_reset(lambda given: given[0]),
+        r"reset returned <class 'numpy.ndarray'>, expected",
+    ),
+    (
+        Walkers,
+        changed_reset(lambda given: given * 2),
+        "reset returned <class 'tuple'>, expected",
+    ),
+    (
+        Walkers,
+        changed_reset(lambda given: (given[0] + 999, {})),
+        "reset: observations .* are not in Box",
+    ),
+    (
+        Walkers,
+        changed_reset(lambda given: (given[0], [])),
+        "reset: infos are <class 'list'>, expected a di",
+    ),
     (Walkers, FOUR, "step returned 4 values, expected 5"),
-    (Walkers, changed_step(seen=lambda one: one + 999), "step: observations .* are not in Box"),
-    (Walkers, changed_step(rewards=lambda one: one[:1]), r"step: rewards of shape and type \(\(1,\), dty"),
-    (Walkers, changed_step(rewards=lambda one: one.astype(int)), "step: rewards of shape .*int64"),
-    (Walkers, changed_step(terminated=lambda one: one * 1.0), "step: terminated of shape and type .*float64"),
-    (Walkers, changed_step(truncated=lambda one: one.tolist()), r"truncated of shape .* \(None, None\)"),
-    (Walkers, changed_step(rewards=lambda one: one / 0.0), "step: rewards .* are not all finite"),
-    (Walkers, changed_step(infos=lambda one: one | {"k": [1]}), r"\['k'\] is \[1\], expected an entry"),
-    (Walkers, changed_step(infos=lambda one: one | {"k": np.zeros(3)}), r"\['k'\] is .* expected an entry"),
-    (Walkers, changed_step(infos=lambda one: one | {"_k": [True] * 2}), r"infos\['_k'\] is \[True, True\]"),
-    (Walkers, changed_step(infos=lambda one: one | {"_k": one["k"]}), r"step: infos\['_k'\] is array"),
-    (Walkers, changed_step(infos=lambda one: one | {"_k": one["_k"][:1]}), r"step: infos\['_k'\] is array"),
-    (Walkers, UNMASKED, r"step, more: infos\['_l'\] is None, expected a mask of 2 truth values"),
-    (Walkers, {"reset": takes_one_seed}, r"gave another episode than reset\(seed=\[s, s \+ 1"),
+    (
+        Walkers,
+        changed_step(seen=lambda one: one + 999),
+        "step: observations .* are not in Box",
+    ),
+    (
+        Walkers,
+        changed_step(rewards=lambda one: one[:1]),
+        r"step: rewards of shape and type \(\(1,\), dty",
+    ),
+    (
+        Walkers,
+        changed_step(rewards=lambda one: one.astype(int)),
+        "step: rewards of shape .*int64",
+    ),
+    (
+        Walkers,
+        changed_step(terminated=lambda one: one * 1.0),
+        "step: terminated of shape and type .*float64",
+    ),
+    (
+        Walkers,
+        changed_step(truncated=lambda one: one.tolist()),
+        r"truncated of shape .* \(None, None\)",
+    ),
+    (
+        Walkers,
+        changed_step(rewards=lambda one: one / 0.0),
+        "step: rewards .* are not all finite",
+    ),
+    (
+        Walkers,
+        changed_step(infos=lambda one: one | {"k": [1]}),
+        r"\['k'\] is \[1\], expected an entry",
+    ),
+    (
+        Walkers,
+        changed_step(infos=lambda one: one | {"k": np.zeros(3)}),
+        r"\['k'\] is .* expected an entry",
+    ),
+    (
+        Walkers,
+        changed_step(infos=lambda one: one | {"_k": [True] * 2}),
+        r"infos\['_k'\] is \[True, True\]",
+    ),
+    (
+        Walkers,
+        changed_step(infos=lambda one: one | {"_k": one["k"]}),
+        r"step: infos\['_k'\] is array",
+    ),
+    (
+        Walkers,
+        changed_step(infos=lambda one: one | {"_k": one["_k"][:1]}),
+        r"step: infos\['_k'\] is array",
+    ),
+    (
+        Walkers,
+        UNMASKED,
+        r"step, more: infos\['_l'\] is None, expected a mask of 2 truth values",
+    ),
+    (
+        Walkers,
+        {"reset": takes_one_seed},
+        r"gave another episode than reset\(seed=\[s, s \+ 1",
+    ),
     (Walkers, ONE_EPISODE, "reset with another seed gave the same first observations"),
     (EndsAtOnce, {}, "an episode ended in the step that had begun it"),
     (WalkersInTurn, NO_INFO, "no 'final_info'"),
-    (WalkersInTurn, ended(_final_obs=np.zeros_like), r"\['_final_obs'\] is \[False False\], expected .*end"),
-    (WalkersInTurn, ended(final_obs=lambda one: one + 999), r"infos\['final_obs'\]\[\d\] is .*not an obser"),
-    (WalkersByHand, {"reset": keeps}, "reset with a mask left a row within it as it was"),
-]  # fmt: skip
+    (
+        WalkersInTurn,
+        ended(_final_obs=np.zeros_like),
+        r"\['_final_obs'\] is \[False False\], expected .*end",
+    ),
+    (
+        WalkersInTurn,
+        ended(final_obs=lambda one: one + 999),
+        r"infos\['final_obs'\]\[\d\] is .*not an obser",
+    ),
+    (
+        WalkersByHand,
+        {"reset": keeps},
+        "reset with a mask left a row within it as it was",
+    ),
+]
 
 
-@pytest.mark.parametrize(("kind", "changes", "message"), WRONG, ids=[message for *_, message in WRONG])
+@pytest.mark.parametrize(
+    ("kind", "changes", "message"), WRONG, ids=[message for *_, message in WRONG]
+)
 def test_each_promise_that_is_broken_is_named(kind, changes, message):
     broken = type("Broken", (kind,), changes)
     with (
@@ -295,7 +415,8 @@ def test_each_promise_that_is_broken_is_named(kind, changes, message):
 )
 def test_a_row_that_is_not_the_single_environment_is_named(changes):
     with pytest.raises(
-        InputError, match=r"row [01] shows .*, expected .* of the single environment with seed"
+        InputError,
+        match=r"row [01] shows .*, expected .* of the single environment with seed",
     ):
         _check_rows(type("Broken", (Walkers,), changes), Walker, 60)
 
@@ -307,7 +428,14 @@ def test_rows_of_different_ends_are_compared_until_all_steps_are_taken():
         def step(self, actions):
             seen, rewards, terminated, *rest = super().step(actions)
             self.ends = getattr(self, "ends", 0) + terminated[1]
-            return seen, rewards - np.array([0.0, self.ends - terminated[1] > 0]), terminated, *rest
+            return (
+                seen,
+                rewards - np.array([0.0, self.ends - terminated[1] > 0]),
+                terminated,
+                *rest,
+            )
 
-    with pytest.raises(InputError, match=r"row 1 shows .* of the single environment with seed 1235"):
+    with pytest.raises(
+        InputError, match=r"row 1 shows .* of the single environment with seed 1235"
+    ):
         _check_rows(Late, Walker, 30)

@@ -24,7 +24,9 @@ def mariner():
 
 
 def vector(name, num_envs=3, **options):
-    return gymnasium.make_vec(name, num_envs=num_envs, **{"model": "mariner", **options})
+    return gymnasium.make_vec(
+        name, num_envs=num_envs, **{"model": "mariner", **options}
+    )
 
 
 @pytest.mark.parametrize("mode", MODES)
@@ -42,16 +44,28 @@ def test_conformance_and_rows_that_are_single_environments(name, mode):
     [
         (COURSE, {"sea": "rough", "noise": 1.0, "measurement": "filtered"}),
         (PATH, {"sea": ["calm", "moderate"], "noise": 2.0}),
-        (PATH, {"model": "mariner-tls-svm", "model_uncertainty": "posterior", "speed_range": (0.7, 1.0)}),
+        (
+            PATH,
+            {
+                "model": "mariner-tls-svm",
+                "model_uncertainty": "posterior",
+                "speed_range": (0.7, 1.0),
+            },
+        ),
         (COURSE, {"action": "rudder-discrete"}),
         (PATH, {"model": "kvlcc2", "action": "rudder-shaft"}),
-        (COURSE, {"model": "container", "roll": True, "roll_weight": 1.0, "sea": "moderate"}),
+        (
+            COURSE,
+            {"model": "container", "roll": True, "roll_weight": 1.0, "sea": "moderate"},
+        ),
     ],
 )
 def test_rows_are_single_environments_with_every_option(name, options):
     options = {"model": "mariner", **SHORT, **options}
     check_vector_env(
-        lambda: gymnasium.make_vec(name, num_envs=66 if "sea" in options else 3, **options),
+        lambda: gymnasium.make_vec(
+            name, num_envs=66 if "sea" in options else 3, **options
+        ),
         lambda: gymnasium.make(name, **options),
         n_steps=30,
     )
@@ -74,7 +88,12 @@ def test_threads_change_nothing(threads):
 def test_infos_are_those_of_gymnasiums_own_vector_environment(mode):
     ours = vector(PATH, 4, autoreset_mode=mode, **SHORT)
     theirs = gymnasium.make_vec(
-        PATH, 4, "sync", vector_kwargs={"autoreset_mode": mode}, model="mariner", **SHORT
+        PATH,
+        4,
+        "sync",
+        vector_kwargs={"autoreset_mode": mode},
+        model="mariner",
+        **SHORT,
     )
     ours.action_space.seed(0)
     first = [env.reset(seed=8)[1] for env in (ours, theirs)]
@@ -89,7 +108,9 @@ def test_infos_are_those_of_gymnasiums_own_vector_environment(mode):
             for row in np.flatnonzero(infos["_final_obs"]):
                 np.testing.assert_array_equal(infos[key][row], expected[key][row])
         for key in seen if "final_info" in infos else ():
-            np.testing.assert_array_equal(infos["final_info"][key], expected["final_info"][key])
+            np.testing.assert_array_equal(
+                infos["final_info"][key], expected["final_info"][key]
+            )
 
 
 def _infos(ours, theirs):
@@ -103,7 +124,11 @@ def test_gymnasiums_vector_wrappers_work_on_it():
     lengths = []
     for _ in range(60):
         *_, infos = env.step(env.action_space.sample())
-        lengths += infos["episode"]["l"][infos["_episode"]].tolist() if "episode" in infos else []
+        lengths += (
+            infos["episode"]["l"][infos["_episode"]].tolist()
+            if "episode" in infos
+            else []
+        )
     assert len(lengths) >= 10
     assert set(lengths) <= set(range(1, 24))
 
@@ -114,7 +139,10 @@ def test_a_vector_environment_says_what_is_wrong(mariner):
         ({"sae": "calm"}, "Did you mean 'sea'"),
         ({"autoreset_mode": "later"}, "autoreset_mode: 'later' found"),
         ({"threads": 0}, "threads: 0 found"),
-        ({"render_mode": "human"}, "render_mode: 'human' found, expected one of 'rgb_array', or None"),
+        (
+            {"render_mode": "human"},
+            "render_mode: 'human' found, expected one of 'rgb_array', or None",
+        ),
         ({"ensemble": ["container"]}, "ensemble: 'container' has other equations"),
         ({"model_uncertainty": "posterior"}, "'mariner' has no covariance"),
         ({"speed_range": 0.5}, "speed_range: 0.5 found"),
@@ -135,7 +163,11 @@ def test_a_vector_environment_says_what_is_wrong(mariner):
 
 def test_ships_differ_from_episode_to_episode_and_return_with_the_seed():
     heavy = replace(shipgym.load_model("mariner"), name="heavy")
-    options = {"ensemble": [heavy], "loading_range": (0.5, 2.0), "speed_range": (0.5, 1.0)}
+    options = {
+        "ensemble": [heavy],
+        "loading_range": (0.5, 2.0),
+        "speed_range": (0.5, 1.0),
+    }
     env = vector(COURSE, 300, **options)
     env.reset(seed=0)
     speeds = env.physical_state()["u"]
@@ -155,17 +187,29 @@ def test_a_task_is_the_same_whatever_ship_is_drawn():
     plain, drawn = vector(PATH, 5), vector(PATH, 5, speed_range=(0.5, 1.0))
     for env in (plain, drawn):
         env.reset(seed=1)
-    np.testing.assert_array_equal(plain.physical_state()["psi"], drawn.physical_state()["psi"])
-    np.testing.assert_array_equal(plain.unwrapped.waypoints(4), drawn.unwrapped.waypoints(4))
-    np.testing.assert_array_equal(plain.unwrapped.waypoints(), plain.unwrapped.waypoints(0))
-    assert not np.array_equal(plain.unwrapped.waypoints(0), plain.unwrapped.waypoints(1))
+    np.testing.assert_array_equal(
+        plain.physical_state()["psi"], drawn.physical_state()["psi"]
+    )
+    np.testing.assert_array_equal(
+        plain.unwrapped.waypoints(4), drawn.unwrapped.waypoints(4)
+    )
+    np.testing.assert_array_equal(
+        plain.unwrapped.waypoints(), plain.unwrapped.waypoints(0)
+    )
+    assert not np.array_equal(
+        plain.unwrapped.waypoints(0), plain.unwrapped.waypoints(1)
+    )
 
 
 def test_workers_of_other_processes():
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         env = gymnasium.make_vec(
-            f"shipgym:{COURSE}", 2, "async", vector_kwargs={"context": "spawn"}, model="mariner"
+            f"shipgym:{COURSE}",
+            2,
+            "async",
+            vector_kwargs={"context": "spawn"},
+            model="mariner",
         )
     seen, _ = env.reset(seed=4)
     ours, _ = vector(COURSE, 2).reset(seed=4)
@@ -176,7 +220,10 @@ def test_workers_of_other_processes():
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"reset_mask": np.zeros(3, dtype=np.bool_)}, "reset_mask is False in all rows"),
+        (
+            {"reset_mask": np.zeros(3, dtype=np.bool_)},
+            "reset_mask is False in all rows",
+        ),
         ({"reset_mask": np.ones(2, dtype=np.bool_)}, "expected a bool array of 3"),
         ({"reset_mask": np.ones(3, dtype=np.int64)}, "expected a bool array of 3"),
         ({"reset_mask": [True] * 3}, "expected a bool array of 3"),
@@ -193,22 +240,35 @@ def test_a_mask_that_says_nothing_is_refused(options, message):
 def test_an_unknown_mode_is_refused():
     for name, value in (("autoreset_mode", "Never"), ("render_mode", "human")):
         with pytest.raises(InputError, match=f"{name}: '{value}' found, expected"):
-            gymnasium.make_vec("shipgym/CourseKeeping-v0", num_envs=2, model="mariner", **{name: value})
+            gymnasium.make_vec(
+                "shipgym/CourseKeeping-v0", num_envs=2, model="mariner", **{name: value}
+            )
 
 
 @pytest.mark.parametrize("given", ["SameStep", "SAME_STEP", AutoresetMode.SAME_STEP])
 def test_a_mode_is_named_as_gymnasium_has_it(given):
-    assert vector(COURSE, 2, autoreset_mode=given).metadata["autoreset_mode"] is AutoresetMode.SAME_STEP
+    assert (
+        vector(COURSE, 2, autoreset_mode=given).metadata["autoreset_mode"]
+        is AutoresetMode.SAME_STEP
+    )
 
 
 def test_without_a_mode_the_next_step_begins_the_next_episode():
     env = vector(COURSE, 2, episode_steps=3)
-    assert env.metadata["autoreset_mode"] is env.unwrapped.autoreset_mode is AutoresetMode.NEXT_STEP
+    assert (
+        env.metadata["autoreset_mode"]
+        is env.unwrapped.autoreset_mode
+        is AutoresetMode.NEXT_STEP
+    )
     assert env.metadata["render_modes"] == ["rgb_array"]
     env.reset(seed=0)
     steps = [env.step(np.zeros((2, 1), np.float32)) for _ in range(5)]
-    assert [truncated.tolist() for *_, truncated, _ in steps] == [[k == 2] * 2 for k in range(5)]
-    assert [rewards.tolist() == [0.0, 0.0] for _, rewards, *_ in steps] == [k == 3 for k in range(5)]
+    assert [truncated.tolist() for *_, truncated, _ in steps] == [
+        [k == 2] * 2 for k in range(5)
+    ]
+    assert [rewards.tolist() == [0.0, 0.0] for _, rewards, *_ in steps] == [
+        k == 3 for k in range(5)
+    ]
 
 
 def test_rows_may_have_seeds_of_their_own_or_go_on_without():
@@ -222,7 +282,9 @@ def test_rows_may_have_seeds_of_their_own_or_go_on_without():
     np.testing.assert_array_equal(mixed[1], first[1])
     env.reset(seed=5)
     np.testing.assert_array_equal(env.reset()[0], second)
-    again, _ = env.reset(options={"reset_mask": np.array([False, True, False])}, seed=[1, 6, 1])
+    again, _ = env.reset(
+        options={"reset_mask": np.array([False, True, False])}, seed=[1, 6, 1]
+    )
     np.testing.assert_array_equal(again, [second[0], first[1], second[2]])
 
 
@@ -240,7 +302,8 @@ def test_rows_outside_of_a_mask_keep_all_that_they_show():
     infos["_reward_heading"][:] = True
     assert mask.tolist() == [True, False, False]
     with pytest.raises(
-        InputError, match=r"options with a reset_mask of some rows: unknown key 'model_index'"
+        InputError,
+        match=r"options with a reset_mask of some rows: unknown key 'model_index'",
     ):
         env.reset(options={"reset_mask": mask, "model_index": 0})
 
@@ -254,7 +317,9 @@ def test_the_last_infos_of_rows_that_go_on_are_zeros():
         seen, *_, infos = env.step(np.full((3, 1), 0.5, np.float32))
         if "final_info" in infos:
             ended = [step != 11, step == 11, step != 11]
-            assert infos["_final_obs"].tolist() == infos["_final_info"].tolist() == ended
+            assert (
+                infos["_final_obs"].tolist() == infos["_final_info"].tolist() == ended
+            )
             final = infos["final_info"]
             assert (final["heading_error"] != 0.0).tolist() == ended
             assert final["_heading_error"].tolist() == ended

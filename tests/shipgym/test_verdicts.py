@@ -29,8 +29,14 @@ def of_zigzags():
 def test_a_turn_outside_the_envelope_of_the_trials_is_not_decided(of_zigzags):
     for name in ("advance", "tactical_diameter"):
         criterion = of_zigzags[name]
-        assert (criterion.decided, criterion.passed, criterion.probability) == (False, None, None)
-        assert criterion.note.endswith("outside the envelope of the trials; run a 35 deg turn to both sides")
+        assert (criterion.decided, criterion.passed, criterion.probability) == (
+            False,
+            None,
+            None,
+        )
+        assert criterion.note.endswith(
+            "outside the envelope of the trials; run a 35 deg turn to both sides"
+        )
         assert criterion.interval[0] <= criterion.value <= criterion.interval[1]
     told = of_zigzags["advance"].to_dict()
     assert told["decided"] is False
@@ -40,7 +46,11 @@ def test_a_turn_outside_the_envelope_of_the_trials_is_not_decided(of_zigzags):
 def test_within_the_trials_the_interval_decides(of_zigzags):
     criterion = of_zigzags["overshoot_1_20_20"]
     assert criterion.interval[1] < criterion.limit
-    assert (criterion.decided, criterion.passed, criterion.probability) == (True, True, 1.0)
+    assert (criterion.decided, criterion.passed, criterion.probability) == (
+        True,
+        True,
+        1.0,
+    )
 
 
 def test_an_interval_on_both_sides_of_the_limit_decides_nothing(of_zigzags):
@@ -79,23 +89,35 @@ def test_the_turn_is_that_of_the_rudder_s_own_limit(of_zigzags):
 
 def test_a_draw_that_spins_as_no_ship_can_has_no_index():
     ship = load_model("mariner")
-    spins = replace(ship, coefficients=ship.coefficients | {"N_d": 10.0 * ship.coefficients["N_d"]})
+    spins = replace(
+        ship, coefficients=ship.coefficients | {"N_d": 10.0 * ship.coefficients["N_d"]}
+    )
     circle = standard_manoeuvres(ship)["turning circle 35 deg to starboard"]
     assert circle.evaluate(ship).advance_lengths > 3.0
     with pytest.raises(UnstableModelError, match="runs away after"):
         circle.evaluate(spins)
 
 
-@pytest.mark.parametrize(("share", "passed"), [(0.98, True), (0.97, None), (0.03, None), (0.02, False)])
-def test_draws_decide_where_97_and_a_half_per_cent_are_on_one_side(of_zigzags, share, passed):
+@pytest.mark.parametrize(
+    ("share", "passed"), [(0.98, True), (0.97, None), (0.03, None), (0.02, False)]
+)
+def test_draws_decide_where_97_and_a_half_per_cent_are_on_one_side(
+    of_zigzags, share, passed
+):
     drawn = np.where(np.arange(1000) < 1000 * share, 1.0, 9.0)
-    index = IndexInterval(1.0 if share > 0.5 else 9.0, drawn, np.zeros(1000, dtype=bool))
-    one = replace(of_zigzags["overshoot_1_20_20"], drawn=index, limit=2.0, passed=share > 0.5)
+    index = IndexInterval(
+        1.0 if share > 0.5 else 9.0, drawn, np.zeros(1000, dtype=bool)
+    )
+    one = replace(
+        of_zigzags["overshoot_1_20_20"], drawn=index, limit=2.0, passed=share > 0.5
+    )
     assert imo._decided(one, "20/20 zigzag", outside=False).passed == passed
 
 
 @pytest.mark.parametrize(("distance", "outside"), [(1.14, False), (1.16, True)])
-def test_a_manoeuvre_is_outside_beyond_115_per_cent_of_the_envelope_up_to_half_a_turn(distance, outside):
+def test_a_manoeuvre_is_outside_beyond_115_per_cent_of_the_envelope_up_to_half_a_turn(
+    distance, outside
+):
     seen = []
 
     def of(u, v, r, delta):
@@ -106,7 +128,10 @@ def test_a_manoeuvre_is_outside_beyond_115_per_cent_of_the_envelope_up_to_half_a
     channels = {"psi": psi, "u": np.ones(5), "v": np.ones(5), "delta": np.arange(5.0)}
     trial = Trial(np.arange(5.0), channels)
     model = SimpleNamespace(envelope=SimpleNamespace(distance=of))
-    assert imo._outside(model, SimpleNamespace(outcome=None, sail=lambda _: trial)) == outside
+    assert (
+        imo._outside(model, SimpleNamespace(outcome=None, sail=lambda _: trial))
+        == outside
+    )
     assert seen == [(3, [0.0, 0.0, 0.0], 2.0)]
 
 
@@ -120,28 +145,35 @@ def test_a_measured_turn_has_the_rudder_within_a_degree_and_a_tenth_of_the_speed
         (35.0, 0.895, False),
     ):
         changed = {name: speed * turn[name] for name in ("u", "v")}
-        changed |= {name: rudder / 35.0 * turn[name] for name in ("delta", "delta_command")}
+        changed |= {
+            name: rudder / 35.0 * turn[name] for name in ("delta", "delta_command")
+        }
         assert ("advance" in imo._measured(ship, turn.with_channels(changed))) == counts
 
 
 @pytest.mark.parametrize(
-    ("channel", "most"), [("u", 1.5 * 7.7175), ("v", 7.7175), ("r", 3.0 * 7.7175 / 160.93)]
+    ("channel", "most"),
+    [("u", 1.5 * 7.7175), ("v", 7.7175), ("r", 3.0 * 7.7175 / 160.93)],
 )
-def test_no_ship_is_half_as_fast_again_or_as_fast_sideways_or_turns_three_radians_a_length(channel, most):
+def test_no_ship_is_half_as_fast_again_or_as_fast_sideways_or_turns_three_radians_a_length(
+    channel, most
+):
     ship = load_model("mariner")
     for share, wild in ((0.99, False), (-1.01, True)):
         trial = Trial([0.0, 1.0, 2.0], {channel: [0.0, share * most, 0.0]})
         if not wild:
             registry._check_physical(ship, trial)
             continue
-        with pytest.raises(UnstableModelError, match=rf"runs away after 1\.0 s \({channel} = -") as away:
+        with pytest.raises(
+            UnstableModelError, match=rf"runs away after 1\.0 s \({channel} = -"
+        ) as away:
             registry._check_physical(ship, trial)
         assert (away.value.time_s, away.value.state) == (1.0, {channel: share * most})
 
 
 def test_standard_manoeuvres_last_forty_ship_lengths_in_steps_of_a_fiftieth():
     second = 160.93 / 7.7175
-    turn = standard_manoeuvres(load_model("mariner"))["turning circle 35 deg to starboard"].sail(
-        load_model("mariner")
-    )
+    turn = standard_manoeuvres(load_model("mariner"))[
+        "turning circle 35 deg to starboard"
+    ].sail(load_model("mariner"))
     np.testing.assert_allclose(turn.t, second / 50.0 * np.arange(2001))

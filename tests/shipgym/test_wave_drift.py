@@ -9,7 +9,12 @@ from hypothesis import strategies as st
 
 from shipgym import InputError, Particulars, Waves, load_model, sea_states
 from shipgym.sea import slow_drift, wave_drift, wave_motion, wave_spectrum
-from shipgym.sea.drift import _speed_factor, added_resistance, end_angle, reflection_coefficients
+from shipgym.sea.drift import (
+    _speed_factor,
+    added_resistance,
+    end_angle,
+    reflection_coefficients,
+)
 from shipgym.sea.estimates import GRAVITY, weather_particulars
 from shipgym.sea.waves import draught_attenuation
 from shipgym.sea.weather_column import mobility_matrix, roll_inertia
@@ -27,13 +32,22 @@ def head_sea_curve(ship, froude):
     lengths = np.linspace(0.3, 2.0, 171)
     omega = np.sqrt(2.0 * np.pi * GRAVITY / (lengths * ship.length))
     scale = ship.water_density * GRAVITY * ship.beam**2 / ship.length
-    return lengths, added_resistance(omega, 0.0, ship, froude * np.sqrt(GRAVITY * ship.length)) / scale
+    return (
+        lengths,
+        added_resistance(omega, 0.0, ship, froude * np.sqrt(GRAVITY * ship.length))
+        / scale,
+    )
 
 
 @pytest.mark.parametrize(
     ("ship", "froude", "peak", "at"),
     [
-        (KVLCC2, 0.142, 7.0, 1.1),  # Sadat-Hosseini et al. 2013; Guo & Steen 2011: 6 to 8 near 1.1
+        (
+            KVLCC2,
+            0.142,
+            7.0,
+            1.1,
+        ),  # Sadat-Hosseini et al. 2013; Guo & Steen 2011: 6 to 8 near 1.1
         (S175, 0.25, 10.0, 1.15),  # Fujii & Takahashi 1975: 9 to 11 near 1.1 to 1.2
     ],
 )
@@ -60,7 +74,9 @@ def test_added_resistance_is_that_of_the_procedure(ship, omega, expected):
     Waves from 0, 0.15, 1, 2, 2.6 and pi rad from the bow: all branches of its parts.
     """
     chi = np.array([0.0, 0.15, 1.0, 2.0, 2.6, np.pi])
-    np.testing.assert_allclose(added_resistance(omega, chi, ship, ship.speed), expected, rtol=1e-5)
+    np.testing.assert_allclose(
+        added_resistance(omega, chi, ship, ship.speed), expected, rtol=1e-5
+    )
 
 
 def test_the_ends_of_the_hulls_are_as_blunt_as_holtrop_and_kerlen_say():
@@ -71,11 +87,21 @@ def test_the_ends_of_the_hulls_are_as_blunt_as_holtrop_and_kerlen_say():
 def test_speed_and_breadth_count_within_the_formulas_range_only():
     """Froude numbers up to 0.4, a beam of twice the draught at least."""
     fast, faster = (np.sqrt(GRAVITY * S175.length) * froude for froude in (0.4, 0.6))
-    assert added_resistance(0.5, 0.3, S175, fast) == added_resistance(0.5, 0.3, S175, faster)
-    assert added_resistance(0.5, 0.3, S175, 0.95 * fast) != added_resistance(0.5, 0.3, S175, fast)
-    ships = (replace(S175, draught=S175.beam / ratio) for ratio in (1.6, 1.99, 2.0, 2.01))
-    deepest, deeper, deep, less = (added_resistance(0.25, 0.3, ship, 8.0) for ship in ships)
-    assert deepest == deeper == deep != less  # in waves too long to be reflected, 0.25 rad/s
+    assert added_resistance(0.5, 0.3, S175, fast) == added_resistance(
+        0.5, 0.3, S175, faster
+    )
+    assert added_resistance(0.5, 0.3, S175, 0.95 * fast) != added_resistance(
+        0.5, 0.3, S175, fast
+    )
+    ships = (
+        replace(S175, draught=S175.beam / ratio) for ratio in (1.6, 1.99, 2.0, 2.01)
+    )
+    deepest, deeper, deep, less = (
+        added_resistance(0.25, 0.3, ship, 8.0) for ship in ships
+    )
+    assert (
+        deepest == deeper == deep != less
+    )  # in waves too long to be reflected, 0.25 rad/s
 
 
 def test_the_ends_of_the_fullest_hulls_are_those_of_a_prismatic_coefficient_of_0_95():
@@ -90,7 +116,9 @@ def test_the_factor_of_speed_changes_its_law_at_a_froude_number_of_0_12():
     """ITTC 7.5-04-01-01.1, equations G-18: the two laws meet there."""
     froude = np.array([0.0, 0.1, 0.1199, 0.1201, 0.13, 0.3])
     slow, fast = 0.0072 + 0.1676 * froude, froude**1.5 * np.exp(-3.5 * froude)
-    np.testing.assert_allclose(_speed_factor(froude), np.r_[slow[:3], fast[3:]], rtol=1e-12)
+    np.testing.assert_allclose(
+        _speed_factor(froude), np.r_[slow[:3], fast[3:]], rtol=1e-12
+    )
     assert slow[2] == pytest.approx(fast[3], rel=2e-3)
 
 
@@ -102,10 +130,14 @@ def test_short_waves_are_resisted_by_reflection_as_in_model_tests():
 
 
 def test_the_draught_takes_up_what_fujii_and_takahashi_say():
-    omega = np.sqrt(np.array([1e-4, 1.0, 100.0, 5000.0]) * GRAVITY / 8.0)  # k T of 1e-4, 1, 100, 5000
+    omega = np.sqrt(
+        np.array([1e-4, 1.0, 100.0, 5000.0]) * GRAVITY / 8.0
+    )  # k T of 1e-4, 1, 100, 5000
     # at 1: I1 = 0.5651591, K1 = 0.6019072
     middle = (np.pi * 0.5651591) ** 2 / ((np.pi * 0.5651591) ** 2 + 0.6019072**2)
-    np.testing.assert_allclose(draught_attenuation(omega, 8.0), [0.0, middle, 1.0, 1.0], atol=1e-6)
+    np.testing.assert_allclose(
+        draught_attenuation(omega, 8.0), [0.0, middle, 1.0, 1.0], atol=1e-6
+    )
 
 
 def test_a_wall_abeam_reflects_all_there_is():
@@ -126,8 +158,12 @@ def test_waves_push_to_lee_and_turn_the_ship_beam_on(ship):
     assert drift.N[bow] < 0.0 < drift.N[quarter]
     assert drift.X[[0, bow]].max() < 0.0
     mirror = -np.arange(len(drift.chi))
-    np.testing.assert_allclose(drift.X, drift.X[mirror], rtol=1e-9, atol=1e-9 * abs(drift.X[0]))
-    np.testing.assert_allclose(drift.Y, -drift.Y[mirror], atol=1e-9 * abs(drift.Y[beam]))
+    np.testing.assert_allclose(
+        drift.X, drift.X[mirror], rtol=1e-9, atol=1e-9 * abs(drift.X[0])
+    )
+    np.testing.assert_allclose(
+        drift.Y, -drift.Y[mirror], atol=1e-9 * abs(drift.Y[beam])
+    )
     np.testing.assert_allclose(drift.N, -drift.N[mirror], atol=1e-9 * abs(drift.N[bow]))
 
 
@@ -142,7 +178,9 @@ def test_drift_scales_by_froude():
     scale = 40.0
     ship = {"length": 320.0, "beam": 58.0, "draught": 20.8}
     model = {name: value / scale for name, value in ship.items()}
-    large = wave_drift(Waves(3.0, 9.0), Particulars(**ship, block_coefficient=0.81, speed=7.0))
+    large = wave_drift(
+        Waves(3.0, 9.0), Particulars(**ship, block_coefficient=0.81, speed=7.0)
+    )
     small = wave_drift(
         Waves(3.0 / scale, 9.0 / scale**0.5),
         Particulars(**model, block_coefficient=0.81, speed=7.0 / scale**0.5),
@@ -157,9 +195,15 @@ def test_drift_scales_by_froude():
 @pytest.mark.parametrize("state", ["slight", "moderate", "rough"])
 def test_eight_harmonics_of_the_drift_suffice_in_a_spread_sea(ship, state):
     sea = sea_states()[state]
-    drift = wave_drift(Waves(sea.significant_height, sea.peak_period), load_model(ship).particulars)
+    drift = wave_drift(
+        Waves(sea.significant_height, sea.peak_period), load_model(ship).particulars
+    )
     series = drift.harmonics(8)
-    for name, sums in (("X", evaluate_cosines), ("Y", evaluate_sines), ("N", evaluate_sines)):
+    for name, sums in (
+        ("X", evaluate_cosines),
+        ("Y", evaluate_sines),
+        ("N", evaluate_sines),
+    ):
         curve = getattr(drift, name)
         error = np.abs(sums(getattr(series, name), drift.chi) - curve).max()
         assert error < 0.001 * np.abs(curve).max()
@@ -168,9 +212,17 @@ def test_eight_harmonics_of_the_drift_suffice_in_a_spread_sea(ship, state):
 def newman_spectrum(sea, draught, mu):
     """8 integral S(w) S(w + mu) c(w) c(w + mu) dw, over the square of the mean, 2 integral S c dw."""
     w = np.linspace(0.15, 6.0, 4000)
-    weighted = [wave_spectrum(sea, w + m) * draught_attenuation(w + m, draught) for m in (0.0, *mu)]
+    weighted = [
+        wave_spectrum(sea, w + m) * draught_attenuation(w + m, draught)
+        for m in (0.0, *mu)
+    ]
     mean = 2.0 * np.trapezoid(weighted[0], w)
-    return np.array([8.0 * np.trapezoid(weighted[0] * shifted, w) for shifted in weighted[1:]]) / mean**2
+    return (
+        np.array(
+            [8.0 * np.trapezoid(weighted[0] * shifted, w) for shifted in weighted[1:]]
+        )
+        / mean**2
+    )
 
 
 @pytest.mark.parametrize("Tp", [7.5, 9.7, 14.0])
@@ -179,7 +231,9 @@ def test_slow_drift_has_the_variance_and_low_frequencies_of_newmans_integral(Tp)
     slow = slow_drift(sea, S175)
     mu = np.linspace(1e-6, 4.0, 500)
     density = newman_spectrum(sea, S175.draught, mu)
-    assert np.trapezoid(density, mu) == pytest.approx(slow.standard_deviation**2, rel=0.01)
+    assert np.trapezoid(density, mu) == pytest.approx(
+        slow.standard_deviation**2, rel=0.01
+    )
     filtered = slow.spectrum(mu / (2.0 * np.pi)) / (2.0 * np.pi)  # per rad/s
     assert filtered[0] == pytest.approx(density[0], rel=0.01)
     below = mu < 0.1  # rad/s, to which a ship answers
@@ -196,7 +250,9 @@ def test_slow_drift_is_the_squared_envelope_of_a_simulated_sea():
     )
     analytic = np.zeros(n, dtype=complex)
     analytic[1 : len(omega) + 1] = amplitude
-    force = np.abs(np.fft.ifft(analytic) * n) ** 2  # mean force by Newman: the squared envelope
+    force = (
+        np.abs(np.fft.ifft(analytic) * n) ** 2
+    )  # mean force by Newman: the squared envelope
     mean = 2.0 * np.trapezoid(weighted, omega)
     assert force.mean() == pytest.approx(mean, rel=0.02)
     slow = force / force.mean() - 1.0
@@ -218,7 +274,9 @@ def test_calm_water_does_not_drift_a_ship():
 def test_mobility_is_the_inverse_of_inertia(ship):
     model = load_model(ship)
     matrix = mobility_matrix(model)
-    np.testing.assert_allclose(matrix[:3, :3] @ inertia(model)[:, :3], np.eye(3), atol=1e-9)
+    np.testing.assert_allclose(
+        matrix[:3, :3] @ inertia(model)[:, :3], np.eye(3), atol=1e-9
+    )
     assert np.abs(matrix[3]).max() == np.abs(matrix[:, 3]).max() == 0.0
 
 
@@ -238,8 +296,12 @@ def test_the_container_ship_rolls_by_son_and_nomotos_inertia():
         ]
     )
     L, mass = c.LENGTH, 0.5 * 1025.0 * c.LENGTH**3
-    expected = np.linalg.inv(mass * prime * np.array([[1, L, L], [L, L * L, L * L], [L, L * L, L * L]]))
-    np.testing.assert_allclose(mobility_matrix(load_model("container"))[1:, 1:], expected, rtol=1e-9)
+    expected = np.linalg.inv(
+        mass * prime * np.array([[1, L, L], [L, L * L, L * L], [L, L * L, L * L]])
+    )
+    np.testing.assert_allclose(
+        mobility_matrix(load_model("container"))[1:, 1:], expected, rtol=1e-9
+    )
 
 
 def test_shallow_water_makes_the_tanker_heavier():
@@ -268,7 +330,10 @@ def test_roll_inertia_from_period_and_stability_is_that_of_the_container_ship():
 def test_weather_tells_which_particulars_it_needs():
     model = load_model("mariner")
     bare = replace(model.particulars, beam=None, mass=None, block_coefficient=None)
-    with pytest.raises(InputError, match="weather without the particulars it needs: beam, block_coefficient"):
+    with pytest.raises(
+        InputError,
+        match="weather without the particulars it needs: beam, block_coefficient",
+    ):
         mobility_matrix(replace(model, particulars=bare))
 
 
@@ -287,10 +352,22 @@ def test_drift_and_motion_are_finite_for_any_ship_in_any_sea(
 ):
     speed = min(froude * (GRAVITY * length) ** 0.5, 40.0) or None
     beam = length / slender
-    ship = Particulars(length=length, beam=beam, draught=beam / flat, block_coefficient=fullness, speed=speed)
+    ship = Particulars(
+        length=length,
+        beam=beam,
+        draught=beam / flat,
+        block_coefficient=fullness,
+        speed=speed,
+    )
     sea = Waves(min(steepness * GRAVITY * period**2 / (2.0 * np.pi), 20.0), period)
     drift, motion = wave_drift(sea, ship), wave_motion(sea, ship)
-    for curve in (drift.X, drift.Y, drift.N, motion.heading_variance, motion.roll_variance):
+    for curve in (
+        drift.X,
+        drift.Y,
+        drift.N,
+        motion.heading_variance,
+        motion.roll_variance,
+    ):
         assert np.isfinite(curve).all()
     assert drift.time_constant > 0.0
     for variance in (motion.heading_variance, motion.roll_variance):

@@ -15,7 +15,10 @@ TABLE = WindTable((0, 90, 180), (-0.6, 0.0, 0.5), (0.0, 0.8, 0.0), (0.0, 0.05, 0
 
 
 def test_sea_states_lie_within_the_codes_of_the_wmo():
-    codes = {state.name: (state.code, state.lowest, state.highest) for state in sea_states().values()}
+    codes = {
+        state.name: (state.code, state.lowest, state.highest)
+        for state in sea_states().values()
+    }
     assert codes == {
         "calm": (0, 0.0, 0.0),
         "slight": (3, 0.5, 1.25),
@@ -30,17 +33,28 @@ def test_winds_of_the_sea_states_raise_seas_of_their_height():
     # Pierson & Moskowitz: Hs = 0.21 U^2 / g of a fully developed sea, wind at 19.5 m
     for state in list(sea_states().values())[1:]:
         at_19_5_m = state.wind_speed * 1.95 ** (1 / 7)
-        assert state.significant_height == pytest.approx(0.21 * at_19_5_m**2 / 9.81, rel=0.16)
+        assert state.significant_height == pytest.approx(
+            0.21 * at_19_5_m**2 / 9.81, rel=0.16
+        )
 
 
 @pytest.mark.parametrize(
     ("name", "code", "height", "period", "knots"),
-    [("slight", 3, 0.88, 7.5, 13.5), ("moderate", 4, 1.88, 8.8, 19.0), ("rough", 5, 3.25, 9.7, 24.5)],
+    [
+        ("slight", 3, 0.88, 7.5, 13.5),
+        ("moderate", 4, 1.88, 8.8, 19.0),
+        ("rough", 5, 3.25, 9.7, 24.5),
+    ],
 )
 def test_sea_states_are_those_of_bales_1983(name, code, height, period, knots):
     weather = Weather.from_sea_state(name)
-    assert (weather.waves.significant_height, weather.waves.peak_period) == (height, period)
-    assert weather.wind.speed == pytest.approx(knots * 0.514444 * (10 / 19.5) ** (1 / 7), rel=1e-5)
+    assert (weather.waves.significant_height, weather.waves.peak_period) == (
+        height,
+        period,
+    )
+    assert weather.wind.speed == pytest.approx(
+        knots * 0.514444 * (10 / 19.5) ** (1 / 7), rel=1e-5
+    )
     assert weather.wind.from_deg == weather.waves.from_deg == 45.0
     assert weather == Weather.from_sea_state(code)
 
@@ -54,7 +68,11 @@ def test_calm_is_calm_unless_there_is_a_current():
 
 def test_directions_may_be_left_to_the_episode():
     weather = Weather.from_sea_state("rough", from_deg=None, current=Current(1.0))
-    assert (weather.current.towards_deg, weather.wind.from_deg, weather.waves.from_deg) == (None, None, None)
+    assert (
+        weather.current.towards_deg,
+        weather.wind.from_deg,
+        weather.waves.from_deg,
+    ) == (None, None, None)
     given = Weather.from_sea_state("rough", current=Current(0.0))
     assert (given.wind.from_deg, given.waves.from_deg) == (45.0, 45.0)
 
@@ -63,9 +81,16 @@ def test_directions_may_be_left_to_the_episode():
     "weather",
     [
         Weather(),
-        Weather.from_sea_state("slight", from_deg=None, current=Current(0.7, 180.0, 0.1, 300.0)),
-        Weather(wind=Wind(12.0, 30.0, gust=False, spectrum="norsok", coefficients=TABLE), name="tunnel"),
-        Weather(waves=Waves(2.0, 9.0, -30.0, "pierson-moskowitz", spreading="long-crested")),
+        Weather.from_sea_state(
+            "slight", from_deg=None, current=Current(0.7, 180.0, 0.1, 300.0)
+        ),
+        Weather(
+            wind=Wind(12.0, 30.0, gust=False, spectrum="norsok", coefficients=TABLE),
+            name="tunnel",
+        ),
+        Weather(
+            waves=Waves(2.0, 9.0, -30.0, "pierson-moskowitz", spreading="long-crested")
+        ),
     ],
 )
 def test_weather_survives_json(weather):
@@ -75,8 +100,14 @@ def test_weather_survives_json(weather):
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda: Weather.from_sea_state("moderat"), r"'moderat' found.*'rough'.*Did you mean 'moderate'"),
-        (lambda: Weather.from_sea_state(7), "7 found, expected one of 'calm'.* 0, 3, 4, 5"),
+        (
+            lambda: Weather.from_sea_state("moderat"),
+            r"'moderat' found.*'rough'.*Did you mean 'moderate'",
+        ),
+        (
+            lambda: Weather.from_sea_state(7),
+            "7 found, expected one of 'calm'.* 0, 3, 4, 5",
+        ),
         (lambda: Weather.from_sea_state(True), "True found"),
         (lambda: Wind(-1.0), "wind speed: -1 found, expected a number >= 0"),
         (lambda: Wind(5.0, 400.0), "wind from_deg: 400 found.*clockwise from north"),
@@ -85,23 +116,49 @@ def test_weather_survives_json(weather):
             lambda: Wind(5.0, coefficients="blendermann-tankerloaded"),
             "Did you mean 'blendermann-tanker-loaded'",
         ),
-        (lambda: Wind(5.0, gust="yes"), "wind gust: 'yes' found, expected true or false"),
-        (lambda: Waves(3.0, 3.0), "peak_period 3, expected at most 1.4.* steeper waves break"),
+        (
+            lambda: Wind(5.0, gust="yes"),
+            "wind gust: 'yes' found, expected true or false",
+        ),
+        (
+            lambda: Waves(3.0, 3.0),
+            "peak_period 3, expected at most 1.4.* steeper waves break",
+        ),
         (lambda: Waves(1.0, 0.0), "waves peak_period: 0 found"),
         (lambda: Waves(1.0, 8.0, peak_enhancement=0.5), "peak_enhancement: 0.5 found"),
         (lambda: Waves(1.0, 8.0, spreading="wide"), "waves spreading: 'wide' found"),
         (lambda: Waves(np.nan, 8.0), "waves significant_height: nan found"),
         (lambda: Current(0.5, time_constant=0.0), "current time_constant: 0 found"),
-        (lambda: Weather(wind=5.0), r"weather wind: 5.0 found, expected shipgym.Wind\(...\) or None"),
-        (lambda: Weather.from_dict({"winds": {}}), "unknown key 'winds'. Did you mean 'wind'"),
-        (lambda: Weather.from_dict({"wind": {}}), "weather wind: field 'speed' is missing"),
         (
-            lambda: Weather.from_dict({"wind": {"speed": 1.0, "coefficients": {"CX": []}}}),
+            lambda: Weather(wind=5.0),
+            r"weather wind: 5.0 found, expected shipgym.Wind\(...\) or None",
+        ),
+        (
+            lambda: Weather.from_dict({"winds": {}}),
+            "unknown key 'winds'. Did you mean 'wind'",
+        ),
+        (
+            lambda: Weather.from_dict({"wind": {}}),
+            "weather wind: field 'speed' is missing",
+        ),
+        (
+            lambda: Weather.from_dict(
+                {"wind": {"speed": 1.0, "coefficients": {"CX": []}}}
+            ),
             "'angles_deg' is missing",
         ),
-        (lambda: WindTable((0, 90), (0, 0), (0, 0), (0, 0)), "at least three that rise from 0 to 180"),
-        (lambda: WindTable((0, 90, 180), (0, 0), (0, 0, 0), (0, 0, 0)), "CX: 2 values found, expected 3"),
-        (lambda: WindTable((0, 90, 180), (0, 0, 0), (0, 1, 1), (0, 0, 0)), "CY: 0 and 1 found at 0 and 180"),
+        (
+            lambda: WindTable((0, 90), (0, 0), (0, 0), (0, 0)),
+            "at least three that rise from 0 to 180",
+        ),
+        (
+            lambda: WindTable((0, 90, 180), (0, 0), (0, 0, 0), (0, 0, 0)),
+            "CX: 2 values found, expected 3",
+        ),
+        (
+            lambda: WindTable((0, 90, 180), (0, 0, 0), (0, 1, 1), (0, 0, 0)),
+            "CY: 0 and 1 found at 0 and 180",
+        ),
     ],
 )
 def test_impossible_weather_is_refused(make, message):
@@ -110,8 +167,13 @@ def test_impossible_weather_is_refused(make, message):
 
 
 def test_saying_what_the_weather_is_loads_no_scipy():
-    script = "import sys, shipgym; shipgym.Weather.from_sea_state('rough'); print('scipy' in sys.modules)"
-    output = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
+    script = (
+        "import sys, shipgym; shipgym.Weather.from_sea_state('rough'); print('scipy' in"
+        " sys.modules)"
+    )
+    output = subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True, check=True
+    )
     assert output.stdout.strip() == "False"
 
 
@@ -126,7 +188,10 @@ def test_saying_what_the_weather_is_loads_no_scipy():
         (lambda x: Waves(x, 30.0), 20.0),
         (lambda x: Waves(1.0, x), 40.0),
         (lambda x: Waves(1.0, 8.0, peak_enhancement=x), 20.0),
-        (lambda x: Waves(x, 8.0), 9.80665 * 64.0 / (20.0 * np.pi)),  # a tenth of the wave's length
+        (
+            lambda x: Waves(x, 8.0),
+            9.80665 * 64.0 / (20.0 * np.pi),
+        ),  # a tenth of the wave's length
     ],
 )
 def test_weather_is_refused_beyond_what_there_is(make, most):
@@ -146,7 +211,12 @@ def test_what_is_not_said_of_the_weather():
 
 
 def test_parts_of_the_weather_begin_to_be_on_above_zero():
-    for part in (Current(1e-9), Current(0.0, variation=1e-9), Wind(1e-9), Waves(1e-9, 8.0)):
+    for part in (
+        Current(1e-9),
+        Current(0.0, variation=1e-9),
+        Wind(1e-9),
+        Waves(1e-9, 8.0),
+    ):
         assert not part.calm
 
 
@@ -156,7 +226,10 @@ def test_parts_of_the_weather_begin_to_be_on_above_zero():
         ({"angles_deg": (0, 90, 90, 180)}, "at least three that rise from 0 to 180"),
         ({"angles_deg": (0, 60, 120, 170)}, "at least three that rise from 0 to 180"),
         ({"angles_deg": (10, 60, 120, 180)}, "at least three that rise from 0 to 180"),
-        ({"CY": (0.1, 1, 1, 0)}, "CY: 0.1 and 0 found at 0 and 180 degrees, expected 0"),
+        (
+            {"CY": (0.1, 1, 1, 0)},
+            "CY: 0.1 and 0 found at 0 and 180 degrees, expected 0",
+        ),
         ({"CN": (0, 0, 0, 0.1)}, "CN: 0 and 0.1 found"),
         ({"CK": (0.1, 0, 0, 0)}, "CK: 0.1 and 0 found"),
         ({"CK": (0, 0, 0)}, "CK: 3 values found, expected 4, one for each angle"),
@@ -178,18 +251,25 @@ def test_tables_that_no_wind_has_are_refused(rows, message):
 
 def test_a_sea_state_by_name_comes_from_north_east():
     weather = as_weather("rough", "weather")
-    assert (weather.name, weather.wind.from_deg, weather.waves.from_deg) == ("rough", 45.0, 45.0)
+    assert (weather.name, weather.wind.from_deg, weather.waves.from_deg) == (
+        "rough",
+        45.0,
+        45.0,
+    )
     assert as_weather("rough", "weather", None).wind.from_deg is None
     assert as_weather(None, "weather").calm
     assert as_weather(weather, "weather") is weather
     with pytest.raises(
-        InputError, match=r"task weather: 3 found, expected a Weather of shipgym.sea or the name"
+        InputError,
+        match=r"task weather: 3 found, expected a Weather of shipgym.sea or the name",
     ):
         as_weather(3, "task weather")
 
 
 def test_numbers_of_numpy_are_plain_ones_in_files():
     five = np.float32(5.0)
-    weather = Weather(Current(five, five, five), Wind(five, five), Waves(five, 20.0, five))
+    weather = Weather(
+        Current(five, five, five), Wind(five, five), Waves(five, 20.0, five)
+    )
     assert Weather.from_dict(json.loads(json.dumps(weather.to_dict()))) == weather
     assert type(weather.wind.speed) is float

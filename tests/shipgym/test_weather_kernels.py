@@ -40,7 +40,10 @@ from shipgym.trials.sensors import Sensors
 from tests.shipgym.outer import outer
 
 GALE = Weather(
-    current=Current(1.0, 90.0, 0.2, 300.0), wind=Wind(12.0, 45.0), waves=Waves(3.25, 9.7, 45.0), name="gale"
+    current=Current(1.0, 90.0, 0.2, 300.0),
+    wind=Wind(12.0, 45.0),
+    waves=Waves(3.25, 9.7, 45.0),
+    name="gale",
 )
 ZERO = np.zeros(720)
 STATE = ("x", "y", "psi", "u", "v", "r", "delta")
@@ -52,7 +55,9 @@ def mariner():
 
 
 def ahead(model, weather=None, steps=1200, dt=0.5, seed=0, state=None, rudder=0.0):
-    return simulate(model, np.full((steps, 1), rudder), dt, state, weather=weather, seed=seed)
+    return simulate(
+        model, np.full((steps, 1), rudder), dt, state, weather=weather, seed=seed
+    )
 
 
 def inert(model, speed=1e-9):
@@ -71,7 +76,9 @@ def sampling_error(correlation_time, duration):
     return np.sqrt(2.0 * correlation_time / duration)
 
 
-@pytest.mark.parametrize("weather", ["calm", Weather(), Weather(current=Current(0.0), wind=Wind(0.0))])
+@pytest.mark.parametrize(
+    "weather", ["calm", Weather(), Weather(current=Current(0.0), wind=Wind(0.0))]
+)
 def test_calm_weather_is_no_weather(mariner, weather):
     there, here = ahead(mariner, weather, rudder=0.1), ahead(mariner, rudder=0.1)
     assert there.channels.keys() == here.channels.keys()
@@ -82,15 +89,27 @@ def test_calm_weather_is_no_weather(mariner, weather):
 def test_a_constant_current_is_a_moving_frame(mariner):
     drifting = ahead(mariner, Weather(current=Current(1.5, 60.0)), rudder=0.2)
     still = ahead(mariner, rudder=0.2)
-    for name in ("psi", "u", "v", "r"):  # two compiled loops, whose last digits may differ
+    for name in (
+        "psi",
+        "u",
+        "v",
+        "r",
+    ):  # two compiled loops, whose last digits may differ
         np.testing.assert_allclose(drifting[name], still[name], rtol=1e-12)
     way = 1.5 * still.t
-    np.testing.assert_allclose(drifting["x"], still["x"] + way * np.cos(np.radians(60.0)), atol=1e-9)
-    np.testing.assert_allclose(drifting["y"], still["y"] + way * np.sin(np.radians(60.0)), atol=1e-9)
+    np.testing.assert_allclose(
+        drifting["x"], still["x"] + way * np.cos(np.radians(60.0)), atol=1e-9
+    )
+    np.testing.assert_allclose(
+        drifting["y"], still["y"] + way * np.sin(np.radians(60.0)), atol=1e-9
+    )
 
 
 def test_a_ship_is_carried_along_by_a_varying_current(mariner):
-    trial, still = ahead(mariner, Weather(current=Current(0.0, 0.0, 0.5, 100.0))), ahead(mariner)
+    trial, still = (
+        ahead(mariner, Weather(current=Current(0.0, 0.0, 0.5, 100.0))),
+        ahead(mariner),
+    )
     np.testing.assert_array_equal(trial["u"], still["u"])
     carried = np.concatenate([[0.0], np.cumsum(0.5 * trial["current_north"][:-1])])
     np.testing.assert_allclose(trial["x"] - still["x"], carried, atol=1e-8)
@@ -110,7 +129,8 @@ def test_the_first_push_of_the_wind_is_its_force_by_the_inertia(mariner, from_de
     expected = mobility_matrix(mariner) @ forces
     felt = [(trial[name][1] - trial[name][0]) / dt for name in "uvr"]
     scale = np.abs(mobility_matrix(mariner)) @ [
-        pressure * np.abs(curve).max() for curve in (curves.X, curves.Y, curves.N, curves.K)
+        pressure * np.abs(curve).max()
+        for curve in (curves.X, curves.Y, curves.N, curves.K)
     ]
     assert np.all(np.abs(felt - expected[:3]) < 0.04 * scale[:3])  # six harmonics
 
@@ -122,27 +142,39 @@ def test_waves_push_by_the_mean_drift_force_times_one_plus_its_variation(mariner
     for word in range(300):
         passage.sea[1][0] = word
         states = passage.states(at_rest, 2)
-        passage.loop("simulate")(states, np.zeros((2, 2)), 1e-3, *passage.sea, passage.numbers)
+        passage.loop("simulate")(
+            states, np.zeros((2, 2)), 1e-3, *passage.sea, passage.numbers
+        )
         pushes.append(states[1, 4])
     drift = wave_drift(waves, mariner.particulars)
     at = np.argmin(np.abs(drift.chi - np.radians(60.0)))
-    mean = (mobility_matrix(mariner) @ [drift.X[at], drift.Y[at], drift.N[at], 0.0])[1] * 1e-3
+    mean = (mobility_matrix(mariner) @ [drift.X[at], drift.Y[at], drift.N[at], 0.0])[
+        1
+    ] * 1e-3
     assert np.mean(pushes) == pytest.approx(mean, rel=4.0 / np.sqrt(300))
     assert np.std(pushes) == pytest.approx(abs(mean), rel=4.0 / np.sqrt(600))
 
 
 def test_weather_from_port_is_the_mirror_image_of_that_from_starboard(mariner):
     crooked = [name for name in mariner.coefficients if name[:3] in ("Y_0", "N_0")]
-    symmetric = replace(mariner, coefficients=mariner.coefficients | dict.fromkeys(crooked, 0.0))
-    port, starboard = (ahead(symmetric, steady_wind(side * 70.0), rudder=side * 0.05) for side in (-1.0, 1.0))
+    symmetric = replace(
+        mariner, coefficients=mariner.coefficients | dict.fromkeys(crooked, 0.0)
+    )
+    port, starboard = (
+        ahead(symmetric, steady_wind(side * 70.0), rudder=side * 0.05)
+        for side in (-1.0, 1.0)
+    )
     sign = {"y": -1.0, "psi": -1.0, "v": -1.0, "r": -1.0, "delta": -1.0}
     for name in STATE:
-        np.testing.assert_allclose(port[name], sign.get(name, 1.0) * starboard[name], rtol=1e-9, atol=1e-9)
+        np.testing.assert_allclose(
+            port[name], sign.get(name, 1.0) * starboard[name], rtol=1e-9, atol=1e-9
+        )
 
 
 def test_head_wind_slows_and_following_wind_does_not(mariner):
     calm, head, stern = (
-        ahead(mariner, weather, 60)["u"][-1] for weather in (None, steady_wind(0.0), steady_wind(180.0))
+        ahead(mariner, weather, 60)["u"][-1]
+        for weather in (None, steady_wind(0.0), steady_wind(180.0))
     )
     assert head < calm < stern
 
@@ -165,7 +197,10 @@ def test_the_current_has_its_variance_and_correlation(mariner):
     T, steps, dt = 50.0, 20000, 2.0
     trial = ahead(mariner, Weather(current=Current(1.0, 30.0, 0.3, T)), steps, dt)
     error = sampling_error(T, steps * dt)
-    for name, mean in (("current_north", np.cos(np.pi / 6)), ("current_east", np.sin(np.pi / 6))):
+    for name, mean in (
+        ("current_north", np.cos(np.pi / 6)),
+        ("current_east", np.sin(np.pi / 6)),
+    ):
         variation = trial[name] - mean
         assert variation.var() == pytest.approx(0.09, rel=4.0 * error)
         lag = round(T / dt)
@@ -179,14 +214,18 @@ def test_gusts_have_the_variance_of_their_spectrum(mariner):
     wind, steps, dt = Wind(12.0, 0.0), 20000, 2.0
     trial = ahead(mariner, Weather(wind=wind), steps, dt)
     T, deviation = gust_filter(wind)
-    assert trial["wind_speed"].std() == pytest.approx(deviation, rel=2.0 * sampling_error(T, steps * dt))
+    assert trial["wind_speed"].std() == pytest.approx(
+        deviation, rel=2.0 * sampling_error(T, steps * dt)
+    )
     assert trial["wind_speed"].mean() == pytest.approx(
         12.0, abs=4.0 * deviation * np.sqrt(2.0 * T / (steps * dt))
     )
 
 
 @pytest.mark.parametrize("dt", [0.2, 1.0])
-def test_heading_in_waves_has_the_variance_and_the_rhythm_of_the_filter(mariner, monkeypatch, dt):
+def test_heading_in_waves_has_the_variance_and_the_rhythm_of_the_filter(
+    mariner, monkeypatch, dt
+):
     """With a body on which nothing acts, so that it keeps its course: variance, correlation and yaw rate."""
     none = lambda waves, ship: replace(wave_drift(waves, ship), X=ZERO, Y=ZERO, N=ZERO)  # noqa: E731
     monkeypatch.setattr("shipgym.sea.weather_column.wave_drift", none)
@@ -201,17 +240,25 @@ def test_heading_in_waves_has_the_variance_and_the_rhythm_of_the_filter(mariner,
     damping = 0.1056
     error = sampling_error(0.5 / (damping * w), steps * dt)
     assert trial["psi_wave"].var() == pytest.approx(variance, rel=0.03 + 4.0 * error)
-    assert trial["r_wave"].var() == pytest.approx(variance * w**2, rel=0.03 + 4.0 * error)
+    assert trial["r_wave"].var() == pytest.approx(
+        variance * w**2, rel=0.03 + 4.0 * error
+    )
     lag = round(4.0 / dt)
     theta, s = w * lag * dt, np.sqrt(1.0 - damping**2)
-    expected = np.exp(-damping * theta) * (np.cos(s * theta) - damping / s * np.sin(s * theta))
+    expected = np.exp(-damping * theta) * (
+        np.cos(s * theta) - damping / s * np.sin(s * theta)
+    )
     psi = trial["psi_wave"]
-    assert np.mean(psi[lag:] * psi[:-lag]) / psi.var() == pytest.approx(expected, abs=4.0 * error)
+    assert np.mean(psi[lag:] * psi[:-lag]) / psi.var() == pytest.approx(
+        expected, abs=4.0 * error
+    )
 
 
 def test_waves_roll_a_ship_that_can_roll():
     trial = shipgym.load_model("container").simulate(
-        np.tile([0.0, 1.0], (2000, 1)), 0.5, weather=Weather(waves=Waves(3.0, 9.0, 90.0))
+        np.tile([0.0, 1.0], (2000, 1)),
+        0.5,
+        weather=Weather(waves=Waves(3.0, 9.0, 90.0)),
     )
     assert trial["phi_wave"].std() > 0.0
     assert "phi_wave" not in ahead(shipgym.load_model("mariner"), GALE, 2).channels
@@ -222,14 +269,21 @@ def test_numbers_of_the_generator_are_normal():
     words = [np.uint64(stream(np.uint64(7), np.uint64(k))) for k in range(4)]
     z = np.array([normal(word, draw) for word in words for draw in random.DRAW])
     assert len(set(z.tolist())) == len(z)
-    trial = ahead(shipgym.load_model("mariner"), Weather(current=Current(0.0, 0.0, 1.0, 1e-6)), 40000, 0.1)
+    trial = ahead(
+        shipgym.load_model("mariner"),
+        Weather(current=Current(0.0, 0.0, 1.0, 1e-6)),
+        40000,
+        0.1,
+    )
     white = np.concatenate([trial["current_north"], trial["current_east"]])
     n = len(white)
     assert abs(white.mean()) < 4.0 / np.sqrt(n)
     assert white.var() == pytest.approx(1.0, abs=4.0 * np.sqrt(2.0 / n))
     assert np.mean(white**3) == pytest.approx(0.0, abs=4.0 * np.sqrt(15.0 / n))
     assert np.mean(white**4) == pytest.approx(3.0, abs=4.0 * np.sqrt(96.0 / n))
-    assert np.mean(np.abs(white) > 3.0) == pytest.approx(0.0027, abs=4.0 * np.sqrt(0.0027 / n))
+    assert np.mean(np.abs(white) > 3.0) == pytest.approx(
+        0.0027, abs=4.0 * np.sqrt(0.0027 / n)
+    )
     assert abs(np.mean(white[1:] * white[:-1])) < 4.0 / np.sqrt(n)
 
 
@@ -241,13 +295,19 @@ def parameters(**given):
     """A sea of 10 s waves, lightly damped, without anything else but what is given."""
     w, damping = 0.628, 0.1
     none = {
-        name: NO_FILTER if name in ("current", "gust", "drift") else 0.0 for name in SeaParameters._fields
+        name: NO_FILTER if name in ("current", "gust", "drift") else 0.0
+        for name in SeaParameters._fields
     } | {
         name: NO_COSINES if name.endswith(("surge", "variance")) else NO_SINES
         for name in SeaParameters._fields[12:]
     }
     waves = {"wave_frequency": w, "wave_number": w * w / 9.81, "wave_damping": damping}
-    return SeaParameters(**none | waves | {"wave_ringing": np.sqrt(1 - damping**2), "still_air": 0.0} | given)
+    return SeaParameters(
+        **none
+        | waves
+        | {"wave_ringing": np.sqrt(1 - damping**2), "still_air": 0.0}
+        | given
+    )
 
 
 angle, few = st.floats(-3.1, 3.1), st.floats(-2.0, 2.0)
@@ -257,14 +317,18 @@ angle, few = st.floats(-3.1, 3.1), st.floats(-2.0, 2.0)
 def test_series_over_an_angle_are_fouriers(angle, a):
     cosine, sine, k = np.cos(angle), np.sin(angle), np.arange(1, 7)
     expected = a[0] + np.cos(k * angle) @ a[1:]
-    assert open_sea.cosine_series(cosine, open_sea.Cosines(*a)) == pytest.approx(expected, abs=1e-9)
+    assert open_sea.cosine_series(cosine, open_sea.Cosines(*a)) == pytest.approx(
+        expected, abs=1e-9
+    )
     sines = open_sea.sine_series(cosine, sine, open_sea.Sines(*a[1:]))
     assert sines == pytest.approx(np.sin(k * angle) @ a[1:], abs=1e-9)
 
 
 def test_what_decays_does_so_exponentially_and_is_gone_after_eight_time_constants():
     x = np.linspace(0.0, 1.0, 41)
-    np.testing.assert_allclose([open_sea.decay(one) for one in x], np.exp(-x), rtol=0.0, atol=1.2e-9)
+    np.testing.assert_allclose(
+        [open_sea.decay(one) for one in x], np.exp(-x), rtol=0.0, atol=1.2e-9
+    )
     assert open_sea.decay(2.0) == pytest.approx(np.exp(-2.0), abs=1e-6)
     assert open_sea.decay(20.0) == open_sea.decay(8.5) == open_sea.decay(8.0) < 4e-4
     assert open_sea.decay(7.9) > open_sea.decay(8.0)
@@ -274,11 +338,20 @@ def test_a_ship_meets_the_waves_at_a_tenth_of_their_frequency_at_least():
     """In a following sea she may sail along with them: U = g / w."""
     p = parameters()
     w, k = p.wave_frequency, p.wave_number
-    for speed, met in ((0.0, w), (0.5 * w / k, 0.5 * w), (0.89 * w / k, 0.11 * w), (0.91 * w / k, 0.1 * w),
-                       (w / k, 0.1 * w), (1.09 * w / k, 0.1 * w), (3.0 * w / k, 2.0 * w)):  # fmt: skip
+    for speed, met in (
+        (0.0, w),
+        (0.5 * w / k, 0.5 * w),
+        (0.89 * w / k, 0.11 * w),
+        (0.91 * w / k, 0.1 * w),
+        (w / k, 0.1 * w),
+        (1.09 * w / k, 0.1 * w),
+        (3.0 * w / k, 2.0 * w),
+    ):
         assert open_sea.encounter(-1.0, 0.0, speed, 0.3, p) == pytest.approx(met)
         assert open_sea.encounter(0.0, -1.0, 0.3, speed, p) == pytest.approx(met)
-    assert open_sea.encounter(0.6, 0.8, 5.0, -2.0, p) == pytest.approx(w + k * (3.0 - 1.6))
+    assert open_sea.encounter(0.6, 0.8, 5.0, -2.0, p) == pytest.approx(
+        w + k * (3.0 - 1.6)
+    )
 
 
 @given(st.floats(0.0, 2.0))
@@ -292,40 +365,62 @@ def test_an_oscillator_in_waves_steps_exactly(turn):
     noise = np.array([[n11, n12], [0.0, n22]])
     np.testing.assert_allclose(noise @ noise.T, np.eye(2) - exact @ exact.T, atol=2e-6)
     stepped = open_sea.oscillated(0.3, -0.7, 0.5, 1.1, (p11, p12, p22, n11, n12, n22))
-    np.testing.assert_allclose(stepped, exact @ [0.3, -0.7] + noise @ [0.5, 1.1], atol=1e-6)
+    np.testing.assert_allclose(
+        stepped, exact @ [0.3, -0.7] + noise @ [0.5, 1.1], atol=1e-6
+    )
 
 
 @given(angle, angle, few, few, st.floats(0.0, 15.0), few)
 def test_wind_and_waves_push_by_where_they_come_from(psi, blows, u, v, speed, gust):
     """Worked with vectors north and east: the air that the ship meets, and the waves from the bow."""
     coefficients = {
-        "wind_surge": open_sea.Cosines(0.2, -0.5, *[0.0] * 5), "wind_sway": open_sea.Sines(0.9, *[0.0] * 5),
+        "wind_surge": open_sea.Cosines(0.2, -0.5, *[0.0] * 5),
+        "wind_sway": open_sea.Sines(0.9, *[0.0] * 5),
         "wind_yaw": open_sea.Sines(0.0, 0.3, *[0.0] * 4),
         "drift_surge": open_sea.Cosines(-0.4, 0.1, *[0.0] * 5),
-        "drift_sway": open_sea.Sines(0.7, *[0.0] * 5), "drift_yaw": open_sea.Sines(0.0, 0.2, *[0.0] * 4),
-        "wind_roll": open_sea.Sines(0.6, *[0.0] * 5), "drift_roll": open_sea.Sines(0.8, *[0.0] * 5),
-    }  # fmt: skip
+        "drift_sway": open_sea.Sines(0.7, *[0.0] * 5),
+        "drift_yaw": open_sea.Sines(0.0, 0.2, *[0.0] * 4),
+        "wind_roll": open_sea.Sines(0.6, *[0.0] * 5),
+        "drift_roll": open_sea.Sines(0.8, *[0.0] * 5),
+    }
     current, waves_from = 0.7 - 0.4j, blows + 0.5
-    sea = Sea(**dict.fromkeys(Sea._fields, 0.0) | {
-        "wind_north": np.cos(blows), "wind_east": np.sin(blows), "waves_north": np.cos(waves_from),
-        "waves_east": np.sin(waves_from), "current_north": current.real, "current_east": current.imag,
-        "gust": gust, "drift": 0.25,
-    })  # fmt: skip
+    sea = Sea(
+        **dict.fromkeys(Sea._fields, 0.0)
+        | {
+            "wind_north": np.cos(blows),
+            "wind_east": np.sin(blows),
+            "waves_north": np.cos(waves_from),
+            "waves_east": np.sin(waves_from),
+            "current_north": current.real,
+            "current_east": current.imag,
+            "gust": gust,
+            "drift": 0.25,
+        }
+    )
     motion = Motion(0.0, 0.0, psi, u, v, *[0.0] * 6)
     p = parameters(wind_speed=speed, still_air=0.01, **coefficients)
     found = open_sea.push(motion, sea, p)
-    met = (speed + gust) * np.exp(1j * blows) + current + (u + 1j * v) * np.exp(1j * psi)
+    met = (
+        (speed + gust) * np.exp(1j * blows) + current + (u + 1j * v) * np.exp(1j * psi)
+    )
     assume(abs(met) > 1e-3)
     felt, size = np.angle(met) - psi, abs(met) ** 2
     bow = waves_from - psi
     assert found.u == pytest.approx(
-        size * (0.2 - 0.5 * np.cos(felt)) + 0.01 * u * abs(u) + 1.25 * (-0.4 + 0.1 * np.cos(bow)), abs=1e-6
+        size * (0.2 - 0.5 * np.cos(felt))
+        + 0.01 * u * abs(u)
+        + 1.25 * (-0.4 + 0.1 * np.cos(bow)),
+        abs=1e-6,
     )
-    assert found.v == pytest.approx(size * 0.9 * np.sin(felt) + 1.25 * 0.7 * np.sin(bow), abs=1e-6)
+    assert found.v == pytest.approx(
+        size * 0.9 * np.sin(felt) + 1.25 * 0.7 * np.sin(bow), abs=1e-6
+    )
     assert found.r == pytest.approx(
         size * 0.3 * np.sin(2.0 * felt) + 1.25 * 0.2 * np.sin(2.0 * bow), abs=1e-6
     )
-    assert found.p == pytest.approx(size * 0.6 * np.sin(felt) + 1.25 * 0.8 * np.sin(bow), abs=1e-6)
+    assert found.p == pytest.approx(
+        size * 0.6 * np.sin(felt) + 1.25 * 0.8 * np.sin(bow), abs=1e-6
+    )
     assert (found.north, found.east) == (current.real, current.imag)
     ahead = u * np.cos(bow) + v * np.sin(bow)
     met_at = max(abs(0.628 + 0.628**2 / 9.81 * ahead), 0.0628)
@@ -349,39 +444,64 @@ def test_what_the_instruments_filter_takes_away_is_a_band_of_scipys():
 def test_a_sea_begins_and_goes_on_as_it_always_was():
     """Over 3,000 episodes every process has its deviation and mean, at the beginning and 2 s later."""
     p = parameters(
-        current_speed=0.8, current_towards=2.0, wind_from=np.nan, waves_from=np.nan,
-        current=open_sea.Filter(0.9, 0.3 * np.sqrt(0.19), 0.3), gust=open_sea.Filter(0.8, 2.0 * 0.6, 2.0),
-        drift=open_sea.Filter(0.6, 0.5 * 0.8, 0.5), heading_variance=open_sea.Cosines(0.04, *[0.0] * 6),
+        current_speed=0.8,
+        current_towards=2.0,
+        wind_from=np.nan,
+        waves_from=np.nan,
+        current=open_sea.Filter(0.9, 0.3 * np.sqrt(0.19), 0.3),
+        gust=open_sea.Filter(0.8, 2.0 * 0.6, 2.0),
+        drift=open_sea.Filter(0.6, 0.5 * 0.8, 0.5),
+        heading_variance=open_sea.Cosines(0.04, *[0.0] * 6),
         roll_variance=open_sea.Cosines(0.09, *[0.0] * 6),
-    )  # fmt: skip
+    )
     motion, n = Motion(0.0, 0.0, 0.3, 5.0, *[0.0] * 7), 3000
     begun, later = [], []
     with np.errstate(over="ignore"):
         for key in range(n):
             word = random.stream(np.uint64(key), np.uint64(0))
             begun.append(open_sea.begin_sea(motion, word, p))
-            later.append(open_sea.evolve(motion, 2.0, begun[-1], word + random.BEGIN_WORDS, p))
+            later.append(
+                open_sea.evolve(motion, 2.0, begun[-1], word + random.BEGIN_WORDS, p)
+            )
     first, second = np.array(begun), np.array(later)
     expected = {
-        "current_north": (0.8 * np.cos(2.0), 0.3), "current_east": (0.8 * np.sin(2.0), 0.3),
+        "current_north": (0.8 * np.cos(2.0), 0.3),
+        "current_east": (0.8 * np.sin(2.0), 0.3),
         "gust": (0.0, 2.0),
-        "drift": (0.0, 0.5), "heading_1": (0.0, 1.0), "heading_2": (0.0, 1.0), "roll_1": (0.0, 1.0),
-        "roll_2": (0.0, 1.0), "psi_wave": (0.0, 0.2), "phi_wave": (0.0, 0.3),
-        "wind_north": (0.0, np.sqrt(0.5)), "wind_east": (0.0, np.sqrt(0.5)),
-    }  # fmt: skip
+        "drift": (0.0, 0.5),
+        "heading_1": (0.0, 1.0),
+        "heading_2": (0.0, 1.0),
+        "roll_1": (0.0, 1.0),
+        "roll_2": (0.0, 1.0),
+        "psi_wave": (0.0, 0.2),
+        "phi_wave": (0.0, 0.3),
+        "wind_north": (0.0, np.sqrt(0.5)),
+        "wind_east": (0.0, np.sqrt(0.5)),
+    }
     for name, (mean, deviation) in expected.items():
         k = Sea._fields.index(name)
         for values in (first[:, k], second[:, k]):
-            assert values.mean() == pytest.approx(mean, abs=4.0 * deviation / np.sqrt(n)), name
-            assert values.std() == pytest.approx(deviation, rel=4.0 / np.sqrt(2 * n)), name
-    by_name = dict(zip(Sea._fields, first.T, strict=True)), dict(zip(Sea._fields, second.T, strict=True))
+            assert values.mean() == pytest.approx(
+                mean, abs=4.0 * deviation / np.sqrt(n)
+            ), name
+            assert values.std() == pytest.approx(deviation, rel=4.0 / np.sqrt(2 * n)), (
+                name
+            )
+    by_name = (
+        dict(zip(Sea._fields, first.T, strict=True)),
+        dict(zip(Sea._fields, second.T, strict=True)),
+    )
     for name, kept in (("current_north", 0.9), ("gust", 0.8), ("drift", 0.6)):
         found = np.corrcoef(by_name[0][name], by_name[1][name])[0, 1]
         assert found == pytest.approx(kept, abs=4.0 / np.sqrt(n)), name
     np.testing.assert_array_equal(by_name[0]["wind_north"], by_name[0]["waves_north"])
     met = np.array([open_sea.encounter_frequency(motion, sea, p) for sea in later])
-    np.testing.assert_allclose(by_name[1]["r_wave"], -0.2 * met * by_name[1]["heading_1"], rtol=1e-9)
-    np.testing.assert_allclose(by_name[1]["p_wave"], -0.3 * met * by_name[1]["roll_1"], rtol=1e-9)
+    np.testing.assert_allclose(
+        by_name[1]["r_wave"], -0.2 * met * by_name[1]["heading_1"], rtol=1e-9
+    )
+    np.testing.assert_allclose(
+        by_name[1]["p_wave"], -0.3 * met * by_name[1]["roll_1"], rtol=1e-9
+    )
     columns = second[:, [Sea._fields.index(name) for name in list(expected)[:8]]]
     assert np.abs(np.corrcoef(columns.T) - np.eye(8)).max() < 5.0 / np.sqrt(n)
 
@@ -398,14 +518,18 @@ def test_a_simulation_is_a_function_of_its_seed(mariner):
 def test_instruments_show_the_motion_in_waves(mariner):
     trial = ahead(mariner, GALE, 50)
     logged = Sensors({}).measure(trial)
-    np.testing.assert_allclose(logged["psi"], trial["psi"] + trial["psi_wave"], atol=1e-14)
+    np.testing.assert_allclose(
+        logged["psi"], trial["psi"] + trial["psi_wave"], atol=1e-14
+    )
     np.testing.assert_allclose(logged["r"], trial["r"] + trial["r_wave"], atol=1e-14)
     assert set(logged.channels) == {*STATE, "delta_command"}
 
 
 def test_prediction_of_a_trial_knows_no_weather(mariner):
     trial = ahead(mariner, rudder=0.1)
-    np.testing.assert_allclose(open_loop(mariner, trial)["psi"], trial["psi"], atol=1e-3)
+    np.testing.assert_allclose(
+        open_loop(mariner, trial)["psi"], trial["psi"], atol=1e-3
+    )
 
 
 @pytest.mark.parametrize(
@@ -431,14 +555,19 @@ def test_manoeuvres_in_weather(mariner, run):
 
 def test_voyages_in_weather_go_on_from_leg_to_leg():
     tanker = shipgym.load_model("tanker")
-    sea = {"weather": Weather(current=Current(1.0, 90.0), wind=Wind(10.0, 0.0)), "seed": 2}
+    sea = {
+        "weather": Weather(current=Current(1.0, 90.0), wind=Wind(10.0, 0.0)),
+        "seed": 2,
+    }
     for trial in (
         manoeuvres.stopping(tanker, speed_ratio=0.6, **sea),
         manoeuvres.acceleration(tanker, duration=200.0, **sea),
         manoeuvres.shaft_speed_steps(tanker, duration=100.0, **sea),
     ):
         np.testing.assert_allclose(trial["current_east"], 1.0, rtol=1e-12)
-        assert np.abs(np.diff(trial["wind_speed"])).max() < 3.0  # no leg begins another weather
+        assert (
+            np.abs(np.diff(trial["wind_speed"])).max() < 3.0
+        )  # no leg begins another weather
         assert np.ptp(trial["wind_speed"]) > 0.5
 
 
@@ -448,7 +577,9 @@ def engine(model, lanes, sea="rough", **task):
 
 def test_each_lane_of_a_rough_sea_is_the_single_environment(mariner):
     small, large = engine(mariner, 3), engine(mariner, 70)
-    env = gymnasium.make("shipgym/CourseKeeping-v0", model="mariner", sea="rough").unwrapped
+    env = gymnasium.make(
+        "shipgym/CourseKeeping-v0", model="mariner", sea="rough"
+    ).unwrapped
     seen, many = small.reset([65, 66, 67]), large.reset(np.arange(70))
     single, _ = env.reset(seed=66)
     for k in range(150):
@@ -479,16 +610,22 @@ def test_the_environment_shows_the_measured_and_rewards_the_slow_heading(mariner
     shown = state["set_point"] - state["psi"] - state["psi_wave"]
     np.testing.assert_allclose(observations[:, 0], np.sin(shown), atol=1e-6)
     scale = mariner.particulars["speed"] / mariner.particulars["length"]
-    np.testing.assert_allclose(observations[:, 2] * scale, state["r"] + state["r_wave"], atol=1e-7)
+    np.testing.assert_allclose(
+        observations[:, 2] * scale, state["r"] + state["r_wave"], atol=1e-7
+    )
     cost = (state["set_point"] - state["psi"] + np.pi) % (2 * np.pi) - np.pi
-    np.testing.assert_allclose(-rough.info("reward_heading"), (cost / np.radians(30.0)) ** 2, rtol=1e-9)
+    np.testing.assert_allclose(
+        -rough.info("reward_heading"), (cost / np.radians(30.0)) ** 2, rtol=1e-9
+    )
 
 
 def test_the_sea_changes_no_task(mariner):
     rough, calm = engine(mariner, 4), engine(mariner, 4, "calm")
     for e in (rough, calm):
         e.reset(np.arange(4))
-    np.testing.assert_array_equal(rough.physical_state()["set_point"], calm.physical_state()["set_point"])
+    np.testing.assert_array_equal(
+        rough.physical_state()["set_point"], calm.physical_state()["set_point"]
+    )
 
 
 def test_a_finished_lane_stays_in_weather(mariner):
@@ -499,7 +636,9 @@ def test_a_finished_lane_stays_in_weather(mariner):
     after, *_ = short.step(np.ones((2, 1)))
     for name, value in short.physical_state().items():
         np.testing.assert_array_equal(value, before[name])
-    np.testing.assert_array_equal(np.delete(after, 6, axis=1), np.delete(observations, 6, axis=1))
+    np.testing.assert_array_equal(
+        np.delete(after, 6, axis=1), np.delete(observations, 6, axis=1)
+    )
 
 
 def test_given_directions_are_kept_and_open_ones_are_drawn_anew(mariner):
@@ -509,7 +648,9 @@ def test_given_directions_are_kept_and_open_ones_are_drawn_anew(mariner):
     drawn.reset(np.arange(500))
     directions = drawn.physical_state()["wind_from"]
     assert abs(np.exp(1j * directions).mean()) < 4.0 / np.sqrt(500)
-    env = gymnasium.make("shipgym/CourseKeeping-v0", model="mariner", sea="slight").unwrapped
+    env = gymnasium.make(
+        "shipgym/CourseKeeping-v0", model="mariner", sea="slight"
+    ).unwrapped
     env.reset(seed=0)
     first = env.physical_state()["wind_from"]
     env.reset()
@@ -531,10 +672,15 @@ print(repr([*observations[1].tolist(), float(trial["r_wave"][-1]), float(trial["
 
 def test_without_compiling_the_weather_is_the_same():
     runs = [
-        subprocess.run([sys.executable, "-c", RUN], env={**os.environ, **extra}, capture_output=True,
-                       text=True, check=True).stdout
+        subprocess.run(
+            [sys.executable, "-c", RUN],
+            env={**os.environ, **extra},
+            capture_output=True,
+            text=True,
+            check=True,
+        ).stdout
         for extra in ({}, {"NUMBA_DISABLE_JIT": "1"})
-    ]  # fmt: skip
+    ]
     np.testing.assert_allclose(eval(runs[0]), eval(runs[1]), rtol=1e-6, atol=1e-8)
 
 
@@ -544,7 +690,9 @@ def test_wrong_weather(mariner):
         ahead(bare, "rough", 2)
     with pytest.raises(InputError, match="weather without the particulars it needs"):
         engine(bare, 1)
-    with pytest.raises(InputError, match=r"weather: .*'rugh' found.*Did you mean 'rough'"):
+    with pytest.raises(
+        InputError, match=r"weather: .*'rugh' found.*Did you mean 'rough'"
+    ):
         ahead(mariner, "rugh", 2)
     with pytest.raises(InputError, match="sea: 7 found"):
         course_keeping_task(sea=7)

@@ -35,18 +35,30 @@ def dead():
 def draft(path, process, host=None):
     own = draft_name(path).name
     name = own.replace(str(os.getpid()), str(process))
-    left = path.with_name(name if host is None else name.replace(own.split(".")[-2].split("-")[0], host))
+    left = path.with_name(
+        name if host is None else name.replace(own.split(".")[-2].split("-")[0], host)
+    )
     left.write_text("half")
     return left
 
 
 def test_drafts_of_dead_processes_are_removed_by_the_next_writer_beside(tmp_path, dead):
     left = draft(tmp_path / "model.json", dead)
-    (draft_name(tmp_path / "ship").with_name(left.name.replace("model.json", "ship"))).mkdir()
-    living, elsewhere = draft(tmp_path / "a", os.getppid()), draft(tmp_path / "b", dead, "00000000")
+    (
+        draft_name(tmp_path / "ship").with_name(left.name.replace("model.json", "ship"))
+    ).mkdir()
+    living, elsewhere = (
+        draft(tmp_path / "a", os.getppid()),
+        draft(tmp_path / "b", dead, "00000000"),
+    )
     (tmp_path / ".mine.draft").write_text("not one of these")
     write_text("whole", tmp_path / "new")
-    assert {path.name for path in tmp_path.iterdir()} == {"new", ".mine.draft", living.name, elsewhere.name}
+    assert {path.name for path in tmp_path.iterdir()} == {
+        "new",
+        ".mine.draft",
+        living.name,
+        elsewhere.name,
+    }
     for path in (living, elsewhere):
         os.utime(path, (path.stat().st_mtime - WEEK - 1,) * 2)
     assert sorted(abandoned_drafts(tmp_path)) == sorted([living, elsewhere])
@@ -64,7 +76,8 @@ def test_a_file_that_is_a_mount_point_is_written(tmp_path, monkeypatch, error):
 
 
 @pytest.mark.parametrize(
-    "path", ["/dev/null", "/proc/self/mem", "/dev/full", "x" * 5000, "/proc/nothing", "/"]
+    "path",
+    ["/dev/null", "/proc/self/mem", "/dev/full", "x" * 5000, "/proc/nothing", "/"],
 )
 def test_what_cannot_be_a_file_is_refused_and_stays(path):
     with pytest.raises(InputError, match=r"cannot be written|is not a file"):
@@ -84,14 +97,20 @@ def test_a_folder_is_made_with_those_above_it_and_may_be_there(tmp_path):
 def test_a_refusal_gives_the_reason_of_the_system_in_words(tmp_path):
     with pytest.raises(InputError) as caught:
         write_text("text", tmp_path / "none" / "a")
-    assert str(caught.value) == (
-        f"{tmp_path}/none/a: cannot be written (No such file or directory); choose a folder that exists"
+    assert (
+        str(caught.value)
+        == f"{tmp_path}/none/a: cannot be written (No such file or directory); choose a"
+        " folder that exists"
     )
     with pytest.raises(InputError) as caught:
-        write_text("text", tmp_path / ("x" * 250))  # its draft's name is longer than names may be
+        write_text(
+            "text", tmp_path / ("x" * 250)
+        )  # its draft's name is longer than names may be
     assert str(caught.value).endswith("x: cannot be written (File name too long)")
     write_text("a file", tmp_path / "file")
-    with pytest.raises(InputError, match=r"no folder can be made there \(Not a directory\)$"):
+    with pytest.raises(
+        InputError, match=r"no folder can be made there \(Not a directory\)$"
+    ):
         make_folder(tmp_path / "file" / "first")
 
 
@@ -120,7 +139,9 @@ def test_a_folder_is_removed_unless_it_was_renamed(tmp_path, dead):
 
 def test_a_process_is_dead_where_the_system_knows_none_of_its_number(monkeypatch, dead):
     host = files._host()
-    assert [files._is_dead(host, str(number)) for number in (dead, os.getpid(), 10**30)] == [
+    assert [
+        files._is_dead(host, str(number)) for number in (dead, os.getpid(), 10**30)
+    ] == [
         True,
         False,
         True,
@@ -134,8 +155,13 @@ def test_a_process_is_dead_where_the_system_knows_none_of_its_number(monkeypatch
     assert files._is_dead(host, "1") is False
 
 
-def test_drafts_of_this_computer_and_of_others_count_as_abandoned_after_a_week(tmp_path):
-    living, elsewhere = draft(tmp_path / "a", os.getpid()), draft(tmp_path / "b", 1, "00000000")
+def test_drafts_of_this_computer_and_of_others_count_as_abandoned_after_a_week(
+    tmp_path,
+):
+    living, elsewhere = (
+        draft(tmp_path / "a", os.getpid()),
+        draft(tmp_path / "b", 1, "00000000"),
+    )
     for age, expected in ((WEEK - 60, []), (WEEK + 60, [living, elsewhere])):
         for path in (living, elsewhere):
             os.utime(path, (time.time() - age,) * 2)

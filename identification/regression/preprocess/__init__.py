@@ -4,7 +4,12 @@ from collections.abc import Callable, Sequence
 
 from identification.regression.preprocess.filters import median, savitzky_golay, smooth
 from identification.regression.preprocess.kinematics import smooth_kinematics
-from identification.regression.preprocess.noise import NOISY, is_noisy, noise_level, noise_ratio
+from identification.regression.preprocess.noise import (
+    NOISY,
+    is_noisy,
+    noise_level,
+    noise_ratio,
+)
 from identification.regression.preprocess.repair import outliers, repaired
 from shipgym import Trial
 from shipgym.arrays import Floats
@@ -12,8 +17,10 @@ from shipgym.checks import check_choice
 
 #: Filters of single channels by name.
 FILTERS: dict[str, Callable[[Floats, Floats], Floats]] = {
-    "spline": smooth, "savgol": savitzky_golay, "median": median,
-}  # fmt: skip
+    "spline": smooth,
+    "savgol": savitzky_golay,
+    "median": median,
+}
 
 #: What `identify` may do with noisy channels.
 PREPROCESSING = (*FILTERS, "rts", "none")
@@ -24,8 +31,9 @@ def smoothed_channels(
 ) -> dict[str, Floats]:
     """Some channels of a trial, smoothed; the rudder, which has corners, is left as it is.
 
-    By one of `PREPROCESSING`: smoothing spline, also for True, Savitzky-Golay filter, running median, Kalman
-    smoother of the kinematics (the shaft speed by a spline), or nothing, also for False.
+    By one of `PREPROCESSING`: smoothing spline, also for True, Savitzky-Golay filter,
+    running median, Kalman smoother of the kinematics (the shaft speed by a spline), or
+    nothing, also for False.
     """
     if isinstance(preprocessing, bool):
         preprocessing = "spline" if preprocessing else "none"
@@ -34,11 +42,28 @@ def smoothed_channels(
         return {name: trial[name] for name in names}
     source = smooth_kinematics(trial) if preprocessing == "rts" else trial
     one = FILTERS.get(preprocessing, smooth)
-    done = ("delta", *(("x", "y", "psi", "u", "v", "r") if preprocessing == "rts" else ()))
-    return {name: source[name] if name in done else one(source.t, source[name]) for name in names}
+    done = (
+        "delta",
+        *(("x", "y", "psi", "u", "v", "r") if preprocessing == "rts" else ()),
+    )
+    return {
+        name: source[name] if name in done else one(source.t, source[name])
+        for name in names
+    }
 
 
 __all__ = [
-    "FILTERS", "NOISY", "PREPROCESSING", "is_noisy", "median", "noise_level", "noise_ratio", "outliers",
-    "repaired", "savitzky_golay", "smooth", "smooth_kinematics", "smoothed_channels",
-]  # fmt: skip
+    "FILTERS",
+    "NOISY",
+    "PREPROCESSING",
+    "is_noisy",
+    "median",
+    "noise_level",
+    "noise_ratio",
+    "outliers",
+    "repaired",
+    "savitzky_golay",
+    "smooth",
+    "smooth_kinematics",
+    "smoothed_channels",
+]

@@ -12,7 +12,8 @@ from shipgym.arrays import Floats
 MEDIAN_WIDTH = 5  # samples
 ORDER = 3  # of the local polynomials
 LONGEST_FILTER = 0.2  # of the record
-UNEVEN = 1e-3  # relative difference of time steps beyond which a record is filtered on an even grid
+# relative difference of time steps beyond which a record is filtered on an even grid
+UNEVEN = 1e-3
 #: Decades of stiffness tried, of a spline on knots a unit apart.
 STIFFNESSES = tuple(float(stiffness) for stiffness in np.arange(-2.0, 8.01, 0.25))
 
@@ -25,9 +26,10 @@ def median(t: ArrayLike, values: ArrayLike, width: int = MEDIAN_WIDTH) -> Floats
 def savitzky_golay(t: ArrayLike, values: ArrayLike, width: int | None = None) -> Floats:
     """Local cubic polynomials by least squares (Savitzky & Golay 1964, Analytical Chemistry 36(8)).
 
-    Records with uneven steps are filtered on an even grid with as many samples. `width`: samples, odd, at
-    least 5; by default the one that generalised cross-validation picks, of at most a fifth of the record.
-    Without a width, values that are free of noise (`noise.NOISY`) or fewer than 25 are returned as they are.
+    Records with uneven steps are filtered on an even grid with as many samples.
+    `width`: samples, odd, at least 5; by default the one that generalised
+    cross-validation picks, of at most a fifth of the record. Without a width, values
+    that are free of noise (`noise.NOISY`) or fewer than 25 are returned as they are.
     """
     t, values = np.asarray(t, dtype=float), np.asarray(values, dtype=float)
     longest = int(LONGEST_FILTER * len(t))
@@ -58,10 +60,11 @@ def _best_width(values: Floats, longest: int) -> int:
 def smooth(t: ArrayLike, values: ArrayLike) -> Floats:
     """Smooth a channel by a cubic spline whose stiffness generalised cross-validation picks.
 
-    The natural smoothing spline of Reinsch 1967 (Numerische Mathematik 10); the trace in the criterion of
-    Craven & Wahba 1979 (Numerische Mathematik 31) is estimated by random signs (Girard 1989), always the same
-    ones. Times in s, of shape (n_samples,) as the values, which are returned as they are where they are free
-    of noise (`NOISY`) or fewer than five.
+    The natural smoothing spline of Reinsch 1967 (Numerische Mathematik 10); the trace
+    in the criterion of Craven & Wahba 1979 (Numerische Mathematik 31) is estimated by
+    random signs (Girard 1989), always the same ones. Times in s, of shape (n_samples,)
+    as the values, which are returned as they are where they are free of noise (`NOISY`)
+    or fewer than five.
     """
     t, values = np.asarray(t, dtype=float), np.asarray(values, dtype=float)
     if len(t) < 5 or noise_ratio(t, values) < NOISY:
@@ -86,17 +89,25 @@ class Reinsch:
         h = np.diff(t)
         self.left, self.right = 1.0 / h[:-1], 1.0 / h[1:]
         self.middle = -self.left - self.right
-        self.curvature = np.zeros((3, len(h) - 1))  # upper bands, as scipy.linalg.solveh_banded wants them
+        self.curvature = np.zeros(
+            (3, len(h) - 1)
+        )  # upper bands, as scipy.linalg.solveh_banded wants them
         self.curvature[2] = (h[:-1] + h[1:]) / 3.0
         self.curvature[1, 1:] = h[1:-1] / 6.0
         self.roughness = np.zeros_like(self.curvature)
         self.roughness[2] = self.left**2 + self.middle**2 + self.right**2
-        self.roughness[1, 1:] = self.middle[:-1] * self.left[1:] + self.right[:-1] * self.middle[1:]
+        self.roughness[1, 1:] = (
+            self.middle[:-1] * self.left[1:] + self.right[:-1] * self.middle[1:]
+        )
         self.roughness[0, 2:] = self.right[:-2] * self.left[2:]
 
     def smoothed(self, values: Floats, stiffness: float) -> Floats:
         """Values of the spline at the knots, shape (n_knots,) or (n_splines, n_knots)."""
-        bends = self.left * values[..., :-2] + self.middle * values[..., 1:-1] + self.right * values[..., 2:]
+        bends = (
+            self.left * values[..., :-2]
+            + self.middle * values[..., 1:-1]
+            + self.right * values[..., 2:]
+        )
         forces = solveh_banded(self.curvature + stiffness * self.roughness, bends.T).T
         pull = np.zeros_like(values)
         pull[..., :-2] += self.left * forces

@@ -5,15 +5,17 @@ from collections.abc import Iterable
 import numpy as np
 from numpy.typing import ArrayLike
 
-#: Noise beyond this part of what a channel changes by from one sample to the next makes it noisy.
+#: Noise beyond this part of what a channel changes by from one sample to the next makes
+#: it noisy.
 NOISY = 0.02
 
 
 def noise_level(t: ArrayLike, values: ArrayLike) -> float:
     """Standard deviation of the sample-to-sample noise of a channel, in its unit.
 
-    Each sample is compared with the cubic through its two neighbours on either side; the median of the
-    differences is not moved by corners of the signal. 0 with fewer than five samples.
+    Each sample is compared with the cubic through its two neighbours on either side;
+    the median of the differences is not moved by corners of the signal. 0 with fewer
+    than five samples.
     """
     t, values = np.asarray(t, dtype=float), np.asarray(values, dtype=float)
     if len(t) < 5:
@@ -23,7 +25,9 @@ def noise_level(t: ArrayLike, values: ArrayLike) -> float:
     expected, gain = np.zeros(len(t) - 4), np.ones(len(t) - 4)
     for i in around:
         others = [times[j] for j in around if j != i]
-        weight = np.prod([(times[2] - other) / (times[i] - other) for other in others], axis=0)
+        weight = np.prod(
+            [(times[2] - other) / (times[i] - other) for other in others], axis=0
+        )
         expected += weight * values[i : len(t) - 4 + i]
         gain += weight**2
     return float(np.median(np.abs(values[2:-2] - expected) / np.sqrt(gain)) / 0.6745)

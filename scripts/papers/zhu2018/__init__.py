@@ -1,8 +1,9 @@
 """Zhu 2018: least-squares support vector regression of simplified ship models, with C by bee colony.
 
-One file per case study: 7.2 Nomoto's forms (`response_models`), 7.3 recursive least squares from LS-SVR's
-start (`recursive_start`), 7.4 the container ship (`container_ship`, `steering_forms`, `sample_counts`), 7.5 a
-vessel of 4 m (`small_vessel`).
+One file per case study: 7.2 Nomoto's forms (`response_models`), 7.3 recursive least
+squares from LS-SVR's start (`recursive_start`), 7.4 the container ship
+(`container_ship`, `steering_forms`, `sample_counts`), 7.5 a vessel of 4 m
+(`small_vessel`).
 """
 
 from __future__ import annotations
@@ -19,7 +20,14 @@ from papers.zhu2018 import (
     steering_forms,
 )
 
-CASES = (response_models, recursive_start, container_ship, steering_forms, sample_counts, small_vessel)
+CASES = (
+    response_models,
+    recursive_start,
+    container_ship,
+    steering_forms,
+    sample_counts,
+    small_vessel,
+)
 
 
 def rows() -> Iterator[Row]:
@@ -51,56 +59,82 @@ _START = (
 def _start_helps(plain: Row, started: Row, moves: Row, fewer: Row) -> bool:
     """Both claims of section 7.3: nearer to the truth, and steadier."""
     pairs = ((plain, started), (moves, fewer))
-    return all(abs(after.as_paper or 0.0) < abs(before.as_paper or 0.0) for before, after in pairs)
+    return all(
+        abs(after.as_paper or 0.0) < abs(before.as_paper or 0.0)
+        for before, after in pairs
+    )
 
 
 CONCLUSIONS = (
     Conclusion(
-        "The further simplified model of steering (five terms) is more accurate than Nomoto's forms",
+        "The further simplified model of steering (five terms) is more accurate than"
+        " Nomoto's forms",
         (_NOMOTO, _FIVE["r"]),
         lambda nomoto, five: five.as_paper < nomoto.as_paper,
     ),
     Conclusion(
         "The model of seven terms predicts poorly; with fewer terms it predicts better",
         (_SEVEN["v"], _FIVE["v"], _SEVEN["r"], _FIVE["r"]),
-        lambda sway, less_sway, yaw, less_yaw: less_sway.as_paper < sway.as_paper
-        and less_yaw.as_paper < yaw.as_paper,
+        lambda sway, less_sway, yaw, less_yaw: (
+            less_sway.as_paper < sway.as_paper and less_yaw.as_paper < yaw.as_paper
+        ),
     ),
     Conclusion(
         "LS-SVR is more robust to outliers than least squares",
-        tuple(f"Section 7.2.2: linear: mean error of {name} by {method}, %"
-              for name in "KT" for method in ("LS", "LS-SVR")),
-        lambda k_ls, k, t_ls, t: k.as_paper < 0.9 * k_ls.as_paper and t.as_paper < 0.9 * t_ls.as_paper,
-        "more robust: by a tenth of the error; both have a squared loss. The weighted LS-SVM (at best) is",
+        tuple(
+            f"Section 7.2.2: linear: mean error of {name} by {method}, %"
+            for name in "KT"
+            for method in ("LS", "LS-SVR")
+        ),
+        lambda k_ls, k, t_ls, t: (
+            k.as_paper < 0.9 * k_ls.as_paper and t.as_paper < 0.9 * t_ls.as_paper
+        ),
+        "more robust: by a tenth of the error; both have a squared loss. The weighted"
+        " LS-SVM (at best) is",
     ),
     Conclusion(
-        "A start by LS-SVR makes RLS more accurate and steadier (ship integrated by Euler's rule)",
+        "A start by LS-SVR makes RLS more accurate and steadier (ship integrated by"
+        " Euler's rule)",
         tuple(f"{recursive_start.EULER_CASE}: {what}" for what in _START),
         _start_helps,
         "by that rule the ship obeys the regression exactly",
     ),
     Conclusion(
-        "A start by LS-SVR makes RLS more accurate and steadier (ship integrated accurately)",
+        "A start by LS-SVR makes RLS more accurate and steadier (ship integrated"
+        " accurately)",
         tuple(f"Table 7.3.2: {what}" for what in _START),
         _start_helps,
         "the start from LS-SVR then has the error of Euler's rule",
     ),
     Conclusion(
-        "The bee colony selects a better C than cross-validation and the particle swarm",
-        tuple(f"Table 7.4.4: {method}, {what}" for what in (
-            "sway: mean squared error of prediction, m2/s2", "yaw: mean squared error of prediction, deg2/s2")
-            for method in ("CV", "PSO", "ABC")),
-        lambda v_cv, v_pso, v_abc, r_cv, r_pso, r_abc: v_abc.as_paper < min(v_cv.as_paper, v_pso.as_paper)
-        and r_abc.as_paper < min(r_cv.as_paper, r_pso.as_paper),
-        "the objective, the error on the training data, falls with C up to the bound of the search; "
-        "cross-validation does not have that flaw",
+        "The bee colony selects a better C than cross-validation and the particle"
+        " swarm",
+        tuple(
+            f"Table 7.4.4: {method}, {what}"
+            for what in (
+                "sway: mean squared error of prediction, m2/s2",
+                "yaw: mean squared error of prediction, deg2/s2",
+            )
+            for method in ("CV", "PSO", "ABC")
+        ),
+        lambda v_cv, v_pso, v_abc, r_cv, r_pso, r_abc: (
+            v_abc.as_paper < min(v_cv.as_paper, v_pso.as_paper)
+            and r_abc.as_paper < min(r_cv.as_paper, r_pso.as_paper)
+        ),
+        "the objective, the error on the training data, falls with C up to the bound of"
+        " the search; cross-validation does not have that flaw",
     ),
     Conclusion(
         "The particle swarm sometimes ends in a local optimum, the bee colony does not",
-        tuple(f"Table 7.4.4: {method}, {q}: C" for q in ("surge", "sway", "yaw")
-              for method in ("PSO", "ABC")),
-        lambda *found: any(abs(pso.as_paper / abc.as_paper - 1.0) > 0.01
-                           for pso, abc in zip(found[::2], found[1::2], strict=True)),
+        tuple(
+            f"Table 7.4.4: {method}, {q}: C"
+            for q in ("surge", "sway", "yaw")
+            for method in ("PSO", "ABC")
+        ),
+        lambda *found: any(
+            abs(pso.as_paper / abc.as_paper - 1.0) > 0.01
+            for pso, abc in zip(found[::2], found[1::2], strict=True)
+        ),
         "both end at the bound, where the objective has its one minimum",
     ),
     Conclusion(
@@ -111,44 +145,66 @@ CONCLUSIONS = (
     ),
     Conclusion(
         "The time grows with the number of samples as O(N^2 + l^3)",
-        ("Figures 7.4.7, 7.4.8: ABC: power of the number of samples with which the time grows",),
+        (
+            (
+                "Figures 7.4.7, 7.4.8: ABC: power of the number of samples with which"
+                " the time grows"
+            ),
+        ),
         lambda power: power.best > 1.5,
         "for a linear kernel one decomposition, linear in the samples, serves every C",
     ),
     Conclusion(
         "350, 630 and 230 samples suffice for surge, sway and yaw",
-        tuple(f"Section 7.4.7: {q}: samples that suffice" for q in ("surge", "sway", "yaw")),
-        lambda *found: all(row.as_paper is not None and row.as_paper <= row.printed for row in found),
-        "suffice: the prediction is as good as the thesis' with all samples. At best they do",
+        tuple(
+            f"Section 7.4.7: {q}: samples that suffice"
+            for q in ("surge", "sway", "yaw")
+        ),
+        lambda *found: all(
+            row.as_paper is not None and row.as_paper <= row.printed for row in found
+        ),
+        "suffice: the prediction is as good as the thesis' with all samples. At best"
+        " they do",
     ),
     Conclusion(
         "The model is valid for ships of different types, a small vessel among them",
-        remark="her records are not published; a stand-in that obeys the printed model is no test of it",
+        remark=(
+            "her records are not published; a stand-in that obeys the printed model is"
+            " no test of it"
+        ),
     ),
-)  # fmt: skip
+)
 PAPER = Paper(
     "zhu2018",
-    "Zhu 2018, Optimized support vector regression algorithm-based modeling of ship dynamics",
-    "Nomoto's forms, the Mariner's linear steering, the container ship of Son & Nomoto and a vessel of 4 m, "
-    "by least squares, recursive least squares and LS-SVR with C by cross-validation, particle swarm and bee "
-    "colony.",
+    "Zhu 2018, Optimized support vector regression algorithm-based modeling of ship"
+    " dynamics",
+    "Nomoto's forms, the Mariner's linear steering, the container ship of Son & Nomoto"
+    " and a vessel of 4 m, by least squares, recursive least squares and LS-SVR with C"
+    " by cross-validation, particle swarm and bee colony.",
     rows,
     conclusions=CONCLUSIONS,
     figures=(
         (
             "reproduction_zhu2018_recursive.png",
-            "Table 7.3.2 sample by sample: two of the Mariner's six parameters by RLS from zero and from "
-            "LS-SVR, on a ship integrated accurately and on one integrated by Euler's rule",
+            (
+                "Table 7.3.2 sample by sample: two of the Mariner's six parameters by"
+                " RLS from zero and from LS-SVR, on a ship integrated accurately and on"
+                " one integrated by Euler's rule"
+            ),
         ),
         (
             "reproduction_zhu2018_zigzag.png",
-            "The container ship's 20/20 zigzag, predicted from her 10/10 by seven terms, by the chosen four, "
-            "by a neural network, and at best",
+            (
+                "The container ship's 20/20 zigzag, predicted from her 10/10 by seven"
+                " terms, by the chosen four, by a neural network, and at best"
+            ),
         ),
         (
             "reproduction_zhu2018_samples.png",
-            "Mean squared error of prediction against the number of samples (figures 7.4.9 and 7.4.10); "
-            "dashed: the thesis with all samples",
+            (
+                "Mean squared error of prediction against the number of samples"
+                " (figures 7.4.9 and 7.4.10); dashed: the thesis with all samples"
+            ),
         ),
     ),
 )

@@ -1,7 +1,8 @@
 """Section 7.4.2 to 7.4.4: the container ship by LS-SVR tuned by CV, PSO and ABC.
 
-The trials are those of Table 7.4.1, simulated again: 900 s from 8 m/s and 80 rpm, sampled at 0.5 s. The shaft
-orders of the straight lines are not printed beyond their range.
+The trials are those of Table 7.4.1, simulated again: 900 s from 8 m/s and 80 rpm,
+sampled at 0.5 s. The shaft orders of the straight lines are not printed beyond their
+range.
 """
 
 from __future__ import annotations
@@ -41,9 +42,16 @@ Floats = NDArray[np.float64]
 SPEED, SHAFT_RPM = 8.0, 80.0
 DURATION, STEP, INTERVAL = 900.0, 0.1, 0.5  # of the simulation and of the samples, s
 RPM = 1.0 / 60.0
-#: Shaft orders of the straight lines, rpm, each held for 150 s: a stand-in within the printed ranges.
-ORDERS = {"learned": (120, 160, 140, 130, 150, 120), "verified": (100, 160, 120, 140, 110, 150)}
-OTHER_TERMS = "at best: U v, U r, v^2 r/U, U^2 delta, with surge: not the thesis' terms, which have |v| r"
+#: Shaft orders of the straight lines, rpm, each held for 150 s: a stand-in within the
+#: printed ranges.
+ORDERS = {
+    "learned": (120, 160, 140, 130, 150, 120),
+    "verified": (100, 160, 120, 140, 110, 150),
+}
+OTHER_TERMS = (
+    "at best: U v, U r, v^2 r/U, U^2 delta, with surge: not the thesis' terms, which"
+    " have |v| r"
+)
 ACCEPTED = 0.5  # mean squared error of surge that the thesis accepts, m^2/s^2
 REPEATS = 30  # of timings
 FAST = 0.010  # aim, s
@@ -89,10 +97,13 @@ PRINTED_FIRST = {  # Table 7.4.3
 }
 PRINTED_REGRESSION = {"u": 4.0346e-6, "v": 3.5005e-6, "r": 4.3924e-6}
 TABLES = {"u": "7.4.5", "v": "7.4.6", "r": "7.4.7"}
-BOUND = "bounds of the search are not printed; the training objective drives C to the upper one, here "
+BOUND = (
+    "bounds of the search are not printed; the training objective drives C to the upper"
+    " one, here "
+)
 
-#: Terms of `WITH_SPEED`: u^2, n^2, n u; u^2, v r, n^2; U v, U r, v^2 r/U, U^2 delta, which is not row 6 of
-#: Tables 7.4.9 and 7.4.10: that has |v| r in place of v^2 r/U.
+#: Terms of `WITH_SPEED`: u^2, n^2, n u; u^2, v r, n^2; U v, U r, v^2 r/U, U^2 delta,
+#: which is not row 6 of Tables 7.4.9 and 7.4.10: that has |v| r in place of v^2 r/U.
 SURGE_ALONE, SURGE_IN_TURNS, FOUR_WITH_SPEED = (0, 2, 3), (0, 1, 2), (0, 3, 7, 6)
 
 
@@ -106,7 +117,14 @@ def ship(rudder_limit_deg: float = 35.0) -> ShipModel:
 @cache
 def zigzag_trial(angle_deg: float, rudder_limit_deg: float = 35.0) -> Trial:
     """A zigzag as sampled."""
-    trial = zigzag(ship(rudder_limit_deg), angle_deg, angle_deg, duration=DURATION, dt=STEP, switch="step")
+    trial = zigzag(
+        ship(rudder_limit_deg),
+        angle_deg,
+        angle_deg,
+        duration=DURATION,
+        dt=STEP,
+        switch="step",
+    )
     return every(trial, round(INTERVAL / STEP), f"zigzag {angle_deg:g}/{angle_deg:g}")
 
 
@@ -122,7 +140,8 @@ def straight_line(use: str) -> Trial:
 def surge_terms(trial: Trial) -> Floats:
     """Terms of equation 5.8: surge speed above 8 m/s, its cube, shaft order above 80 rpm.
 
-    The thesis does not say whether it took order or shaft speed; with the order come its coefficients.
+    The thesis does not say whether it took order or shaft speed; with the order come
+    its coefficients.
     """
     faster = trial["u"] - SPEED
     return np.column_stack([faster, faster**3, trial["n_command"] / RPM - SHAFT_RPM])
@@ -177,7 +196,9 @@ def best_surge() -> ShipModel:
 def best_steering(rudder_limit_deg: float = 35.0) -> ShipModel:
     """Four terms with the instantaneous speed in sway and yaw, from spline samples of the 10/10 zigzag."""
     columns = {"u": SURGE_IN_TURNS, "v": FOUR_WITH_SPEED, "r": FOUR_WITH_SPEED}
-    return spline_fit(zigzag_trial(10, rudder_limit_deg), ship(rudder_limit_deg), columns)
+    return spline_fit(
+        zigzag_trial(10, rudder_limit_deg), ship(rudder_limit_deg), columns
+    )
 
 
 @cache
@@ -193,7 +214,8 @@ def best_errors() -> dict[str, float]:
 def seconds() -> dict[tuple[str, str], float]:
     """Processor time of each search with its fit by method and equation, s.
 
-    The least of several, taken in turns, so that other work on the estimator does not count.
+    The least of several, taken in turns, so that other work on the estimator does not
+    count.
     """
     searches = [(method, q) for method in PRINTED_TIME for q in EQUATIONS]
     least = dict.fromkeys(searches, np.inf)
@@ -208,17 +230,25 @@ def seconds() -> dict[tuple[str, str], float]:
 def regression_rows() -> Iterator[Row]:
     """Table 7.4.2: C and the errors of the regression by ABC."""
     for q, printed in PRINTED_REGRESSION.items():
-        fit, trial = as_printed("ABC")[q], straight_line("learned") if q == "u" else zigzag_trial(10)
+        fit, trial = (
+            as_printed("ABC")[q],
+            straight_line("learned") if q == "u" else zigzag_trial(10),
+        )
         terms = surge_terms(trial) if q == "u" else steering_terms(trial)
         offset = SPEED if q == "u" else 0.0
         error = terms[:-1] @ np.array(fit.gains) + fit.constant + offset - trial[q][1:]
         yield Row(
             "Table 7.4.2",
-            f"{EQUATIONS[q]}: mean squared error of the regression, {'rad2/s2' if q == 'r' else 'm2/s2'}",
+            f"{EQUATIONS[q]}: mean squared error of the regression,"
+            f" {'rad2/s2' if q == 'r' else 'm2/s2'}",
             printed,
             float(np.mean(error**2)),
             None,
-            note="printed in deg2/s2, but its size is that of rad2/s2" if q == "r" else "",
+            note=(
+                "printed in deg2/s2, but its size is that of rad2/s2"
+                if q == "r"
+                else ""
+            ),
         )
 
 
@@ -230,10 +260,20 @@ def weight_rows() -> Iterator[Row]:
             assert isinstance(estimator, TunedLSSVM)
             note = f"{BOUND}{MOST_C[q]:g}"
             if method == "ABC":
-                note += "; Table 7.4.4 has this row shifted, the value is that of Table 7.4.2"
+                note += (
+                    "; Table 7.4.4 has this row shifted, the value is that of Table"
+                    " 7.4.2"
+                )
             if method == "CV":
                 note = "folds are not printed: 5 blocks of time here"
-            yield Row("Table 7.4.4", f"{method}, {EQUATIONS[q]}: C", printed, estimator.C_, None, note=note)
+            yield Row(
+                "Table 7.4.4",
+                f"{method}, {EQUATIONS[q]}: C",
+                printed,
+                estimator.C_,
+                None,
+                note=note,
+            )
 
 
 def condition() -> float:
@@ -253,7 +293,10 @@ def printed_coefficients() -> Iterator[tuple[str, str, str, tuple[float, ...]]]:
 
 def coefficient_rows() -> Iterator[Row]:
     """Tables 7.4.3 and 7.4.5 to 7.4.7, with the printed C."""
-    drift = f"C as printed; seven collinear terms, condition number {condition():.0f}: easily changed"
+    drift = (
+        f"C as printed; seven collinear terms, condition number {condition():.0f}:"
+        " easily changed"
+    )
     notes = {"u": "C as printed", "v": drift, "r": drift}
     for table, method, q, printed in printed_coefficients():
         fit = fit_equation(q, LSSVM(C=PRINTED_C[method][q], scale=False))
@@ -275,15 +318,19 @@ def prediction_rows() -> Iterator[Row]:
             best = best_errors()[q]
             yield Row(
                 "Table 7.4.4",
-                f"{method}, {EQUATIONS[q]}: mean squared error of prediction, {UNITS[q]}",
+                f"{method}, {EQUATIONS[q]}: mean squared error of prediction,"
+                f" {UNITS[q]}",
                 value,
                 ours[q],
                 best,
                 f"below {least:g}" + (f" (accepted: {ACCEPTED:g})" if q == "u" else ""),
                 best < least,
-                "shaft orders of the straight lines are not printed: a stand-in; at best: u^2, n^2 and n u"
-                if q == "u"
-                else OTHER_TERMS,
+                (
+                    "shaft orders of the straight lines are not printed: a stand-in; at"
+                    " best: u^2, n^2 and n u"
+                    if q == "u"
+                    else OTHER_TERMS
+                ),
             )
 
 
@@ -300,7 +347,8 @@ def time_rows() -> Iterator[Row]:
                 best,
                 f"below {FAST:g}",
                 best < FAST,
-                f"the same search, by one decomposition; least of {REPEATS} on this machine",
+                f"the same search, by one decomposition; least of {REPEATS} on this"
+                " machine",
             )
 
 

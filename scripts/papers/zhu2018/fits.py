@@ -1,7 +1,7 @@
 """LS-SVR as the thesis uses it, what it predicts, and the fit at best to put beside it.
 
-The thesis regresses x(k+1) on terms at k that hold x(k) itself, on columns as they are, and predicts by
-stepping that difference equation.
+The thesis regresses x(k+1) on terms at k that hold x(k) itself, on columns as they are,
+and predicts by stepping that difference equation.
 """
 
 from __future__ import annotations
@@ -26,21 +26,32 @@ Floats = NDArray[np.float64]
 STEERING = "steering7"
 PREFIX = {"v": "b", "r": "c"}
 LEAST_C = 1e-2  # of the searches, as printed
-#: Upper bounds of the searches; not printed, but its degenerate objective drives C to them, so that the
-#: values printed lie just below.
+#: Upper bounds of the searches; not printed, but its degenerate objective drives C to
+#: them, so that the values printed lie just below.
 MOST_C = {"u": 5e7, "v": 1e10, "r": 20.0}
 RAN_AWAY = 1e3  # m/s or rad/s: beyond every physical range
 #: Optimiser and objective of the thesis' three methods.
-SEARCHES = {"CV": ("grid", "k-fold"), "PSO": ("pso", "training"), "ABC": ("abc", "training")}
+SEARCHES = {
+    "CV": ("grid", "k-fold"),
+    "PSO": ("pso", "training"),
+    "ABC": ("abc", "training"),
+}
 
-#: The seven terms with the speed of the moment in them, so that they follow the loss of speed in a turn, two
-#: cubic ones, and surge to know that speed: resistance, and a thrust that falls with the advance ratio.
+#: The seven terms with the speed of the moment in them, so that they follow the loss of
+#: speed in a turn, two cubic ones, and surge to know that speed: resistance, and a
+#: thrust that falls with the advance ratio.
 STEERING_WITH_SPEED = "U v, |v| v, |r| v, U r, |v| r, |r| r, U^2 delta, v^2 r/U, v^3/U"
 WITH_SPEED = own_structure(
     {
         "name": "zhu-with-speed",
-        "source": f"{get_structure(STEERING).source}, with the instantaneous speed, and surge",
-        "equations": {"u": "u^2, v r, n^2, n u", "v": STEERING_WITH_SPEED, "r": STEERING_WITH_SPEED},
+        "source": (
+            f"{get_structure(STEERING).source}, with the instantaneous speed, and surge"
+        ),
+        "equations": {
+            "u": "u^2, v r, n^2, n u",
+            "v": STEERING_WITH_SPEED,
+            "r": STEERING_WITH_SPEED,
+        },
     },
     "zhu2018",
 )
@@ -49,26 +60,34 @@ WITH_SPEED = own_structure(
 def every(trial: Trial, steps: int, name: str) -> Trial:
     """Every n-th sample of a simulated trial."""
     channels = {channel: values[::steps] for channel, values in trial.channels.items()}
-    return Trial(trial.t[::steps], channels, name=name, kind=trial.kind, length=trial.length)
+    return Trial(
+        trial.t[::steps], channels, name=name, kind=trial.kind, length=trial.length
+    )
 
 
 def first_samples(trial: Trial, count: int) -> Trial:
     """The beginning of a trial."""
     channels = {channel: values[:count] for channel, values in trial.channels.items()}
-    return Trial(trial.t[:count], channels, name=trial.name, kind=trial.kind, length=trial.length)
+    return Trial(
+        trial.t[:count], channels, name=trial.name, kind=trial.kind, length=trial.length
+    )
 
 
 def search(method: str, equation: str, most: float | None = None) -> TunedLSSVM:
     """LS-SVR of which C is searched for by one of the thesis' methods, on columns as they are."""
     optimiser, objective = SEARCHES[method]
     bounds = (LEAST_C, MOST_C[equation] if most is None else most)
-    return TunedLSSVM(optimiser=optimiser, objective=objective, bounds=bounds, scale=False)
+    return TunedLSSVM(
+        optimiser=optimiser, objective=objective, bounds=bounds, scale=False
+    )
 
 
 def steering_terms(trial: Trial) -> Floats:
     """The seven terms of equation 7.1, SI units, shape (n_samples, 7)."""
     v, r, delta = trial["v"], trial["r"], trial["delta"]
-    return np.column_stack([v, np.abs(v) * v, np.abs(r) * v, r, np.abs(v) * r, np.abs(r) * r, delta])
+    return np.column_stack(
+        [v, np.abs(v) * v, np.abs(r) * v, r, np.abs(v) * r, np.abs(r) * r, delta]
+    )
 
 
 def term_columns(structure: str, equation: str) -> list[int]:
@@ -88,7 +107,8 @@ class Difference:
     constant : float
         The intercept b of LS-SVR.
     kept : float
-        0 where x(k) is among the terms, as printed; 1 where the change of x was regressed.
+        0 where x(k) is among the terms, as printed; 1 where the change of x was
+        regressed.
     estimator : LSSVM or TunedLSSVM
         What was fitted.
     """
@@ -100,7 +120,10 @@ class Difference:
 
     def step(self, x: float, terms: Sequence[float]) -> float:
         """The next value."""
-        change = sum([gain * term for gain, term in zip(self.gains, terms, strict=True)], self.constant)
+        change = sum(
+            [gain * term for gain, term in zip(self.gains, terms, strict=True)],
+            self.constant,
+        )
         return self.kept * x + change
 
 
@@ -151,13 +174,19 @@ def steer(sway: Difference, yaw: Difference, trial: Trial) -> dict[str, Floats]:
     return {"v": path[0], "r": path[1]}
 
 
-def mean_square(predicted: Mapping[str, Floats] | Trial | None, trial: Trial, channel: str) -> float:
+def mean_square(
+    predicted: Mapping[str, Floats] | Trial | None, trial: Trial, channel: str
+) -> float:
     """Mean squared error of a channel, of yaw rate in deg^2/s^2 as printed; infinite after running away."""
     if predicted is None:
         return float("inf")
     error = predicted[channel] - trial[channel]
     unit = np.degrees(1.0) if channel == "r" else 1.0
-    return float(unit**2 * np.mean(error**2)) if np.all(np.isfinite(error)) else float("inf")
+    return (
+        float(unit**2 * np.mean(error**2))
+        if np.all(np.isfinite(error))
+        else float("inf")
+    )
 
 
 @lru_cache(maxsize=2)
@@ -166,7 +195,9 @@ def spline_samples(trial: Trial, ship: ShipModel) -> Samples:
     return build_samples([trial], WITH_SPEED, ship.particulars, gear=ship.steering)
 
 
-def spline_fit(trial: Trial, ship: ShipModel, columns: Mapping[str, Sequence[int]]) -> ShipModel:
+def spline_fit(
+    trial: Trial, ship: ShipModel, columns: Mapping[str, Sequence[int]]
+) -> ShipModel:
     """A model with the instantaneous speed in its terms, by least squares on spline samples.
 
     Parameters
@@ -192,7 +223,9 @@ def spline_fit(trial: Trial, ship: ShipModel, columns: Mapping[str, Sequence[int
         service_shaft_speed=ship.service_shaft_speed,
     )
     samples = spline_samples(trial, ship)
-    accelerations = {q: np.zeros(len(WITH_SPEED.terms(q))) for q in WITH_SPEED.regressed}
+    accelerations = {
+        q: np.zeros(len(WITH_SPEED.terms(q))) for q in WITH_SPEED.regressed
+    }
     for q, chosen in columns.items():
         estimator = LSSVM(C=np.inf, fit_intercept=False)
         accelerations[q][list(chosen)] = estimator.fit(

@@ -1,9 +1,10 @@
 """Section 7.3: the Mariner's linear steering by recursive least squares, started from zero or from LS-SVR.
 
-A 20/20 zigzag at 7.7 m/s, sampled at 0.5 s; from 200 to 220 s the record of the rudder has noise of 1.5 per
-cent of its order. The thesis regresses v(k+1) on v, v U, r U and delta U^2 at k. Its U barely differs from
-7.7 m/s, so that v and v U are nearly the same column: that, and Euler's rule, is where its errors come from.
-A ship that is herself integrated by Euler's rule at the step of the samples obeys the regression exactly; the
+A 20/20 zigzag at 7.7 m/s, sampled at 0.5 s; from 200 to 220 s the record of the rudder
+has noise of 1.5 per cent of its order. The thesis regresses v(k+1) on v, v U, r U and
+delta U^2 at k. Its U barely differs from 7.7 m/s, so that v and v U are nearly the same
+column: that, and Euler's rule, is where its errors come from. A ship that is herself
+integrated by Euler's rule at the step of the samples obeys the regression exactly; the
 thesis' order of the two methods is that of such a ship.
 """
 
@@ -32,7 +33,9 @@ Floats = NDArray[np.float64]
 
 STRUCTURE = "linear-steering"
 NAMES = ("a11", "a12", "b11", "a21", "a22", "b21")
-TRUTH = np.array([-0.693, -0.304, 0.207, -3.41, -2.17, -1.63])  # Table 7.3.1, rudder positive to port
+TRUTH = np.array(
+    [-0.693, -0.304, 0.207, -3.41, -2.17, -1.63]
+)  # Table 7.3.1, rudder positive to port
 TO_STARBOARD = np.array([1.0, 1.0, -1.0, 1.0, 1.0, -1.0])
 LENGTH, SPEED = 161.0, 7.7
 DURATION, STEP, INTERVAL = 1000.0, 0.1, 0.5  # s
@@ -43,14 +46,17 @@ START_SAMPLES, START_INTERVAL = 200, 3  # of LS-SVR
 C_ZERO, C_START = (
     1e6,
     1e10,
-)  # variance of coefficients that start from zero, weight of LS-SVR's errors; not printed
+    # variance of coefficients that start from zero, weight of LS-SVR's errors; not
+    # printed
+)
 WITHIN = 5.0  # aim, %
 PRINTED = {
     "RLS": (0.4273, -0.0042, -0.0162, 0.0140, -0.8033, 0.0),
     "LSSVR-RLS": (0.4278, -0.0042, -0.0162, 0.0129, -0.1850, 0.0),
 }
 VARIANCE = (
-    "the variance at the start is not printed, here 1e6; a finite one keeps a22 near zero on raw columns"
+    "the variance at the start is not printed, here 1e6; a finite one keeps a22 near"
+    " zero on raw columns"
 )
 COUNTS, INTERVALS = (50, 100, 200, 300), range(1, 11)  # of Figure 7.3.2
 PREDICTED_FOR = 500.0  # s, of the 10/10
@@ -82,15 +88,25 @@ def zigzag_trial(noisy: bool) -> Trial:
     delta = trial["delta"].copy()
     delta[rows] += NOISE * np.random.default_rng(SEED).standard_normal(int(rows.sum()))
     return Trial(
-        trial.t, dict(trial.channels) | {"delta": delta}, name=trial.name, kind="zigzag", length=LENGTH
+        trial.t,
+        dict(trial.channels) | {"delta": delta},
+        name=trial.name,
+        kind="zigzag",
+        length=LENGTH,
     )
 
 
 def regressions(trial: Trial) -> dict[str, tuple[Floats, Floats]]:
     """Inputs and output of sway and yaw as printed (appendix A.3)."""
-    v, r, delta, U = trial["v"], trial["r"], -trial["delta"], np.hypot(trial["u"], trial["v"])
+    v, r, delta, U = (
+        trial["v"],
+        trial["r"],
+        -trial["delta"],
+        np.hypot(trial["u"], trial["v"]),
+    )
     return {
-        q: (np.column_stack([trial[q], v * U, r * U, delta * U**2])[:-1], trial[q][1:]) for q in ("v", "r")
+        q: (np.column_stack([trial[q], v * U, r * U, delta * U**2])[:-1], trial[q][1:])
+        for q in ("v", "r")
     }
 
 
@@ -105,14 +121,19 @@ def euler_trial(noisy: bool) -> Trial:
     """The ship integrated by Euler's rule at the interval of the samples, under the same rudder."""
     trial, record = zigzag_trial(False), zigzag_trial(noisy)
     v, r = np.zeros(len(trial)), np.zeros(len(trial))
-    sway, yaw = (TRUTH * INTERVAL / np.array([LENGTH, 1.0, LENGTH, LENGTH**2, LENGTH, LENGTH**2])).reshape(
-        2, 3
-    )
+    sway, yaw = (
+        TRUTH * INTERVAL / np.array([LENGTH, 1.0, LENGTH, LENGTH**2, LENGTH, LENGTH**2])
+    ).reshape(2, 3)
     for k, delta in enumerate(-trial["delta"][:-1]):
         U = np.hypot(SPEED, v[k])
         terms = np.array([v[k] * U, r[k] * U, delta * U**2])
         v[k + 1], r[k + 1] = v[k] + sway @ terms, r[k] + yaw @ terms
-    channels = {"u": np.full(len(trial), SPEED), "v": v, "r": r, "delta": record["delta"]}
+    channels = {
+        "u": np.full(len(trial), SPEED),
+        "v": v,
+        "r": r,
+        "delta": record["delta"],
+    }
     return Trial(trial.t, channels, name=trial.name, kind="zigzag", length=LENGTH)
 
 
@@ -120,9 +141,12 @@ def euler_trial(noisy: bool) -> Trial:
 def history(method: str, euler: bool = False, noisy: bool = True) -> Floats:
     """The six parameters after each sample by `RLS` or `LSSVR-RLS`, on columns as they are."""
     estimator = RecursiveLeastSquares(
-        C=C_ZERO, scale=False, start_samples=START_SAMPLES if method == "LSSVR-RLS" else 0,
-        start_interval=START_INTERVAL, start_C=C_START,
-    )  # fmt: skip
+        C=C_ZERO,
+        scale=False,
+        start_samples=START_SAMPLES if method == "LSSVR-RLS" else 0,
+        start_interval=START_INTERVAL,
+        start_C=C_START,
+    )
     trial = (euler_trial if euler else zigzag_trial)(noisy)
     found = [estimator.fit_history(X, y) for X, y in regressions(trial).values()]
     return parameters(*(path.T for path in found)).T
@@ -165,7 +189,11 @@ def from_pairs(count: int, interval: int, noisy: bool) -> Floats:
     found = []
     for X, y in regressions(zigzag_trial(noisy)).values():
         rows = slice(0, count * interval, interval)
-        found.append(LSSVM(C=C_START, scale=False, fit_intercept=False).fit(X[rows], y[rows]).coef_)
+        found.append(
+            LSSVM(C=C_START, scale=False, fit_intercept=False)
+            .fit(X[rows], y[rows])
+            .coef_
+        )
     return parameters(*found)
 
 
@@ -174,7 +202,12 @@ def spline_rows(noisy: bool) -> dict[str, tuple[Floats, Floats]]:
     """Inputs and output of sway and yaw as spline samples."""
     table = get_structure(STRUCTURE)
     samples = build_samples(
-        [zigzag_trial(noisy)], table, ship().particulars, window=1, gear=ship().steering, smooth=False
+        [zigzag_trial(noisy)],
+        table,
+        ship().particulars,
+        window=1,
+        gear=ship().steering,
+        smooth=False,
     )
     return {q: (samples.features[q], samples.targets[q]) for q in table.regressed}
 
@@ -216,17 +249,29 @@ def euler_rows() -> Iterator[Row]:
         found = errors(history(method, euler=True)[-1])
         for k, name in enumerate(NAMES):
             yield Row(
-                EULER_CASE, f"{method}: {name}, error, %", 100.0 * printed[k], float(found[k]), None,
-                note="the thesis' order of the methods, but not its a11" if name == "a22" else "",
-            )  # fmt: skip
+                EULER_CASE,
+                f"{method}: {name}, error, %",
+                100.0 * printed[k],
+                float(found[k]),
+                None,
+                note=(
+                    "the thesis' order of the methods, but not its a11"
+                    if name == "a22"
+                    else ""
+                ),
+            )
     for euler, case in ((False, "Table 7.3.2"), (True, EULER_CASE)):
         for method in PRINTED:
-            yield Row(case, f"{method}: {MOVES}", None, fluctuation(method, euler), None)
+            yield Row(
+                case, f"{method}: {MOVES}", None, fluctuation(method, euler), None
+            )
 
 
 def figure_rows() -> Iterator[Row]:
     """Figure 7.3.2: number and interval of the samples."""
-    plan = [(count, START_INTERVAL) for count in COUNTS] + [(START_SAMPLES, step) for step in INTERVALS]
+    plan = [(count, START_INTERVAL) for count in COUNTS] + [
+        (START_SAMPLES, step) for step in INTERVALS
+    ]
     for noisy in (False, True):
         for count, interval in plan:
             ours, best = (
@@ -235,15 +280,15 @@ def figure_rows() -> Iterator[Row]:
             )
             yield Row(
                 "Figure 7.3.2",
-                f"{'noisy' if noisy else 'clean'} record, {count} samples at interval {interval}: "
-                "largest error of the six, %",
+                f"{'noisy' if noisy else 'clean'} record, {count} samples at interval"
+                f" {interval}: largest error of the six, %",
                 None,
                 ours,
                 best,
                 f"within {WITHIN:g}",
                 best < WITHIN,
-                "the thesis shows a picture; 200 clean samples are enough for it, as where Euler's rule "
-                "integrates the ship",
+                "the thesis shows a picture; 200 clean samples are enough for it, as"
+                " where Euler's rule integrates the ship",
             )
 
 

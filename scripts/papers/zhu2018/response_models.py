@@ -1,8 +1,9 @@
 """Section 7.2: Nomoto's forms by least squares and by LS-SVR.
 
-The zigzags of the small ship are not published. In their place stands a Nomoto ship with the printed K and T
-of LS-SVR, whose yaw rate is logged once a second with white noise, coloured noise and outliers. Where the
-thesis has one log, here are twenty, and the rows hold means over them.
+The zigzags of the small ship are not published. In their place stands a Nomoto ship
+with the printed K and T of LS-SVR, whose yaw rate is logged once a second with white
+noise, coloured noise and outliers. Where the thesis has one log, here are twenty, and
+the rows hold means over them.
 """
 
 from __future__ import annotations
@@ -32,12 +33,22 @@ K, T = 0.1921, 1.0524  # 1/s, s: of LS-SVR in Table 7.2.1, the truth of the stan
 WITHIN = {"K": 2.0, "T": 5.0}  # aims, %
 SEEDS = range(20)
 DEGREE = np.pi / 180.0
-#: Angle, deg, duration, s, and speed, m/s, of the zigzag to learn from and of that to assess it by.
+#: Angle, deg, duration, s, and speed, m/s, of the zigzag to learn from and of that to
+#: assess it by.
 LEARNED, ASSESSED = (20.0, 82.0, 1.5), (30.0, 89.0, 1.7)
 STEP = 0.02  # of the simulation, s
-NOISE = {"noise": 0.05 * DEGREE, "drift": 0.15 * DEGREE, "drift_time_s": 2.0}  # of the yaw rate, rad/s
-OUTLIERS = {"outlier_probability": 0.05, "outlier_size": 4.0 * DEGREE}  # in what is learned from
-WINDOW = 2  # samples over which the form is integrated: two, to average the noise, in a lag of about one
+NOISE = {
+    "noise": 0.05 * DEGREE,
+    "drift": 0.15 * DEGREE,
+    "drift_time_s": 2.0,
+}  # of the yaw rate, rad/s
+OUTLIERS = {
+    "outlier_probability": 0.05,
+    "outlier_size": 4.0 * DEGREE,
+}  # in what is learned from
+# samples over which the form is integrated: two, to average the noise, in a lag of
+# about one
+WINDOW = 2
 LAGS = 20
 SMALL_STEP = 0.1  # of predictions, s
 LARGEST_YAW_RATE = 1.0  # yaw rate at which a form that runs away is held, rad/s
@@ -52,7 +63,10 @@ MEASURES = (
     "lags of its autocorrelation beyond the 95 % bounds, %",
     "lags of its correlation with the rudder beyond them, %",
 )
-ONE_AMPLITUDE = "one zigzag has one steady yaw rate, which gives K and a together but not separately"
+ONE_AMPLITUDE = (
+    "one zigzag has one steady yaw rate, which gives K and a together but not"
+    " separately"
+)
 STAND_IN = "the log is not published: a stand-in, means over 20 logs"
 
 
@@ -82,8 +96,12 @@ TRUTH = Form(K, T)
 
 def ship(speed: float) -> ShipModel:
     """The stand-in."""
-    gear = SteeringGear(rudder_limit_deg=35.0, rudder_rate_deg_s=20.0, time_constant=0.0)
-    return nomoto1_ship(K, T, Particulars(name="small ship", length=5.0, speed=speed), gear)
+    gear = SteeringGear(
+        rudder_limit_deg=35.0, rudder_rate_deg_s=20.0, time_constant=0.0
+    )
+    return nomoto1_ship(
+        K, T, Particulars(name="small ship", length=5.0, speed=speed), gear
+    )
 
 
 @cache
@@ -91,8 +109,12 @@ def log(zigzag_of: tuple[float, float, float], seed: int) -> Trial:
     """A zigzag of the stand-in as logged; that to assess by without outliers."""
     angle, duration, speed = zigzag_of
     gyro = Sensor(**NOISE, **(OUTLIERS if zigzag_of == LEARNED else {}))
-    sensors = Sensors({"r": gyro, "delta": Sensor(resolution=0.1 * DEGREE)}, sampling_s=1.0)
-    return sensors.measure(zigzag(ship(speed), angle, angle, duration=duration, dt=STEP), seed)
+    sensors = Sensors(
+        {"r": gyro, "delta": Sensor(resolution=0.1 * DEGREE)}, sampling_s=1.0
+    )
+    return sensors.measure(
+        zigzag(ship(speed), angle, angle, duration=duration, dt=STEP), seed
+    )
 
 
 def as_printed(trial: Trial, method: str, form: str) -> Form:
@@ -110,7 +132,12 @@ def as_printed(trial: Trial, method: str, form: str) -> Form:
     estimator = LSSVM(C=np.inf, fit_intercept=False) if method == "LS" else TunedLSSVM()
     estimator.fit(np.column_stack(terms)[:-1], np.diff(r) / step)
     damping, gain, *bend = estimator.coef_.tolist()
-    return Form(-gain / damping, -1.0 / damping, bend[0] / damping if bend else 0.0, estimator.intercept_)
+    return Form(
+        -gain / damping,
+        -1.0 / damping,
+        bend[0] / damping if bend else 0.0,
+        estimator.intercept_,
+    )
 
 
 def at_best(trial: Trial, form: str) -> Form:
@@ -136,7 +163,8 @@ def fitted(method: str, form: str) -> tuple[Form, ...]:
     """The forms from all logs by `LS`, `LS-SVR`, or the `best` method here."""
     logs = [log(LEARNED, seed) for seed in SEEDS]
     return tuple(
-        at_best(trial, form) if method == "best" else as_printed(trial, method, form) for trial in logs
+        at_best(trial, form) if method == "best" else as_printed(trial, method, form)
+        for trial in logs
     )
 
 
@@ -148,7 +176,9 @@ def mean(forms: tuple[Form, ...], name: str) -> float:
 def mean_error(forms: tuple[Form, ...], name: str) -> float:
     """Mean error over the logs, without sign, %."""
     truth = getattr(TRUTH, name)
-    return float(100.0 * np.mean([abs(getattr(form, name) / truth - 1.0) for form in forms]))
+    return float(
+        100.0 * np.mean([abs(getattr(form, name) / truth - 1.0) for form in forms])
+    )
 
 
 def residuals(form: Form, trial: Trial) -> Floats:
@@ -158,7 +188,10 @@ def residuals(form: Form, trial: Trial) -> Floats:
     path, now = np.empty(len(times)), float(trial["r"][0])
     for k, delta in enumerate(np.interp(times, trial.t, trial["delta"]).tolist()):
         path[k] = now
-        now = min(max(now + SMALL_STEP * form.rate(now, delta), -LARGEST_YAW_RATE), LARGEST_YAW_RATE)
+        now = min(
+            max(now + SMALL_STEP * form.rate(now, delta), -LARGEST_YAW_RATE),
+            LARGEST_YAW_RATE,
+        )
     return np.asarray(trial["r"] - path[::steps])
 
 
@@ -208,7 +241,8 @@ def robust_rows() -> Iterator[Row]:
     for form, names in {"linear": ("K", "T"), "nonlinear": ("steady",)}.items():
         for name in names:
             plain, theirs, best = (
-                mean_error(fitted(method, form), name) for method in ("LS", "LS-SVR", "best")
+                mean_error(fitted(method, form), name)
+                for method in ("LS", "LS-SVR", "best")
             )
             what = f"{form}: mean error of {quantities[name]}"
             yield Row("Section 7.2.2", f"{what} by LS, %", None, plain, best)
@@ -220,8 +254,8 @@ def robust_rows() -> Iterator[Row]:
                 best,
                 "at most half of LS-SVR's",
                 best <= 0.5 * theirs,
-                "a squared loss does not bound an outlier's influence, whatever its weight; at best the "
-                "weighted LS-SVM after repair",
+                "a squared loss does not bound an outlier's influence, whatever its"
+                " weight; at best the weighted LS-SVM after repair",
             )
 
 
@@ -248,8 +282,15 @@ def figure_rows() -> Iterator[Row]:
                     None,
                     value,
                     best[quantity],
-                    note="the thesis shows a picture; the coloured noise of the log is in all of them"
-                    + ("" if form == "linear" else "; some forms of a < 0 run away at 30 deg"),
+                    note=(
+                        "the thesis shows a picture; the coloured noise of the log is"
+                        " in all of them"
+                    )
+                    + (
+                        ""
+                        if form == "linear"
+                        else "; some forms of a < 0 run away at 30 deg"
+                    ),
                 )
 
 

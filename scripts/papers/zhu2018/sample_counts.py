@@ -1,7 +1,7 @@
 """Section 7.4.7: time, error of prediction and coefficients against the number of samples.
 
-Surge as in section 7.4.2, sway and yaw with the four terms that section 7.4.6 chooses, from the first so many
-samples of the same trials.
+Surge as in section 7.4.2, sway and yaw with the four terms that section 7.4.6 chooses,
+from the first so many samples of the same trials.
 """
 
 from __future__ import annotations
@@ -46,27 +46,40 @@ from papers.zhu2018.steering_forms import CHOSEN, MOST_C, structure_of
 
 Floats = NDArray[np.float64]
 
-COUNTS: tuple[int, ...] = (*range(30, 700, 20), *range(700, 1801, 100))  # the thesis goes on in steps of 10
+COUNTS: tuple[int, ...] = (
+    *range(30, 700, 20),
+    *range(700, 1801, 100),
+)  # the thesis goes on in steps of 10
 SUFFICE = {"u": 350, "v": 630, "r": 230}
 SHOWN = (230, 350, 630, 1200, 1800)  # of the curves, in the table
-#: Mean squared errors of the thesis with all samples: ABC of Table 7.4.4, row 6 of Tables 7.4.9 and 7.4.10.
+#: Mean squared errors of the thesis with all samples: ABC of Table 7.4.4, row 6 of
+#: Tables 7.4.9 and 7.4.10.
 WITH_ALL = {"u": 0.1289, "v": 0.0472, "r": 0.0162}
 SETTLED = 0.1  # deviation from the value with all samples that counts as none, relative
-TIMED = (18_000, 180_000)  # samples of which the growth of the time is seen; below, other things cost more
+TIMED = (
+    18_000,
+    180_000,
+)  # samples of which the growth of the time is seen; below, other things cost more
 REPEATS, FINE_REPEATS = 5, 100
 
 
 def fits_of(count: int, method: str) -> dict[str, Difference]:
     """The three equations from the first samples by one of the thesis' methods."""
-    line, turns = first_samples(straight_line("learned"), count), first_samples(zigzag_trial(10), count)
+    line, turns = (
+        first_samples(straight_line("learned"), count),
+        first_samples(zigzag_trial(10), count),
+    )
     structure = structure_of(CHOSEN)
     return {"u": surge_fit(line, search(method, "u"))} | {
-        q: steering_fit(turns, q, search(method, q, MOST_C[q]), structure, change=True) for q in MOST_C
+        q: steering_fit(turns, q, search(method, q, MOST_C[q]), structure, change=True)
+        for q in MOST_C
     }
 
 
 @cache
-def learned(count: int, method: str = "ABC") -> tuple[dict[str, float], dict[str, list[float]]]:
+def learned(
+    count: int, method: str = "ABC"
+) -> tuple[dict[str, float], dict[str, list[float]]]:
     """Mean squared errors of prediction, and coefficients, by equation: points of Figures 7.4.9 to 7.4.13."""
     line, turns = straight_line("verified"), zigzag_trial(20)
     fits = fits_of(count, method)
@@ -75,7 +88,9 @@ def learned(count: int, method: str = "ABC") -> tuple[dict[str, float], dict[str
     coefficients = {"u": fits["u"].gains}
     for q in MOST_C:
         errors[q] = mean_square(steered, turns, q)
-        coefficients[q] = [fits[q].gains[k] for k in term_columns(structure_of(CHOSEN), q)]
+        coefficients[q] = [
+            fits[q].gains[k] for k in term_columns(structure_of(CHOSEN), q)
+        ]
     return errors, coefficients
 
 
@@ -84,8 +99,12 @@ def learned_best(count: int) -> dict[str, float]:
     """The same errors by least squares on spline samples, with the instantaneous speed in sway and yaw."""
     line, turns = straight_line("verified"), zigzag_trial(20)
     columns = {"u": SURGE_IN_TURNS, "v": FOUR_WITH_SPEED, "r": FOUR_WITH_SPEED}
-    alone = spline_fit(first_samples(straight_line("learned"), count), ship(), {"u": SURGE_ALONE})
-    sailed = predict(spline_fit(first_samples(zigzag_trial(10), count), ship(), columns), turns)
+    alone = spline_fit(
+        first_samples(straight_line("learned"), count), ship(), {"u": SURGE_ALONE}
+    )
+    sailed = predict(
+        spline_fit(first_samples(zigzag_trial(10), count), ship(), columns), turns
+    )
     errors = {q: mean_square(sailed, turns, q) for q in MOST_C}
     return {"u": mean_square(predict(alone, line), line, "u")} | errors
 
@@ -104,7 +123,9 @@ def settled_from(values: Floats) -> int:
     return COUNTS[last]
 
 
-def seconds(count: int, method: str, objective: str | None = None, repeats: int = REPEATS) -> float:
+def seconds(
+    count: int, method: str, objective: str | None = None, repeats: int = REPEATS
+) -> float:
     """Processor time of the search for C of the chosen yaw model, s, the least of some.
 
     Parameters
@@ -156,8 +177,8 @@ def time_rows() -> Iterator[Row]:
             power,
             "at most 1.1",
             power < 1.1,
-            f"printed: O(N^2 + N^3), section 5.2.3; at best: from {TIMED[0]} to {TIMED[1]} samples, "
-            f"{1e3 * few:.0f} to {1e3 * many:.0f} ms",
+            f"printed: O(N^2 + N^3), section 5.2.3; at best: from {TIMED[0]} to"
+            f" {TIMED[1]} samples, {1e3 * few:.0f} to {1e3 * many:.0f} ms",
         )
 
 
@@ -165,7 +186,9 @@ def count_rows() -> Iterator[Row]:
     """Section 7.4.7: how many samples suffice."""
     for q, printed in SUFFICE.items():
         ours = enough(np.array([learned(count)[0][q] for count in COUNTS]), WITH_ALL[q])
-        best = enough(np.array([learned_best(count)[q] for count in COUNTS]), WITH_ALL[q])
+        best = enough(
+            np.array([learned_best(count)[q] for count in COUNTS]), WITH_ALL[q]
+        )
         yield Row(
             "Section 7.4.7",
             f"{EQUATIONS[q]}: samples that suffice",
@@ -174,14 +197,15 @@ def count_rows() -> Iterator[Row]:
             best,
             f"at most {printed}",
             best is not None and best <= printed,
-            "the thesis assesses its curves by eye; here those from which on the error of prediction keeps "
-            f"below its own with all samples, {WITH_ALL[q]:g} {UNITS[q]}"
-            + (f"; {OTHER_TERMS}" if q in MOST_C else ""),
+            "the thesis assesses its curves by eye; here those from which on the error"
+            f" of prediction keeps below its own with all samples, {WITH_ALL[q]:g}"
+            f" {UNITS[q]}" + (f"; {OTHER_TERMS}" if q in MOST_C else ""),
         )
     for q in SUFFICE:
         yield Row(
             "Figures 7.4.11 to 7.4.13",
-            f"{EQUATIONS[q]}: samples from which on no coefficient is 10 % off its last value",
+            f"{EQUATIONS[q]}: samples from which on no coefficient is 10 % off its last"
+            " value",
             SUFFICE["u"] if q == "u" else None,
             settled_from(np.array([learned(count)[1][q] for count in COUNTS])),
             None,
@@ -193,10 +217,14 @@ def curve_rows() -> Iterator[Row]:
     """Figures 7.4.9 and 7.4.10: points of the curves."""
     for q in SUFFICE:
         for count in SHOWN:
-            others = ", ".join(f"{method} {learned(count, method)[0][q]:.3g}" for method in ("CV", "PSO"))
+            others = ", ".join(
+                f"{method} {learned(count, method)[0][q]:.3g}"
+                for method in ("CV", "PSO")
+            )
             yield Row(
                 "Figure 7.4.9" if q == "u" else "Figure 7.4.10",
-                f"{EQUATIONS[q]}: mean squared error of prediction from {count} samples, {UNITS[q]}",
+                f"{EQUATIONS[q]}: mean squared error of prediction from {count}"
+                f" samples, {UNITS[q]}",
                 None,
                 learned(count)[0][q],
                 learned_best(count)[q],

@@ -1,9 +1,10 @@
 """Section 7.5: the I-Nav-II vessel, 4.15 m, by four terms in sway and yaw.
 
-Her records are not published. In their place sails the printed model, which is complete, at 3 m/s, and her
-sensors log position, heading, yaw rate and rudder once a second. As in the thesis, sway is the derivative of
-the positions, with a median filter over it. Where the thesis has one record to learn from, here are five, and
-the rows hold means over them.
+Her records are not published. In their place sails the printed model, which is
+complete, at 3 m/s, and her sensors log position, heading, yaw rate and rudder once a
+second. As in the thesis, sway is the derivative of the positions, with a median filter
+over it. Where the thesis has one record to learn from, here are five, and the rows hold
+means over them.
 """
 
 from __future__ import annotations
@@ -17,7 +18,14 @@ from scipy.ndimage import median_filter
 from identification.pipeline import identify
 from identification.validation.prediction import predict
 from papers.row import Row
-from papers.zhu2018.fits import Difference, every, mean_square, search, steer, steering_fit
+from papers.zhu2018.fits import (
+    Difference,
+    every,
+    mean_square,
+    search,
+    steer,
+    steering_fit,
+)
 from papers.zhu2018.steering_forms import MOST_C
 from shipgym.manoeuvres import zigzag
 from shipgym.ships import ShipModel
@@ -28,9 +36,15 @@ from shipgym.trials.trial import Trial
 
 STRUCTURE = "steering5"
 COEFFICIENTS = {
-    "b_v": -0.5706, "b_r": -1.1529, "b_|v|r": 1.4889, "b_d": -0.0775,
-    "c_v": -0.1386, "c_r": -0.5113, "c_|v|r": -1.4883, "c_d": 0.2839,
-}  # fmt: skip
+    "b_v": -0.5706,
+    "b_r": -1.1529,
+    "b_|v|r": 1.4889,
+    "b_d": -0.0775,
+    "c_v": -0.1386,
+    "c_r": -0.5113,
+    "c_|v|r": -1.4883,
+    "c_d": 0.2839,
+}
 LENGTH, SPEED = 4.15, 3.0
 LEARNED, ASSESSED = 10.0, (20.0, 25.0)  # angles of the zigzags, deg
 SAMPLES = 142
@@ -38,7 +52,8 @@ STEP, INTERVAL = 0.05, 1.0  # of the simulation and of the record, s
 SEEDS = range(5)
 FILTER = 3  # samples of the median filter
 DEGREE = np.pi / 180.0
-#: A satellite receiver of this class knows the position to centimetres; the thesis does not tell its noise.
+#: A satellite receiver of this class knows the position to centimetres; the thesis does
+#: not tell its noise.
 SENSORS = Sensors(
     {
         "x": Sensor(noise=0.02),
@@ -49,7 +64,12 @@ SENSORS = Sensors(
     },
     sampling_s=INTERVAL,
 )
-PRINTED = {("v", 20.0): 0.0035, ("v", 25.0): 0.0017, ("r", 20.0): 3.6220, ("r", 25.0): 3.9294}
+PRINTED = {
+    ("v", 20.0): 0.0035,
+    ("v", 25.0): 0.0017,
+    ("r", 20.0): 3.6220,
+    ("r", 25.0): 3.9294,
+}
 EQUATIONS = {"v": ("sway", "m2/s2"), "r": ("yaw", "deg2/s2")}
 
 
@@ -67,24 +87,35 @@ def ship() -> ShipModel:
 @cache
 def sailed(angle_deg: float) -> Trial:
     """A zigzag without noise, of as many seconds as the thesis has samples."""
-    return zigzag(ship(), angle_deg, angle_deg, duration=(SAMPLES - 1) * INTERVAL, dt=STEP)
+    return zigzag(
+        ship(), angle_deg, angle_deg, duration=(SAMPLES - 1) * INTERVAL, dt=STEP
+    )
 
 
 @cache
 def record(seed: int) -> Trial:
     """The zigzag to learn from, with speeds from its positions."""
     log = SENSORS.measure(sailed(LEARNED), seed)
-    north, east, psi = np.gradient(log["x"], log.t), np.gradient(log["y"], log.t), log["psi"]
+    north, east, psi = (
+        np.gradient(log["x"], log.t),
+        np.gradient(log["y"], log.t),
+        log["psi"],
+    )
     speeds = {
         "u": median_filter(north * np.cos(psi) + east * np.sin(psi), FILTER),
         "v": median_filter(east * np.cos(psi) - north * np.sin(psi), FILTER),
     }
-    return Trial(log.t, dict(log.channels) | speeds, name=log.name, kind=log.kind, length=LENGTH)
+    return Trial(
+        log.t, dict(log.channels) | speeds, name=log.name, kind=log.kind, length=LENGTH
+    )
 
 
 def as_printed(trial: Trial) -> dict[str, Difference]:
     """Sway and yaw by ABC-LSSVR on Euler samples."""
-    return {q: steering_fit(trial, q, search("ABC", q, MOST_C[q]), STRUCTURE, change=True) for q in MOST_C}
+    return {
+        q: steering_fit(trial, q, search("ABC", q, MOST_C[q]), STRUCTURE, change=True)
+        for q in MOST_C
+    }
 
 
 def at_best(trial: Trial) -> ShipModel:
@@ -109,8 +140,13 @@ def errors() -> tuple[dict[tuple[str, float], float], dict[tuple[str, float], fl
     for seed in SEEDS:
         fits, model = as_printed(record(seed)), at_best(record(seed))
         for angle in ASSESSED:
-            truth = every(sailed(angle), round(INTERVAL / STEP), f"zigzag {angle:g}/{angle:g}")
-            stepped, simulated = steer(fits["v"], fits["r"], truth), predict(model, sailed(angle))
+            truth = every(
+                sailed(angle), round(INTERVAL / STEP), f"zigzag {angle:g}/{angle:g}"
+            )
+            stepped, simulated = (
+                steer(fits["v"], fits["r"], truth),
+                predict(model, sailed(angle)),
+            )
             for q in EQUATIONS:
                 ours[q, angle].append(mean_square(stepped, truth, q))
                 best[q, angle].append(mean_square(simulated, sailed(angle), q))
@@ -133,6 +169,7 @@ def rows() -> Iterator[Row]:
             best[q, angle],
             f"below {printed:g}",
             best[q, angle] < printed,
-            "her records are not published: the printed model with noise is used instead, which the terms "
-            "fit exactly, unlike a real ship; at best by simulation of the whole record",
+            "her records are not published: the printed model with noise is used"
+            " instead, which the terms fit exactly, unlike a real ship; at best by"
+            " simulation of the whole record",
         )

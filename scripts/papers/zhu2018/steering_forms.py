@@ -1,7 +1,8 @@
 """Sections 7.4.5 and 7.4.6: Nomoto's forms and ten reduced steering models of the container ship.
 
-All learn from the 10/10 zigzag and predict the 20/20. The reduced forms are fits of the change of v and r
-over a step, since some of them have no linear term that could carry the state on.
+All learn from the 10/10 zigzag and predict the 20/20. The reduced forms are fits of the
+change of v and r over a step, since some of them have no linear term that could carry
+the state on.
 """
 
 from __future__ import annotations
@@ -43,17 +44,38 @@ TABLES = {"v": "7.4.9", "r": "7.4.10"}
 EQUATIONS = {"v": "sway", "r": "yaw"}
 UNITS = {"v": "m2/s2", "r": "deg2/s2"}
 CHOSEN = 6  # row of the tables that the thesis chooses
-#: Upper bounds of the search for C; not printed, and not those of Table 7.4.4: with 20 for yaw the
-#: coefficients come out a hundredth of those printed, with this they come nearest to them.
+#: Upper bounds of the search for C; not printed, and not those of Table 7.4.4: with 20
+#: for yaw the coefficients come out a hundredth of those printed, with this they come
+#: nearest to them.
 MOST_C = {"v": 1e10, "r": 2e3}
 #: Mean squared errors of Tables 7.4.9 and 7.4.10; rows 1 and 4 are not numbers.
 PRINTED_MSE = {
-    "v": {2: 0.0604, 3: 0.0495, 5: 0.0472, 6: 0.0472, 7: 0.0411, 8: 0.0413, 9: 0.0462, 10: 0.0730},
-    "r": {2: 0.0688, 3: 0.0646, 5: 0.0169, 6: 0.0162, 7: 0.0684, 8: 0.1346, 9: 0.0407, 10: 0.0447},
+    "v": {
+        2: 0.0604,
+        3: 0.0495,
+        5: 0.0472,
+        6: 0.0472,
+        7: 0.0411,
+        8: 0.0413,
+        9: 0.0462,
+        10: 0.0730,
+    },
+    "r": {
+        2: 0.0688,
+        3: 0.0646,
+        5: 0.0169,
+        6: 0.0162,
+        7: 0.0684,
+        8: 0.1346,
+        9: 0.0407,
+        10: 0.0447,
+    },
 }
-#: Coefficients of the tables by row, in the order of their columns v, r, |v|v, rv, |v|r, |r|r, delta.
+#: Coefficients of the tables by row, in the order of their columns v, r, |v|v, rv,
+#: |v|r, |r|r, delta.
 PRINTED = {
-    "v": """
+    "v": (
+        """
         1 |v|v 0.0264 |r|v -10.102 |v|r -0.8184 |r|r -704.84 delta -0.0769
         2 v -0.0419 r -3.3219 |v|v -0.0280 |r|r -105.78 delta -0.0542
         3 v -0.0400 r -3.5520 |v|v -0.0338 |v|r -1.2368 delta -0.0568
@@ -63,8 +85,10 @@ PRINTED = {
         7 v -0.0532 r -3.6720 delta -0.0606
         8 v -0.0025 |v|v -0.0183 delta -0.1153
         9 r -3.6746 |v|v -0.0184 delta -0.0610
-        10 v -0.0094 |r|v -0.6068 delta -0.1179""",
-    "r": """
+        10 v -0.0094 |r|v -0.6068 delta -0.1179"""
+    ),
+    "r": (
+        """
         1 |v|v -0.0300 |r|v -0.0026 |v|r 0.0015 |r|r 0.0004 delta 0.0300
         2 v -0.0007 r -0.0799 |v|v 0.0007 |r|r 2.4079 delta 0.0026
         3 v -0.0007 r -0.0738 |v|v 0.0008 |v|r 0.0198 delta 0.0027
@@ -74,16 +98,17 @@ PRINTED = {
         7 v -0.0004 r -0.0720 delta 0.0028
         8 r -0.0436 |r|r 0.6847 delta 0.0023
         9 v -0.0004 |v|v -0.4861 delta 0.0028
-        10 r -0.0335 |r|v 0.0069 delta 0.0022""",
+        10 r -0.0335 |r|v 0.0069 delta 0.0022"""
+    ),
 }
 ORDER = ("v", "|v|v", "|r|v", "r", "|v|r", "|r|r", "delta")  # of equation 7.1
 SPEED_NOTE = (
-    f"{OTHER_TERMS}. The terms as printed keep the speed at 8 m/s, while the 20/20 falls to 6 m/s, which no "
-    "zigzag of 10/10 can teach them"
+    f"{OTHER_TERMS}. The terms as printed keep the speed at 8 m/s, while the 20/20"
+    " falls to 6 m/s, which no zigzag of 10/10 can teach them"
 )
 LIMIT_NOTE = (
-    "the thesis does not say which limit it used; its 20/20 may have been steered with 10 deg; at best with "
-    "v^2 r/U in place of |v| r"
+    "the thesis does not say which limit it used; its 20/20 may have been steered with"
+    " 10 deg; at best with v^2 r/U in place of |v| r"
 )
 INCONSISTENT = "not a number in the thesis; without a linear damping term"
 
@@ -115,14 +140,19 @@ def as_printed(row: int, rudder_limit_deg: float = 35.0) -> dict[str, Difference
     """Sway and yaw of a row by LS-SVR, its C by ABC on the training error."""
     trial = zigzag_trial(10, rudder_limit_deg)
     return {
-        q: steering_fit(trial, q, search("ABC", q, MOST_C[q]), structure_of(row), change=True) for q in PREFIX
+        q: steering_fit(
+            trial, q, search("ABC", q, MOST_C[q]), structure_of(row), change=True
+        )
+        for q in PREFIX
     }
 
 
 @cache
 def at_best(row: int, angle_deg: float = 10.0) -> ShipModel:
     """The terms of a row with the instantaneous speed, by least squares on spline samples of a zigzag."""
-    columns: dict[str, Sequence[int]] = {q: term_columns(structure_of(row), q) for q in PREFIX}
+    columns: dict[str, Sequence[int]] = {
+        q: term_columns(structure_of(row), q) for q in PREFIX
+    }
     return spline_fit(zigzag_trial(angle_deg), ship(), {"u": SURGE_IN_TURNS, **columns})
 
 
@@ -152,7 +182,9 @@ def nomoto(cubic: bool, estimator: str) -> NomotoFit:
     """
     trial, turns = zigzag_trial(10), zigzag_trial(20)
     r = trial["r"]
-    terms = np.column_stack([r, r**3, trial["delta"]] if cubic else [r, trial["delta"]])[:-1]
+    terms = np.column_stack(
+        [r, r**3, trial["delta"]] if cubic else [r, trial["delta"]]
+    )[:-1]
     fit = search("ABC", "r", MOST_C["r"]) if estimator == "ABC" else LSSVM(C=np.inf)
     fit.fit(terms, np.diff(r))
     damping, *bend, gain = fit.coef_.tolist()
@@ -163,16 +195,25 @@ def nomoto(cubic: bool, estimator: str) -> NomotoFit:
         path[k] = now
         now += damping * now + cube * now**3 + gain * delta + fit.intercept_
     return NomotoFit(
-        -gain / damping, -INTERVAL / damping, cube / damping, mean_square({"r": path}, turns, "r")
+        -gain / damping,
+        -INTERVAL / damping,
+        cube / damping,
+        mean_square({"r": path}, turns, "r"),
     )
 
 
 def nomoto_rows() -> Iterator[Row]:
     """Table 7.4.8."""
     least = best_errors()["r"]
-    printed = {"linear": (0.031, 30.2487, 0.0548), "nonlinear": (0.031, 30.2487, 0.0548)}
+    printed = {
+        "linear": (0.031, 30.2487, 0.0548),
+        "nonlinear": (0.031, 30.2487, 0.0548),
+    }
     for name, (gain, lag, error) in printed.items():
-        ours, best = (nomoto(name == "nonlinear", estimator) for estimator in ("ABC", "least squares"))
+        ours, best = (
+            nomoto(name == "nonlinear", estimator)
+            for estimator in ("ABC", "least squares")
+        )
         yield Row("Table 7.4.8", f"{name} Nomoto: K, 1/s", gain, ours.K, best.K)
         yield Row("Table 7.4.8", f"{name} Nomoto: T, s", lag, ours.T, best.T)
         if name == "nonlinear":
@@ -182,7 +223,10 @@ def nomoto_rows() -> Iterator[Row]:
                 7.0853,
                 ours.n3 / 1e-11,
                 best.n3 / 1e-11,
-                note="printed as no effect at all: on its own scale r^3 is held at zero by the penalty",
+                note=(
+                    "printed as no effect at all: on its own scale r^3 is held at zero"
+                    " by the penalty"
+                ),
             )
         yield Row(
             "Table 7.4.8",
@@ -192,8 +236,8 @@ def nomoto_rows() -> Iterator[Row]:
             least,
             f"below {error:g}",
             least < error,
-            f"{OTHER_TERMS}; the best Nomoto form from the 10/10 reaches {best.error:.3g}: it knows neither "
-            "sway nor the loss of speed",
+            f"{OTHER_TERMS}; the best Nomoto form from the 10/10 reaches"
+            f" {best.error:.3g}: it knows neither sway nor the loss of speed",
         )
 
 
@@ -222,15 +266,21 @@ def error_rows() -> Iterator[Row]:
         for row in range(1, 11):
             printed, value = PRINTED_MSE[q].get(row), best[row][q]
             met = None if printed is None else value < printed
-            note = INCONSISTENT if printed is None else "at best: its terms with the instantaneous speed"
+            note = (
+                INCONSISTENT
+                if printed is None
+                else "at best: its terms with the instantaneous speed"
+            )
             if met is False:
                 reached = sailed_errors(at_best(row, 20.0), turns)[q]
                 note += (
-                    f"; the limit is what a 10/10 teaches these terms: the 20/20 itself gives {reached:.3g}"
+                    "; the limit is what a 10/10 teaches these terms: the 20/20 itself"
+                    f" gives {reached:.3g}"
                 )
             yield Row(
                 f"Table {TABLES[q]}",
-                f"row {row}: mean squared error of the 20/20, {EQUATIONS[q]}, {UNITS[q]}",
+                f"row {row}: mean squared error of the 20/20, {EQUATIONS[q]},"
+                f" {UNITS[q]}",
                 printed,
                 ours[row][q],
                 value,
@@ -243,13 +293,25 @@ def error_rows() -> Iterator[Row]:
 def chosen_rows() -> Iterator[Row]:
     """Section 7.4.6: the pair that the thesis chooses, its |v| r replaced, and either rudder limit."""
     cases = (
-        (35.0, "chosen model", "at best: its terms with the instantaneous speed", False),
+        (
+            35.0,
+            "chosen model",
+            "at best: its terms with the instantaneous speed",
+            False,
+        ),
         (35.0, "v^2 r/U in place of |v| r", SPEED_NOTE, True),
-        (TOOLBOX_LIMIT, "chosen model, the toolbox's rudder limit of 10 deg", LIMIT_NOTE, True),
+        (
+            TOOLBOX_LIMIT,
+            "chosen model, the toolbox's rudder limit of 10 deg",
+            LIMIT_NOTE,
+            True,
+        ),
     )
     for limit, what, note, replaced in cases:
         turns, ours = zigzag_trial(20, limit), stepped_errors(CHOSEN, limit)
-        best = sailed_errors(best_steering(limit) if replaced else at_best(CHOSEN), turns)
+        best = sailed_errors(
+            best_steering(limit) if replaced else at_best(CHOSEN), turns
+        )
         for q in PREFIX:
             yield Row(
                 "Section 7.4.6",
