@@ -49,14 +49,12 @@ from shipgym.errors import InputError  # noqa: E402
 from shipgym.manoeuvres import turning_circle, zigzag  # noqa: E402
 from shipgym.sea.conditions import Current, Weather, Wind  # noqa: E402
 from shipgym.tasks.task import course_keeping_task  # noqa: E402
+from shipgym.trials.conventions import Conventions  # noqa: E402
 from shipgym.trials.identify_table import Options  # noqa: E402
+from shipgym.trials.midship import to_project_conventions  # noqa: E402
 from shipgym.trials.resampling import Log  # noqa: E402
 from shipgym.trials.sensors import GNSS, Sensor, Sensors  # noqa: E402
 from shipgym.trials.ship_file import ShipFile  # noqa: E402
-from shipgym.trials.trial_import import (  # noqa: E402
-    Conventions,
-    to_project_conventions,
-)
 
 CURRENT, WIND = 0.5, 9.0  # m/s
 UNSEEN = "turn 25 port"

@@ -63,10 +63,10 @@ def new_ship_command(
             read.append(guess_trial(log))
         except InputError as error:
             warn(str(error))
-    guesses, _, trial, unused = read[0]
+    guesses, trial, unused = read[0].columns, read[0].trial, read[0].unused
     # one log with another convention is enough: the usual one is also what a log says
     # that does not tell
-    found = {name: value for one in read for name, value in one.conventions.items()}
+    found = {one.name: one.value for log in read for one in log.conventions}
     side = found.pop("rudder_positive", "starboard")
     known = [
         [one.trial[name] for name in ("u", "stw", "sog") if name in one.trial.channels]

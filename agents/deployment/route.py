@@ -11,8 +11,8 @@ from shipgym.arrays import Floats
 from shipgym.checks import check_number, placed
 from shipgym.tasks.guidance import Path
 from shipgym.tasks.path_following import fix, leg_from, next_turn, turned_off
-from shipgym.trials.csv_reader import read_table
 from shipgym.trials.navigation import local_metres
+from shipgym.trials.readers.csv_file import read_csv
 
 COLUMNS = ("latitude", "longitude")
 FURTHEST_M = 100e3  # of a waypoint from the first one: the route is laid on a plane
@@ -63,15 +63,15 @@ class Route:
     @classmethod
     def from_csv(cls, path: str | File, radius: float) -> Self:
         """Read waypoints in degrees from the columns `latitude` and `longitude`; InputError names the row."""
-        table, limits = read_table(path), (89.0, 180.0)
+        table, limits = read_csv(path), (89.0, 180.0)
         columns = [table.numbers(name) for name in COLUMNS]
         for name, values, most in zip(COLUMNS, columns, limits, strict=True):
             for row, value in enumerate(values.tolist()):
                 where = f"{path}: {table.place(row)}, column '{name}'"
                 check_number(value, where, at_least=-most, at_most=most, hint="degrees")
-        if len(table.lines) < 2:
+        if len(table.rows) < 2:
             raise InputError(
-                f"{path}: {len(table.lines)} waypoints found, expected at least 2"
+                f"{path}: {len(table.rows)} waypoints found, expected at least 2"
             )
         with placed(str(path)):
             return cls(np.column_stack(columns), radius)

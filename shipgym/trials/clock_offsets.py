@@ -8,47 +8,62 @@ the rest of it follows from yaw rate, sway and their history.
 
 import math
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
 from shipgym.arrays import Floats, integral
-from shipgym.errors import InputError
-from shipgym.trials.derivatives import time_derivative
-from shipgym.trials.resampling import Log, Series
+from shipgym.trials.resampling import usual_step
 
-#: Delays that are looked for, s, and the significance, in standard errors, from which
-#: one is corrected.
-LONGEST_S, SIGNIFICANT = 10.0, 2.5
-#: By how much ships of other dynamics seem late, s, which the standard errors contain.
-DYNAMICS_S = {"r": 0.25, "delta": 1.0}
-#: Delays of channels on one clock that are refused, s.
-REFUSED_S = {"r": 1.0, "delta": 2.0}
-_WORDS = {
-    "r": ("the yaw rate", "the heading"),
-    "delta": ("the rudder", "the yaw acceleration"),
-}
-_LEAST_RUDDER = math.radians(2.0)
-_WINDOW_S, _FEWEST, _MOST = 5.0, 60, 200_000
-_MEMORIES_S = (20.0, 80.0)
-_LEAST_DIRECTION = 0.02  # of what explains the change beside the channel
-_SURE = 5.0  # standard errors by which the channel must tell on the other
-_HARD_OVER, _TURNED = math.radians(8.0), math.radians(60.0)
-_OTHER_SIGN = (
-    "with the opposite sign, expected a positive rudder to turn the bow to starboard;"
-    ' write rudder_positive = "port" in [conventions], or take it out if it stands'
-    " there"
-)
-_OTHER_SIDE = (("rudder_positive", "port"),)
+LONGEST_DELAY_S = 10.0  # that is looked for
+DELAY_STEP_S = 0.25
+WINDOW_S = 5.0
+FEWEST_WINDOWS, MOST_WINDOWS = 60, 200_000
+MEMORIES_S = (20.0, 80.0)  # of rudder and yaw rate, by which the ship's history counts
+LEAST_DIRECTION = 0.02  # of what explains the change with the channel; less is rounding
+_TINY = 1e-300
 
 
 class ClockOffset(NamedTuple):
-    """How late a channel is, s, with its standard error, and what it tells there."""
+    """How late a channel is, and what it explains of another."""
 
-    late: float
-    error: float
+    late: float  # s
+    error: float  # standard error, s
     gain: float
-    sure: float  # the gain in standard errors
+    certainty: float  # the gain in standard errors
+
+
+@dataclass(frozen=True)
+class _Windows:
+    """Windows of time in which channels are compared."""
+
+    t: Floats  # of the samples, s
+    centres: Floats
+    half: float  # of a window, s
+
+    def slope(self, values: Floats, delay: float = 0.0) -> Floats:
+        """Mean slope of sampled values over each window, that many seconds later."""
+        middle = self.centres + delay
+        begin = np.interp(middle - self.half, self.t, values)
+        end = np.interp(middle + self.half, self.t, values)
+        slope: Floats = (end - begin) / (2.0 * self.half)
+        return slope
+
+
+class _Fit(NamedTuple):
+    """Least squares of a change by one regressor."""
+
+    gain: float
+    residual: Floats
+    squares: float  # of the residual
+
+
+class _Minimum(NamedTuple):
+    """Least value of a parabola through three neighbours."""
+
+    place: float  # in steps from the first value
+    curvature: float
 
 
 def clock_offset(
@@ -56,167 +71,130 @@ def clock_offset(
 ) -> ClockOffset | None:
     """How late a channel is against the change of a target; None where nothing can be said.
 
-    `target` is differentiated over windows of time, s; `others` are what explains it
-    beside the channel.
+    Parameters
+    ----------
+    t : ndarray of shape (n_samples,)
+        Time, s.
+    target : ndarray of shape (n_samples,)
+        Differentiated over windows of time.
+    late : ndarray of shape (n_samples,)
+        The channel.
+    others : mapping of str to ndarray of shape (n_samples,)
+        What explains the change of the target together with the channel.
     """
-    step = max(float(np.median(np.diff(t))), 0.5)
-    first, last = (
-        float(t[0]) + LONGEST_S + _WINDOW_S,
-        float(t[-1]) - LONGEST_S - _WINDOW_S,
-    )
-    if not _FEWEST < (last - first) / step < _MOST:
+    windows = _windows(t)
+    if windows is None:
         return None
-    grid = np.arange(first, last, step)
-    half = 0.5 * max(_WINDOW_S, 2.0 * step)
-    change = (np.interp(grid + half, t, target) - np.interp(grid - half, t, target)) / (
-        2.0 * half
-    )
-    sums = {name: integral(t, values) for name, values in (*others.items(), ("", late))}
+    known = _known_directions(windows, others)
+    change = _unexplained(windows.slope(target), known)
+    channel = integral(t, late)
 
-    def mean(name: str, delay: float = 0.0) -> Floats:
-        ends = (
-            np.interp(grid + delay + sign * half, t, sums[name]) for sign in (1.0, -1.0)
-        )
-        return np.asarray(np.subtract(*ends) / (2.0 * half))
+    def fit(delay: float) -> _Fit:
+        regressor = _unexplained(windows.slope(channel, delay), known)
+        return _fit(change, regressor)
 
-    known = np.column_stack([np.ones(grid.size), *(mean(name) for name in others)])
-    basis, sizes, _ = np.linalg.svd(
-        known / np.linalg.norm(known, axis=0), full_matrices=False
-    )
-    basis = basis[:, sizes > _LEAST_DIRECTION]
-    change = change - basis @ (basis.T @ change)
+    delays = np.arange(-LONGEST_DELAY_S, LONGEST_DELAY_S + 0.1, DELAY_STEP_S)
+    squares = [fit(delay).squares for delay in delays]
+    minimum = _minimum(squares)
     power = float(change @ change)
-
-    def fitted(delay: float) -> tuple[float, float, Floats]:
-        column = mean("", delay)
-        column = column - basis @ (basis.T @ column)
-        gain = float(column @ change) / max(float(column @ column), 1e-300)
-        left = change - gain * column
-        return max(float(left @ left), 1e-300), gain, left
-
-    delays = np.arange(-LONGEST_S, LONGEST_S + 0.1, 0.25)
-    errors = np.array([fitted(delay)[0] for delay in delays])
-    k = int(np.argmin(errors))
-    curve = (
-        errors[k - 1] - 2.0 * errors[k] + errors[k + 1]
-        if 0 < k < delays.size - 1
-        else 0.0
-    )
-    if curve <= 1e-12 * power:
+    if minimum is None or minimum.curvature <= 1e-12 * power:
         return None
-    best = float(delays[k] + 0.25 * 0.5 * (errors[k - 1] - errors[k + 1]) / curve)
-    least, gain, left = fitted(best)
-    memory = max(float(left[1:] @ left[:-1]) / least, 0.0)
-    free = max(grid.size * (1.0 - memory) / (1.0 + memory), 2.0)
-    error = math.sqrt(2.0 * least / free / (curve / 0.25**2))
-    return ClockOffset(
-        best, error, gain, math.sqrt(free * max(power / least - 1.0, 0.0))
-    )
+
+    delay = DELAY_STEP_S * minimum.place - LONGEST_DELAY_S
+    best = fit(delay)
+    free = _independent_samples(best)
+    curvature = minimum.curvature / DELAY_STEP_S**2
+    error = math.sqrt(2.0 * best.squares / free / curvature)
+    explained = max(power / best.squares - 1.0, 0.0)
+    return ClockOffset(delay, error, best.gain, math.sqrt(free * explained))
 
 
-def rudder_offset(t: Floats, r: Floats, delta: Floats) -> ClockOffset | None:
-    """How late the rudder is against the yaw acceleration, beside yaw rate and the history of both."""
-    from scipy.signal import lfilter
+def _windows(t: Floats) -> _Windows | None:
+    """Windows a sample apart, within the record however late a channel is; None of too few or many."""
+    step = max(usual_step(t), 0.5)
+    first = t[0] + LONGEST_DELAY_S + WINDOW_S
+    last = t[-1] - LONGEST_DELAY_S - WINDOW_S
+    count = (last - first) / step
+    if not FEWEST_WINDOWS < count < MOST_WINDOWS:
+        return None
+    centres = np.arange(first, last, step)
+    return _Windows(t, centres, max(0.5 * WINDOW_S, step))
 
-    grid = np.linspace(t[0], t[-1], t.size)
+
+def _known_directions(windows: _Windows, others: Mapping[str, Floats]) -> Floats:
+    """Orthonormal basis of what a constant and other channels explain, shape (n_windows, n)."""
+    columns = [np.ones(windows.centres.size)]
+    for values in others.values():
+        total = integral(windows.t, values)
+        columns.append(windows.slope(total))
+    directions = np.column_stack(columns)
+    directions /= np.linalg.norm(directions, axis=0)
+    basis, sizes, _ = np.linalg.svd(directions, full_matrices=False)
+    kept: Floats = basis[:, sizes > LEAST_DIRECTION]
+    return kept
+
+
+def _unexplained(values: Floats, directions: Floats) -> Floats:
+    """Values less what orthonormal directions explain of them."""
+    shares = directions.T @ values
+    left: Floats = values - directions @ shares
+    return left
+
+
+def _fit(change: Floats, regressor: Floats) -> _Fit:
+    power = max(float(regressor @ regressor), _TINY)
+    gain = float(regressor @ change) / power
+    residual = change - gain * regressor
+    squares = float(residual @ residual)
+    return _Fit(gain, residual, max(squares, _TINY))
+
+
+def _minimum(values: list[float]) -> _Minimum | None:
+    """Parabola through the least value and those before and after it; None where it is at an end."""
+    k = values.index(min(values))
+    if k in (0, len(values) - 1):
+        return None
+    before, least, after = values[k - 1 : k + 2]
+    curvature = before - 2.0 * least + after
+    if curvature <= 0.0:
+        return None
+    return _Minimum(k + 0.5 * (before - after) / curvature, curvature)
+
+
+def _independent_samples(fit: _Fit) -> float:
+    """Number of independent residuals, by the correlation of each with the next."""
+    covariance = float(fit.residual[1:] @ fit.residual[:-1])
+    correlation = max(covariance / fit.squares, 0.0)
+    independent = fit.residual.size * (1.0 - correlation) / (1.0 + correlation)
+    return max(independent, 2.0)
+
+
+def rudder_clock_offset(t: Floats, r: Floats, delta: Floats) -> ClockOffset | None:
+    """How late the rudder is against the yaw acceleration, given yaw rate and the history of both."""
     others = {"r": r, "r3": r**3}
-    for memory in _MEMORIES_S:
-        share = 1.0 - math.exp(-(grid[1] - grid[0]) / memory)
-        for name, values in (("r", r), ("delta", delta)):
-            lagged = lfilter([share], [1.0, share - 1.0], np.interp(grid, t, values))
-            others[f"{name}{memory}"] = np.interp(t, grid, lagged)
+    for memory in MEMORIES_S:
+        others[f"r, {memory:g} s"] = _remembered(t, r, memory)
+        others[f"delta, {memory:g} s"] = _remembered(t, delta, memory)
     return clock_offset(t, r, delta, others)
 
 
-def _reverses(values: Floats, least: float = 0.0) -> bool:
-    """Whether a channel goes there and back as in zigzags, three times or more: one step tells no delay."""
+def _remembered(t: Floats, values: Floats, memory: float) -> Floats:
+    """Values by a first-order low-pass, whose time constant is the memory, s."""
+    from scipy.signal import lfilter
+
+    even = np.linspace(t[0], t[-1], t.size)
+    decay = math.exp(-(even[1] - even[0]) / memory)
+    resampled = np.interp(even, t, values)
+    lagged = lfilter([1.0 - decay], [1.0, -decay], resampled)
+    return np.interp(t, even, lagged)
+
+
+def reverses(values: Floats, least: float = 0.0) -> bool:
+    """Tell whether a channel goes there and back as in zigzags, three times or more: one step shows no delay."""
     low, high = np.quantile(values, [0.02, 0.98])
-    far = values - 0.5 * (low + high)
-    far = far[np.abs(far) > 0.25 * (high - low)]
-    return bool(high - low > least and np.count_nonzero(np.diff(np.sign(far))) >= 3)
-
-
-def _turns_against(psi: Floats, delta: Floats) -> bool:
-    """Whether a rudder that stays on one side turns the ship to the other, as in a circle."""
-    side = math.copysign(1.0, float(np.median(delta)))
-    one_side = (
-        float(np.quantile(side * delta, 0.1)) > 0.0
-        and side * float(np.median(delta)) > _HARD_OVER
-    )
-    return one_side and side * float(psi[-1] - psi[0]) < -_TURNED
-
-
-def corrected_clocks(
-    log: Log, series: Series, choice: str | None
-) -> tuple[Series, list[str]]:
-    """The channels with late yaw rate and rudder put right, none where nothing is, and what was found.
-
-    The series are those that the log was made of; `choice` is that of
-    :class:`shipgym.trials.navigation.Instruments`: without one, channels on one clock
-    are left, and more than `REFUSED_S` between them is an InputError. So is a rudder of
-    the wrong sign, which is judged by a yaw rate only where this does not contradict
-    the heading.
-    """
-    t, values, where = log.t, log.channels, log.where
-    found: dict[str, ClockOffset | None] = {}
-    if {"psi", "r"} <= values.keys() and _reverses(values["r"]):
-        found["r"] = clock_offset(t, values["psi"], values["r"], {})
-    rate = found.get("r")
-    contradicted = rate is not None and rate.gain < 0.0 and rate.sure > _SURE
-    if (
-        "delta" in values
-        and {"psi", "r"} & values.keys()
-        and _reverses(values["delta"], _LEAST_RUDDER)
-    ):
-        late = rate.late if rate else 0.0
-        r = (
-            np.interp(t + late, t, values["r"])
-            if "r" in values
-            else time_derivative(t, values["psi"])
-        )
-        found["delta"] = rudder_offset(t, r, values["delta"])
-        plain = clock_offset(t, r, values["delta"], {"r": r})
-        against = [
-            one is not None and one.gain < 0.0 and one.sure > _SURE
-            for one in (found["delta"], plain)
-        ]
-        if all(against) and not contradicted:
-            raise InputError(
-                f"{where}: the yaw acceleration follows the rudder {_OTHER_SIGN}",
-                _OTHER_SIDE,
-            )
-    elif {"psi", "delta"} <= values.keys() and _turns_against(
-        values["psi"], values["delta"]
-    ):
-        raise InputError(
-            f"{where}: the ship turns away from the rudder, {_OTHER_SIGN}", _OTHER_SIDE
-        )
-    own, notes = len({id(clock) for clock, _ in series.values()}) > 1, []
-    changed: Series = {}
-    for name, offset in found.items():
-        error = math.hypot(offset.error, DYNAMICS_S[name]) if offset else 0.0
-        if (
-            offset is None
-            or offset.sure < _SURE
-            or abs(offset.late) < SIGNIFICANT * error
-        ):
-            continue
-        told = (
-            f"{_WORDS[name][0]} is {abs(offset.late):.2f} s"
-            f" {'late' if offset.late > 0.0 else 'early'} against {_WORDS[name][1]}"
-            f" (standard error {error:.2f} s)"
-        )
-        if choice == "keep" or (
-            choice is None and not own and abs(offset.late) <= REFUSED_S[name]
-        ):
-            notes.append(f"{told}; left as logged")
-        elif choice is None and not own:
-            raise InputError(
-                f"{where}: {told}, expected one clock; to have it corrected write"
-                ' clock_offsets = "correct" in [sensors] of the ship file, or "keep"'
-                " if it is so"
-            )
-        else:
-            changed[name] = series[name][0] - offset.late, series[name][1]
-            notes.append(f"{told}; corrected")
-    return series | changed if changed else {}, notes
+    span = high - low
+    from_middle = values - 0.5 * (low + high)
+    is_far = np.abs(from_middle) > 0.25 * span
+    sides = np.sign(from_middle[is_far])
+    reversals = np.count_nonzero(np.diff(sides))
+    return bool(span > least and reversals >= 3)

@@ -1,96 +1,116 @@
 """Parts of a log that are trials: stretches by the clock, or between quiet rudders."""
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from shipgym.checks import shown
 from shipgym.errors import InputError
 from shipgym.trials.clock_texts import DAY, clock_text, read_clock
-from shipgym.trials.resampling import Log
+from shipgym.trials.resampling import FEWEST_SAMPLES, Log
+from shipgym.trials.units import DEGREE
 
 #: A rudder this far, rad, from its usual place is active; quiet for this long, s, it
 #: ends a manoeuvre.
-ACTIVE, QUIET_S = float(np.radians(3.0)), 60.0
-_BEFORE_S, _SHORTEST_S = 30.0, 30.0
+ACTIVE, QUIET_S = 3.0 * DEGREE, 60.0
+
+#: A manoeuvre lasts longer than this, s, and a trial begins and ends so much outside
+#: it.
+SHORTEST_S, MARGIN_S = 30.0, 30.0
+
 _EXPECTED = (
     'expected cut = "rudder", or stretches in seconds or clock time: [[60, 360],'
     ' ["09:30:00", "09:41:30"]]'
 )
 
 
+class Stretch(NamedTuple):
+    """A part of a log, from one moment to another, in seconds of its time or by the clock."""
+
+    first: float | str
+    last: float | str
+
+
 def check_cut(cut: Any, where: str) -> None:
     """InputError unless this is None, "rudder" or a list of pairs of numbers or texts."""
-    pairs = cut if isinstance(cut, list) and cut else [None]
-    if cut not in (None, "rudder") and not all(
-        isinstance(pair, list)
-        and len(pair) == 2
-        and all(type(end) in (int, float, str) for end in pair)
-        for pair in pairs
-    ):
-        raise InputError(f"{where} cut: {shown(cut)} found, {_EXPECTED}")
+    if cut is None or cut == "rudder":
+        return
+    if not isinstance(cut, list) or not cut or not all(map(_is_stretch, cut)):
+        raise InputError(f"{where} cut: {_EXPECTED}, got {shown(cut)}")
+
+
+def _is_stretch(pair: Any) -> bool:
+    if not isinstance(pair, list) or len(pair) != 2:
+        return False
+    return all(type(moment) in (int, float, str) for moment in pair)
 
 
 def cut_log(cut: Any, log: Log, where: str) -> list[slice]:
-    """The samples of each part, in order of time; all of them where `cut` is None."""
+    """Samples of each part, in order of time; all of them where `cut` is None.
+
+    Raises InputError for a part without samples, and for clock times of a log without a
+    clock.
+    """
     if cut is None:
         return [slice(0, log.t.size)]
-    found = []
-    for ends in _active_stretches(log, where) if cut == "rudder" else cut:
-        first, last = (_seconds(moment, log, where) for moment in ends)
-        part = slice(
-            int(np.searchsorted(log.t, first)),
-            int(np.searchsorted(log.t, last, side="right")),
+    if cut == "rudder":
+        stretches = _active_stretches(log, where)
+    else:
+        stretches = [Stretch(*pair) for pair in cut]
+    return [_samples(stretch, log, where) for stretch in stretches]
+
+
+def _samples(stretch: Stretch, log: Log, where: str) -> slice:
+    first, last = (_seconds(moment, log, where) for moment in stretch)
+    begin = int(np.searchsorted(log.t, first))
+    end = int(np.searchsorted(log.t, last, side="right"))
+    if end - begin < FEWEST_SAMPLES:
+        span = f"{log.t[0]:g} to {log.t[-1]:g} s"
+        if log.start is not None:
+            opening, closing = (clock_text(log.start + log.t[k]) for k in (0, -1))
+            span = f"{span}, {opening} to {closing}"
+        raise InputError(
+            f"{where} cut: expected stretches of the log, which goes from {span}, got"
+            f" {stretch.first} to {stretch.last}, which holds no trial"
         )
-        if part.stop - part.start < 3:
-            clock = (clock_text((log.start or 0.0) + log.t[k]) for k in (0, -1))
-            raise InputError(
-                f"{where} cut: {ends[0]} to {ends[1]} holds no trial, expected"
-                f" stretches of the log, which goes from {log.t[0]:g} to"
-                f" {log.t[-1]:g} s" + (f", {' to '.join(clock)}" if log.start else "")
-            )
-        found.append(part)
-    return found
+    return slice(begin, end)
 
 
-def _seconds(when: float | str, log: Log, where: str) -> float:
+def _seconds(moment: float | str, log: Log, where: str) -> float:
     """A moment on the time of the log, s; a time of the day is that next to its beginning."""
-    if not isinstance(when, str):
-        return float(when)
+    if not isinstance(moment, str):
+        return float(moment)
     try:
-        (seconds,), dated = read_clock([when])
+        clock = read_clock([moment])
     except ValueError:
-        raise InputError(f"{where} cut: {when!r} found, {_EXPECTED}") from None
+        raise InputError(f"{where} cut: {_EXPECTED}, got {moment!r}") from None
     if log.start is None:
         raise InputError(
-            f"{where} cut: {when!r} found, but the log has no clock; write seconds of"
-            " its time"
+            f"{where} cut: expected seconds of the log's time, which has no clock, got"
+            f" {moment!r}"
         )
-    if dated:
-        return float(seconds - log.start)
-    after = float((seconds - log.start) % DAY)
+    after = float(clock.seconds[0]) - log.start
+    if clock.dated:
+        return after
+    after %= DAY
     return after if after < log.t[-1] + 0.5 * DAY else after - DAY
 
 
-def _active_stretches(log: Log, where: str) -> list[tuple[float, float]]:
+def _active_stretches(log: Log, where: str) -> list[Stretch]:
     """From before the rudder leaves its usual place until it is quiet again."""
     delta = log.channels.get("delta", np.zeros(log.t.size))
-    active = log.t[np.abs(delta - np.median(delta)) > ACTIVE]
-    breaks = np.flatnonzero(np.diff(active) > QUIET_S)
-    ends = (
-        zip(active[np.r_[0, breaks + 1]], active[np.r_[breaks, -1]], strict=True)
-        if active.size
-        else ()
-    )
-    found = [
-        (float(a) - _BEFORE_S, float(b) + _BEFORE_S)
-        for a, b in ends
-        if b - a > _SHORTEST_S
-    ]
-    if not found:
+    is_active = np.abs(delta - np.median(delta)) > ACTIVE
+    active = log.t[is_active]
+    breaks = np.flatnonzero(np.diff(active) > QUIET_S) + 1
+    stretches = []
+    for moments in np.split(active, breaks):
+        if moments.size and moments[-1] - moments[0] > SHORTEST_S:
+            first, last = float(moments[0]), float(moments[-1])
+            stretches.append(Stretch(first - MARGIN_S, last + MARGIN_S))
+    if not stretches:
         raise InputError(
-            f'{where} cut: "rudder" found, but no rudder that is more than 3 deg from'
-            f" its usual place for over {_SHORTEST_S:g} s, expected manoeuvres; give"
-            " the stretches, or read another log"
+            f'{where} cut: expected with "rudder" manoeuvres, in which the rudder is'
+            f" more than 3 deg from its usual place for over {SHORTEST_S:g} s, got none;"
+            " give the stretches, or read another log"
         )
-    return found
+    return stretches

@@ -1,12 +1,13 @@
 """Time derivatives of sampled and noisy signals."""
 
 import math
+from typing import Any
 
 import numpy as np
 
 from shipgym.arrays import Floats
 
-_DEGREE = 5
+_DEGREE = 5  # of the splines
 _FEWEST_SPANS = 8
 # of noise, as a power of the distance of knots: that of a random walk has a half
 _STEEPEST_GROWTH = 0.8
@@ -23,30 +24,39 @@ def time_derivative(t: Floats, values: Floats) -> Floats:
     to speak of and a cubic spline through all of them is differentiated. Steps of the
     time, s, may differ.
     """
-    from scipy.interpolate import make_interp_spline, make_lsq_spline
+    from scipy.interpolate import make_interp_spline
 
     n = t.size
     step = (t[-1] - t[0]) / (n - 1)
-    s = (t - t[0]) / step
-    size = max(float(np.abs(values).max()), 1e-290)
-    best = make_interp_spline(s, values, k=min(3, n - 1))
-    before: tuple[int, float] | None = None
+    samples = (t - t[0]) / step
+    best = make_interp_spline(samples, values, k=min(3, n - 1))
+
+    noise_before, spacing_before = 0.0, 0
     spacing = 2
     while n // spacing >= _FEWEST_SPANS:
-        inner = s[np.arange(spacing, n - spacing, spacing)]
-        knots = np.concatenate(
-            [np.full(_DEGREE + 1, s[0]), inner, np.full(_DEGREE + 1, s[-1])]
-        )
-        fit = make_lsq_spline(s, values, knots, k=_DEGREE)
-        free = max(n - (inner.size + _DEGREE + 1), 1)
-        noise = (
-            float(np.linalg.norm(values - fit(s))) * math.sqrt(n) / free + 1e-15 * size
-        )
-        if before is not None:
-            growth = math.log(noise / before[1]) / math.log(spacing / before[0])
-            if growth > _STEEPEST_GROWTH:
+        spline, noise = _smoothed(samples, values, spacing)
+        if spacing_before:
+            growth = math.log(noise / noise_before)
+            if growth > _STEEPEST_GROWTH * math.log(spacing / spacing_before):
                 break
-            best = fit
-        before = (spacing, noise)
+            best = spline
+        noise_before, spacing_before = noise, spacing
         spacing = math.ceil(1.4 * spacing)
-    return np.asarray(best.derivative()(s) / step, dtype=np.float64)
+    return np.asarray(best.derivative()(samples) / step, dtype=np.float64)
+
+
+def _smoothed(samples: Floats, values: Floats, spacing: int) -> tuple[Any, float]:
+    """Quintic spline with a knot at every so many samples, and the noise that it leaves."""
+    from scipy.interpolate import make_lsq_spline
+
+    n = samples.size
+    inner = samples[np.arange(spacing, n - spacing, spacing)]
+    first, last = np.full(_DEGREE + 1, samples[0]), np.full(_DEGREE + 1, samples[-1])
+    spline = make_lsq_spline(
+        samples, values, np.concatenate([first, inner, last]), k=_DEGREE
+    )
+
+    free = max(n - (inner.size + _DEGREE + 1), 1)
+    residual = float(np.linalg.norm(values - spline(samples)))
+    rounding = 1e-15 * max(float(np.abs(values).max()), 1e-290)
+    return spline, residual * math.sqrt(n) / free + rounding

@@ -1,247 +1,208 @@
-"""NMEA 0183 logs: position, speeds, heading, rate of turn, rudder, shaft and wind, of whatever talkers.
+"""Sentences of NMEA 0183, for logs and for the helm: the table `nmea.toml`, and the numbers in a line.
 
-pynmea2 parses the sentences; those that hold no channel (AIS, depth, satellites) are
-passed over.
+A sentence is ``$`` or nothing, two letters of the talker, three of the kind, fields
+after commas, and ``*`` with the checksum: the exclusive or of all characters between.
 """
 
 import re
-from collections import defaultdict
-from collections.abc import Iterator
-from datetime import UTC, datetime, time
-from pathlib import Path
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import reduce
+from math import copysign, isfinite
+from operator import xor
 from typing import Any, NamedTuple
 
-import numpy as np
+from shipgym.files import shipped_toml
+from shipgym.trials.units import UNITS
 
-from shipgym.arrays import Floats
-from shipgym.checks import quoted
-from shipgym.errors import InputError
-from shipgym.files import LARGEST_CSV, read_bytes, read_text, shipped_toml
-from shipgym.trials.clock_texts import DAY
-from shipgym.trials.csv_reader import MOST_LINES, Table, column_table
-from shipgym.trials.units import si_factor
-
-#: Share of damaged sentences from which a log is refused.
-MOST_DAMAGED = 0.1
-
-SENTENCES: dict[str, dict[str, list[str]]] = shipped_toml(
-    "shipgym.trials", "sentences.toml"
+_SENTENCE = re.compile(
+    r"\s*\$?(?P<text>(?P<address>\w+),(?P<fields>[^*]*))\*(?P<checksum>[0-9A-Fa-f]{2})\s*"
 )
-_SPEEDS = {"N": "knots", "K": "km/h", "M": "m/s"}
-#: The better sources: of heading true ones, of the speed through the water the log with
-#: two axes.
-_BETTER = {"HDT": 3, "THS": 2, "VHW": 1, "VBW": 2}
-_SENTENCE = re.compile(rf"\$[A-Z]{{2}}(?:{'|'.join(SENTENCES)}),.*")
-_ANY = re.compile(r"^[^\n]{0,60}[$!][A-Z]{4,5},", re.MULTILINE)
+_QUANTITIES_IN_SI = ("length", "angle", "angular rate", "speed", "shaft speed")
+_SPEED_UNITS = {"N": "knots", "K": "km/h", "M": "m/s"}
+
+#: Sign of a number by the letter of its side; L and R are the sides to steer to.
+_SIGNS = {"N": 1.0, "S": -1.0, "E": 1.0, "W": -1.0, "L": 1.0, "R": -1.0}
+
+Letters = Mapping[int, frozenset[str]]  # those that may stand in a field, by its place
 
 
-class Reading(NamedTuple):
-    """One value of a channel: the line, its time (s since 1970 or of the day, or nan), the value."""
+class Sentence(NamedTuple):
+    """One sentence, cut into its parts."""
 
-    line: int
-    time: float
-    value: float
-
-
-Series = tuple[Floats, Floats, Floats]  # time, line and value
-Readings = dict[
-    str, dict[str, list[Reading]]
-]  # by channel and source, the talker with the sentence
+    talker: str  # who sent it, such as HE: a gyro
+    kind: str  # such as HDT
+    fields: list[str]
 
 
-def is_nmea(path: Path) -> bool:
-    """Whether a file begins with sentences of NMEA 0183."""
-    head = read_bytes(path, "CSV file", LARGEST_CSV)[:4096].decode("latin-1")
-    return len(_ANY.findall(head.replace("\r", "\n"))) >= 2
+@dataclass(frozen=True)
+class NumberField:
+    """Where a number stands in a sentence; `nmea.toml` explains the names."""
+
+    at: int
+    unit: str = ""
+    unit_at: int | None = None
+    side: int | None = None
+    letters: Letters = field(default_factory=dict)
+    only_if: Letters = field(default_factory=dict)
 
 
-def read_nmea(path: Path) -> Table:
-    """The channels of a log in SI units, positions in degrees, nan where a row has none.
+@dataclass(frozen=True)
+class SentenceKind:
+    """What a kind of sentence says; `nmea.toml` explains the names."""
 
-    Raises InputError for a damaged log and one without time or channels.
+    fields: Mapping[str, NumberField]  # by quantity
+    valid: Letters = field(default_factory=dict)
+    degraded: Letters = field(default_factory=dict)
+    time: int | None = None
+    date: int | None = None
+    log_only: bool = False
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """What a number in a sentence measures, in SI units and radians."""
+
+    largest: float
+    tolerance: float | None  # between two instruments; None: not compared
+    channel: str | None  # of a log
+
+
+def _units_in_si() -> dict[str, float]:
+    units: dict[str, float] = {}
+    for quantity in _QUANTITIES_IN_SI:
+        units |= UNITS[quantity]
+    return units
+
+
+def _with_letters(entry: Mapping[str, Any]) -> dict[str, Any]:
+    """An entry of the table whose tables of letters are by place."""
+    return {
+        key: {int(at): frozenset(letters) for at, letters in value.items()}
+        if key in ("valid", "degraded", "letters", "only_if")
+        else value
+        for key, value in entry.items()
+    }
+
+
+def _sentence_kind(entry: Mapping[str, Any]) -> SentenceKind:
+    fields = {
+        quantity: NumberField(**_with_letters(place))
+        for quantity, place in entry["fields"].items()
+    }
+    return SentenceKind(**{**_with_letters(entry), "fields": fields})
+
+
+def _quantity(entry: Mapping[str, Any]) -> Quantity:
+    largest = _si(*entry["largest"])
+    tolerance = _si(*entry["tolerance"]) if "tolerance" in entry else None
+    return Quantity(largest, tolerance, entry.get("channel"))
+
+
+def _si(number: float, unit: str) -> float:
+    return float(number * _TO_SI[unit])
+
+
+_TO_SI = _units_in_si()
+_TABLE = shipped_toml("shipgym.trials", "nmea.toml")
+
+#: What each kind of sentence says, by its three letters.
+NMEA_SENTENCES = {
+    kind: _sentence_kind(entry) for kind, entry in _TABLE["sentences"].items()
+}
+
+#: What the numbers measure, by the name of the quantity.
+NMEA_QUANTITIES = {
+    name: _quantity(entry) for name, entry in _TABLE["quantities"].items()
+}
+
+
+def checksum(text: str) -> str:
+    """Two hexadecimal digits, of what stands between ``$`` and ``*``."""
+    return f"{reduce(xor, map(ord, text), 0):02X}"
+
+
+def parse_sentence(line: str) -> Sentence:
+    """Cut a line into talker, kind and fields.
+
+    A proprietary sentence has the talker P. Raises ValueError where the line is no
+    sentence, or its checksum is wrong or missing.
     """
-    import pynmea2
+    match = _SENTENCE.fullmatch(line)
+    if match is None:
+        raise ValueError(f"expected a sentence with a checksum, got {line!r}")
+    expected = checksum(match["text"])
+    if expected != match["checksum"].upper():
+        raise ValueError(f"expected the checksum {expected}, got {match['checksum']}")
 
-    if not hasattr(pynmea2, "THS"):  # which pynmea2 does not know
-        fields = (("True heading", "heading"), ("Mode", "mode"))
-        vars(pynmea2)["THS"] = type(
-            "THS", (pynmea2.TalkerSentence,), {"fields": fields}
-        )
-    lines = read_text(path, "log of NMEA 0183", LARGEST_CSV, latin=True).splitlines()
-    if len(lines) > MOST_LINES:
-        raise InputError(
-            f"{path}: {len(lines)} lines found, expected at most {MOST_LINES}; split"
-            " the file"
-        )
-    readings: Readings = defaultdict(lambda: defaultdict(list))
-    damaged, total = [], 0
-    for number, line in enumerate(lines, start=1):
-        found = _SENTENCE.search(line)
-        if found is None:
-            continue
-        total += 1
-        try:
-            message = pynmea2.parse(found[0], check=True)
-            time, values = _time_of(message), list(_values_of(message))
-        except (
-            pynmea2.ParseError,
-            ValueError,
-            TypeError,
-            AttributeError,
-            IndexError,
-            OverflowError,
-        ):
-            damaged.append(number)
-            continue
-        source = f"{message.talker}{message.sentence_type}"
-        if np.isfinite(time):
-            readings["t"][source].append(Reading(number, time, time))
-        for channel, value in values:
-            readings[channel][source].append(Reading(number, time, value))
-    if len(damaged) > MOST_DAMAGED * total:
-        raise InputError(
-            f"{path}: {len(damaged)} of {total} sentences have a wrong checksum or"
-            f" broken fields (the first in line {damaged[0]}), expected hardly any; the"
-            " log was damaged on the way: take the original"
-        )
-    notes = (
-        [f"{len(damaged)} of {total} sentences with a wrong checksum left out"]
-        if damaged
-        else []
-    )
-    return _assembled(path, readings, notes)
+    address = match["address"]
+    letters = 1 if address.startswith("P") else 2
+    return Sentence(address[:letters], address[letters:], match["fields"].split(","))
 
 
-def _values_of(message: Any) -> Iterator[tuple[str, float]]:
-    """The channels of a sentence that is valid; ValueError for an infinite number."""
-    kind = message.sentence_type
-    fields = dict(SENTENCES[kind])
-    flag, valid = fields.pop("valid", ("", ""))
-    if flag and str(getattr(message, flag) or " ") not in valid:
-        return
-    for channel, (field, unit) in fields.items():
-        told = getattr(message, field)
-        if told in (None, "") or not getattr(
-            message, field[:3], " "
-        ):  # the latitude of an empty lat
-            continue
-        value = si_factor(channel, unit) * float(told)
-        if np.isinf(value) or "_" in str(told):
-            raise ValueError(told)
-        if kind == "HDG":
-            for size, side in (
-                (message.deviation, message.dev_dir),
-                (message.variation, message.var_dir),
-            ):
-                value += (
-                    si_factor("psi", "deg")
-                    * {"E": 1.0, "W": -1.0}.get(side, 0.0)
-                    * float(size or 0.0)
-                )
-        elif kind == "MWV":
-            if message.wind_speed_units not in _SPEEDS:  # damaged where no checksum is
-                return
-            if channel == "wind_speed":
-                value *= si_factor(channel, _SPEEDS[message.wind_speed_units])
-            channel += "" if message.reference == "T" else "_relative"
-        yield channel, value
+def steering_numbers(sentence: Sentence) -> dict[str, float]:
+    """Numbers of a sentence that an autopilot may steer by, in SI units and radians, by quantity.
+
+    Nothing for a kind that is not known, a status that is not valid, an empty field, or
+    a number beyond any sensor's range. Raises ValueError, KeyError or IndexError where
+    fields are broken or missing.
+    """
+    kind = NMEA_SENTENCES.get(sentence.kind)
+    if kind is None or kind.log_only:
+        return {}
+    numbers = {}
+    for quantity, place in kind.fields.items():
+        needed = {**kind.valid, **place.letters, **place.only_if}
+        value = _number(place, sentence.fields, needed)
+        if value is not None and abs(value) <= NMEA_QUANTITIES[quantity].largest:
+            numbers[quantity] = value
+    return numbers
 
 
-def _time_of(message: Any) -> float:
-    """Seconds since 1970 where the sentence has a date, else of the day; nan without a time."""
-    clock = getattr(message, "timestamp", None)
-    if not isinstance(clock, time):
-        return np.nan
-    date = getattr(message, "datestamp", None) or datetime(1970, 1, 1)
-    day = datetime(date.year, date.month, date.day, tzinfo=UTC).timestamp()
-    return (
-        day
-        + 3600 * clock.hour
-        + 60 * clock.minute
-        + clock.second
-        + 1e-6 * clock.microsecond
-    )
+def logged_numbers(sentence: Sentence) -> dict[str, float]:
+    """Numbers of a sentence in a log, in SI units and radians, by quantity.
+
+    More lenient than :func:`steering_numbers`: estimated and simulated values count,
+    letters that the standard puts beside a number may be missing, and no number is too
+    large. Raises ValueError where one is broken.
+    """
+    kind = NMEA_SENTENCES[sentence.kind]
+    fields = sentence.fields + [""] * 20  # those at the end may be missing
+    valid = {
+        at: letters | kind.degraded.get(at, frozenset())
+        for at, letters in kind.valid.items()
+    }
+    numbers = {}
+    for quantity, place in kind.fields.items():
+        present = {at: one for at, one in place.letters.items() if fields[at]}
+        needed = {**valid, **present, **place.only_if}
+        if place.side is not None:
+            needed[place.side] = frozenset(_SIGNS)
+        value = _number(place, fields, needed)
+        if value is not None and not isfinite(value):
+            raise ValueError(f"expected a finite number, got {value}")
+        if value is not None:
+            numbers[quantity] = value
+    return numbers
 
 
-def _assembled(path: Path, readings: Readings, notes: list[str]) -> Table:
-    clocks = readings.pop("t", {})
-    if not readings or not clocks:
-        found = "sentence of a ship's motion" if clocks else "time that can be read"
-        wanted = quoted(SENTENCES) if clocks else "RMC, GGA or GLL"
-        raise InputError(
-            f"{path}: no {found} in this log, expected some of {wanted}; log these too"
-        )
-    main = max(clocks, key=lambda name: _rank(name, clocks[name]))
-    stamps = np.array([(stamp.line, stamp.time) for stamp in clocks[main]])
-    counted = (
-        stamps[:, 1]
-        if stamps[0, 1] > 2.0 * DAY
-        else np.unwrap(stamps[:, 1], period=DAY)
-    )
-    times, first = np.unique(np.maximum.accumulate(counted), return_index=True)
-    chosen: dict[str, Series] = {}
-    for channel, sources in readings.items():
-        source = max(
-            sorted(sources),
-            key=lambda s: (_BETTER.get(s[2:], 0), *_rank(s, sources[s])),
-        )
-        line, clock, value = np.array(sources[source]).T
-        at = np.interp(line, stamps[first, 0], times)
-        clock = np.where(
-            np.isfinite(clock), clock + DAY * np.round((at - clock) / DAY), at
-        )
-        clock, kept = np.unique(np.round(clock, 3), return_index=True)
-        chosen[channel] = clock, line[kept], value[kept]
-        if others := sorted(sources.keys() - {source}):
-            notes.append(f"{channel} is from {source}; {', '.join(others)} left out")
-    _absolute_wind(chosen)
-    every = np.unique(np.concatenate([clock for clock, *_ in chosen.values()]))
-    columns, lines = {"t": every}, np.zeros(every.size, dtype=int)
-    for channel, (clock, line, value) in chosen.items():
-        place = np.searchsorted(every, clock)
-        columns[channel] = np.full(every.size, np.nan)
-        columns[channel][place], lines[place] = value, line
-    return column_table(
-        path,
-        columns,
-        lines.tolist(),
-        "line {line}",
-        time_unit="unix",
-        notes=tuple(notes),
-    )
+def _number(place: NumberField, fields: Sequence[str], needed: Letters) -> float | None:
+    """One number in SI units; None where its field is empty or the letters needed are not there."""
+    if any(fields[at] not in letters for at, letters in needed.items()):
+        return None
+    text = fields[place.at]
+    if not text:
+        return None
+    if "_" in text:
+        raise ValueError(f"expected a number, got {text!r}")
 
+    value = float(text)
+    unit = place.unit if place.unit_at is None else _SPEED_UNITS[fields[place.unit_at]]
+    if unit == "ddmm.mm":  # 5430.5 is 54 degrees and 30.5 minutes
+        degrees, minutes = divmod(value, 100.0)
+        value, unit = degrees + minutes / 60.0, "deg"
+    value *= _TO_SI[unit]
 
-def _rank(source: str, readings: list[Reading]) -> tuple[bool, bool, int]:
-    """What is preferred: dates, no display that passes others' sentences on (II), many times."""
-    times = {one.line if np.isnan(one.time) else one.time for one in readings}
-    return readings[0].time > 2.0 * DAY, not source.startswith("II"), len(times)
-
-
-def _absolute_wind(chosen: dict[str, Series]) -> None:
-    """Make the wind that is told from the bow one over ground, where heading and velocity are known."""
-    angle, speed = (
-        chosen.pop("wind_from_relative", None),
-        chosen.pop("wind_speed_relative", None),
-    )
-    theoretical = chosen.pop("wind_from", None), chosen.pop("wind_speed", None)
-
-    def at(clock: Floats, name: str) -> Floats:
-        times, _, values = chosen[name]
-        return np.interp(clock, times, values if name == "sog" else np.unwrap(values))
-
-    if "psi" not in chosen:
-        return
-    if theoretical[0] is not None and theoretical[1] is not None:
-        clock, line, value = theoretical[0]
-        chosen |= {
-            "wind_from": (clock, line, value + at(clock, "psi")),
-            "wind_speed": theoretical[1],
-        }
-    elif angle is not None and speed is not None and {"sog", "cog"} <= chosen.keys():
-        clock, line, value = angle
-        seen = speed[2] * np.exp(1j * (value + at(clock, "psi")))  # where it comes from
-        wind = seen - at(clock, "sog") * np.exp(1j * at(clock, "cog"))
-        chosen |= {
-            "wind_from": (clock, line, np.angle(wind)),
-            "wind_speed": (clock, line, np.abs(wind)),
-        }
+    if place.side is None:
+        return value
+    return copysign(value, _SIGNS[fields[place.side]])

@@ -1,41 +1,67 @@
 """Channels that were logged at different rates, each on a clock of its own, and one clock for all of them."""
 
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 
 from shipgym.arrays import Flags, Floats
 from shipgym.errors import InputError
-from shipgym.trials.columns import Source
 
-#: Time and values of each channel.
-Series = dict[str, tuple[Floats, Floats]]
-#: The slowest of these gives the common clock, so that nothing of the motion is
-#: invented between samples.
+#: The slowest of these channels gives the common clock, so that nothing of the motion
+#: is invented between samples.
 MOTION = ("x", "ground_north", "u", "psi", "r", "delta")
+
 #: A step this many times the usual one of a channel is a hole, not a slow clock.
 HOLE_STEPS = 6.0
-_FEWEST = 3
+
+#: Fewest samples of a trial, and of a channel.
+FEWEST_SAMPLES = 3
+
+
+class Signal(NamedTuple):
+    """A channel on its own clock, SI units."""
+
+    t: Floats
+    values: Floats
+
+
+Signals = dict[str, Signal]  # by channel
 
 
 @dataclass
 class Log:
-    """The channels of one log on one clock, in SI units; corrections change it in place."""
+    """The channels of one log on one clock, in SI units; corrections change it in place.
+
+    Attributes
+    ----------
+    t : ndarray of shape (n_samples,)
+        Time, s.
+    channels : dict of str to ndarray of shape (n_samples,)
+        Values by channel.
+    where : str
+        What messages begin with: the file.
+    notes : list of str
+        Remarks of readers, checks and corrections.
+    derived : set of str
+        Channels that were computed from others.
+    repaired : dict of str to int
+        How many values of a channel were filled in.
+    over_ground : bool or None
+        Whether surge and sway are velocities over ground; None: where they are derived.
+    start : float or None
+        Clock at t = 0 as the file has it, s since 1970 or of the day.
+    """
 
     t: Floats
-    channels: dict[str, Floats]  # by name, shape (n_samples,)
-    where: str  # start of messages: the file
-    notes: list[str]  # remarks of the readers and corrections
+    channels: dict[str, Floats]
+    where: str
+    notes: list[str]
     derived: set[str] = field(default_factory=set)
-    repaired: dict[str, int] = field(
-        default_factory=dict
-    )  # how many values of a channel were filled in
-    over_ground: bool | None = (
-        None  # whether surge and sway are; None: where they are derived
-    )
-    start: float | None = (
-        None  # clock at t = 0 as the file has it, s since 1970 or of the day
-    )
+    repaired: dict[str, int] = field(default_factory=dict)
+    over_ground: bool | None = None
+    start: float | None = None
 
     def derive(self, channel: str, values: Floats) -> None:
         """Add a channel that follows from others."""
@@ -43,76 +69,83 @@ class Log:
         self.derived.add(channel)
 
 
-def have_own_clocks(present: Flags) -> bool:
-    """Whether blanks, shape (n_rows, n_columns), are those of channels at different rates.
+def usual_step(t: Floats) -> float:
+    """Median time between samples, s."""
+    return float(np.median(np.diff(t)))
+
+
+def have_own_clocks(missing: Iterable[Flags]) -> bool:
+    """Tell whether missing values are those of channels at different rates, from the flags of each channel.
 
     Then every row has some value, and the values of some channel stand two rows or more
     apart as a rule.
     """
-    rows = [np.flatnonzero(column) for column in present.T]
-    return bool(present.any(axis=1).all()) and any(
-        one.size >= _FEWEST and np.median(np.diff(one)) >= 2.0 for one in rows
-    )
+    flags = list(missing)
+    if np.all(flags, axis=0).any():
+        return False
+    for is_missing in flags:
+        rows = np.flatnonzero(~is_missing)
+        if rows.size >= FEWEST_SAMPLES and usual_step(rows) >= 2.0:
+            return True
+    return False
 
 
-def own_clock(
-    channel: str, t: Floats, values: Floats, source: Source
-) -> tuple[Floats, Floats]:
-    """Time and values of a channel where it has some; InputError for too few or time that goes back."""
-    rows = np.flatnonzero(np.isfinite(values))
-    clock, name = t[rows], source.columns[channel].name
-    if rows.size < _FEWEST:
-        raise InputError(
-            f"{source.table.path}: column '{name}' has {rows.size} values, expected"
-            f" {_FEWEST} or more; leave it out"
-        )
-    back = np.diff(clock) <= 0.0
-    if back.any():
-        k = int(np.argmax(back))
-        raise InputError(
-            f"{source.at(int(rows[k + 1]), 't')}: time goes from {clock[k]:.10g} to"
-            f" {clock[k + 1]:.10g} s between values of '{name}', expected it to"
-            " increase; sort the rows, or, where two ships or receivers are in the"
-            " file, keep those of one"
-        )
-    return clock, values[rows]
+def share_clock(signals: Mapping[str, Signal]) -> bool:
+    """Tell whether all channels were logged by one and the same clock."""
+    first = next(iter(signals.values()))
+    return all(signal.t is first.t for signal in signals.values())
 
 
-def on_one_clock(series: Series, where: str) -> Log:
-    """Channels on clocks of their own on one.
+def on_one_clock(signals: Mapping[str, Signal], where: str) -> Log:
+    """Put channels onto one clock.
 
-    The clock is that of the slowest channel of the motion, where all of these have
-    values; the others are interpolated linearly onto it. A hole in one of the motion's
-    channels stays a hole.
+    Where they do not share one already, it is that of the slowest channel of the
+    motion, where all of these have values; the others are interpolated linearly. A hole
+    in one of the motion's channels stays a hole. Raises InputError where too few
+    moments are left.
     """
-    clocks = [clock for clock, _ in series.values()]
-    if all(clock is clocks[0] for clock in clocks):
-        return Log(
-            clocks[0], {name: values for name, (_, values) in series.items()}, where, []
-        )
-    names = [name for name in series if name in MOTION] or list(series)
-    motion = {name: series[name][0] for name in names}
-    t = max(motion.values(), key=lambda clock: float(np.median(np.diff(clock))))
-    inside, notes = np.ones(t.size, dtype=bool), []
-    for name, clock in motion.items():
-        step = np.diff(clock)
-        holes = step > HOLE_STEPS * max(
-            float(np.median(step)), float(np.median(np.diff(t)))
-        )
-        after = np.clip(np.searchsorted(clock, t), 1, clock.size - 1)
-        in_hole = holes[after - 1] & (t > clock[after - 1]) & (t < clock[after])
-        inside &= (t >= clock[0]) & (t <= clock[-1]) & ~in_hole
-        if holes.any():
+    if not share_clock(signals):
+        return _resampled(signals, where)
+    channels = {name: signal.values for name, signal in signals.items()}
+    first = next(iter(signals.values()))
+    return Log(first.t, channels, where, [])
+
+
+def _resampled(signals: Mapping[str, Signal], where: str) -> Log:
+    names = [name for name in signals if name in MOTION] or list(signals)
+    clocks = {name: signals[name].t for name in names}
+    steps = {name: usual_step(clock) for name, clock in clocks.items()}
+    slowest = max(steps, key=steps.__getitem__)
+    t, longest_step = clocks[slowest], HOLE_STEPS * steps[slowest]
+
+    is_known = np.ones(t.size, dtype=bool)
+    notes = []
+    for name, clock in clocks.items():
+        is_hole = np.diff(clock) > longest_step
+        is_known &= _inside(t, clock, is_hole)
+        if is_hole.any():
             notes.append(
-                f"{name} has {holes.sum()} holes, of up to {step.max():.4g} s; nothing"
-                " is put there"
+                f"{name} has {is_hole.sum()} holes, of up to"
+                f" {np.diff(clock).max():.4g} s; nothing is put there"
             )
-    t = t[inside]
-    if t.size < _FEWEST:
+
+    t = t[is_known]
+    if t.size < FEWEST_SAMPLES:
         raise InputError(
-            f"{where}: {', '.join(motion)} have {t.size} moments in common, expected"
-            " channels of one time; check their clocks"
+            f"{where}: expected channels of one time, got {t.size} moments that"
+            f" {', '.join(clocks)} have in common; check their clocks"
         )
-    return Log(
-        t, {name: np.interp(t, *pair) for name, pair in series.items()}, where, notes
-    )
+    channels = {name: np.interp(t, *signal) for name, signal in signals.items()}
+    return Log(t, channels, where, notes)
+
+
+def _inside(t: Floats, clock: Floats, is_hole: Flags) -> Flags:
+    """Which times lie within a clock's span and in none of its holes."""
+    after = np.searchsorted(clock, t)
+    after = np.clip(after, 1, clock.size - 1)
+    before = after - 1
+    is_between = (t > clock[before]) & (t < clock[after])
+    in_hole = is_between & is_hole[before]
+    in_span = (t >= clock[0]) & (t <= clock[-1])
+    inside: Flags = in_span & ~in_hole
+    return inside

@@ -1,18 +1,20 @@
 """Whether a trial can be that of a ship of this size and speed."""
 
 import math
+from collections.abc import Iterator
 
 import numpy as np
 
-from shipgym.errors import InputError
+from shipgym.arrays import Floats
 from shipgym.ships.particulars import Particulars
+from shipgym.trials.plausibility.finding import LogFinding, settle
 from shipgym.trials.trial import Trial
 from shipgym.trials.units import KNOT
 
 _MOST = 0.95  # share of the samples that count: the others may be outliers
 _FASTEST_TURN_PRIME = 3.0  # |r| L / U; a ship in its tightest turn stays below about 1
-_FASTEST_TIP = 100.0  # m/s at the propeller's tip
-_SPEEDS = (0.2, 2.0)  # of a trial, by the service speed
+_FASTEST_TIP = 100.0  # m/s, of a propeller
+_SLOWEST_SHARE, _FASTEST_SHARE = 0.2, 2.0  # of the service speed
 _LEAST_SLENDERNESS, _FASTEST_FROUDE = 1.5, 0.3  # of ships that displace water
 
 
@@ -23,58 +25,78 @@ def check_scale(trial: Trial, ship: Particulars, where: str) -> None:
     m/s. Service speed and propeller diameter count where they are given; `where` begins
     the messages.
     """
-    if ship.beam is not None and ship.length < _LEAST_SLENDERNESS * ship.beam:
-        raise InputError(
-            f"{where}: a ship of {ship.length:g} m by {ship.beam:g} m found, expected"
-            f" at least {_LEAST_SLENDERNESS:g} times as long as broad; likely [ship]"
-            " length is something else, such as an antenna's height: write the length"
-            " between perpendiculars"
-        )
-    speeds = (
-        np.hypot(trial["u"], trial.channels.get("v", np.zeros(1)))
-        if "u" in trial
-        else None
-    )
-    if speeds is not None and "r" in trial:
-        speed, fastest = (
-            float(speeds.max()),
-            float(np.quantile(np.abs(trial["r"]), _MOST)),
-        )
-        limit = _FASTEST_TURN_PRIME * speed / ship.length
-        if fastest > limit:
-            raise InputError(
-                f"{where}: yaw rate up to {math.degrees(fastest):.4g} deg/s at up to"
-                f" {speed:.4g} m/s found, expected at most {math.degrees(limit):.4g}"
-                f" deg/s for a length of {ship.length:g} m; likely the trial of another"
-                " ship or scale, or a wrong unit of r, psi, u or v in [columns], or of"
-                " [ship] length"
-            )
-    if speeds is not None and ship.speed is not None and "speed" not in ship.estimated:
-        fastest = float(np.quantile(speeds, _MOST))
-        low, high = (share * ship.speed for share in _SPEEDS)
-        knots = ship.speed * KNOT
-        if (
-            ship.speed > _FASTEST_FROUDE * math.sqrt(9.81 * ship.length)
-            and abs(fastest / knots - 1.0) < 0.1
-        ):
-            raise InputError(
-                f"{where}: {ship.speed:g} is {knots:.4g} m/s in knots, as fast as she"
-                f" sails here, expected [ship] speed in m/s; write speed = {knots:.4g}"
-            )
-        if not low <= fastest <= high:
-            raise InputError(
-                f"{where}: up to {fastest:.4g} m/s found, expected {low:.4g} to"
-                f" {high:.4g} m/s of a ship with a service speed of {ship.speed:g} m/s;"
-                " likely the trial of another ship or scale, or a wrong unit of u; if"
-                " it is this ship's, give its speed as sailed"
-            )
+    settle(_check_slenderness(ship, where))
+    if "u" in trial:
+        sway = trial.channels.get("v", np.zeros(1))
+        speed = np.hypot(trial["u"], sway)
+        if "r" in trial:
+            settle(_check_turning(trial["r"], speed, ship, where))
+        if ship.speed is not None and "speed" not in ship.estimated:
+            settle(_check_speed(speed, ship.speed, ship.length, where))
     if "n" in trial and ship.propeller_diameter is not None:
-        fastest = float(np.quantile(np.abs(trial["n"]), _MOST))
-        limit = _FASTEST_TIP / (math.pi * ship.propeller_diameter)
-        if fastest > limit:
-            raise InputError(
-                f"{where}: shaft speed up to {fastest:.4g} rps found, expected at most"
-                f" {limit:.4g} rps for a propeller of {ship.propeller_diameter:g} m;"
-                ' likely a wrong unit: declare n = { column = "...", unit = "rpm" }'
-                " in [columns]"
-            )
+        settle(_check_shaft(trial["n"], ship.propeller_diameter, where))
+
+
+def _check_slenderness(ship: Particulars, where: str) -> Iterator[LogFinding]:
+    if ship.beam is not None and ship.length < _LEAST_SLENDERNESS * ship.beam:
+        yield LogFinding(
+            where,
+            f"expected a ship at least {_LEAST_SLENDERNESS:g} times as long as broad,"
+            f" got {ship.length:g} m by {ship.beam:g} m",
+            "likely [ship] length is something else, such as an antenna's height: write"
+            " the length between perpendiculars",
+        )
+
+
+def _check_turning(
+    r: Floats, speed: Floats, ship: Particulars, where: str
+) -> Iterator[LogFinding]:
+    fastest = float(np.quantile(np.abs(r), _MOST))
+    largest_speed = float(speed.max())
+    limit = _FASTEST_TURN_PRIME * largest_speed / ship.length
+    if fastest > limit:
+        yield LogFinding(
+            where,
+            f"expected a yaw rate of at most {math.degrees(limit):.4g} deg/s at up to"
+            f" {largest_speed:.4g} m/s for a length of {ship.length:g} m, got up to"
+            f" {math.degrees(fastest):.4g} deg/s",
+            "likely the trial of another ship or scale, or a wrong unit of r, psi, u or"
+            " v in [columns], or of [ship] length",
+        )
+
+
+def _check_speed(
+    speed: Floats, service_speed: float, length: float, where: str
+) -> Iterator[LogFinding]:
+    fastest = float(np.quantile(speed, _MOST))
+    in_knots = service_speed * KNOT
+    is_fast = service_speed > _FASTEST_FROUDE * math.sqrt(9.81 * length)
+    if is_fast and abs(fastest / in_knots - 1.0) < 0.1:
+        yield LogFinding(
+            where,
+            f"expected [ship] speed in m/s, got {service_speed:g}, which in knots is"
+            f" {in_knots:.4g} m/s, as fast as she sails here",
+            f"write speed = {in_knots:.4g}",
+        )
+    low, high = _SLOWEST_SHARE * service_speed, _FASTEST_SHARE * service_speed
+    if not low <= fastest <= high:
+        yield LogFinding(
+            where,
+            f"expected a speed of {low:.4g} to {high:.4g} m/s for a service speed of"
+            f" {service_speed:g} m/s, got up to {fastest:.4g} m/s",
+            "likely the trial of another ship or scale, or a wrong unit of u; if it is"
+            " this ship's, give its speed as sailed",
+        )
+
+
+def _check_shaft(n: Floats, diameter: float, where: str) -> Iterator[LogFinding]:
+    fastest = float(np.quantile(np.abs(n), _MOST))
+    limit = _FASTEST_TIP / (math.pi * diameter)
+    if fastest > limit:
+        yield LogFinding(
+            where,
+            f"expected a shaft speed of at most {limit:.4g} rps for a propeller of"
+            f" {diameter:g} m, got up to {fastest:.4g} rps",
+            'likely a wrong unit: declare n = { column = "...", unit = "rpm" } in'
+            " [columns]",
+        )

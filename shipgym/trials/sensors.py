@@ -10,10 +10,9 @@ from shipgym.arrays import Flags, Floats
 from shipgym.checks import check_number, check_whole
 from shipgym.engine.trajectories import SEA_CHANNELS
 from shipgym.errors import InputError
+from shipgym.trials.resampling import FEWEST_SAMPLES
 from shipgym.trials.trial import Trial
 from shipgym.trials.units import CHANNELS, DEGREE, check_channel
-
-FEWEST_SAMPLES = 3  # of a trial
 
 
 @dataclass(frozen=True)
@@ -52,32 +51,27 @@ class Sensor:
 
     def __post_init__(self) -> None:
         for item in fields(self):
-            most = 1.0 if item.name == "outlier_probability" else None
-            check_number(
-                getattr(self, item.name),
-                f"sensor {item.name}",
-                at_least=0.0,
-                at_most=most,
-            )
+            where, value = f"sensor {item.name}", getattr(self, item.name)
+            check_number(value, where, at_least=0.0)
         check_number(self.drift_time_s, "sensor drift_time_s", above=0.0)
+        probability = self.outlier_probability
+        check_number(probability, "sensor outlier_probability", at_most=1.0)
 
     def read(
         self, times: Floats, t: Floats, signal: Floats, rng: np.random.Generator
     ) -> Floats:
         """Readings at some times of a signal known at times t, straight between them; all times in s."""
+        n = times.size
         reading: Floats = np.interp(times - self.latency_s, t, signal)
         if self.drift:
             reading += self.drift * gauss_markov(times, self.drift_time_s, rng)
-        reading += self.noise * rng.standard_normal(len(times))
-        wrong = rng.random(len(times)) < self.outlier_probability
-        reading += self.outlier_size * np.where(
-            wrong, rng.standard_normal(len(times)), 0.0
-        )
-        return (
-            np.round(reading / self.resolution) * self.resolution
-            if self.resolution
-            else reading
-        )
+        reading += self.noise * rng.standard_normal(n)
+        is_outlier = rng.random(n) < self.outlier_probability
+        error = self.outlier_size * rng.standard_normal(n)
+        reading += np.where(is_outlier, error, 0.0)
+        if self.resolution:
+            reading = np.round(reading / self.resolution) * self.resolution
+        return reading
 
 
 def gauss_markov(
@@ -89,11 +83,12 @@ def gauss_markov(
     1974, Applied Optimal Estimation, 3.8).
     """
     decay = np.exp(-np.diff(t) / correlation_time_s)
+    spread = np.sqrt(1.0 - decay**2)
     shocks = rng.standard_normal(len(t))
     process = np.empty(len(t))
     process[0] = shocks[0]
-    for i, kept in enumerate(decay):
-        process[i + 1] = kept * process[i] + np.sqrt(1.0 - kept * kept) * shocks[i + 1]
+    for k in range(len(t) - 1):
+        process[k + 1] = decay[k] * process[k] + spread[k] * shocks[k + 1]
     return process
 
 
@@ -116,6 +111,9 @@ SEA_TRIAL: Mapping[str, Sensor] = MappingProxyType(
         "n": Sensor(resolution=0.1 / 60.0),
     }
 )
+
+
+ORDERS = ("delta_command", "n_command")
 
 
 @dataclass(frozen=True)
@@ -147,89 +145,92 @@ class Sensors:
             check_channel(channel, "sensors", time=False)
             if not isinstance(sensor, Sensor):
                 raise InputError(
-                    f"sensors: {channel}: {sensor!r} found, expected a Sensor"
+                    f"sensors: {channel}: expected a Sensor, got {sensor!r}"
                 )
         if self.sampling_s is not None:
             check_number(self.sampling_s, "sensors sampling_s", above=0.0)
-        check_number(
-            self.dropout_probability,
-            "sensors dropout_probability",
-            at_least=0.0,
-            below=1.0,
-        )
+        where = "sensors dropout_probability"
+        check_number(self.dropout_probability, where, at_least=0.0, below=1.0)
         check_number(self.dropout_samples, "sensors dropout_samples", at_least=1.0)
         object.__setattr__(self, "by_channel", MappingProxyType(dict(self.by_channel)))
 
     def measure(self, trial: Trial, seed: int = 0) -> Trial:
-        """What the log of a trial, the true motion, would hold.
+        """Log of a trial, the true motion, by these sensors.
 
         The same seed gives the same readings, channel by channel: a sensor more or less
         changes no other. Channels and name are the trial's; samples in gaps are left
         out. Heading, heel and their rates have the first-order motion in waves in them;
-        the weather itself is not measured. Raises InputError if the seed is not a whole
-        number >= 0, or sampling and gaps leave fewer than three samples.
+        the weather itself is not measured. Raises InputError if the seed is no integer
+        >= 0, or sampling and gaps leave fewer than three samples.
         """
         check_whole(seed, "seed", at_least=0)
-        t = self._sampled(trial)
-        readings = {}
-        for name, values in on_board(trial).items():
-            rng = np.random.default_rng([seed, CHANNELS.index(name)])
-            sensor, signal = self.by_channel.get(name, PERFECT), (t, trial.t, values)
-            readings[name] = (
-                orders_at(*signal) if name in ORDERS else sensor.read(*signal, rng)
-            )
-        kept = self._logged(
-            len(t), np.random.default_rng([seed, CHANNELS.index(WEATHER[0])])
-        )
-        if kept.sum() < FEWEST_SAMPLES:
+        t = self._logged_times(trial)
+        logged = self._outside_gaps(t.size, seed)
+        if logged.sum() < FEWEST_SAMPLES:
             raise InputError(
-                f"trial {trial.name!r}: {kept.sum()} of {len(t)} samples outside the"
-                f" gaps, expected at least {FEWEST_SAMPLES}; give a smaller"
+                f"trial {trial.name!r}: expected at least {FEWEST_SAMPLES} samples"
+                f" outside the gaps, got {logged.sum()} of {t.size}; give a smaller"
                 " dropout_probability"
             )
-        facts = ("name", "kind", "use", "derived", "length", "over_ground")
-        logged = {name: values[kept] for name, values in readings.items()}
-        return Trial(t[kept], logged, **{fact: getattr(trial, fact) for fact in facts})
+        readings = {
+            name: self._read(name, t, trial.t, values, seed)[logged]
+            for name, values in _measurable(trial).items()
+        }
+        return Trial(
+            t[logged],
+            readings,
+            name=trial.name,
+            kind=trial.kind,
+            use=trial.use,
+            derived=trial.derived,
+            length=trial.length,
+            over_ground=trial.over_ground,
+        )
 
-    def _sampled(self, trial: Trial) -> Floats:
-        """Times of the logger, s."""
+    def _read(
+        self, channel: str, times: Floats, t: Floats, signal: Floats, seed: int
+    ) -> Floats:
+        if channel in ORDERS:
+            return orders_at(times, t, signal)
+        sensor = self.by_channel.get(channel, Sensor())
+        rng = np.random.default_rng([seed, CHANNELS.index(channel)])
+        return sensor.read(times, t, signal, rng)
+
+    def _logged_times(self, trial: Trial) -> Floats:
+        """Times at which the logger asks the sensors, s."""
         if self.sampling_s is None:
             return trial.t.copy()
-        count = int(np.floor(trial.duration / self.sampling_s * (1.0 + 1e-12))) + 1
+        steps = trial.duration / self.sampling_s * (1.0 + 1e-12)
+        count = int(np.floor(steps)) + 1
         if count < FEWEST_SAMPLES:
             raise InputError(
-                f"sensors sampling_s: {self.sampling_s:g} s found, expected at most"
-                f" half of the {trial.duration:g} s of trial {trial.name!r}"
+                f"sensors sampling_s: expected at most half of the {trial.duration:g} s"
+                f" of trial {trial.name!r}, got {self.sampling_s:g} s"
             )
         return np.asarray(trial.t[0] + self.sampling_s * np.arange(count))
 
-    def _logged(self, count: int, rng: np.random.Generator) -> Flags:
+    def _outside_gaps(self, count: int, seed: int) -> Flags:
         """Which samples are not in a gap."""
+        rng = np.random.default_rng([seed, CHANNELS.index(SEA_CHANNELS[0])])
         logged = np.ones(count, dtype=bool)
         starts = np.flatnonzero(rng.random(count) < self.dropout_probability)
-        lengths = rng.geometric(1.0 / self.dropout_samples, len(starts))
+        lengths = rng.geometric(1.0 / self.dropout_samples, starts.size)
         for start, length in zip(starts, lengths, strict=True):
             logged[start : start + length] = False
         return logged
 
 
-PERFECT = Sensor()
-ORDERS = ("delta_command", "n_command")
-WEATHER = SEA_CHANNELS  # known of a simulation, to no instrument
-
-
-def on_board(trial: Trial) -> dict[str, Floats]:
-    """What there is to measure: first-order motion in waves added, the weather left out."""
-    channels = trial.channels
-    return {
-        name: (
-            values + channels[f"{name}_wave"] if f"{name}_wave" in channels else values
-        )
-        for name, values in channels.items()
-        if name not in WEATHER
-    }
+def _measurable(trial: Trial) -> dict[str, Floats]:
+    """Channels that there are to measure: first-order motion in waves added, the weather left out."""
+    measurable = {}
+    for name, values in trial.channels.items():
+        if name not in SEA_CHANNELS:  # known of a simulation, to no instrument
+            wave = trial.channels.get(f"{name}_wave")
+            measurable[name] = values if wave is None else values + wave
+    return measurable
 
 
 def orders_at(times: Floats, t: Floats, orders: Floats) -> Floats:
     """Orders, each given at a time t and held until the next, at other times; all in s."""
-    return np.asarray(orders[np.searchsorted(t, times + 1e-9, side="right") - 1])
+    last = np.searchsorted(t, times + 1e-9, side="right") - 1
+    return np.asarray(orders[last])

@@ -24,11 +24,14 @@ from shipgym.checks import (
 )
 from shipgym.errors import InputError
 from shipgym.files import write_text
-from shipgym.trials.csv_reader import Table
+from shipgym.trials.conventions import Conventions
 from shipgym.trials.cuts import cut_log
-from shipgym.trials.navigation import Instruments
-from shipgym.trials.tables import from_frame, read_log
-from shipgym.trials.trial_import import Conventions, import_tables
+from shipgym.trials.installation import Installation
+from shipgym.trials.readers.frames import read_frame
+from shipgym.trials.readers.kinds import read_log
+from shipgym.trials.readers.log_table import LogTable
+from shipgym.trials.resampling import FEWEST_SAMPLES
+from shipgym.trials.trial_import import import_tables
 from shipgym.trials.units import CHANNELS, check_channel
 
 #: Kinds of manoeuvre that a trial may name; `shipgym.manoeuvres.register_manoeuvre`
@@ -123,31 +126,31 @@ class Trial:
         times = _frozen_array(t, f"{where}: t")
         _check_time(times, where)
         arrays = _frozen_channels(channels, times.shape, where)
-        if unknown := sorted(set(derived) - arrays.keys()):
+        unknown = sorted(set(derived) - arrays.keys())
+        if unknown:
             raise InputError(
-                f"{where}: derived: {quoted(unknown)} found, expected some of"
-                f" {quoted(arrays)}"
+                f"{where}: derived: expected some of {quoted(arrays)}, got"
+                f" {quoted(unknown)}"
             )
+        if kind is not None:
+            check_choice(kind, KINDS, f"{where}: kind")
+        check_choice(use, USES, f"{where}: use")
+        if length is not None:
+            length = check_number(length, f"{where}: length", above=0.0)
+        if over_ground is None:
+            over_ground = bool({"u", "v"} & set(derived))
         vars(self).update(
             t=times,
             channels=MappingProxyType(arrays),
             name=name,
+            kind=kind,
+            use=use,
             derived=frozenset(derived),
-            kind=None if kind is None else check_choice(kind, KINDS, f"{where}: kind"),
-            use=check_choice(use, USES, f"{where}: use"),
-            length=(
-                None
-                if length is None
-                else check_number(length, f"{where}: length", above=0.0)
-            ),
+            length=length,
             repaired=MappingProxyType(dict(repaired or {})),
+            over_ground=bool(over_ground),
             notes=tuple(notes),
             _raw=raw,
-            over_ground=(
-                bool({"u", "v"} & set(derived))
-                if over_ground is None
-                else bool(over_ground)
-            ),
         )
 
     def __setattr__(self, name: str, value: Any) -> None:
@@ -158,7 +161,7 @@ class Trial:
 
     @property
     def raw(self) -> Trial:
-        """The trial as it was recorded: before it was smoothed or repaired, itself where it was not."""
+        """The trial before it was smoothed or repaired; itself where it was not."""
         raw: Trial | None = vars(self)["_raw"]
         return self if raw is None else raw.raw
 
@@ -171,8 +174,9 @@ class Trial:
     def sha256(self) -> str:
         """Hash of time and channels, independent of the file's formatting and of name, kind and use."""
         digest = hashlib.sha256()
-        for channel, values in (("t", self.t), *sorted(self.channels.items())):
-            digest.update(channel.encode() + b"\0" + values.astype("<f8").tobytes())
+        for channel in ("t", *sorted(self.channels)):
+            digest.update(channel.encode() + b"\0")
+            digest.update(self[channel].astype("<f8").tobytes())
         return digest.hexdigest()
 
     def __len__(self) -> int:
@@ -212,9 +216,10 @@ class Trial:
     def with_(self, **changes: Any) -> Trial:
         """Return a copy with another ``name``, ``kind``, ``use``, ``length`` or ``over_ground``."""
         known = ("name", "kind", "use", "length", "over_ground")
-        if unknown := changes.keys() - set(known):
+        unknown = sorted(changes.keys() - set(known))
+        if unknown:
             raise InputError(
-                f"trial '{self.name}': cannot change {quoted(sorted(unknown))}, only"
+                f"trial '{self.name}': cannot change {quoted(unknown)}, only"
                 f" {', '.join(known)}"
             )
         return Trial(self.t, self.channels, **(self._settings() | changes))
@@ -226,26 +231,25 @@ class Trial:
         t: npt.ArrayLike | None = None,
         repaired: Mapping[str, int] | None = None,
     ) -> Trial:
-        """Return a copy with some channels replaced, of which this trial is the raw one.
+        """Return a copy with some channels replaced; this trial is its raw one.
 
         With other times `t`, s, all channels are given. `repaired` counts filled values
         by channel, on top of those filled before. Raises InputError as for a new trial.
         """
         counts = Counter(self.repaired) + Counter(repaired or {})
         settings = self._settings() | {"repaired": counts, "raw": self}
-        return Trial(
-            self.t if t is None else t, {**self.channels, **channels}, **settings
-        )
+        times = self.t if t is None else t
+        return Trial(times, {**self.channels, **channels}, **settings)
 
     def part(self, rows: slice, name: str | None = None) -> Trial:
-        """Some of the samples, which are no manoeuvre, as a trial to fit, by the same name or another."""
+        """Trial of some of the samples, which are no manoeuvre any more, by the same name or another."""
         channels = {channel: values[rows] for channel, values in self.channels.items()}
         return Trial(self.t[rows], channels, name=self.name if name is None else name)
 
     @classmethod
     def from_csv(
         cls,
-        path: str | Path | Table,
+        path: str | Path | LogTable,
         columns: Mapping[str, str | Mapping[str, str]] | None = None,
         rudder_positive: str = "starboard",
         velocity_frame: str = "body",
@@ -295,9 +299,9 @@ class Trial:
         """
         table = read_log(path)
         where = f"{table.path}:"
-        tools = Instruments.from_mapping(sensors or {}, f"{where} sensors")
+        installation = Installation.from_mapping(sensors or {}, f"{where} sensors")
         conventions = Conventions(
-            rudder_positive, velocity_frame, origin, xg, repair, where, tools
+            rudder_positive, velocity_frame, origin, xg, repair, where, installation
         )
         name = table.path.name if name is None else name
         return read_trials(
@@ -311,12 +315,12 @@ class Trial:
         columns: Mapping[str, str | Mapping[str, str]] | None = None,
         **settings: Any,
     ) -> Trial:
-        """A trial from a pandas frame, whose index is a column where it is no plain count of rows.
+        """Read a trial from a pandas frame; an index that is no plain count of rows is a column.
 
         `columns` and the other keywords are those of :meth:`from_csv`. Raises
         InputError as that does.
         """
-        return cls.from_csv(from_frame(frame), columns, **settings)
+        return cls.from_csv(read_frame(frame), columns, **settings)
 
     def to_csv(self, path: str | Path) -> None:
         """Write time and all channels in SI units; :meth:`from_csv` reads back the very same numbers.
@@ -324,17 +328,16 @@ class Trial:
         The file, replaced where it exists, is never there in part. InputError if it
         cannot be written.
         """
-        names = ["t", *self.channels]
-        rows = zip(*(self[name].tolist() for name in names), strict=True)
-        text = (
-            "\n".join([",".join(names), *(",".join(map(repr, row)) for row in rows)])
-            + "\n"
-        )
-        write_text(text, Path(path))
+        columns = {"t": self.t, **self.channels}
+        rows = zip(*(values.tolist() for values in columns.values()), strict=True)
+        lines = [",".join(columns)]
+        for row in rows:
+            lines.append(",".join(map(repr, row)))
+        write_text("\n".join(lines) + "\n", Path(path))
 
 
 def read_trials(
-    tables: Sequence[Table],
+    tables: Sequence[LogTable],
     columns: Mapping[str, Any] | None,
     conventions: Conventions,
     cut: Any = None,
@@ -342,38 +345,37 @@ def read_trials(
     name: str,
     **facts: Any,
 ) -> list[Trial]:
-    """The trials in the tables of one log: one, or those that `cut` makes of it (:func:`.cuts.cut_log`).
+    """Read the trials in the tables of one log: one, or those that `cut` makes of it (:func:`.cut_log`).
 
     `name`, `kind`, `use` and `length` are as in :class:`Trial`; a part is named by its
     seconds.
     """
-    found = import_tables(tables, columns, conventions)
+    log = import_tables(tables, columns, conventions)
     trials = []
-    for part in cut_log(cut, found, conventions.where):
-        t = found.t[part]
-        called = name if cut is None else f"{name} {t[0]:.0f}-{t[-1]:.0f} s"
-        trials.append(
-            Trial(
-                t,
-                {channel: values[part] for channel, values in found.channels.items()},
-                name=called,
-                derived=found.derived,
-                repaired=found.repaired,
-                over_ground=found.over_ground,
-                notes=found.notes,
-                **facts,
-            )
+    for part in cut_log(cut, log, conventions.where):
+        t = log.t[part]
+        part_name = name if cut is None else f"{name} {t[0]:.0f}-{t[-1]:.0f} s"
+        trial = Trial(
+            t,
+            {channel: values[part] for channel, values in log.channels.items()},
+            name=part_name,
+            derived=log.derived,
+            repaired=log.repaired,
+            over_ground=log.over_ground,
+            notes=log.notes,
+            **facts,
         )
+        trials.append(trial)
     return trials
 
 
 def _frozen_channels(
     channels: Mapping[str, npt.ArrayLike], shape: tuple[int, ...], where: str
 ) -> dict[str, Floats]:
-    """The channels as read-only arrays, after checking names and lengths."""
+    """Channels as read-only arrays, their names and lengths checked."""
     if not channels:
         raise InputError(
-            f"{where}: no channel found, expected at least one of {quoted(CHANNELS)}"
+            f"{where}: expected at least one channel of {quoted(CHANNELS)}, got none"
         )
     arrays = {}
     for channel, values in channels.items():
@@ -381,8 +383,8 @@ def _frozen_channels(
         arrays[channel] = _frozen_array(values, f"{where}: {channel}")
         if arrays[channel].shape != shape:
             raise InputError(
-                f"{where}: {channel} has {arrays[channel].size} samples, expected"
-                f" {shape[0]} as in t"
+                f"{where}: {channel}: expected {shape[0]} samples as in t, got"
+                f" {arrays[channel].size}"
             )
     return arrays
 
@@ -393,18 +395,20 @@ def _frozen_array(values: npt.ArrayLike, where: str) -> Floats:
     array = check_finite(values, where, hint)
     if array.ndim != 1:
         raise InputError(
-            f"{where}: array of shape {array.shape} found, expected (n_samples,)"
+            f"{where}: expected an array of shape (n_samples,), got {array.shape}"
         )
     return array
 
 
 def _check_time(t: Floats, where: str) -> None:
-    if t.size < 3:
-        raise InputError(f"{where}: {t.size} samples found, expected at least 3")
-    back = np.diff(t) <= 0.0
-    if back.any():
-        index = int(np.argmax(back))
+    if t.size < FEWEST_SAMPLES:
         raise InputError(
-            f"{where}: t goes from {t[index]:g} to {t[index + 1]:g} s at sample"
-            f" {index + 1}, expected strictly increasing time"
+            f"{where}: expected at least {FEWEST_SAMPLES} samples, got {t.size}"
+        )
+    stands_still = np.diff(t) <= 0.0
+    if stands_still.any():
+        k = int(np.argmax(stands_still))
+        raise InputError(
+            f"{where}: sample {k + 1}: expected strictly increasing time, got"
+            f" {t[k + 1]:g} after {t[k]:g} s"
         )

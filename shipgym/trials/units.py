@@ -26,48 +26,48 @@ CHANNELS: tuple[str, ...] = tuple(
     name for name in QUANTITIES if name not in ("t", *INPUTS)
 )
 
+
+def si_unit(channel: str) -> str:
+    """SI unit of a channel, such as ``"rad/s"`` of ``r``."""
+    return next(iter(UNITS[QUANTITIES[channel]]))
+
+
+def si_factor(channel: str, unit: str, where: str = "unit") -> float:
+    """Factor from `unit` to the SI unit of a channel.
+
+    `where` begins the InputError about a unit that is not known, or of another
+    quantity.
+    """
+    fitting = UNITS[QUANTITIES[channel]]
+    if not isinstance(unit, str) or unit not in fitting:
+        raise InputError(
+            f"{where}: expected a unit of {QUANTITIES[channel]} ({quoted(fitting)}),"
+            f" got {unit!r}.{_unit_hint(unit, channel)}"
+        )
+    return fitting[unit]
+
+
+def _unit_hint(unit: object, channel: str) -> str:
+    """The quantity of which an unfitting unit is one, or the unit that was likely meant."""
+    for quantity, units in UNITS.items():
+        if isinstance(unit, str) and unit in units:
+            return f" '{unit}' is a unit of {quantity}"
+    return did_you_mean(str(unit), UNITS[QUANTITIES[channel]])
+
+
 #: Largest magnitude of each channel that can be a ship's, or a small model's; SI units.
-LIMITS: dict[str, float] = {
-    name: (
-        row["largest"] * (UNITS[row["quantity"]][row["unit"]] if "unit" in row else 1.0)
-    )
+LARGEST_MAGNITUDES: dict[str, float] = {
+    name: row["largest"] * si_factor(name, row.get("unit", si_unit(name)))
     for name, row in _CHANNELS.items()
 }
 
 
 def check_channel(name: str, where: str, *, time: bool = True) -> str:
-    """Return `name`, which must be that of a channel (or ``t``, unless `time` is false)."""
-    known = tuple(QUANTITIES) if time else CHANNELS  # a file's, or a trial's
+    """Return `name`, which must be a channel of a file, ``t`` included, or of a trial where not `time`."""
+    known = tuple(QUANTITIES) if time else CHANNELS
     if name not in known:
         hint = did_you_mean(str(name), known)
         raise InputError(
             f"{where}: unknown channel {name!r}.{hint} Known channels: {quoted(known)}"
         )
     return name
-
-
-def si_unit(channel: str) -> str:
-    """Return the SI unit of a channel, such as ``"rad/s"`` for ``r``."""
-    return next(iter(UNITS[QUANTITIES[channel]]))
-
-
-def si_factor(channel: str, unit: str, where: str = "unit") -> float:
-    """The factor from `unit` to the SI unit of a channel; `where` begins the message about a wrong unit."""
-    quantity = QUANTITIES[channel]
-    fitting = UNITS[quantity]
-    if isinstance(unit, str) and unit in fitting:
-        return fitting[unit]
-    others = [
-        other
-        for other, units in UNITS.items()
-        if isinstance(unit, str) and unit in units
-    ]
-    hint = (
-        f" '{unit}' is a unit of {others[0]}"
-        if others
-        else did_you_mean(str(unit), fitting)
-    )
-    raise InputError(
-        f"{where}: unit {unit!r} found, expected a unit of {quantity}:"
-        f" {quoted(fitting)}.{hint}"
-    )

@@ -14,28 +14,43 @@ import pandas as pd
 
 from shipgym.ships.particulars import Particulars
 from shipgym.trials import (
+    angle_texts,
     clock_offsets,
     clock_texts,
     columns,
-    csv_reader,
     cuts,
-    guesses,
     identify_table,
+    instrument_offsets,
     navigation,
-    nmea,
-    plausibility,
     resampling,
     sensors,
-    tables,
-    trial_import,
     units,
 )
+from shipgym.trials.conventions import Conventions
 from shipgym.trials.derivatives import time_derivative
-from shipgym.trials.navigation import Instruments
-from shipgym.trials.resampling import Log
+from shipgym.trials.guesses import guess_columns, guess_trial
+from shipgym.trials.installation import Installation
+from shipgym.trials.late_channels import check_circle, find_late_channels
+from shipgym.trials.midship import set_and_drift, to_midship
+from shipgym.trials.plausibility import (
+    agreement,
+    headings,
+    over_ground,
+    overlap,
+    positions,
+    ranges,
+    sampling,
+)
+from shipgym.trials.plausibility.finding import settle
+from shipgym.trials.readers.csv_file import read_csv
+from shipgym.trials.readers.frames import read_frame
+from shipgym.trials.readers.kinds import read_log, recognise_kind
+from shipgym.trials.readers.log_table import LogTable
+from shipgym.trials.resampling import Log, Signal
 from shipgym.trials.scale import check_scale
 from shipgym.trials.ship_file import ShipFile
 from shipgym.trials.trial import Trial
+from shipgym.trials.trial_import import import_tables
 from tests.golden.answers import Questions, asked, plain, refused
 from tests.golden.store import Floats
 
@@ -430,7 +445,7 @@ def clocks() -> Answers:
         "seconds too many": ["57°10'60\""],
         "both": ["-57.5S", "-12.25N"],
     }
-    start = clock_texts.read_clock(["2024-05-31T09:30:00Z"])[0][0]
+    start = clock_texts.read_clock(["2024-05-31T09:30:00Z"]).seconds[0]
     s, ticks = (
         sailed(),
         [
@@ -449,27 +464,25 @@ def clocks() -> Answers:
     zone = {"t": {"column": "time", "date": "date", "zone": "+03:30"}, "u": "u"}
 
     def started(path: str, given: dict[str, Any]) -> Any:
-        log = trial_import.import_tables(
-            [tables.read_log(path)], given, trial_import.Conventions()
-        )
+        log = import_tables([read_log(path)], given, Conventions())
         return log.t, log.start
 
     def angle_error(values: list[str]) -> Any:
         try:
-            return plain(clock_texts.read_angles(values))
+            return plain(angle_texts.read_angles(values))
         except ValueError as error:
             return f"ValueError {error}"
 
     def clock_error(values: list[str]) -> Any:
         try:
-            return plain(clock_texts.read_clock(values))
+            return plain(tuple(clock_texts.read_clock(values)))
         except ValueError as error:
             return f"ValueError {error}"
 
     return {
         "clocks": {name: clock_error(values) for name, values in times.items()},
         "angles": {name: angle_error(values) for name, values in angles.items()},
-        "as minutes": lambda: clock_texts.read_angles(["12.5", "145.25"], True),
+        "as minutes": lambda: angle_texts.read_angles(["12.5", "145.25"], True),
         "zones": [
             lambda one=one: clock_texts.zone_seconds(one, "here")
             for one in ("UTC", "+02:00", "-03:30", "CET", "")
@@ -530,22 +543,28 @@ def one_clock() -> Answers:
         t = np.arange(start, end, step)
         for first, last in holes:
             t = t[(t <= first) | (t >= last)]
-        return t, np.sin(0.1 * t) + 0.3 * t
+        return Signal(t, np.sin(0.1 * t) + 0.3 * t)
 
     def joined(**given: tuple[Floats, Floats]) -> Any:
         log = resampling.on_one_clock(given, "log.csv")
         return {"t": log.t, "channels": log.channels, "notes": log.notes}
 
     t = np.arange(0.0, 20.0)
-    table = csv_reader.column_table(
+    table = LogTable.of_columns(
         Path("log.csv"), {"t": t, "rate": t}, range(2, 22), "line {line} (row {row})"
     )
-    source = columns.Source(
+    source = columns.Locator(
         table,
         {"t": columns.Column("t", "s"), "r": columns.Column("rate", "rad/s")},
         np.arange(20),
     )
     sparse = np.where(np.arange(20) % 3 == 1, t, np.nan)
+
+    def own(values: Floats, clock: Floats = t) -> Any:
+        from shipgym.trials.recording import _own_signal
+
+        return tuple(_own_signal("r", clock, values, source))
+
     presents = [random.random((24, 2)) < share for share in (0.2, 0.5, 0.8)]
     halves = np.array([[True, k % 2 == 0] for k in range(24)])
     return {
@@ -568,19 +587,15 @@ def one_clock() -> Answers:
             wind_speed=series(3.0, 30.0), wind_from=series(1.0, 33.0)
         ),
         "apart": lambda: joined(psi=series(1.0, 20.0), u=series(2.0, 60.0, start=18.0)),
-        "own": lambda: resampling.own_clock("r", t, sparse, source),
-        "few": lambda: resampling.own_clock(
-            "r", t, np.where(t < 2.0, t, np.nan), source
-        ),
-        "back": lambda: resampling.own_clock(
-            "r", np.where(t == 7.0, 2.5, t), sparse, source
-        ),
+        "own": lambda: own(sparse),
+        "few": lambda: own(np.where(t < 2.0, t, np.nan)),
+        "back": lambda: own(sparse, np.where(t == 7.0, 2.5, t)),
         "own clocks": [
-            resampling.have_own_clocks(one)
+            resampling.have_own_clocks(list(~one.T))
             for one in (*presents, halves, halves[:4], halves[:, :1], ~halves)
         ],
-        "at": source.at(7, "r"),
-        "declare": source.declare("r", "deg/s"),
+        "at": source.place(7, "r"),
+        "declare": source.declaration("r", "deg/s"),
     }
 
 
@@ -596,11 +611,25 @@ def late_channels() -> Answers:
     def corrected(choice: str | None, own: bool = False, **changed: Floats) -> Any:
         channels = {"psi": psi, "r": r, "delta": delta} | changed
         log = Log(t, channels, "log.csv", [])
-        series = {
-            name: (t.copy() if own else t, values) for name, values in channels.items()
+        late = find_late_channels(log, choice, is_one_clock=not own)
+        if not late.delays:
+            return {}, late.notes
+        return {name: t - late.delays.get(name, 0.0) for name in channels}, late.notes
+
+    def by_heading() -> Any:
+        channels = {"psi": psi, "delta": moved(delta, 4.0)}
+        log = Log(t, channels, "log", [])
+        late = find_late_channels(log, "correct", is_one_clock=True)
+        found = {
+            name: (t - late.delays.get(name, 0.0), {"psi": psi, "delta": delta}[name])
+            for name in channels
         }
-        found, notes = clock_offsets.corrected_clocks(log, series, choice)
-        return {name: pair[0] for name, pair in found.items()}, notes
+        return found, late.notes
+
+    def turns_away(turned: Floats, rudder: float) -> bool:
+        channels = {"psi": -turned, "delta": np.full(turned.size, rudder)}
+        log = Log(np.arange(turned.size), channels, "log.csv", [])
+        return bool(list(check_circle(log)))
 
     shifts = (-3.3, 0.4, 1.9)
     steps = np.where(np.sin(t / 30.0) > 0.4, 0.2, -0.1)
@@ -610,7 +639,7 @@ def late_channels() -> Answers:
             for d in shifts
         ],
         "rudder": [
-            lambda d=d: clock_offsets.rudder_offset(t, r, moved(delta, d))
+            lambda d=d: clock_offsets.rudder_clock_offset(t, r, moved(delta, d))
             for d in shifts
         ],
         "beside": [
@@ -629,21 +658,17 @@ def late_channels() -> Answers:
         ),
         "none": lambda: clock_offsets.clock_offset(t, psi, 0.0 * r, {}),
         "reverses": [
-            clock_offsets._reverses(one, least)
+            clock_offsets.reverses(one, least)
             for one in (r, delta, steps, np.abs(r))
             for least in (0.0, 0.28, 0.32)
         ],
         "turns": (
             refused_pairs(
-                lambda angle: clock_offsets._turns_against(
-                    -np.linspace(0.0, angle, 50), np.full(50, 0.2)
-                ),
+                lambda angle: turns_away(np.linspace(0.0, angle, 50), 0.2),
                 np.radians(60.0),
             )
             + refused_pairs(
-                lambda angle: clock_offsets._turns_against(
-                    -np.linspace(0.0, 2.0, 50), np.full(50, angle)
-                ),
+                lambda angle: turns_away(np.linspace(0.0, 2.0, 50), angle),
                 np.radians(8.0),
             )
         ),
@@ -658,11 +683,7 @@ def late_channels() -> Answers:
         "least": [
             lambda d=d: corrected(None, r=moved(r, d)) for d in (0.6, 0.65, 0.95, 1.05)
         ],
-        "by heading": lambda: clock_offsets.corrected_clocks(
-            Log(t, {"psi": psi, "delta": moved(delta, 4.0)}, "log", []),
-            {"psi": (t, psi), "delta": (t, delta)},
-            "correct",
-        ),
+        "by heading": lambda: by_heading(),
     }
 
 
@@ -682,29 +703,29 @@ def ways() -> Answers:
         "ground_north": s["north"],
         "ground_east": s["east"],
     }
-    straight = navigation.straight_parts(t, channels)
+    straight = instrument_offsets.straight_parts(t, channels)
     along = (
         s["u"] + 0.31 * np.cos(psi) - 0.47 * np.sin(psi),
         s["v"] - 0.31 * np.sin(psi) - 0.47 * np.cos(psi),
     )
 
-    def corrected(tools: Instruments, **given: Floats) -> Any:
+    def corrected(tools: Installation, **given: Floats) -> Any:
         log = Log(t, dict(given), "log.csv", [])
-        navigation.correct_offsets(log, tools)
+        instrument_offsets.correct_offsets(log, tools)
         return log.channels, log.notes
 
-    def midship(tools: Instruments, **given: Floats) -> Any:
+    def midship(tools: Installation, **given: Floats) -> Any:
         log = Log(t, dict(given), "log.csv", [])
-        navigation.to_midship(log, tools)
+        to_midship(log, tools)
         return log.channels, sorted(log.derived), log.notes
 
     tools, ground = (
-        Instruments(25.0, -3.0),
+        Installation(25.0, -3.0),
         {"ground_north": s["north"], "ground_east": s["east"]},
     )
     ship, own = (
         Particulars(150.0, beam=24.0),
-        partial(Instruments.from_mapping, where="[sensors]"),
+        partial(Installation.from_mapping, where="[sensors]"),
     )
     antennas = (
         {"forward": 91.0},
@@ -723,48 +744,49 @@ def ways() -> Answers:
         "body": lambda: navigation.rotate_to_body(3.0, -0.7, 0.9),
         "straight": straight,
         "shares": [
-            navigation.straight_parts(t, {"psi": scale * 0.02 * t / 20.0}).mean()
+            instrument_offsets.straight_parts(
+                t, {"psi": scale * 0.02 * t / 20.0}
+            ).mean()
             for scale in (1.5, 1.7, 1.8, 2.0)
         ],
-        "few": navigation.straight_parts(t[:40], {"psi": 0.0 * t[:40]}).sum(),
-        "no heading": navigation.straight_parts(t, {"delta": 0.0 * t}).sum(),
-        "offset": lambda: navigation.heading_offset(channels, straight),
-        "one course": lambda: navigation.heading_offset(channels, t < 50.0),
+        "few": instrument_offsets.straight_parts(t[:40], {"psi": 0.0 * t[:40]}).sum(),
+        "no heading": instrument_offsets.straight_parts(t, {"delta": 0.0 * t}).sum(),
+        "offset": lambda: instrument_offsets.heading_offset(channels, straight),
+        "one course": lambda: instrument_offsets.heading_offset(channels, t < 50.0),
         "courses": [
-            navigation.heading_offset(
+            instrument_offsets.heading_offset(
                 {**ground, "psi": a * (t > 120.0) * DEGREE}, t > 0.0
             )
             is None
             for a in (50.0, 58.0, 62.0, 70.0)
         ],
         "corrected": lambda: corrected(
-            Instruments(heading_offset="estimate", rudder_offset="estimate"), **channels
+            Installation(heading_offset="estimate", rudder_offset="estimate"),
+            **channels,
         ),
         "given": lambda: corrected(
-            Instruments(heading_offset=0.05, rudder_offset=-0.03), **channels
+            Installation(heading_offset=0.05, rudder_offset=-0.03), **channels
         ),
         "not told": lambda: corrected(
-            Instruments(rudder_offset="estimate"), psi=psi[:], delta=30.0 * r
+            Installation(rudder_offset="estimate"), psi=psi[:], delta=30.0 * r
         ),
-        "drift": lambda: navigation.set_and_drift(psi, s["stw"], along),
-        "drift on a course": lambda: navigation.set_and_drift(
-            0.1 * psi, s["stw"], along
-        ),
+        "drift": lambda: set_and_drift(psi, s["stw"], along),
+        "drift on a course": lambda: set_and_drift(0.1 * psi, s["stw"], along),
         "over ground": lambda: midship(tools, psi=psi, r=r, **ground),
-        "not moved": lambda: midship(Instruments(), psi=psi, r=r, **ground),
+        "not moved": lambda: midship(Installation(), psi=psi, r=r, **ground),
         "through water": lambda: midship(tools, psi=psi, r=r, stw=s["stw"], **ground),
         "positions": lambda: midship(tools, psi=psi, r=r, x=s["x"], y=s["y"]),
         "velocities kept": lambda: midship(
             tools, psi=psi, r=r, x=s["x"], y=s["y"], u=s["u"], v=s["v"]
         ),
-        "surge kept": lambda: midship(Instruments(), psi=psi, r=r, u=s["u"], **ground),
+        "surge kept": lambda: midship(Installation(), psi=psi, r=r, u=s["u"], **ground),
         "log alone": [
-            lambda: midship(Instruments(), stw=s["stw"]),
-            lambda: midship(Instruments(), psi=psi, r=r, stw=s["stw"]),
+            lambda: midship(Installation(), stw=s["stw"]),
+            lambda: midship(Installation(), psi=psi, r=r, stw=s["stw"]),
         ],
         "no psi": [
             lambda: midship(tools, r=r),
-            lambda: midship(Instruments(), **ground),
+            lambda: midship(Installation(), **ground),
         ],
         "antennas": [
             lambda one=one: own({"gnss_antenna": one}, ship=ship) for one in antennas
@@ -784,18 +806,17 @@ def plausible() -> Answers:
     """From where on values and channels are refused."""
     s = sailed()
     t, psi = s["t"], s["psi"]
-    table = csv_reader.column_table(Path("log.csv"), {"a": t}, range(2, t.size + 2))
+    table = LogTable.of_columns(Path("log.csv"), {"a": t}, range(2, t.size + 2))
 
-    def source(**in_units: str) -> columns.Source:
+    def source(**in_units: str) -> columns.Locator:
         named = {name: columns.Column(name, unit) for name, unit in in_units.items()}
-        return columns.Source(
+        return columns.Locator(
             table, {"t": columns.Column("t", "s"), **named}, np.arange(t.size)
         )
 
     def in_range(channel: str, unit: str, size: float) -> None:
-        plausibility.check_ranges(
-            {channel: np.array([0.0, np.nan, -size])}, source(**{channel: unit})
-        )
+        values = {channel: np.array([0.0, np.nan, -size])}
+        settle(ranges.check_ranges(values, source(**{channel: unit})))
 
     def consistent(frame: str = "body", **changed: Any) -> None:
         channels = {
@@ -807,45 +828,52 @@ def plausible() -> Answers:
             "log",
             [],
         )
-        plausibility.check_consistency(
-            log, frame, source(x="m", y="m", psi="rad", u="m/s", v="m/s", r="rad/s")
-        )
+        here = source(x="m", y="m", psi="rad", u="m/s", v="m/s", r="rad/s")
+        if {"psi", "r"} <= log.channels.keys():
+            settle(agreement.check_yaw_rate(log, here))
+        if {"x", "y", "psi", "u", "v"} <= log.channels.keys():
+            settle(agreement.check_velocity(log, frame, here))
 
     def turning(step_deg: float, share: float) -> None:
         heading = np.zeros(100)
         heading[:: max(round(1.0 / share), 1)] = step_deg * DEGREE
-        plausibility.check_heading(
-            0.3 * np.arange(100.0), heading, heading, source(psi="rad")
+        t = 0.3 * np.arange(100.0)
+        settle(headings.check_heading(t, heading, heading, source(psi="rad")))
+
+    def checked(log: Log, here: columns.Locator) -> list[str]:
+        found = settle(sampling.check_steps(log.t, here))
+        velocity = over_ground.velocity_over_ground(log, False)
+        assert velocity is not None
+        return found + settle(
+            over_ground.check_over_ground(log, velocity, Installation(), here)
         )
 
     def berth(speed: float) -> None:
         log = Log(
             t, {"ground_north": 0.0 * t + speed, "ground_east": 0.0 * t}, "log", []
         )
-        plausibility.check_log(log, Instruments(), source(), False)
+        checked(log, source())
 
     def course(
         apart: float, turned: float, sign: float = 1.0, offset: float = 0.0
     ) -> None:
         heading = np.linspace(0.0, turned, 300)
-        plausibility._check_course(
-            heading,
-            sign * heading + apart,
-            Instruments(heading_offset=offset),
-            source(),
+        known = Installation(heading_offset=offset)
+        settle(
+            over_ground.check_course(heading, sign * heading + apart, known, source())
         )
 
     def apart(begin: float, end: float) -> None:
         first, second = (
-            {"r": (np.array(ends), np.zeros(2))}
+            {"r": Signal(np.array(ends), np.zeros(2))}
             for ends in ([0.0, 100.0], [begin, end])
         )
-        plausibility.check_overlap(first, second, Path("second.csv"), "clock")
+        settle(overlap.check_overlap(first, second, Path("second.csv"), "clock"))
 
     def jumping(n: int, size: int) -> None:
         k = np.arange(size)
         track = np.stack([np.where(k % 10 < 1, 0.0, 900.0) * (k < n), 0.0 * k])
-        plausibility.find_outliers(1.0 * k, track, source(lat="deg"), k)
+        settle(positions.check_one_ship(1.0 * k, *track, k, source(lat="deg")))
 
     def noted(offset: float, noise: float) -> Any:
         random = np.random.default_rng(1).standard_normal((2, 400))
@@ -861,12 +889,12 @@ def plausible() -> Answers:
             "log",
             [],
         )
-        return plausibility.check_log(log, Instruments(), source(psi="rad"), False)
+        return checked(log, source(psi="rad"))
 
     half = np.where(t > 120.0, 1.0, -1.0)
     limits = {
         f"{one}, {unit}": lambda one=one, unit=unit: in_range(
-            one, unit, 1.07 * units.LIMITS[one]
+            one, unit, 1.07 * units.LARGEST_MAGNITUDES[one]
         )
         for one, quantity in units.QUANTITIES.items()
         for unit in units.UNITS[quantity]
@@ -931,11 +959,14 @@ def plausible() -> Answers:
             for n in (0.02, 0.6, 1.2)
         ],
         "outliers": [
-            lambda a=a: plausibility.find_outliers(
-                np.arange(40.0),
-                np.array([np.where(np.arange(40) == 9, a, 0.0), np.zeros(40)]),
-                source(lat="deg"),
-                np.arange(40),
+            lambda a=a: np.flatnonzero(
+                positions.outliers(
+                    positions.too_fast_steps(
+                        np.arange(40.0),
+                        np.where(np.arange(40) == 9, a, 0.0),
+                        np.zeros(40),
+                    )
+                )
             )
             for a in (45.0, 49.0, 51.0, 55.0)
         ],
@@ -943,12 +974,6 @@ def plausible() -> Answers:
             refused(lambda n, size=size: jumping(n, size), (20, 30, 40))
             for size in (60, 64)
         ],
-        "windows": lambda: plausibility._at_windows(np.arange(100.0)),
-        "detrended": lambda: plausibility._detrended(t, psi),
-        "fit": lambda: plausibility._fit(
-            s["u"] + 1j * s["v"], s["north"] + 1j * s["east"]
-        ),
-        "nothing": lambda: plausibility._fit(0.0 * t, t),
     }
 
 
@@ -1016,13 +1041,13 @@ def nmea_logs() -> Answers:
     )
 
     def table(name: str) -> Any:
-        found = tables.read_log(name)
+        found = read_log(name)
         return (
             {one: found.numbers(one) for one in found.header},
             found.notes,
-            found.lines[:3],
+            list(found.rows[:3]),
             found.place(2),
-            found.time_unit,
+            found.units.get("t", "s"),
         )
 
     log("all.nmea", rmc, gga, *motion, *waters, *winds)
@@ -1091,7 +1116,9 @@ def nmea_logs() -> Answers:
         }
         | {
             "corpus": lambda: table(str(CORPUS / "log" / "bridge.nmea")),
-            "is": [nmea.is_nmea(Path(one)) for one in ("all.nmea", "dark.nmea")],
+            "is": [
+                recognise_kind(Path(one)) == "nmea" for one in ("all.nmea", "dark.nmea")
+            ],
         }
     )
 
@@ -1101,17 +1128,17 @@ def kinds_of_files() -> Answers:
     found: Answers = {}
     for ending in ("csv", "xlsx", "parquet", "mat"):
         path = CORPUS / "log" / f"bridge.{ending}"
-        table = tables.read_log(path)
+        table = read_log(path)
         cells = {name: " ".join(table.texts(name)[::4]) for name in table.header}
         found[ending] = asked(
             lambda t=table, c=cells: [
                 t.header,
                 c,
                 t.place(2),
-                t.lines[:4],
+                list(t.rows[:4]),
                 t.decimal_comma,
                 t.notes,
-                t.time_unit,
+                t.units.get("t", "s"),
             ]
         )
         if ending != "csv":
@@ -1119,7 +1146,7 @@ def kinds_of_files() -> Answers:
                 path.read_bytes()[: path.stat().st_size // 3]
             )
             found[f"cut {ending}"] = asked(
-                lambda e=ending: tables.read_log(f"cut.{e}").header
+                lambda e=ending: read_log(f"cut.{e}").header
             ).__class__.__name__
     numbers_of = {name: sailed()[name][:30] for name in ("t", "psi", "u")}
     frame = pd.DataFrame(numbers_of)
@@ -1135,27 +1162,25 @@ def kinds_of_files() -> Answers:
             name="frame",
         )
     )
-    found["place"] = asked(lambda: tables.from_frame(frame, "sheet", 3).place(4))
-    found["no frame"] = asked(lambda: tables.from_frame([1.0]))
-    found["empty frame"] = asked(lambda: tables.from_frame(frame[:0]))
+    found["place"] = asked(lambda: read_frame(frame, "sheet", 3).place(4))
+    found["no frame"] = asked(lambda: read_frame([1.0]))
+    found["empty frame"] = asked(lambda: read_frame(frame[:0]))
     found["numbers"] = asked(
-        lambda: tables.read_log(CORPUS / "log" / "bridge.mat").numbers("psi")
+        lambda: read_log(CORPUS / "log" / "bridge.mat").numbers("psi")
     )
     found["again"] = asked(
-        lambda: tables.read_log(tables.read_log(CORPUS / "log" / "bridge.csv")).numbers(
-            "psi [deg]"
-        )
+        lambda: read_log(read_log(CORPUS / "log" / "bridge.csv")).numbers("psi [deg]")
     )
     for name in ("own", "semicolons"):
         found[name] = asked(
             lambda name=name: Trial.from_csv(CORPUS / "trial" / f"{name}.csv")
         )
     Path("seven.mat").write_bytes(b"MATLAB 7.3 MAT-file" + bytes(200))
-    found["seven"] = asked(lambda: tables.read_log("seven.mat"))
+    found["seven"] = asked(lambda: read_log("seven.mat"))
     Path("empty.mat").write_bytes(b" " * 124 + b"\0\1IM")
-    found["empty"] = asked(lambda: tables.read_log("empty.mat"))
-    found["missing"] = asked(lambda: tables.read_log("none.xlsx"))
-    texts = csv_reader.column_table(
+    found["empty"] = asked(lambda: read_log("empty.mat"))
+    found["missing"] = asked(lambda: read_log("none.xlsx"))
+    texts = LogTable.of_columns(
         Path("cells"),
         {"a": np.array(["1,5", " NA ", "", "2.25", "n/a"], dtype=object)},
         range(5),
@@ -1278,19 +1303,26 @@ def guessed() -> Answers:
     csv("nothing.csv", {"a": s["t"], "b": s["t"]})
 
     def sizes(name: str, limit: float) -> list[str]:
-        made = csv_reader.column_table(Path("t"), {name: np.zeros(3)}, range(3))
+        made = LogTable.of_columns(Path("t"), {name: np.zeros(3)}, range(3))
         return [
-            guesses.guess_columns(
-                replace(made, cells=lambda _, size=size: np.full(3, -size))
-            )[0].unit
+            guess_columns(replace(made, cells=lambda _, size=size: np.full(3, -size)))[
+                0
+            ].unit
             for size in (0.93 * limit, limit, 1.04 * limit)
         ]
 
     def read(path: str | Path) -> tuple[Any, ...]:
-        found = guesses.guess_trial(path)
+        found = guess_trial(path)
         return (
             found.columns,
-            found.conventions.get("rudder_positive", "starboard"),
+            next(
+                (
+                    one.value
+                    for one in found.conventions
+                    if one.name == "rudder_positive"
+                ),
+                "starboard",
+            ),
             found.trial,
         )
 
@@ -1304,11 +1336,8 @@ def guessed() -> Answers:
         "phi": 1.0,
     }
     return {
-        "columns": lambda: guesses.guess_columns(csv_reader.read_table("bridge.csv")),
-        "quoted": [
-            one.quoted
-            for one in guesses.guess_columns(csv_reader.read_table("bridge.csv"))
-        ],
+        "columns": lambda: guess_columns(read_csv("bridge.csv")),
+        "quoted": [one.quoted for one in guess_columns(read_csv("bridge.csv"))],
         "trial": lambda: read("simple.csv"),
         "corpus": lambda: read(CORPUS / "log" / "bridge.csv"),
         "nmea": lambda: read(CORPUS / "log" / "bridge.nmea")[:2],
@@ -1631,7 +1660,7 @@ def scales() -> Answers:
             lambda: units.check_channel("headin", "here"),
             lambda: units.check_channel("t", "here", time=False),
             units.si_unit("r"),
-            lambda: units.LIMITS,
+            lambda: units.LARGEST_MAGNITUDES,
         ],
         "options": {
             name: lambda n=name, o=option: identify_table.check_options(

@@ -22,9 +22,10 @@ from shipgym.sea.conditions import Current, Weather, Wind
 from shipgym.sea.weather_column import mobility_matrix
 from shipgym.sea.wind import AIR_DENSITY, wind_curves
 from shipgym.ships.simulate import open_loop
+from shipgym.trials.conventions import Conventions
 from shipgym.trials.identify_table import Options
+from shipgym.trials.midship import to_project_conventions
 from shipgym.trials.resampling import Log
-from shipgym.trials.trial_import import Conventions, to_project_conventions
 from tests.golden.texts import flat, same_text
 
 NORTH, EAST = 0.3, -0.4  # m/s

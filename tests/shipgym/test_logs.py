@@ -9,10 +9,9 @@ import pytest
 from shipgym.errors import InputError
 from shipgym.manoeuvres import zigzag
 from shipgym.ships import load_model
-from shipgym.trials.clock_texts import read_angles, read_clock
-from shipgym.trials.navigation import local_metres, rudder_offset, straight_parts
+from shipgym.trials.instrument_offsets import rudder_offset, straight_parts
+from shipgym.trials.navigation import local_metres
 from shipgym.trials.ship_file import ShipFile
-from shipgym.trials.tables import read_log
 from shipgym.trials.trial import Trial
 
 DATA = Path(__file__).parents[2].parent / "shared" / "data"
@@ -149,49 +148,6 @@ def test_a_bridge_log_becomes_a_trial_at_midship_on_one_clock(tmp_path):
     assert np.std(shifted["v"] - truth["v"] - (-0.3 * s - 0.4 * c)) > 0.2
 
 
-# --- times and positions
-
-
-@pytest.mark.parametrize(
-    ("texts", "seconds", "dated"),
-    [
-        (["2024-05-31T23:59:59Z", "2024-06-01T00:00:01.5Z"], [0.0, 2.5], True),
-        (["31.05.2024 23:59:59", "01.06.2024 00:00:01,5"], [0.0, 2.5], True),
-        (["05/31/2024 11:59:59 PM", "06/01/2024 12:00:01 AM"], [0.0, 2.0], True),
-        (["2024-05-03T09:00:00", "2024-05-03T09:00:01"], [0.0, 1.0], True),
-        (["23:59:59", "", "0:00:01.5"], [0.0, math.nan, 2.5], False),
-    ],
-)
-def test_clocks_are_read_as_instruments_write_them(texts, seconds, dated):
-    found, known = read_clock(texts)
-    np.testing.assert_allclose(found - found[0], seconds, atol=1e-6)
-    assert known is dated
-    if "2024-05-03" in texts[0]:
-        assert found[0] == 1714726800.0
-
-
-def test_latitudes_are_read_in_degrees_and_minutes():
-    texts = [
-        "57.68723333",
-        "57°41.234'N",
-        "N 57 41.234",
-        "57° 41' 14.04\" N",
-        "-57,68723333",
-        "57°41.234\u2032S",
-        "",
-    ]
-    expected = [57.68723333] * 4 + [-57.68723333] * 2 + [math.nan]
-    np.testing.assert_allclose(read_angles(texts), expected, atol=1e-7)
-    np.testing.assert_allclose(
-        read_angles(["5741.234N", "5741.234"]), 57.68723333, atol=1e-7
-    )
-    np.testing.assert_allclose(
-        read_angles(["0044.3", "00044.3W"], True), [44.3 / 60, -44.3 / 60]
-    )
-    with pytest.raises(ValueError, match="57°61'N"):
-        read_angles(["57°61'N"])
-
-
 def test_a_track_over_the_date_line_has_no_jump():
     x, y = local_metres(
         np.array([-17.0, -17.0]), np.array([179.999, -179.999]), (-17.0, 179.999)
@@ -240,49 +196,9 @@ def test_every_kind_of_table_gives_the_same_trial(tmp_path):
     trial = Trial.from_frame(unix, columns | {"t": {"column": "time", "unit": "unix"}})
     np.testing.assert_allclose(trial.t, expected.t, atol=1e-6)
     with pytest.raises(
-        InputError, match="frame: a list found, expected a pandas DataFrame"
+        InputError, match="frame: expected a pandas DataFrame, got a list"
     ):
         Trial.from_frame([1, 2])
-
-
-def test_a_sheet_with_merged_cells_is_refused(tmp_path):
-    openpyxl = pytest.importorskip("openpyxl")
-    book = openpyxl.Workbook()
-    for row in (["t", "u"], [0, 1], [1, 1], [2, 1]):
-        book.active.append(row)
-    book.active.merge_cells("A3:A4")
-    book.save(tmp_path / "log.xlsx")
-    with pytest.raises(
-        InputError, match=r"merged cells A3:A4 found in sheet 'Sheet'.*unmerge them"
-    ):
-        read_log(tmp_path / "log.xlsx")
-
-
-@pytest.mark.parametrize("names", [["t", "t"], [0, 1]])
-def test_a_sheet_begins_with_names_where_it_is_not_empty(names, tmp_path):
-    openpyxl = pytest.importorskip("openpyxl")
-    book = openpyxl.Workbook()
-    for row in ([], [None, "t", "u"], [None, 0, 1], [], [None, 1, 2]):
-        book.active.append(row)
-    book.save(tmp_path / "log.xlsx")
-    table = read_log(tmp_path / "log.xlsx")
-    assert (table.header, list(table.lines)) == (("t", "u"), [3, 5])
-    book.active["B2"], book.active["C2"] = names
-    book.save(tmp_path / "log.xlsx")
-    with pytest.raises(
-        InputError,
-        match=r"log.xlsx: row 2: .* found, expected names of columns, each once",
-    ):
-        read_log(tmp_path / "log.xlsx")
-
-
-@pytest.mark.parametrize("ending", ["xlsx", "parquet", "mat"])
-def test_a_damaged_file_is_one_message(tmp_path, ending):
-    (tmp_path / f"log.{ending}").write_bytes(b"PK\x03\x04" + bytes(300))
-    with pytest.raises(
-        InputError, match=rf"log.{ending}: (cannot be read|no numeric vectors)"
-    ):
-        read_log(tmp_path / f"log.{ending}")
 
 
 # --- NMEA 0183
@@ -344,116 +260,6 @@ def test_an_nmea_log_becomes_a_trial(tmp_path):
     )
     assert trial["wind_speed"][0] == pytest.approx(abs(expected), abs=0.1)
     assert trial["wind_from"][0] == pytest.approx(np.angle(expected), abs=0.02)
-
-
-def test_a_log_with_wrong_checksums_or_without_time_is_refused(tmp_path):
-    lines = nmea_log(tmp_path / "log.nmea", end=20).read_text().splitlines()
-    (tmp_path / "bad.nmea").write_text(
-        "\n".join(one[:-2] + "00" if k % 2 else one for k, one in enumerate(lines))
-    )
-    with pytest.raises(
-        InputError, match=r"sentences have a wrong checksum.*the first in line 2\)"
-    ):
-        read_log(tmp_path / "bad.nmea")
-    lines[3:4] = [sentence("GPVTG,inf,T,,M,5.0,N,,K"), lines[3]]
-    (tmp_path / "infinite.nmea").write_text("\n".join(lines))
-    notes = read_log(tmp_path / "infinite.nmea").notes
-    assert [note.partition(" of ")[0] for note in notes if "checksum" in note] == ["1"]
-    (tmp_path / "dark.nmea").write_text(
-        "\n".join(one for one in lines if "HETHS" in one)
-    )
-    with pytest.raises(
-        InputError, match="no time that can be read in this log, expected some of RMC"
-    ):
-        read_log(tmp_path / "dark.nmea")
-
-
-def test_a_tenth_of_the_sentences_may_be_damaged(tmp_path):
-    lines = nmea_log(tmp_path / "log.nmea", end=20).read_text().splitlines()[1:201]
-    for count in (20, 21):
-        damaged = [
-            one[:-2] + "ZZ" if k >= 200 - count else one for k, one in enumerate(lines)
-        ]
-        (tmp_path / "log.nmea").write_text("\n".join(damaged))
-        if count == 20:
-            assert (
-                "20 of 200 sentences with a wrong checksum"
-                in read_log(tmp_path / "log.nmea").notes[0]
-            )
-    with pytest.raises(
-        InputError, match=r"21 of 200 sentences have a wrong checksum.*in line 180\)"
-    ):
-        read_log(tmp_path / "log.nmea")
-
-
-def test_a_wind_of_no_unit_is_left_out(tmp_path):
-    path = nmea_log(tmp_path / "log.nmea", end=60)
-    before = Trial.from_csv(path)
-    path.write_text(path.read_text() + sentence("WIMWV,090.0,T,9.0,X,A") + "\n")
-    assert Trial.from_csv(path).channels.keys() == before.channels.keys()
-
-
-@pytest.mark.parametrize(
-    ("unit", "metres"), [("M", 1.0), ("N", 1852.0 / 3600.0), ("K", 1.0 / 3.6)]
-)
-def test_a_wind_is_told_in_metres_per_second_knots_or_kilometres_per_hour(
-    unit, metres, tmp_path
-):
-    clocks = [
-        f"GPGGA,00000{k},5741.0000,N,01144.0000,E,1,08,1.0,20.0,M,,M,,"
-        for k in range(3)
-    ]
-    wind = f"WIMWV,030.0,T,10.0,{unit},A"
-    lines = [
-        sentence(text) for clock in clocks for text in (clock, "HEHDT,20.0,T", wind)
-    ]
-    (tmp_path / "log.nmea").write_text("\n".join(lines))
-    table = read_log(tmp_path / "log.nmea")
-    found = {name: table.numbers(name) for name in ("wind_speed", "wind_from")}
-    assert found["wind_speed"][np.isfinite(found["wind_speed"])] == pytest.approx(
-        10.0 * metres
-    )
-    assert np.degrees(
-        found["wind_from"][np.isfinite(found["wind_from"])]
-    ) == pytest.approx(50.0)
-
-
-def test_a_log_without_dates_goes_on_at_midnight(tmp_path):
-    texts = ("235958", "235959", "000000", "000001", "000002")
-    lines = [
-        sentence(one)
-        for clock in texts
-        for one in (
-            f"GPGGA,{clock},5741.0000,N,01144.0000,E,1,08,1.0,20.0,M,,M,,",
-            "HEHDT,30.0,T",
-        )
-    ]
-    (tmp_path / "log.nmea").write_text("\n".join(lines))
-    assert np.ptp(read_log(tmp_path / "log.nmea").numbers("t")) == 4.0
-
-
-@pytest.mark.parametrize(
-    ("fields", "true_deg"),
-    [
-        ("10.0,2.0,E,3.0,E", 15.0),
-        ("10.0,2.0,W,3.5,W", 4.5),
-        ("10.0,2.0,W,3.0,E", 11.0),
-        ("10.0,,,3.0,E", 13.0),
-        ("10.0,2.0,,3.0,E", 13.0),  # to which side is not told
-        ("10.0,,W,3.0,E", 13.0),
-    ],
-)
-def test_deviation_and_variation_to_the_east_are_added_to_a_compass(
-    fields, true_deg, tmp_path
-):
-    clocks = [
-        f"GPGGA,00000{k},5741.0000,N,01144.0000,E,1,08,1.0,20.0,M,,M,,"
-        for k in range(3)
-    ]
-    lines = [sentence(text) for clock in clocks for text in (clock, f"HCHDG,{fields}")]
-    (tmp_path / "log.nmea").write_text("\n".join(lines))
-    found = np.degrees(read_log(tmp_path / "log.nmea").numbers("psi"))
-    assert found[np.isfinite(found)] == pytest.approx(true_deg)
 
 
 @pytest.mark.skipif(
@@ -521,7 +327,7 @@ def test_a_yaw_rate_or_heading_of_the_wrong_sign_is_not_taken_for_the_rudders(tm
         path = written(tmp_path / "run.csv", **changed)
         with pytest.raises(
             InputError,
-            match=r"'psi' \(heading\) and 'r' \(yaw rate\) have opposite signs",
+            match=r"'psi' \(heading\) and 'r' \(yaw rate\) to be positive .* opposite signs",
         ):
             Trial.from_csv(path)
 
@@ -595,10 +401,9 @@ def test_no_time_that_can_be_read_is_named_by_its_line(tmp_path):
         tmp_path / "log.csv",
         changed(0, lambda cell: "noon" if "30:02" in cell else cell),
     )
-    assert (
-        "line 6 (data row 5), column 'Zeit': no time that can be read: 'noon'"
-        in refusal(path)
-    )
+    message = refusal(path)
+    assert "line 6 (data row 5), column 'Zeit': expected a number, ISO 8601" in message
+    assert message.endswith("got 'noon'")
 
 
 def test_an_outlier_of_the_position_is_named_and_left_out_on_demand(tmp_path):
@@ -607,7 +412,8 @@ def test_an_outlier_of_the_position_is_named_and_left_out_on_demand(tmp_path):
         1, lambda cell: cell.replace("57°", "58°") if next(rows) == 30 else cell
     )
     path = bridge_log(tmp_path / "log.csv", keep)
-    assert "line 62 (data row 61), column 'Breite': position 58.6" in refusal(path)
+    assert "got 58.6" in refusal(path)
+    assert "line 62 (data row 61), column 'Breite': expected a pos" in refusal(path)
     trial = Trial.from_csv(path, COLUMNS, "port", repair="interpolate", sensors=ANTENNA)
     assert np.abs(np.diff(trial["x"]) / np.diff(trial.t)).max() < 8.0
     assert trial.repaired == {"x": 1, "y": 1}
@@ -628,13 +434,13 @@ def test_a_heading_that_contradicts_the_course_over_ground_is_named(tmp_path):
         bridge_log(tmp_path / "log.csv", course)
     )
     mirrored = bridge_log(tmp_path / "log.csv", gyro=-1.0)
-    assert "it turns the other way, expected it clockwise" in refusal(mirrored)
+    assert "it turns the other way" in refusal(mirrored)
 
 
 def test_the_course_over_ground_taken_for_the_heading_is_named(tmp_path):
     path = bridge_log(tmp_path / "log.csv")
     columns = COLUMNS | {"psi": COLUMNS["cog"]}
-    assert "the heading is the course over ground" in refusal(path, columns)
+    assert "less than 0.3 deg of difference" in refusal(path, columns)
 
 
 def test_a_magnetic_heading_is_told_and_its_offset_taken_out(tmp_path):
@@ -676,7 +482,7 @@ def test_overshoots_are_not_taken_for_straight_parts(name, angle):
         found.append(
             rudder_offset(t[first:], channels, straight_parts(t[first:], channels))
         )
-    assert found[0][0] == pytest.approx(3.0 * DEGREE, abs=0.1 * DEGREE)
+    assert found[0] == pytest.approx(3.0 * DEGREE, abs=0.1 * DEGREE)
     assert found[1] is None
 
 
@@ -737,7 +543,7 @@ def test_a_log_is_cut_into_trials_by_rudder_by_seconds_and_by_the_clock(tmp_path
     with pytest.raises(
         InputError,
         match=(
-            r"11:00 to 11:10 holds no trial.*2024-05-31 09:30:00 to 2024-05-31 09:40:00"
+            r"2024-05-31 09:30:00 to 2024-05-31 09:40:00, got 11:00 to 11:10, which holds"
         ),
     ):
         ship_file(
@@ -772,7 +578,7 @@ def test_an_antenna_outside_the_ship_is_refused(tmp_path):
     with pytest.raises(
         InputError,
         match=(
-            r"\[sensors\] gnss_antenna.forward: 125 m found, outside the ship of 150 m"
+            r"\[sensors\] gnss_antenna.forward: expected at most 90 m .*, got 125 m"
         ),
     ):
         ship_file(tmp_path, text)
@@ -784,9 +590,9 @@ def test_an_antenna_outside_the_ship_is_refused(tmp_path):
         (
             "speed = 7.0",
             "speed = 13.6",
-            "13.6 is 6.99. m/s in knots.*write speed = 6.99",
+            "got 13.6, which in knots is 6.99. m/s.*write speed = 6.99",
         ),
-        ("length = 150.0", "length = 28.0", "28 m by 22 m.*an antenna's height"),
+        ("length = 150.0", "length = 28.0", "got 28 m by 22 m.*an antenna's height"),
     ],
 )
 def test_knots_for_metres_per_second_and_a_height_for_the_length_are_named(

@@ -12,7 +12,6 @@ from scipy.interpolate import make_interp_spline
 from scipy.optimize import brentq
 
 from shipgym.errors import InputError
-from shipgym.trials import plausibility
 from shipgym.trials.derivatives import time_derivative
 from shipgym.trials.navigation import rotate_to_body
 from shipgym.trials.trial import Trial
@@ -134,15 +133,27 @@ def test_a_missing_channel_is_named_with_those_present():
 @pytest.mark.parametrize(
     ("t", "channels", "message"),
     [
-        ([0.0, 1.0], {"r": [0, 0]}, "2 samples found, expected at least 3"),
-        ([0.0, 1.0, 1.0], {"r": [0, 0, 0]}, "goes from 1 to 1 s at sample 2"),
-        ([0.0, 2.0, 1.0], {"r": [0, 0, 0]}, "goes from 2 to 1 s at sample 2"),
-        ([0.0, 1.0, 2.0], {"r": [0, 0]}, "r has 2 samples, expected 3"),
+        ([0.0, 1.0], {"r": [0, 0]}, "expected at least 3 samples, got 2"),
+        (
+            [0.0, 1.0, 1.0],
+            {"r": [0, 0, 0]},
+            "sample 2: expected strictly .*, got 1 after 1 s",
+        ),
+        (
+            [0.0, 2.0, 1.0],
+            {"r": [0, 0, 0]},
+            "sample 2: expected strictly .*, got 1 after 2 s",
+        ),
+        ([0.0, 1.0, 2.0], {"r": [0, 0]}, "r: expected 3 samples as in t, got 2"),
         ([0.0, 1.0, 2.0], {"r": [0, math.nan, 0]}, "nan found at sample 1"),
-        ([0.0, 1.0, 2.0], {"r": [[0], [1], [2]]}, r"array of shape \(3, 1\) found"),
+        (
+            [0.0, 1.0, 2.0],
+            {"r": [[0], [1], [2]]},
+            r"expected an array of shape \(n_samples,\), got \(3, 1\)",
+        ),
         ([0.0, 1.0, 2.0], {"r": ["a", "b", "c"]}, "expected an array of numbers"),
         ([0.0, 1.0, 2.0], {"rudder": [0, 0, 0]}, "unknown channel 'rudder'"),
-        ([0.0, 1.0, 2.0], {}, "no channel found"),
+        ([0.0, 1.0, 2.0], {}, "expected at least one channel of"),
     ],
 )
 def test_unsound_arrays_are_refused(t, channels, message):
@@ -157,7 +168,7 @@ def test_words_that_are_not_known_are_refused():
         Trial([0, 1, 2], {"r": [0, 0, 0]}, kind="zig-zag")
     with pytest.raises(InputError, match="use: 'test' found"):
         Trial([0, 1, 2], {"r": [0, 0, 0]}, use="test")
-    with pytest.raises(InputError, match="derived: 'psi' found"):
+    with pytest.raises(InputError, match="derived: expected some of 'r', got 'psi'"):
         Trial([0, 1, 2], {"r": [0, 0, 0]}, derived=["psi"])
 
 
@@ -243,25 +254,6 @@ def test_writing_replaces_the_file_as_a_whole_or_says_why_not(tmp_path):
     with pytest.raises(InputError, match="is not a file"):
         trial.to_csv(tmp_path)
     assert [path.name for path in tmp_path.iterdir()] == ["out.csv"]
-
-
-@pytest.mark.parametrize("delimiter", [",", ";", "\t"])
-def test_semicolons_tabs_quotes_blank_lines_and_byte_order_marks_are_read(
-    tmp_path, delimiter
-):
-    lines = ['"t","u"', "0,1.5", "", "1,2.5", '"2",3.5', " , "]
-    text = "\ufeff" + "\r\n".join(line.replace(",", delimiter) for line in lines)
-    (tmp_path / "run.csv").write_text(text, encoding="utf-8", newline="")
-    np.testing.assert_array_equal(
-        Trial.from_csv(tmp_path / "run.csv")["u"], [1.5, 2.5, 3.5]
-    )
-
-
-def test_decimal_commas_are_read_where_the_delimiter_leaves_no_doubt(tmp_path):
-    (tmp_path / "run.csv").write_text("t;u\n0;1,5\n0,5;2,5\n1;3,5\n")
-    trial = Trial.from_csv(tmp_path / "run.csv")
-    np.testing.assert_array_equal(trial["u"], [1.5, 2.5, 3.5])
-    np.testing.assert_array_equal(trial.t, [0.0, 0.5, 1.0])
 
 
 def test_text_in_a_column_that_is_not_asked_for_does_no_harm(tmp_path):
@@ -356,7 +348,9 @@ def test_velocity_and_position_of_the_centre_of_gravity_are_moved_to_midship(tmp
     trial = Trial.from_csv(path, origin="cg", xg=xg)
     for name in ("x", "y", "u", "v"):
         np.testing.assert_allclose(trial[name], channels[name], atol=1e-14)
-    assert "origin: 'cg' found without xg" in refusal(path, origin="cg")
+    assert "origin: expected xg, the distance of the centre" in refusal(
+        path, origin="cg"
+    )
 
 
 def test_a_heading_that_jumps_at_north_becomes_continuous(tmp_path):
@@ -503,40 +497,10 @@ def test_time_cannot_be_repaired_nor_a_column_that_is_mostly_empty(tmp_path):
     )
     r = np.where(np.arange(T.size) % 3 == 0, 0.01, np.nan)
     path = write(tmp_path / "run.csv", {"t": T, "r": r})
-    assert "only 101 of 301 rows" in refusal(path, repair="interpolate")
+    assert "got only 101;" in refusal(path, repair="interpolate")
     assert "repair: 'drop' found, expected one of 'interpolate'" in refusal(
         path, repair="drop"
     )
-
-
-@pytest.mark.parametrize("rows", [10, 15, 60])
-def test_a_hole_too_long_to_interpolate_is_refused_with_its_line_and_length(
-    tmp_path, rows
-):
-    channels, _ = manoeuvre()
-    r = channels["r"].copy()
-    r[5] = np.nan
-    r[100 : 100 + rows] = np.nan
-    path = write(tmp_path / "run.csv", {"t": T, **channels, "r": r})
-    if rows < 20:
-        assert len(Trial.from_csv(path, repair="interpolate")) == T.size
-        return
-    message = refusal(path, repair="interpolate")
-    length = T[100 + rows] - T[99]
-    assert (
-        f"line 102 (data row 101), column 'r': {rows} rows without a value, over"
-        f" {length:g} s" in message
-    )
-    assert "split the file there" in message
-
-
-def test_a_few_rows_over_a_long_time_are_no_hole(tmp_path):
-    channels, _ = manoeuvre()
-    kept = np.r_[0:102, 150 : T.size]
-    r = channels["r"][kept]
-    r[100:104] = np.nan
-    path = write(tmp_path / "run.csv", {"t": T[kept], "r": r})
-    assert np.isfinite(Trial.from_csv(path, repair="interpolate")["r"]).all()
 
 
 # --- files that are refused
@@ -544,33 +508,22 @@ def test_a_few_rows_over_a_long_time_are_no_hole(tmp_path):
 
 def test_text_in_a_number_is_named_with_line_column_and_value(tmp_path):
     message = refusal(edited(tmp_path, 7, {4: "1,1".replace(",", ".1.")}))
-    assert (
-        "line 7 (data row 6), column 'u': '1.1.1' found, expected a number" in message
-    )
-
-
-def test_a_ragged_row_is_named_with_its_number_of_cells(tmp_path):
-    assert "line 9 (data row 8) has 3 cells, expected 8" in refusal(
-        edited(tmp_path, 9, text="1,2,3")
-    )
-    assert "line 9 (data row 8) has 9 cells, expected 8" in refusal(
-        edited(tmp_path, 9, text="1,2,3,4,5,6,7,8,9")
-    )
+    assert "line 7 (data row 6), column 'u': expected a number, got '1.1.1'" in message
 
 
 def test_time_that_goes_back_or_stands_still_is_named_with_both_values(tmp_path):
     message = refusal(edited(tmp_path, 20, {0: "1.5"}))
-    assert (
-        "line 20 (data row 19), column 't': time goes back from 3.4 to 1.5 s" in message
-    )
-    assert "line 20 (data row 19), column 't': time stands still at 3.4 s" in refusal(
-        edited(tmp_path, 20, {0: repr(float(T[17]))})
-    )
+    assert "line 20 (data row 19), column 't': expected time to increase" in message
+    assert "got one that goes back from 3.4 to 1.5 s" in message
+    stands_still = edited(tmp_path, 20, {0: repr(float(T[17]))})
+    assert "got one that stands still at 3.4 s" in refusal(stands_still)
 
 
 def test_blank_lines_do_not_shift_the_line_numbers(tmp_path):
     (tmp_path / "run.csv").write_text("\n\nt,u\n\n0,1\n1,1\n\n2,x\n")
-    assert "line 8 (data row 3), column 'u': 'x' found" in refusal(tmp_path / "run.csv")
+    assert "line 8 (data row 3), column 'u': expected a number, got 'x'" in refusal(
+        tmp_path / "run.csv"
+    )
 
 
 @pytest.mark.parametrize("rows", [0, 1, 2])
@@ -578,59 +531,27 @@ def test_fewer_than_three_samples_are_refused(tmp_path, rows):
     (tmp_path / "run.csv").write_text(
         "t,u\n" + "".join(f"{k},1\n" for k in range(rows))
     )
-    assert f"{rows} samples found, expected at least 3" in refusal(tmp_path / "run.csv")
+    assert f"at least 3 rows below the header, got {rows};" in refusal(
+        tmp_path / "run.csv"
+    )
 
 
 @pytest.mark.parametrize(
     ("content", "message"),
     [
-        (b"", "the file is empty"),
-        (b"\n \n", "the file is empty"),
-        (b"PK\x03\x04\x14\x00\x06\x00", "binary content (a zero byte at byte 5)"),
-        (b"\x89PNG\r\n\x1a\n", "byte 0x89, which is not UTF-8"),
-        (b"t,u\n0,1\n1,\xff\n", "line 3 holds byte 0xff"),
-        ("t,u\n0,1\n".encode("utf-16"), "the file is in UTF-16"),
-        (b"\x01\x02\x03\n", "expected column names"),
-        (b"t,u,u\n0,1,1\n", "column 'u' appears twice"),
-        (b"0,1,2\n1,1,1\n", "only numbers, expected a header"),
-        (b"time,speed\n0,1\n", "no column is named like a channel"),
-        (b"t,speed\n0,1\n", "no column is named like a channel"),
-        (b"u,v\n0,1\n", "column 't' not found"),
-        (
-            b"t," + b'"' + b"x" * 200_000 + b"\n0,1\n",
-            "200003 characters found, expected at most 100000",
-        ),
-        (
-            b",".join(b"c%d" % i for i in range(1001)),
-            "line 1 names 1001 columns, expected at most 1000",
-        ),
-        (b"t,u\n" + b"\n" * 1_000_000, "1000002 lines found, expected at most 1000000"),
-        (
-            b't\tu\tv\n0\t"1\t2\nx\t1\t2\n',
-            "line 2 (data row 1) has 2 cells, expected 3",
-        ),
-        (
-            b't,u,c\n0,1,"\n5",3,4\n2,1,0\n3,1,0\n',
-            "line 3 (data row 2), column 't': '5\"' found",
-        ),
-        (b"t,x\n0,1\n1,1e150\n2,1\n", "x = 1e+150 m found, expected at most 1e+08 m"),
-        (
-            b"t,u\n0,1\n1e200,1\n2e200,1\n",
-            "t = 1e+200 s found, expected at most 1e+10 s",
-        ),
-        (b"t,u\n0,1\n1e-300,1\n1,1\n", "time stands still at 1e-300 s"),
-        (
-            b"t,u\n0,1\n1,1_0\n2,1\n",
-            "line 3 (data row 2), column 'u': '1_0' found, expected a number",
-        ),
-        (
-            b"t;u\n0;1\n1;1_0,5\n2;1\n",
-            "line 3 (data row 2), column 'u': '1_0,5' found, expected a number",
-        ),
+        ("time,speed\n0,1\n", "no column is named like a channel"),
+        ("t,speed\n0,1\n", "no column is named like a channel"),
+        ("u,v\n0,1\n", "column 't' not found"),
+        ('t,u,c\n0,1,"\n5",3,4\n2,1,0\n3,1,0\n', "line 3 (data row 2), column 't': "),
+        ("t,x\n0,1\n1,1e150\n2,1\n", "x of at most 1e+08 m, got 1e+150 m"),
+        ("t,u\n0,1\n1e200,1\n2e200,1\n", "t of at most 1e+10 s, got 1e+200 s"),
+        ("t,u\n0,1\n1e-300,1\n1,1\n", "stands still at 1e-300 s"),
+        ("t,u\n0,1\n1,1_0\n2,1\n", "column 'u': expected a number, got '1_0'"),
+        ("t;u\n0;1\n1;1_0,5\n2;1\n", "column 'u': expected a number, got '1_0,5'"),
     ],
 )
-def test_what_is_not_a_table_of_numbers_is_refused(tmp_path, content, message):
-    (tmp_path / "run.csv").write_bytes(content)
+def test_what_holds_no_trial_is_refused(tmp_path, content, message):
+    (tmp_path / "run.csv").write_text(content)
     assert message in refusal(tmp_path / "run.csv")
 
 
@@ -639,15 +560,6 @@ def test_a_heading_of_the_smallest_numbers_is_differentiated(tmp_path):
         "t,psi\n" + "".join(f"{k},5e-324\n" for k in range(70))
     )
     assert np.abs(Trial.from_csv(tmp_path / "run.csv")["r"]).max() < 1e-300
-
-
-def test_a_missing_file_and_a_folder_are_refused(tmp_path):
-    (tmp_path / "run_1.csv").write_text("t,u\n")
-    assert "there is no such CSV file. Did you mean 'run_1.csv'?" in refusal(
-        tmp_path / "run1.csv"
-    )
-    assert "no such CSV file" in refusal(tmp_path / "nowhere" / "run.csv")
-    assert "this is a folder" in refusal(tmp_path)
 
 
 def test_a_missing_column_is_named_with_those_present(tmp_path):
@@ -666,19 +578,19 @@ def test_a_missing_column_is_named_with_those_present(tmp_path):
         ({"Delta": "u"}, "Did you mean 'delta'?"),
         (
             {"r": {"column": "u", "unit": "knots"}},
-            "unit 'knots' found, expected a unit of angular rate",
+            "expected a unit of angular rate ('rad/s', ",
         ),
         ({"r": {"column": "u", "unit": "knots"}}, "'knots' is a unit of speed"),
         ({"u": {"column": "u", "unit": "knot"}}, "Did you mean 'knots'?"),
-        ({"u": {"column": "u", "unit": 3}}, "unit 3 found"),
+        ({"u": {"column": "u", "unit": 3}}, "got 3"),
         (
             {"u": {"column": "u", "units": "m/s"}},
             "unknown key 'units'. Did you mean 'unit'?",
         ),
         ({"u": {"unit": "m/s"}}, "expected the name of a column"),
-        ({"u": 3}, "3 found, expected the name of a column"),
+        ({"u": 3}, "expected the name of a column"),
         ({"u": " "}, "expected a text that is not empty"),
-        ({"t": "t"}, "no channel named besides time"),
+        ({"t": "t"}, "got time alone"),
     ],
 )
 def test_columns_that_make_no_sense_are_refused(tmp_path, columns, message):
@@ -706,13 +618,11 @@ def test_conventions_that_are_not_known_are_refused(tmp_path, argument, message)
 
 def test_earth_fixed_velocities_need_a_recorded_heading(tmp_path):
     (tmp_path / "run.csv").write_text("t,u,v\n0,1,0\n1,1,0\n2,1,0\n")
-    assert "without a recorded psi" in refusal(
+    assert "got no recorded psi" in refusal(
         tmp_path / "run.csv", velocity_frame="earth"
     )
     (tmp_path / "run.csv").write_text("t,u,psi\n0,1,0\n1,1,0\n2,1,0\n")
-    assert "without a recorded v" in refusal(
-        tmp_path / "run.csv", velocity_frame="earth"
-    )
+    assert "got no recorded v" in refusal(tmp_path / "run.csv", velocity_frame="earth")
 
 
 @settings(
@@ -750,7 +660,7 @@ def test_whatever_a_file_holds_the_answer_is_a_trial_or_one_message(tmp_path, co
             'likely a wrong unit: declare r = { column = "r", unit = "deg/s" }',
         ),
         ("delta", 180 / np.pi, 'declare delta = { column = "delta", unit = "deg" }'),
-        ("u", 100.0, "expected at most 50 m/s"),
+        ("u", 100.0, "expected u of at most 50 m/s"),
     ],
 )
 def test_values_beyond_any_ship_are_refused_with_the_likely_unit(
@@ -766,10 +676,10 @@ def test_values_beyond_any_ship_are_refused_with_the_likely_unit(
 def test_a_ship_turning_400_deg_s_is_refused(tmp_path):
     message = refusal(edited(tmp_path, 30, {6: repr(math.radians(400.0))}))
     assert (
-        "line 30 (data row 29), column 'r': r = 6.98132 rad/s (400 deg/s) found"
+        "line 30 (data row 29), column 'r': expected r of at most 1.0472 rad/s (60"
         in message
     )
-    assert "expected at most 1.0472 rad/s (60 deg/s)" in message
+    assert "got 6.98132 rad/s (400 deg/s)" in message
 
 
 def test_degrees_read_as_radians_are_noticed_in_the_heading(tmp_path):
@@ -814,20 +724,6 @@ def test_a_biased_rate_sensor_on_a_straight_run_is_no_contradiction(tmp_path):
         len(Trial.from_csv(write(tmp_path / "run.csv", {"t": T, "psi": psi, "r": r})))
         == T.size
     )
-
-
-def test_velocities_in_the_wrong_frame_or_unit_are_refused(tmp_path):
-    channels, earth = manoeuvre()
-    path = write(
-        tmp_path / "run.csv",
-        {"t": T, **channels, "u": earth["north"], "v": earth["east"]},
-    )
-    assert 'declare velocity_frame = "earth"' in refusal(path)
-    path = write(tmp_path / "run.csv", {"t": T, **channels})
-    assert 'declare velocity_frame = "body"' in refusal(path, velocity_frame="earth")
-    knots = {"u": channels["u"] / 0.5144, "v": channels["v"] / 0.5144}
-    message = refusal(write(tmp_path / "run.csv", {"t": T, **channels, **knots}))
-    assert "the position changes 0.514 times as fast as the velocities say" in message
 
 
 # --- real input
@@ -880,7 +776,7 @@ def test_what_no_ship_does_begins_at_its_limit(tmp_path, channel, unit, largest)
     path = write(
         tmp_path / "more.csv", {"t": T, channel: np.full(T.size, 1.01 * largest)}
     )
-    with pytest.raises(InputError, match=rf"{channel} = .* found, expected at most"):
+    with pytest.raises(InputError, match=rf"expected {channel} of at most"):
         Trial.from_csv(path, columns)
 
 
@@ -898,12 +794,3 @@ def test_velocities_derived_from_positions_are_over_ground(tmp_path):
         for copy in (gnss, gnss.with_(name="a"), pickle.loads(pickle.dumps(gnss)))
     )
     assert not gnss.with_(over_ground=False).with_channels({"u": gnss["u"]}).over_ground
-
-
-def test_a_yaw_rate_loses_its_bias_whatever_its_clock_begins_at():
-    t = np.arange(301.0)
-    turned = np.sin(t / 40.0)
-    of_zero = plausibility._detrended(t, turned + 0.01 * t + 3.0)
-    plain = plausibility._detrended(t, turned)
-    np.testing.assert_allclose(plain, of_zero, atol=1e-12)
-    np.testing.assert_array_equal(plausibility._detrended(t + 2.0**31, turned), plain)

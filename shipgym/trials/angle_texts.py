@@ -1,0 +1,63 @@
+"""Latitudes and longitudes as instruments write them: degrees, degrees and minutes, or also seconds."""
+
+import re
+from collections.abc import Sequence
+
+import numpy as np
+
+from shipgym.arrays import Floats
+
+_NUMBER = r"\d+(?:[.,]\d+)?"
+_ANGLE = re.compile(
+    r"\s*(?P<before>[NSEW])?\s*"
+    rf"(?P<sign>[-+]?)(?P<degrees>{_NUMBER})"
+    rf"(?:\s*[°º\s]\s*(?P<minutes>{_NUMBER}))?"
+    rf"(?:\s*['\u2032\u2019\s]\s*(?P<seconds>{_NUMBER}))?"
+    "\\s*['\u2032\u2019\"\u2033\u201d]{0,2}\\s*"
+    r"(?P<after>[NSEW])?\s*",
+    re.IGNORECASE,
+)
+_PLAIN_DIGITS = 4  # before the point, from which a number is ddmm.mmm
+
+
+def read_angles(texts: Sequence[str], minutes: bool = False) -> Floats:
+    """Degrees of latitudes or longitudes, nan where empty, south and west negative.
+
+    Numbers of at least four digits before the point, in any of the texts, say that all
+    are ddmm.mmm as in NMEA 0183, as does `minutes`. Raises ValueError, with the text,
+    where one is none of these.
+    """
+    matches = []
+    for text in texts:
+        match = _ANGLE.fullmatch(text)
+        if text and match is None:
+            raise ValueError(text)
+        matches.append(match if text else None)
+
+    with_minutes = minutes or any(_is_ddmm(match) for match in matches)
+    return np.array([_degrees(match, with_minutes) for match in matches], dtype=float)
+
+
+def _is_ddmm(match: re.Match[str] | None) -> bool:
+    if match is None:
+        return False
+    whole = match["degrees"].replace(",", ".").partition(".")[0]
+    return len(whole) >= _PLAIN_DIGITS
+
+
+def _degrees(match: re.Match[str] | None, with_minutes: bool) -> float:
+    if match is None:
+        return np.nan
+    degrees, minutes, seconds = (
+        float((match[name] or "0").replace(",", "."))
+        for name in ("degrees", "minutes", "seconds")
+    )
+    if with_minutes and match["minutes"] is None:
+        degrees, minutes = divmod(degrees, 100.0)
+    if minutes >= 60.0 or seconds >= 60.0:
+        raise ValueError(match[0])
+
+    size = degrees + minutes / 60.0 + seconds / 3600.0
+    side = (match["before"] or match["after"] or "N").upper()
+    is_negative = (side in "SW") != (match["sign"] == "-")
+    return -size if is_negative else size

@@ -1,0 +1,12 @@
+"""What a log holds where nobody says it: columns, units, signs and frames, each guess with its reason."""
+
+from shipgym.trials.guesses.columns import ColumnGuess, guess_columns
+from shipgym.trials.guesses.trials import ConventionGuess, TrialGuess, guess_trial
+
+__all__ = [
+    "ColumnGuess",
+    "ConventionGuess",
+    "TrialGuess",
+    "guess_columns",
+    "guess_trial",
+]

@@ -1,0 +1,105 @@
+"""A log read with what is guessed: where a check names another unit, sign or frame, that is tried."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from shipgym.errors import InputError
+from shipgym.trials.conventions import Conventions
+from shipgym.trials.guesses.columns import ColumnGuess, guess_columns
+from shipgym.trials.plausibility.finding import Proposal
+from shipgym.trials.readers.kinds import read_log
+from shipgym.trials.readers.log_table import LogTable
+from shipgym.trials.trial import Trial, read_trials
+from shipgym.trials.units import QUANTITIES
+
+
+class ConventionGuess(NamedTuple):
+    """A convention that is not the usual one, and why."""
+
+    name: str
+    value: str
+    reason: str
+
+
+@dataclass(frozen=True)
+class TrialGuess:
+    """A log, and the columns and conventions with which it could be read."""
+
+    columns: list[ColumnGuess]
+    conventions: list[ConventionGuess]  # those that are not the usual ones
+    trial: Trial
+    unused: list[str]  # columns of which no channel was made
+
+
+def guess_trial(path: str | Path) -> TrialGuess:
+    """Read a log with what is guessed, and where a check names something else, with that.
+
+    A unit that a column's name tells is kept. Raises InputError, as the readers do, for
+    a log that cannot be read so.
+    """
+    table = read_log(path)
+    columns: dict[str, ColumnGuess] = {}
+    if not table.units:  # the reader knows none
+        columns = {guess.channel: guess for guess in guess_columns(table)}
+    conventions: dict[str, ConventionGuess] = {}
+    tried: set[Proposal] = set()
+    while True:
+        try:
+            trial = _read(table, columns, conventions)
+            break
+        except InputError as error:
+            proposal = _next_proposal(error, columns, tried)
+            if proposal is None:
+                raise
+        tried.add(proposal)
+        if proposal.name in columns:
+            columns[proposal.name] = _with_unit(columns[proposal.name], proposal.value)
+        else:
+            reason = "without it a log is refused"
+            conventions[proposal.name] = ConventionGuess(*proposal, reason)
+
+    used = [guess.column for guess in columns.values()] or QUANTITIES
+    unused = [name for name in table.header if name not in used]
+    return TrialGuess(list(columns.values()), list(conventions.values()), trial, unused)
+
+
+def _read(
+    table: LogTable,
+    columns: Mapping[str, ColumnGuess],
+    conventions: Mapping[str, ConventionGuess],
+) -> Trial:
+    """Read a log with the guesses so far."""
+    named = {
+        channel: {"column": guess.column, "unit": guess.unit}
+        for channel, guess in columns.items()
+    }
+    settings: dict[str, Any] = {
+        name: guess.value for name, guess in conventions.items()
+    }
+    return read_trials(
+        [table],
+        named or None,
+        Conventions(**settings, where=f"{table.path}:"),
+        name=table.path.name,
+    )[0]
+
+
+def _next_proposal(
+    error: InputError, columns: Mapping[str, ColumnGuess], tried: set[Proposal]
+) -> Proposal | None:
+    """The first proposal of a refusal that was not tried yet, and is no unit that a name tells."""
+    for name, value in error.instead:
+        proposal = Proposal(name, value)
+        is_convention = name not in QUANTITIES
+        is_guess = name in columns and columns[name].reason != "from its name"
+        if proposal not in tried and (is_convention or is_guess):
+            return proposal
+    return None
+
+
+def _with_unit(guess: ColumnGuess, unit: str) -> ColumnGuess:
+    """A column with the unit that a check proposed."""
+    reason = f"by the check that refused {guess.unit} ({guess.reason})"
+    return guess._replace(unit=unit, reason=reason)

@@ -1,0 +1,88 @@
+"""Units of columns, by the ends of their names and by the size of their values."""
+
+from fnmatch import fnmatchcase
+from typing import NamedTuple
+
+import numpy as np
+
+from shipgym.arrays import Floats
+from shipgym.files import shipped_toml
+from shipgym.trials.units import QUANTITIES, UNITS, si_unit
+
+_SPELLINGS: dict[str, list[str]] = shipped_toml(
+    "shipgym.trials.guesses", "unit_names.toml"
+)
+
+#: Size from which on a channel or quantity is not in SI units, and the unit that it has
+#: then.
+_BY_SIZE = {
+    "t": (1e8, "unix"),
+    "delta": (1.0, "deg"),
+    "delta_command": (1.0, "deg"),
+    "phi": (1.0, "deg"),
+    "angle": (6.3, "deg"),
+    "angular rate": (0.2, "deg/min"),
+    "shaft speed": (10.0, "rpm"),
+}
+_MILLISECONDS = 1e11  # since 1970, and seconds of the year 5138
+
+
+class UnitGuess(NamedTuple):
+    """A unit, and why."""
+
+    unit: str
+    reason: str
+
+
+class NameEnd(NamedTuple):
+    """A column's name, parted from its unit."""
+
+    name: str
+    units: list[str]  # that are spelled like its end, the longest first
+
+
+def split_unit(name: str) -> NameEnd:
+    """Part a column's name, in lower case with blanks for underscores, from the unit with which it ends."""
+    text = name.replace(" per ", "/").rstrip("]) ")
+    starts = [0, *(k + 1 for k, letter in enumerate(text) if letter in "[( ")]
+    bare, units = text, []
+    for start in starts:
+        spelled = [
+            unit
+            for unit, spellings in _SPELLINGS.items()
+            if any(fnmatchcase(text[start:], one) for one in spellings)
+        ]
+        if spelled and not units:
+            bare = text[:start].rstrip("[( ")
+        units += spelled
+    return NameEnd(bare, units)
+
+
+def named_unit(units: list[str], channel: str) -> UnitGuess | None:
+    """The unit of a channel among those with which a name ends; None where there is none."""
+    for unit in units:
+        if unit in UNITS[QUANTITIES[channel]]:
+            return UnitGuess(unit, "from its name")
+    return None
+
+
+def names_another_quantity(units: list[str], channel: str) -> bool:
+    """Tell whether a name ends with a unit of another quantity; one letter may be none: "Heading M"."""
+    of_channel = UNITS[QUANTITIES[channel]]
+    return any(len(unit) > 1 for unit in units) and not of_channel.keys() & set(units)
+
+
+def unit_by_size(values: Floats | None, channel: str) -> UnitGuess:
+    """The SI unit of a channel unless its largest value is too large for that; None: values that are texts."""
+    unit = si_unit(channel)
+    if values is None:
+        return UnitGuess(unit, "from its content")
+    largest = float(np.max(np.abs(values[np.isfinite(values)]), initial=0.0))
+    limit, other = _BY_SIZE.get(channel) or _BY_SIZE.get(
+        QUANTITIES[channel], (np.inf, "")
+    )
+    if largest > limit:
+        unit = other
+    if unit == "unix" and largest > _MILLISECONDS:
+        unit = "unix ms"
+    return UnitGuess(unit, f"from its size, up to {largest:.4g}")

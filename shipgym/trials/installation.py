@@ -1,0 +1,98 @@
+"""How the instruments are installed: the table ``[sensors]`` of a ship file."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from shipgym.checks import check_choice, check_number, check_table
+from shipgym.errors import InputError
+from shipgym.trials.units import DEGREE
+
+if TYPE_CHECKING:
+    from shipgym.ships.particulars import Particulars
+
+ESTIMATE = "estimate"
+_KEYS = ("gnss_antenna", "heading_offset_deg", "rudder_offset_deg", "clock_offsets")
+
+
+@dataclass(frozen=True)
+class Installation:
+    """Where the antenna stands, what heading and rudder show too much, what is done with late clocks.
+
+    Attributes
+    ----------
+    forward, starboard : float
+        The antenna from midship, m.
+    heading_offset, rudder_offset : float or "estimate"
+        What they show where the truth is zero, rad.
+    clock_offsets : {"correct", "keep"}, optional
+        By default late channels are corrected where they have clocks of their own, else
+        refused.
+    """
+
+    forward: float = 0.0
+    starboard: float = 0.0
+    heading_offset: float | str = 0.0
+    rudder_offset: float | str = 0.0
+    clock_offsets: str | None = None
+
+    @classmethod
+    def from_mapping(
+        cls, table: Any, where: str, ship: Particulars | None = None
+    ) -> Installation:
+        """Check the table ``[sensors]``; InputError also for an antenna outside the ship."""
+        check_table(table, where, _KEYS)
+        clocks = table.get("clock_offsets")
+        if clocks is not None:
+            check_choice(clocks, ("correct", "keep"), f"{where} clock_offsets")
+        antenna = table.get("gnss_antenna", {})
+        forward, starboard = _antenna(antenna, f"{where} gnss_antenna", ship)
+        return cls(
+            forward,
+            starboard,
+            _offset(table, "heading_offset_deg", where),
+            _offset(table, "rudder_offset_deg", where),
+            clocks,
+        )
+
+    @property
+    def is_at_midship(self) -> bool:
+        """Whether the antenna stands at midship, or is not known to stand elsewhere."""
+        return self.forward == 0.0 and self.starboard == 0.0
+
+
+def _antenna(table: Any, where: str, ship: Particulars | None) -> tuple[float, float]:
+    check_table(table, where, ("forward", "starboard"))
+    forward = check_number(table.get("forward", 0.0), f"{where}.forward")
+    starboard = check_number(table.get("starboard", 0.0), f"{where}.starboard")
+    if ship is not None:
+        _check_aboard(forward, ship.length, ship, f"{where}.forward")
+        _check_aboard(starboard, ship.beam or ship.length, ship, f"{where}.starboard")
+    return forward, starboard
+
+
+def _check_aboard(distance: float, size: float, ship: Particulars, where: str) -> None:
+    limit = 0.6 * size
+    if abs(distance) > limit:
+        raise InputError(
+            f"{where}: expected at most {limit:.4g} m from midship, got {distance:g} m,"
+            f" outside the ship of {ship.length:g} m; measured from the aft"
+            f" perpendicular take off {ship.length / 2:g}"
+        )
+
+
+def _offset(table: Mapping[str, Any], key: str, where: str) -> float | str:
+    """An offset in rad, of one in degrees, or that it is to be estimated."""
+    value = table.get(key, 0.0)
+    if value == ESTIMATE:
+        return ESTIMATE
+    hint = f'or "{ESTIMATE}"'
+    degrees = check_number(
+        value, f"{where} {key}", at_least=-180.0, at_most=180.0, hint=hint
+    )
+    return DEGREE * degrees
+
+
+AS_LOGGED = Installation()

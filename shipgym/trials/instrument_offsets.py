@@ -1,0 +1,158 @@
+"""What heading and rudder show where the truth is zero, by the straight parts of a log."""
+
+import math
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from shipgym.arrays import Flags, Floats
+from shipgym.errors import InputError
+from shipgym.trials.installation import Installation
+from shipgym.trials.resampling import Log
+from shipgym.trials.units import DEGREE
+
+#: A straight part lasts this long, s, with heading and rudder within this range, rad.
+STRAIGHT_S, STRAIGHT_RANGE = 20.0, 2.0 * DEGREE
+
+#: Courses this far apart tell an offset of the heading, and a current across, from each
+#: other.
+DISTINCT_COURSES = 60.0 * DEGREE
+
+_FEWEST_SAMPLES = 10
+_STRAIGHT_BEND = 0.3  # of the heading, by that at the overshoots
+
+
+class HeadingOffset(NamedTuple):
+    """What a heading shows too much, rad."""
+
+    offset: float
+    error: float  # standard error
+
+
+def straight_parts(t: Floats, channels: Mapping[str, Floats]) -> Flags:
+    """Which samples lie amid a straight steady part, where heading and rudder hardly change."""
+    from scipy.ndimage import maximum_filter1d, minimum_filter1d
+
+    width = math.ceil(STRAIGHT_S / float(np.median(np.diff(t)))) + 1
+    straight = np.full(t.size, "psi" in channels and t.size > width)
+    for name in {"psi", "delta"} & channels.keys():
+        highest = maximum_filter1d(channels[name], width)
+        lowest = minimum_filter1d(channels[name], width)
+        straight &= highest - lowest < STRAIGHT_RANGE
+    return straight
+
+
+def heading_offset(
+    channels: Mapping[str, Floats], straight: Flags
+) -> HeadingOffset | None:
+    """What the heading shows too much by the velocity over ground.
+
+    An offset turns with the ship, a current does not: with the speed U and the offset
+    o, the velocity to the north is U cos(psi - o) and that of the current. None without
+    straight parts on several courses.
+    """
+    psi = channels["psi"][straight]
+    is_distinct = psi.size >= _FEWEST_SAMPLES and np.ptp(psi) >= DISTINCT_COURSES
+    if "ground_north" not in channels or not is_distinct:
+        return None
+
+    # unknown are U cos(o), U sin(o) and the current to north and east
+    c, s = np.cos(psi), np.sin(psi)
+    zero, one = np.zeros(psi.size), np.ones(psi.size)
+    to_north = np.column_stack([c, s, one, zero])
+    to_east = np.column_stack([s, -c, zero, one])
+    rows = np.vstack([to_north, to_east])
+    names = ("ground_north", "ground_east")
+    ground = np.concatenate([channels[name][straight] for name in names])
+    fitted = np.linalg.lstsq(rows, ground, rcond=None)[0]
+
+    # samples of one straight part say the same
+    residual = ground - rows @ fitted
+    variance = 0.5 * STRAIGHT_S * np.var(residual)
+    across = np.linalg.pinv(rows.T @ rows)[1, 1]
+    speed = float(np.hypot(fitted[0], fitted[1]))
+    offset = float(np.arctan2(fitted[1], fitted[0]))
+    return HeadingOffset(offset, math.sqrt(variance * across) / speed)
+
+
+def rudder_offset(
+    t: Floats, channels: Mapping[str, Floats], straight: Flags
+) -> float | None:
+    """Mean rudder, rad, of the straight parts; None without any in which the heading is straight.
+
+    At an overshoot the heading hardly changes either, and the rudder is held, but the
+    heading is bent. Of several angles held the one counts at which it is bent least, by
+    far.
+    """
+    psi, delta = channels.get("psi", t), channels["delta"]
+    half = math.ceil(0.5 * STRAIGHT_S / float(np.median(np.diff(t))))
+    rows = np.flatnonzero(straight[half : t.size - half]) + half
+    if not rows.size:
+        return None
+
+    by_rudder = rows[np.argsort(delta[rows])]
+    breaks = np.flatnonzero(np.diff(delta[by_rudder]) > STRAIGHT_RANGE) + 1
+    held = np.split(by_rudder, breaks)
+    bends = [_bend(psi, part, half) for part in held]
+    straightest = int(np.argmin(bends))
+    is_distinct = bends[straightest] <= _STRAIGHT_BEND * max(bends)
+    if len(held) > 1 and not is_distinct:
+        return None
+    return float(np.mean(delta[held[straightest]]))
+
+
+def _bend(psi: Floats, rows: npt.NDArray[np.intp], half: int) -> float:
+    """Mean second difference of the heading over so many samples to both sides."""
+    bends = psi[rows + half] - 2.0 * psi[rows] + psi[rows - half]
+    return abs(float(np.mean(bends)))
+
+
+def correct_offsets(log: Log, installation: Installation) -> None:
+    """Take the offsets of heading and rudder, given or estimated, out of the channels of a log.
+
+    Raises InputError where one cannot be estimated.
+    """
+    channels = log.channels
+    if "psi" in channels and installation.heading_offset:
+        offset = installation.heading_offset
+        if isinstance(offset, str):
+            offset = _estimated_heading_offset(log)
+        channels["psi"] = channels["psi"] - offset
+    if "delta" in channels and installation.rudder_offset:
+        offset = installation.rudder_offset
+        if isinstance(offset, str):
+            offset = _estimated_rudder_offset(log)
+        channels["delta"] = channels["delta"] - offset
+
+
+def _estimated_heading_offset(log: Log) -> float:
+    found = heading_offset(log.channels, straight_parts(log.t, log.channels))
+    if found is None:
+        needed = "with sog and cog on courses over 60 deg apart"
+        raise _not_estimated("heading_offset_deg", needed, log)
+    _note_estimate("heading_offset_deg", found.offset, log)
+    return found.offset
+
+
+def _estimated_rudder_offset(log: Log) -> float:
+    offset = rudder_offset(log.t, log.channels, straight_parts(log.t, log.channels))
+    if offset is None:
+        needed = "and a heading that does not turn back in them, as at an overshoot"
+        raise _not_estimated("rudder_offset_deg", needed, log)
+    _note_estimate("rudder_offset_deg", offset, log)
+    return offset
+
+
+def _not_estimated(key: str, needed: str, log: Log) -> InputError:
+    return InputError(
+        f'{log.where}: {key} = "estimate": expected straight parts of {STRAIGHT_S:g} s'
+        f" {needed}, got none; give {key} in degrees, or leave it out"
+    )
+
+
+def _note_estimate(key: str, offset: float, log: Log) -> None:
+    log.notes.append(
+        f"{key} {offset / DEGREE:.2f}, estimated from straight parts and removed"
+    )

@@ -1,0 +1,154 @@
+"""Late yaw rate and rudder in a log, and a rudder of the wrong sign: found, refused or to be corrected."""
+
+import math
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+
+from shipgym.arrays import Floats
+from shipgym.errors import InputError
+from shipgym.trials.clock_offsets import (
+    ClockOffset,
+    clock_offset,
+    reverses,
+    rudder_clock_offset,
+)
+from shipgym.trials.derivatives import time_derivative
+from shipgym.trials.plausibility.finding import LogFinding, Proposal, settle
+from shipgym.trials.resampling import Log
+from shipgym.trials.units import DEGREE
+
+SIGNIFICANT = 2.5  # standard errors from which on a delay is believed
+CERTAIN = 5.0  # standard errors by which a channel must explain the other
+SMALLEST_RUDDER = 2.0 * DEGREE  # range of a rudder that tells a clock
+CIRCLE_RUDDER, CIRCLE_TURN = 8.0 * DEGREE, 60.0 * DEGREE  # that tell a sign
+
+
+class _Comparison(NamedTuple):
+    """A channel and what it is compared with."""
+
+    name: str
+    target: str
+    dynamics_s: float  # by which ships of other dynamics seem late: a standard error
+    refused_s: float  # delay on one clock that is refused
+
+
+_COMPARISONS = {
+    "r": _Comparison("the yaw rate", "the heading", 0.25, 1.0),
+    "delta": _Comparison("the rudder", "the yaw acceleration", 1.0, 2.0),
+}
+
+
+class LateChannels(NamedTuple):
+    """What is done about late channels."""
+
+    delays: dict[str, float]  # to take off their clocks, s, by channel
+    notes: list[str]
+
+
+def find_late_channels(
+    log: Log, choice: str | None, *, is_one_clock: bool
+) -> LateChannels:
+    """Delays of yaw rate and rudder that are to be corrected, and remarks on these and on others.
+
+    By `choice`, "correct" or "keep", of :class:`.installation.Installation`. Without
+    one, large delays of channels on one clock are an InputError, small ones are left,
+    and those of channels with clocks of their own are corrected. So is a rudder of the
+    wrong sign an InputError, which is judged by a yaw rate only where this does not
+    contradict the heading.
+    """
+    late = LateChannels({}, [])
+    for channel, offset in _offsets(log).items():
+        comparison = _COMPARISONS[channel]
+        delay = abs(offset.late)
+        error = math.hypot(offset.error, comparison.dynamics_s)
+        if offset.certainty < CERTAIN or delay < SIGNIFICANT * error:
+            continue
+
+        side = "late" if offset.late > 0.0 else "early"
+        evidence = (
+            f"{comparison.name} is {delay:.2f} s {side} against {comparison.target}"
+            f" (standard error {error:.2f} s)"
+        )
+        is_open = choice is None and is_one_clock
+        if choice == "keep" or (is_open and delay <= comparison.refused_s):
+            late.notes.append(f"{evidence}; left as logged")
+        elif is_open:
+            raise InputError(
+                f"{log.where}: expected one clock, got one of which {evidence}; to have"
+                ' it corrected write clock_offsets = "correct" in [sensors] of the ship'
+                ' file, or "keep" if it is so'
+            )
+        else:
+            late.delays[channel] = offset.late
+            late.notes.append(f"{evidence}; corrected")
+    return late
+
+
+def _offsets(log: Log) -> dict[str, ClockOffset]:
+    """How late yaw rate and rudder are, where a log tells it; InputError for a rudder of the wrong sign."""
+    channels = log.channels
+    offsets = {}
+    rate = rudder = None
+    if {"psi", "r"} <= channels.keys() and reverses(channels["r"]):
+        rate = clock_offset(log.t, channels["psi"], channels["r"], {})
+    if rate is not None:
+        offsets["r"] = rate
+
+    if "delta" in channels and {"psi", "r"} & channels.keys():
+        if reverses(channels["delta"], SMALLEST_RUDDER):
+            rudder = _rudder_offset(log, rate)
+        elif "psi" in channels:
+            settle(check_circle(log))
+    if rudder is not None:
+        offsets["delta"] = rudder
+    return offsets
+
+
+def _rudder_offset(log: Log, rate: ClockOffset | None) -> ClockOffset | None:
+    """How late the rudder is against the yaw rate on the clock of the heading."""
+    t, delta = log.t, log.channels["delta"]
+    if "r" in log.channels:
+        delay = rate.late if rate else 0.0
+        r = np.interp(t + delay, t, log.channels["r"])
+    else:
+        r = time_derivative(t, log.channels["psi"])
+    rudder = rudder_clock_offset(t, r, delta)
+    without_history = clock_offset(t, r, delta, {"r": r})
+
+    rate_contradicts = rate is not None and _is_against(rate)
+    if not rate_contradicts and _is_against(rudder) and _is_against(without_history):
+        settle([_wrong_sign(log, "a yaw acceleration that follows the rudder")])
+    return rudder
+
+
+def _is_against(offset: ClockOffset | None) -> bool:
+    """Tell whether a channel surely acts with the opposite sign."""
+    return offset is not None and offset.gain < 0.0 and offset.certainty > CERTAIN
+
+
+def check_circle(log: Log) -> Iterator[LogFinding]:
+    """Find a rudder that stays on one side and turns the ship to the other, as in a circle."""
+    if _turns_away(log.channels["psi"], log.channels["delta"]):
+        yield _wrong_sign(log, "a ship that turns away from the rudder,")
+
+
+def _turns_away(psi: Floats, delta: Floats) -> bool:
+    rudder = np.median(delta)
+    side = np.sign(rudder)
+    is_hard_over = abs(rudder) > CIRCLE_RUDDER
+    stays_there = np.quantile(side * delta, 0.1) > 0.0
+    turned = side * (psi[-1] - psi[0])
+    return bool(is_hard_over and stays_there and turned < -CIRCLE_TURN)
+
+
+def _wrong_sign(log: Log, found: str) -> LogFinding:
+    return LogFinding(
+        log.where,
+        f"expected a positive rudder to turn the bow to starboard, got {found} with the"
+        " opposite sign",
+        'write rudder_positive = "port" in [conventions], or take it out if it stands'
+        " there",
+        (Proposal("rudder_positive", "port"),),
+    )

@@ -1,0 +1,37 @@
+"""Tables in pandas frames."""
+
+from pathlib import Path
+from typing import Any
+
+from shipgym.errors import InputError
+from shipgym.trials.readers.log_table import LogTable
+
+#: Most values of a table.
+MOST_CELLS = 5_000_000
+
+
+def read_frame(frame: Any, name: str | Path = "frame", first: int = 0) -> LogTable:
+    """Table in a pandas frame; an index that is no plain count of rows is a column.
+
+    Messages call it `name`, and its rows by numbers from `first` on. Raises InputError
+    for what is no frame, and for one without values or with too many.
+    """
+    if not hasattr(frame, "columns") or not hasattr(frame, "index"):
+        raise InputError(
+            f"{name}: expected a pandas DataFrame, got a {type(frame).__name__}"
+        )
+    if type(frame.index).__name__ != "RangeIndex":
+        frame = frame.reset_index()
+    if not 0 < frame.size <= MOST_CELLS:
+        raise InputError(
+            f"{name}: expected a table of at most {MOST_CELLS} values, got"
+            f" {len(frame.columns)} columns of {len(frame)} rows; split the file, or"
+            " leave out columns"
+        )
+    columns = {}
+    for label, column in frame.items():
+        numeric = column.dtype.kind in "fiub"
+        columns[str(label).strip()] = (
+            column.to_numpy() if numeric else column.to_numpy(object)
+        )
+    return LogTable.of_columns(Path(name), columns, range(first, first + len(frame)))

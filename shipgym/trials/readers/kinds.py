@@ -1,0 +1,54 @@
+"""Which kind of log a file is, by the ending of its name and by how it begins, and what reads it."""
+
+import re
+from collections.abc import Callable
+from pathlib import Path
+
+from shipgym.files import LARGEST_CSV, read_bytes
+from shipgym.trials.readers.csv_file import read_csv
+from shipgym.trials.readers.excel import read_excel
+from shipgym.trials.readers.log_table import LogTable
+from shipgym.trials.readers.matlab import read_matlab
+from shipgym.trials.readers.nmea_log import read_nmea
+from shipgym.trials.readers.parquet import read_parquet
+
+#: Bytes of a text file by which its kind is recognised.
+BEGINNING = 4096
+
+READERS: dict[str, Callable[[Path], LogTable]] = {
+    "csv": read_csv,
+    "excel": read_excel,
+    "matlab": read_matlab,
+    "nmea": read_nmea,
+    "parquet": read_parquet,
+}
+_ENDINGS = {".xlsx": "excel", ".mat": "matlab", ".parquet": "parquet"}
+_NMEA_LINE = re.compile(r"^[^\n]{0,60}[$!][A-Z]{4,5},", re.MULTILINE)
+
+
+def recognise_kind(path: Path) -> str:
+    """Kind of a log, a key of `READERS`; texts are CSV unless they begin as another kind does.
+
+    Raises InputError for a text file that is missing or too large.
+    """
+    by_ending = _ENDINGS.get(path.suffix.lower())
+    if by_ending is not None:
+        return by_ending
+
+    content = read_bytes(path, "CSV file", LARGEST_CSV)
+    beginning = content[:BEGINNING].decode("latin-1").replace("\r", "\n")
+    if len(_NMEA_LINE.findall(beginning)) >= 2:
+        return "nmea"
+    return "csv"
+
+
+def read_log(path: str | Path | LogTable) -> LogTable:
+    """Read the table in a file, whatever its kind; a table is itself.
+
+    Raises InputError for a file that is missing, too large, damaged, of no such kind,
+    or whose library is missing.
+    """
+    if isinstance(path, LogTable):
+        return path
+    path = Path(path)
+    return READERS[recognise_kind(path)](path)

@@ -1,0 +1,135 @@
+"""A log as a table of named columns: what every reader returns, whatever the kind of its file."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from shipgym.arrays import Floats
+from shipgym.checks import did_you_mean, quoted
+from shipgym.errors import InputError
+
+#: Cells that stand for "no value".
+MISSING_WORDS = frozenset(
+    {"", "nan", "na", "n/a", "#n/a", "null", "none", "nat", "<na>"}
+)
+
+
+@dataclass(frozen=True)
+class LogTable:
+    """A log as columns of cells, with the place of each row in the file.
+
+    Attributes
+    ----------
+    path : Path
+        The file, for messages.
+    header : tuple of str
+        Names of the columns, without blanks around them.
+    cells : callable
+        Of a column's name: its cells, a sequence of texts or other objects, or an array
+        of numbers.
+    rows : sequence of int
+        Line or row of the file in which each row of the table stands.
+    place_words : str
+        How a message names that place, with ``{line}`` and ``{row}``.
+    decimal_comma : bool
+        Whether a comma may stand for the decimal point.
+    units : mapping of str to str
+        Units of columns, where the reader knows them.
+    notes : tuple of str
+        What the reader left out or assumed.
+    """
+
+    path: Path
+    header: tuple[str, ...]
+    cells: Callable[[str], Any]
+    rows: Sequence[int]
+    place_words: str = "line {line} (data row {row})"
+    decimal_comma: bool = False
+    units: Mapping[str, str] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
+
+    @classmethod
+    def of_columns(
+        cls,
+        path: Path,
+        columns: Mapping[str, Any],
+        rows: Sequence[int],
+        place_words: str = "row {line}",
+        **settings: Any,
+    ) -> "LogTable":
+        """Table of whole columns; `settings` are the other fields."""
+        header = tuple(columns)
+        return cls(path, header, columns.__getitem__, rows, place_words, **settings)
+
+    def place(self, row: int) -> str:
+        """Place of a row, counted from 0, for a message: ``line 12 (data row 11)``."""
+        return self.place_words.format(line=self.rows[row], row=row + 1)
+
+    def column(self, name: str) -> Any:
+        """Cells of a column; InputError if there is none of this name."""
+        if name not in self.header:
+            raise InputError(
+                f"{self.path}: column '{name}' not"
+                f" found.{did_you_mean(name, self.header)} Columns present:"
+                f" {quoted(self.header)}. Name the column in [columns] (or columns=...)"
+            )
+        return self.cells(name)
+
+    def texts(self, name: str) -> list[str]:
+        """Cells of a column as texts without blanks around them, empty where there is no value."""
+        texts = []
+        for cell in self.column(name):
+            text = "" if cell is None else str(cell).strip()
+            texts.append("" if text.lower() in MISSING_WORDS else text)
+        return texts
+
+    def numbers(self, name: str) -> Floats:
+        """A column as numbers, nan where there is no value; InputError for other text."""
+        cells = self.column(name)
+        if isinstance(cells, np.ndarray) and cells.dtype.kind in "fiub":
+            return cells.astype(np.float64)
+
+        numbers = plain_numbers(cells)
+        if numbers is None:
+            numbers = self._numbers_of_texts(name)
+        return numbers
+
+    def _numbers_of_texts(self, name: str) -> Floats:
+        """Numbers with decimal commas and words for "no value"; InputError names the first other text."""
+        texts = self.texts(name)
+        numbers = np.full(len(texts), np.nan)
+        for row, text in enumerate(texts):
+            if not text:
+                continue
+            if self.decimal_comma and "." not in text:
+                text = text.replace(",", ".")
+            if not is_number(text):
+                raise InputError(
+                    f"{self.path}: {self.place(row)}, column '{name}': expected a"
+                    f" number, got '{texts[row]}'; correct the cell, or leave it empty"
+                    ' where the value is missing and import with repair = "interpolate"'
+                )
+            numbers[row] = float(text)
+        return numbers
+
+
+def plain_numbers(cells: Sequence[Any]) -> Floats | None:
+    """Numbers of cells that are all written plainly or empty, as in most files; None of others."""
+    if "_" in "".join(map(str, cells)):
+        return None
+    try:
+        return np.array([float("nan" if cell == "" else cell) for cell in cells])
+    except (ValueError, TypeError):
+        return None
+
+
+def is_number(text: str) -> bool:
+    """Tell whether a text is a number as Python reads it, without underscores."""
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return "_" not in text

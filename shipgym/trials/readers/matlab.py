@@ -1,0 +1,142 @@
+"""Vectors in MATLAB files of version 5 to 7, read here: SciPy crashes on damaged ones.
+
+MathWorks, MAT-File Format, "Level 5 MAT-File Format".
+"""
+
+import struct
+import zlib
+from collections.abc import Iterator
+from itertools import islice
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from shipgym.arrays import Floats
+from shipgym.errors import InputError
+from shipgym.files import read_bytes
+from shipgym.trials.readers.damage import (
+    LARGEST_PACKED,
+    LARGEST_UNPACKED,
+    check_unpacked,
+    damage_reported,
+)
+from shipgym.trials.readers.log_table import LogTable
+
+MOST_VARIABLES = 10_000
+HEADER_BYTES = 128
+
+#: Types of elements: matrices, compressed ones, and those of numbers as numpy names
+#: them.
+_MATRIX, _COMPRESSED = 14, 15
+_NUMBER_TYPES = {
+    1: "i1",
+    2: "u1",
+    3: "i2",
+    4: "u2",
+    5: "i4",
+    6: "u4",
+    7: "f4",
+    9: "f8",
+    12: "i8",
+    13: "u8",
+}
+#: In the flags of a matrix: the class, the first of the numeric ones, complex numbers.
+_CLASS, _FIRST_NUMERIC, _COMPLEX = 0xFF, 6, 0x0800
+
+
+class Element(NamedTuple):
+    """One element of a MATLAB file."""
+
+    type: int
+    content: bytes
+
+
+def read_matlab(path: Path) -> LogTable:
+    """Read the numeric vectors of the commonest length, each as a column by its name.
+
+    Raises InputError for a damaged or large file, one of version 7.3, one without
+    vectors, and complex numbers.
+    """
+    content = read_bytes(path, "MATLAB file", LARGEST_PACKED)
+    if content[:8] == b"\x89HDF\r\n\x1a\n" or b"MATLAB 7.3" in content[:HEADER_BYTES]:
+        raise InputError(
+            f"{path}: expected a MATLAB file of version 5 to 7, got MATLAB 7.3 (HDF5);"
+            " save(..., '-v7')"
+        )
+    remedy = "save the vectors again with save(..., '-v7')"
+    with damage_reported(path, "MATLAB (.mat)", remedy):
+        order = "<" if content[126:HEADER_BYTES] == b"IM" else ">"
+        vectors: dict[str, Floats] = {}
+        for matrix in _matrices(path, content[HEADER_BYTES:], order):
+            vectors |= _vector(path, matrix, order)
+
+    lengths = [values.size for values in vectors.values()]
+    length = max(lengths, key=lengths.count, default=0)
+    if not length:
+        raise InputError(
+            f"{path}: expected a numeric vector for each channel, got none; a struct is"
+            " not read: save('run.mat', '-struct', 'data', '-v7')"
+        )
+    columns = {
+        name: values for name, values in vectors.items() if values.size == length
+    }
+    return LogTable.of_columns(path, columns, range(1, length + 1))
+
+
+def _matrices(path: Path, content: bytes, order: str) -> Iterator[bytes]:
+    """Contents of the matrices of a file, unpacked; `order` is that of its bytes, "<" or ">"."""
+    unpacked = 0
+    for number, element in enumerate(_elements(content, order)):
+        if number == MOST_VARIABLES:
+            raise InputError(
+                f"{path}: expected at most {MOST_VARIABLES} variables, got more; save a"
+                " few vectors: save('run.mat', 't', 'psi', '-v7')"
+            )
+        if element.type == _COMPRESSED:
+            unpacker = zlib.decompressobj()
+            rest = LARGEST_UNPACKED + 1 - unpacked
+            inner = unpacker.decompress(element.content, rest)
+            unpacked += len(inner)
+            check_unpacked(path, unpacked)
+            element = next(_elements(inner, order))
+        if element.type == _MATRIX:
+            yield element.content
+
+
+def _vector(path: Path, matrix: bytes, order: str) -> dict[str, Floats]:
+    """Numbers of a matrix by its name, where it is a numeric vector."""
+    parts = list(islice(_elements(matrix, order), 4))
+    if len(parts) < 4 or parts[3].type not in _NUMBER_TYPES:
+        return {}
+    flags, shape, name, numbers = parts
+    sizes = np.frombuffer(shape.content, f"{order}i4")
+    values = np.frombuffer(numbers.content, f"{order}{_NUMBER_TYPES[numbers.type]}")
+    about = struct.unpack(f"{order}I", flags.content[:4])[0]
+
+    is_vector = np.count_nonzero(sizes != 1) == 1 and sizes.max() == values.size
+    if not is_vector or (about & _CLASS) < _FIRST_NUMERIC:
+        return {}
+    label = name.content.decode("ascii")
+    if about & _COMPLEX:
+        raise InputError(
+            f"{path}: variable {label!r}: expected real numbers, got complex ones; save"
+            " real(...)"
+        )
+    return {label: values.astype(np.float64)}
+
+
+def _elements(content: bytes, order: str) -> Iterator[Element]:
+    """Elements one after another, each with a tag of eight bytes: type and size."""
+    at = 0
+    while at + 8 <= len(content):
+        kind, size = struct.unpack(f"{order}II", content[at : at + 8])
+        begin = at + 8
+        small = kind >> 16  # size of an element within its own tag
+        if small:
+            yield Element(kind & 0xFFFF, content[at + 4 : at + 4 + min(small, 4)])
+            at = begin
+            continue
+        yield Element(kind, content[begin : begin + size])
+        padding = 0 if kind == _COMPRESSED else -size % 8
+        at = begin + size + padding

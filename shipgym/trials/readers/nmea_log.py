@@ -1,0 +1,266 @@
+"""Logs of NMEA 0183: position, speeds, heading, rate of turn, rudder, shaft and wind, of any talkers.
+
+Which sentences say what stands in `shipgym/trials/nmea.toml`; those that hold no channel
+(AIS, depth, satellites) are passed over.
+"""
+
+import re
+from collections import defaultdict
+from dataclasses import dataclass, field
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from shipgym.arrays import Floats
+from shipgym.errors import InputError
+from shipgym.trials.clock_texts import DAY
+from shipgym.trials.nmea import (
+    NMEA_QUANTITIES,
+    NMEA_SENTENCES,
+    Sentence,
+    logged_numbers,
+    parse_sentence,
+)
+from shipgym.trials.readers.csv_file import read_lines
+from shipgym.trials.readers.log_table import LogTable
+
+#: Share of damaged sentences from which on a log is refused.
+MOST_DAMAGED = 0.1
+
+#: Preferred kinds of sentences: true headings, and of speeds through the water the log
+#: with two axes.
+_PREFERENCE = {"HDT": 3, "THS": 2, "VHW": 1, "VBW": 2}
+_WINDS = ("wind_angle", "wind_speed", "apparent_wind_angle", "apparent_wind_speed")
+#: Kinds of sentences that hold a channel.
+_KINDS = [
+    kind
+    for kind, told in NMEA_SENTENCES.items()
+    if any(NMEA_QUANTITIES[quantity].channel for quantity in told.fields)
+]
+_SENTENCE = re.compile(rf"\$[A-Z]{{2}}(?:{'|'.join(_KINDS)}),.*")
+_TIME = re.compile(r"([01]\d|2[0-3])([0-5]\d)([0-5]\d(?:\.\d*)?)")
+
+
+class _Value(NamedTuple):
+    """One value of a channel, or one time."""
+
+    line: int
+    time: float  # s since 1970 or of the day; nan where the sentence has none
+    value: float
+
+
+class _Track(NamedTuple):
+    """Values of a channel over time, with the lines in which they stand."""
+
+    t: Floats
+    lines: Floats
+    values: Floats
+
+
+_BySource = dict[str, list[_Value]]  # by talker and kind, such as HEHDT
+
+
+@dataclass
+class _Heard:
+    """What the sentences of a log say."""
+
+    times: _BySource = field(default_factory=lambda: defaultdict(list))
+    channels: dict[str, _BySource] = field(
+        default_factory=lambda: defaultdict(lambda: defaultdict(list))
+    )
+    count: int = 0
+    damaged: list[int] = field(default_factory=list)  # lines
+
+
+def read_nmea(path: Path) -> LogTable:
+    """Read the channels of a log: SI units, positions in degrees, nan where a row has none.
+
+    Of several sources of a channel the best is taken, and a note names the others.
+    Raises InputError for a damaged log and one without time or channels.
+    """
+    heard = _listen(read_lines(path, "log of NMEA 0183"))
+    notes = _check_damage(path, heard)
+    _check_content(path, heard)
+
+    clock = _main_clock(heard.times)
+    tracks = {}
+    for channel, sources in heard.channels.items():
+        best = _best_source(sources)
+        tracks[channel] = _track(sources[best], clock)
+        others = sorted(sources.keys() - {best})
+        if others:
+            notes.append(f"{channel} is from {best}; {', '.join(others)} left out")
+    return _table(path, _with_wind_over_ground(tracks), notes)
+
+
+def _listen(lines: list[str]) -> _Heard:
+    """Take times and channels out of the sentences of a log."""
+    heard = _Heard()
+    for number, line in enumerate(lines, start=1):
+        match = _SENTENCE.search(line)
+        if match is None:
+            continue
+        heard.count += 1
+        try:
+            found = parse_sentence(match[0])
+            time = _time(found)
+            values = _channel_values(found)
+        except ValueError:
+            heard.damaged.append(number)
+            continue
+
+        source = found.talker + found.kind
+        if np.isfinite(time):
+            heard.times[source].append(_Value(number, time, time))
+        for channel, value in values.items():
+            heard.channels[channel][source].append(_Value(number, time, value))
+    return heard
+
+
+def _time(sentence: Sentence) -> float:
+    """Seconds since 1970 where a sentence has a date, else of the day; nan without a time."""
+    kind = NMEA_SENTENCES[sentence.kind]
+    fields = dict(enumerate(sentence.fields))
+    match = (
+        _TIME.fullmatch(fields.get(kind.time, "")) if kind.time is not None else None
+    )
+    if match is None:
+        return np.nan
+    hours, minutes, seconds = match.groups()
+    of_day = 3600.0 * int(hours) + 60.0 * int(minutes) + float(seconds)
+
+    date = fields.get(kind.date, "") if kind.date is not None else ""
+    if not date:
+        return of_day
+    return datetime.strptime(date, "%d%m%y").replace(tzinfo=UTC).timestamp() + of_day
+
+
+def _channel_values(sentence: Sentence) -> dict[str, float]:
+    """Values by channel, positions in degrees; winds are still from the bow, by quantity."""
+    numbers = logged_numbers(sentence)
+    if "compass_heading" in numbers:
+        numbers["compass_heading"] += numbers.get("deviation", 0.0)
+        numbers["compass_heading"] += numbers.get("variation", 0.0)
+
+    values = {}
+    for quantity, number in numbers.items():
+        channel = NMEA_QUANTITIES[quantity].channel
+        if quantity in _WINDS:
+            values[quantity] = number
+        elif channel in ("lat", "lon"):
+            values[channel] = float(np.degrees(number))
+        elif channel is not None:
+            values[channel] = number
+    return values
+
+
+def _check_damage(path: Path, heard: _Heard) -> list[str]:
+    """Refuse a log of many damaged sentences; a note of few."""
+    damaged = len(heard.damaged)
+    if damaged > MOST_DAMAGED * heard.count:
+        raise InputError(
+            f"{path}: line {heard.damaged[0]}: expected hardly any damaged sentences,"
+            f" got {damaged} of {heard.count} with a wrong checksum or broken fields,"
+            " this the first; the log was damaged on the way: take the original"
+        )
+    if damaged:
+        return [f"{damaged} of {heard.count} sentences with a wrong checksum left out"]
+    return []
+
+
+def _check_content(path: Path, heard: _Heard) -> None:
+    if not heard.times:
+        raise InputError(
+            f"{path}: expected sentences with a time (RMC, GGA or GLL), got none; log"
+            " these too"
+        )
+    if not heard.channels.keys() - set(_WINDS):
+        raise InputError(
+            f"{path}: expected sentences of a ship's motion ({', '.join(_KINDS)}), got"
+            " none; log these too"
+        )
+
+
+def _rank(source: str, values: list[_Value]) -> tuple[bool, bool, int]:
+    """Rank of a source: with dates, no display that repeats others' sentences (II), many times."""
+    dated = values[0].time > 2.0 * DAY
+    moments = {one.line if np.isnan(one.time) else one.time for one in values}
+    return dated, not source.startswith("II"), len(moments)
+
+
+def _best_source(sources: _BySource) -> str:
+    def rank(source: str) -> tuple[int, tuple[bool, bool, int]]:
+        kind = source[2:]
+        return _PREFERENCE.get(kind, 0), _rank(source, sources[source])
+
+    return max(sorted(sources), key=rank)
+
+
+def _main_clock(times: _BySource) -> _Track:
+    """Times of the best source, s, which never go back, and go on at midnight."""
+    best = max(times, key=lambda source: _rank(source, times[source]))
+    lines, clock, _ = np.array(times[best]).T
+    dated = clock[0] > 2.0 * DAY
+    if not dated:
+        clock = np.unwrap(clock, period=DAY)
+    t, first = np.unique(np.maximum.accumulate(clock), return_index=True)
+    return _Track(t, lines[first], t)
+
+
+def _track(values: list[_Value], clock: _Track) -> _Track:
+    """Values of a source at their own times, else at those of the lines between which they stand."""
+    lines, own, numbers = np.array(values).T
+    by_line = np.interp(lines, clock.lines, clock.t)
+    days = np.round((by_line - own) / DAY)
+    t = np.where(np.isfinite(own), own + DAY * days, by_line)
+    t, first = np.unique(np.round(t, 3), return_index=True)
+    return _Track(t, lines[first], numbers[first])
+
+
+def _with_wind_over_ground(tracks: dict[str, _Track]) -> dict[str, _Track]:
+    """Winds from the bow as those over ground where heading and velocity are known, else left out."""
+    found = {name: track for name, track in tracks.items() if name not in _WINDS}
+    if "psi" not in tracks:
+        return found
+
+    def at(name: str, t: Floats) -> Floats:
+        track = tracks[name]
+        values = track.values if name == "sog" else np.unwrap(track.values)
+        return np.interp(t, track.t, values)
+
+    if {"wind_angle", "wind_speed"} <= tracks.keys():
+        angle = tracks["wind_angle"]
+        wind_from = angle.values + at("psi", angle.t)
+        found["wind_from"] = angle._replace(values=wind_from)
+        found["wind_speed"] = tracks["wind_speed"]
+    elif {"apparent_wind_angle", "apparent_wind_speed", "sog", "cog"} <= tracks.keys():
+        angle = tracks["apparent_wind_angle"]
+        bearing = angle.values + at("psi", angle.t)
+        apparent = tracks["apparent_wind_speed"].values * np.exp(1j * bearing)
+        headwind = at("sog", angle.t) * np.exp(1j * at("cog", angle.t))
+        wind = apparent - headwind
+        found["wind_from"] = angle._replace(values=np.angle(wind))
+        found["wind_speed"] = angle._replace(values=np.abs(wind))
+    return found
+
+
+def _table(path: Path, tracks: dict[str, _Track], notes: list[str]) -> LogTable:
+    """One row for each time at which some channel has a value."""
+    t = np.unique(np.concatenate([track.t for track in tracks.values()]))
+    columns = {"t": t}
+    lines = np.zeros(t.size, dtype=int)
+    for channel, track in tracks.items():
+        rows = np.searchsorted(t, track.t)
+        columns[channel] = np.full(t.size, np.nan)
+        columns[channel][rows] = track.values
+        lines[rows] = track.lines
+    return LogTable.of_columns(
+        path,
+        columns,
+        lines.tolist(),
+        "line {line}",
+        units={"t": "unix"},
+        notes=tuple(notes),
+    )
