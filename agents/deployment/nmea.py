@@ -3,25 +3,17 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from contextlib import suppress
 from functools import cache
-from math import copysign, radians
-from pathlib import Path
 from types import ModuleType
 from typing import Any, NamedTuple
 
 from shipgym import InputError, extras
-from shipgym.files import read_toml
-from shipgym.trials.units import UNITS
+from shipgym.trials.nmea import checksum, parse_sentence, steering_numbers
 
 LONGEST_LINE = 512  # bytes; 82 are the standard's
 BAUD = 4800  # of the standard
-TABLES = read_toml(Path(__file__).with_name("sentences.toml"), "table of sentences")
-TO_SI = {**UNITS["length"], **UNITS["angle"], **UNITS["angular rate"], **UNITS["speed"]}
-#: Signs of the cross-track error by the side to steer to, and of a latitude or
-#: longitude.
-SIDES = {"L": 1.0, "R": -1.0, "N": 1.0, "S": -1.0, "E": 1.0, "W": -1.0}
 EXPECTED = "expected tcp:HOST:PORT, udp:HOST:PORT, serial:DEVICE or serial:DEVICE@BAUD"
 
 
@@ -34,12 +26,9 @@ class Reading(NamedTuple):
 
 
 @cache
-def library(name: str = "pynmea2") -> ModuleType:
-    """pynmea2, taught what it does not know, or pyserial; InputError where it is not installed."""
+def library(name: str) -> ModuleType:
+    """pyserial; InputError where it is not installed."""
     found: ModuleType = extras.library(name, "nmea")
-    if name == "pynmea2":
-        for one in TABLES["fields"].keys() - found.TalkerSentence.sentence_types.keys():
-            type(one, (found.TalkerSentence,), {"fields": ()})
     return found
 
 
@@ -48,48 +37,19 @@ def readings(line: str) -> list[Reading] | None:
 
     A sentence without a checksum counts as damaged, as one with a wrong one.
     """
-    nmea = library()
     try:
-        sentence = nmea.parse(line, check=True)
-        if not isinstance(sentence, nmea.TalkerSentence):
-            return []
-        return list(
-            _told(
-                sentence.data,
-                TABLES["fields"].get(sentence.sentence_type, {}),
-                sentence.talker,
-            )
-        )
-    except nmea.SentenceTypeError:
-        return []
+        sentence = parse_sentence(line)
+        numbers = steering_numbers(sentence)
     except (ValueError, IndexError, KeyError):
         return None
-
-
-def _told(fields: list[str], kinds: dict[str, Any], talker: str) -> Iterator[Reading]:
-    for quantity, one in kinds.items():
-        if (
-            all(fields[int(k)] == text for k, text in one["needs"].items())
-            and fields[one["at"]]
-        ):
-            value = float(fields[one["at"]])
-            minutes = one["unit"] == "deg min"  # as 5430.5, 54 degrees and 30.5 minutes
-            value = (
-                radians(value // 100.0 + value % 100.0 / 60.0)
-                if minutes
-                else value * TO_SI[one["unit"]]
-            )
-            value = (
-                copysign(value, SIDES[fields[one["side"]]]) if "side" in one else value
-            )
-            if abs(value) <= TABLES["believed"][quantity]:
-                yield Reading(quantity, value, talker)
+    return [
+        Reading(quantity, value, sentence.talker) for quantity, value in numbers.items()
+    ]
 
 
 def sentences(text: str) -> str:
     """Lines such as HEHDT,90,T as sentences, with their checksums."""
-    checksum = library().NMEASentence.checksum
-    return "".join(f"${line}*{checksum(line):02X}\r\n" for line in text.splitlines())
+    return "".join(f"${line}*{checksum(line)}\r\n" for line in text.splitlines())
 
 
 class Line(asyncio.Protocol, asyncio.DatagramProtocol):

@@ -73,7 +73,7 @@ class SimulatedShip:
         return dict(zip(self.model.state_names, self.states[0].tolist(), strict=False))
 
     def measured(self) -> dict[str, float]:
-        """What her instruments and plotter know, SI units and radians, by quantity of `sentences.toml`."""
+        """What her instruments and plotter know, SI units and radians, by quantity of `shipgym/trials/nmea.toml`."""
         s, sea = self.now, np.zeros(len(SEA_CHANNELS))
         if (
             self.passage.windy

@@ -13,12 +13,13 @@ from agents.controllers.los_autopilot import Guided
 from agents.controllers.turn_rate import TurnRate
 from agents.deployment.autopilot import Autopilot
 from agents.deployment.c99 import render
-from agents.deployment.nmea import TABLES, Link, Reading, readings, sentences
+from agents.deployment.nmea import Link, Reading, readings, sentences
 from agents.deployment.route import Route
 from agents.deployment.scheduling import short_slice
 from shipgym import InputError
 from shipgym.checks import check_number
 from shipgym.tasks.guidance import wrapped
+from shipgym.trials.nmea import NMEA_QUANTITIES
 from shipgym.trials.units import KNOT
 
 STANDBY, STEERING, MANUAL = "standby", "steering", "manual"
@@ -216,7 +217,7 @@ class Helm:
                 " route found, expected 'wheel-over' or 'preview-mpc' of shipgym"
                 " autopilot with a route, or another without"
             )
-        if unknown := set(self.needed) - TABLES["believed"].keys():
+        if unknown := set(self.needed) - NMEA_QUANTITIES.keys():
             raise InputError(
                 f"autopilot: it reads {', '.join(sorted(unknown))}, which no sentence"
                 " of NMEA 0183 tells it"

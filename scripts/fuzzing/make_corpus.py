@@ -30,6 +30,7 @@ from agents.training.plan import Given, make_plan
 from agents.training.training import train
 from shipgym import Episode, Particulars, ShipFile, ShipModel
 from shipgym.tasks.task import OBSERVATION_NAMES, Task, observation_scales
+from shipgym.trials.nmea import checksum
 
 CORPUS = Path(__file__).parents[2] / "tests" / "corpus"
 EXAMPLE = Path(shipgym.__file__).parent / "examples" / "mariner"
@@ -74,7 +75,6 @@ def trials(folder: Path) -> None:
 def logs(folder: Path) -> None:
     """A log of each kind: ISO time, positions and rudder; NMEA 0183 with its checksums."""
     import pandas as pd
-    import pynmea2
     from scipy.io import savemat
 
     folder.joinpath("log").mkdir()
@@ -114,10 +114,8 @@ def logs(folder: Path) -> None:
             ("VW", "VHW", ",T,,M,13.6,N,,K"),
         )
     ]
-    lines = [
-        str(pynmea2.GGA(talker, kind, tuple(text.split(","))))
-        for talker, kind, text in fields
-    ]
+    texts = [f"{talker}{kind},{text}" for talker, kind, text in fields]
+    lines = [f"${text}*{checksum(text)}" for text in texts]
     (folder / "log" / "bridge.nmea").write_text("\r\n".join(lines) + "\r\n")
 
 
