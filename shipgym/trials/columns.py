@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, SupportsIndex
 
 import numpy as np
 import numpy.typing as npt
@@ -37,15 +37,17 @@ class Locator:
         """The file."""
         return str(self.table.path)
 
-    def place(self, sample: int, channel: str) -> str:
+    def place(self, sample: SupportsIndex, channel: str) -> str:
         """Place of a value: ``run.csv: line 12 (data row 11), column 'yaw'``."""
         row = int(self.rows[sample])
-        name = self.columns[channel].name
-        return f"{self.path}: {self.table.place(row)}, column '{name}'"
+        column = self.columns[channel].name
+        return self.table.cell(row, column)
 
-    def in_file(self, channel: str, value: float) -> float:
-        """A value in SI units as the file has it."""
-        return value / si_factor(channel, self.columns[channel].unit)
+    def in_file(self, channel: str, value: float, digits: int = 6) -> str:
+        """A value in SI units as the file has it, such as "12.5 deg"."""
+        unit = self.columns[channel].unit
+        number = value / si_factor(channel, unit)
+        return f"{number:.{digits}g} {unit}"
 
     def declaration(self, channel: str, unit: str) -> str:
         """How to declare another unit: ``r = { column = "yaw", unit = "deg/s" }``."""

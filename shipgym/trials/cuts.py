@@ -35,8 +35,10 @@ def check_cut(cut: Any, where: str) -> None:
     """InputError unless this is None, "rudder" or a list of pairs of numbers or texts."""
     if cut is None or cut == "rudder":
         return
-    if not isinstance(cut, list) or not cut or not all(map(_is_stretch, cut)):
-        raise InputError(f"{where} cut: {_EXPECTED}, got {shown(cut)}")
+    pairs = cut if isinstance(cut, list) and cut else [None]
+    for pair in pairs:
+        if not _is_stretch(pair):
+            raise InputError(f"{where} cut: {_EXPECTED}, got {shown(cut)}")
 
 
 def _is_stretch(pair: Any) -> bool:
@@ -61,19 +63,27 @@ def cut_log(cut: Any, log: Log, where: str) -> list[slice]:
 
 
 def _samples(stretch: Stretch, log: Log, where: str) -> slice:
-    first, last = (_seconds(moment, log, where) for moment in stretch)
+    first = _seconds(stretch.first, log, where)
+    last = _seconds(stretch.last, log, where)
     begin = int(np.searchsorted(log.t, first))
     end = int(np.searchsorted(log.t, last, side="right"))
     if end - begin < FEWEST_SAMPLES:
-        span = f"{log.t[0]:g} to {log.t[-1]:g} s"
-        if log.start is not None:
-            opening, closing = (clock_text(log.start + log.t[k]) for k in (0, -1))
-            span = f"{span}, {opening} to {closing}"
         raise InputError(
-            f"{where} cut: expected stretches of the log, which goes from {span}, got"
-            f" {stretch.first} to {stretch.last}, which holds no trial"
+            f"{where} cut: expected stretches of the log, which goes from {_span(log)},"
+            f" got {stretch.first} to {stretch.last}, which holds no trial"
         )
     return slice(begin, end)
+
+
+def _span(log: Log) -> str:
+    """From when to when a log goes, in seconds and by its clock."""
+    first, last = log.t[0], log.t[-1]
+    seconds = f"{first:g} to {last:g} s"
+    if log.start is None:
+        return seconds
+    opening = clock_text(log.start + first)
+    closing = clock_text(log.start + last)
+    return f"{seconds}, {opening} to {closing}"
 
 
 def _seconds(moment: float | str, log: Log, where: str) -> float:

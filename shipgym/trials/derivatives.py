@@ -51,12 +51,12 @@ def _smoothed(samples: Floats, values: Floats, spacing: int) -> tuple[Any, float
 
     n = samples.size
     inner = samples[np.arange(spacing, n - spacing, spacing)]
-    first, last = np.full(_DEGREE + 1, samples[0]), np.full(_DEGREE + 1, samples[-1])
-    spline = make_lsq_spline(
-        samples, values, np.concatenate([first, inner, last]), k=_DEGREE
-    )
+    ends = np.repeat([samples[0], samples[-1]], _DEGREE + 1)
+    knots = np.sort(np.concatenate([ends, inner]))
+    spline = make_lsq_spline(samples, values, knots, k=_DEGREE)
 
-    free = max(n - (inner.size + _DEGREE + 1), 1)
-    residual = float(np.linalg.norm(values - spline(samples)))
-    rounding = 1e-15 * max(float(np.abs(values).max()), 1e-290)
-    return spline, residual * math.sqrt(n) / free + rounding
+    residual = np.linalg.norm(values - spline(samples))
+    free = max(n - inner.size - _DEGREE - 1, 1)
+    largest = max(np.abs(values).max(), 1e-290)
+    noise = residual * math.sqrt(n) / free
+    return spline, float(noise + 1e-15 * largest)

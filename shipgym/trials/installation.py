@@ -64,12 +64,17 @@ class Installation:
 
 
 def _antenna(table: Any, where: str, ship: Particulars | None) -> tuple[float, float]:
+    """Distances of the antenna from midship, forward and to starboard, m."""
     check_table(table, where, ("forward", "starboard"))
-    forward = check_number(table.get("forward", 0.0), f"{where}.forward")
-    starboard = check_number(table.get("starboard", 0.0), f"{where}.starboard")
-    if ship is not None:
-        _check_aboard(forward, ship.length, ship, f"{where}.forward")
-        _check_aboard(starboard, ship.beam or ship.length, ship, f"{where}.starboard")
+    distances = []
+    for name in ("forward", "starboard"):
+        place = f"{where}.{name}"
+        distance = check_number(table.get(name, 0.0), place)
+        if ship is not None:
+            size = ship.beam if name == "starboard" else None
+            _check_aboard(distance, size or ship.length, ship, place)
+        distances.append(distance)
+    forward, starboard = distances
     return forward, starboard
 
 

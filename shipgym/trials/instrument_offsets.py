@@ -10,7 +10,7 @@ import numpy.typing as npt
 from shipgym.arrays import Flags, Floats
 from shipgym.errors import InputError
 from shipgym.trials.installation import Installation
-from shipgym.trials.resampling import Log
+from shipgym.trials.resampling import Log, usual_step
 from shipgym.trials.units import DEGREE
 
 #: A straight part lasts this long, s, with heading and rudder within this range, rad.
@@ -35,12 +35,13 @@ def straight_parts(t: Floats, channels: Mapping[str, Floats]) -> Flags:
     """Which samples lie amid a straight steady part, where heading and rudder hardly change."""
     from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
-    width = math.ceil(STRAIGHT_S / float(np.median(np.diff(t)))) + 1
+    width = math.ceil(STRAIGHT_S / usual_step(t)) + 1
     straight = np.full(t.size, "psi" in channels and t.size > width)
-    for name in {"psi", "delta"} & channels.keys():
-        highest = maximum_filter1d(channels[name], width)
-        lowest = minimum_filter1d(channels[name], width)
-        straight &= highest - lowest < STRAIGHT_RANGE
+    for name in ("psi", "delta"):
+        if name in channels:
+            highest = maximum_filter1d(channels[name], width)
+            lowest = minimum_filter1d(channels[name], width)
+            straight &= highest - lowest < STRAIGHT_RANGE
     return straight
 
 
@@ -54,9 +55,11 @@ def heading_offset(
     straight parts on several courses.
     """
     psi = channels["psi"][straight]
-    is_distinct = psi.size >= _FEWEST_SAMPLES and np.ptp(psi) >= DISTINCT_COURSES
-    if "ground_north" not in channels or not is_distinct:
+    are_distinct = psi.size >= _FEWEST_SAMPLES and np.ptp(psi) >= DISTINCT_COURSES
+    if "ground_north" not in channels or not are_distinct:
         return None
+    north = channels["ground_north"][straight]
+    east = channels["ground_east"][straight]
 
     # unknown are U cos(o), U sin(o) and the current to north and east
     c, s = np.cos(psi), np.sin(psi)
@@ -64,17 +67,19 @@ def heading_offset(
     to_north = np.column_stack([c, s, one, zero])
     to_east = np.column_stack([s, -c, zero, one])
     rows = np.vstack([to_north, to_east])
-    names = ("ground_north", "ground_east")
-    ground = np.concatenate([channels[name][straight] for name in names])
-    fitted = np.linalg.lstsq(rows, ground, rcond=None)[0]
+    ground = np.concatenate([north, east])
+    fitted, *_ = np.linalg.lstsq(rows, ground, rcond=None)
 
     # samples of one straight part say the same
-    residual = ground - rows @ fitted
-    variance = 0.5 * STRAIGHT_S * np.var(residual)
-    across = np.linalg.pinv(rows.T @ rows)[1, 1]
-    speed = float(np.hypot(fitted[0], fitted[1]))
-    offset = float(np.arctan2(fitted[1], fitted[0]))
-    return HeadingOffset(offset, math.sqrt(variance * across) / speed)
+    left = ground - rows @ fitted
+    variance = 0.5 * STRAIGHT_S * np.var(left)
+    covariance = variance * np.linalg.pinv(rows.T @ rows)
+    along, across, *_ = fitted
+    speed = math.hypot(along, across)
+    return HeadingOffset(
+        offset=math.atan2(across, along),
+        error=math.sqrt(covariance[1, 1]) / speed,
+    )
 
 
 def rudder_offset(
@@ -86,21 +91,22 @@ def rudder_offset(
     heading is bent. Of several angles held the one counts at which it is bent least, by
     far.
     """
-    psi, delta = channels.get("psi", t), channels["delta"]
-    half = math.ceil(0.5 * STRAIGHT_S / float(np.median(np.diff(t))))
-    rows = np.flatnonzero(straight[half : t.size - half]) + half
+    delta = channels["delta"]
+    half = math.ceil(0.5 * STRAIGHT_S / usual_step(t))
+    inside = straight[half : t.size - half]
+    rows = np.flatnonzero(inside) + half
     if not rows.size:
         return None
 
     by_rudder = rows[np.argsort(delta[rows])]
-    breaks = np.flatnonzero(np.diff(delta[by_rudder]) > STRAIGHT_RANGE) + 1
-    held = np.split(by_rudder, breaks)
-    bends = [_bend(psi, part, half) for part in held]
-    straightest = int(np.argmin(bends))
+    is_step = np.diff(delta[by_rudder]) > STRAIGHT_RANGE
+    held = np.split(by_rudder, np.flatnonzero(is_step) + 1)
+    bends = [_bend(channels["psi"], part, half) for part in held]
+    straightest = bends.index(min(bends))
     is_distinct = bends[straightest] <= _STRAIGHT_BEND * max(bends)
     if len(held) > 1 and not is_distinct:
         return None
-    return float(np.mean(delta[held[straightest]]))
+    return float(delta[held[straightest]].mean())
 
 
 def _bend(psi: Floats, rows: npt.NDArray[np.intp], half: int) -> float:

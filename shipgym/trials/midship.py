@@ -48,9 +48,10 @@ def _heading_from_start(log: Log) -> Floats:
     from scipy.interpolate import make_interp_spline
 
     degree = min(3, log.t.size - 1)
-    spline = make_interp_spline(log.t, log.channels["r"], k=degree)
-    heading = spline.antiderivative()
-    return np.asarray(heading(log.t) - heading(log.t[0]), dtype=np.float64)
+    rate = make_interp_spline(log.t, log.channels["r"], k=degree)
+    heading = rate.antiderivative()(log.t)
+    from_start: Floats = heading - heading[0]
+    return from_start
 
 
 def _earth_to_body(log: Log) -> None:
@@ -123,8 +124,9 @@ def to_midship(log: Log, installation: Installation) -> None:
 
 def _move_positions(channels: dict[str, Floats], installation: Installation) -> None:
     """Move positions from the antenna to midship."""
-    psi = channels["psi"]
-    north, east = rotate_to_body(installation.forward, installation.starboard, -psi)
+    forward, starboard = installation.forward, installation.starboard
+    to_earth = -channels["psi"]
+    north, east = rotate_to_body(forward, starboard, to_earth)
     channels["x"] = channels["x"] - north
     channels["y"] = channels["y"] - east
 
@@ -186,10 +188,18 @@ def set_and_drift(
     """
     surge, sway = ground
     c, s = np.cos(psi), np.sin(psi)
-    rows, values = np.column_stack([c, s]), surge - water
+    # along the ship, and on one course across her too
+    rows = np.column_stack([c, s])
+    values = surge - water
     if np.ptp(psi) < DISTINCT_COURSES:
-        rows = np.vstack([rows, np.column_stack([-s, c])])
+        across = np.column_stack([-s, c])
+        rows = np.vstack([rows, across])
         values = np.concatenate([values, sway])
-    current = np.linalg.lstsq(rows, values, rcond=None)[0]
-    unexplained = float(np.std(values - rows @ current))
-    return SetAndDrift(float(current[0]), float(current[1]), unexplained)
+
+    current, *_ = np.linalg.lstsq(rows, values, rcond=None)
+    left = values - rows @ current
+    return SetAndDrift(
+        north=float(current[0]),
+        east=float(current[1]),
+        unexplained=float(np.std(left)),
+    )

@@ -5,11 +5,12 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from shipgym.arrays import Flags, Floats
 from shipgym.errors import InputError
 from shipgym.trials.columns import Locator
-from shipgym.trials.resampling import FEWEST_SAMPLES
+from shipgym.trials.resampling import FEWEST_SAMPLES, usual_step
 
 #: A hole of more rows that lasts more median time steps is too long to fill.
 LONGEST_HOLE_ROWS = 10
@@ -40,20 +41,19 @@ def check_time(t: Floats, locator: Locator) -> None:
         )
     stands_still = np.diff(t) <= SHORTEST_STEP_S
     if stands_still.any():
-        _refuse_time(t, int(np.argmax(stands_still)), locator)
+        k = int(np.argmax(stands_still))
+        _refuse_time(t[k], t[k + 1], locator.place(k + 1, "t"), locator)
 
 
-def _refuse_time(t: Floats, k: int, locator: Locator) -> None:
-    """Name the sample after the k-th, whose time is not later."""
-    before, after = (locator.in_file("t", float(one)) for one in t[k : k + 2])
-    change = f"stands still at {after:.10g}"
+def _refuse_time(before: float, after: float, place: str, locator: Locator) -> None:
+    later = locator.in_file("t", after, digits=10)
+    change = f"stands still at {later}"
     if after < before:
-        change = f"goes back from {before:.10g} to {after:.10g}"
-    unit = locator.columns["t"].unit
+        earlier = locator.in_file("t", before, digits=10)
+        change = f"goes back from {earlier} to {later}"
     raise InputError(
-        f"{locator.place(k + 1, 't')}: expected time to increase from row to row, got"
-        f" one that {change} {unit}; sort the rows, remove the repeated ones, or split"
-        " the file into one per run"
+        f"{place}: expected time to increase from row to row, got one that {change};"
+        " sort the rows, remove the repeated ones, or split the file into one per run"
     )
 
 
@@ -66,84 +66,92 @@ def fill_missing(
     is not "interpolate", a time is missing, less than half of the rows are whole, or a
     hole is too long.
     """
-    missing = {name: ~np.isfinite(values) for name, values in channels.items()}
-    no_time = ~np.isfinite(t)
-    lacking = np.logical_or.reduce([no_time, *missing.values()])
-    if no_time.any() or (repair is None and lacking.any()):
-        _refuse_missing(t, channels, locator, int(lacking.sum()), repair)
-
+    _check_present(t, channels, locator, repair)
     check_time(t, locator)
-    whole = np.flatnonzero(~lacking)
-    if whole.size < max(FEWEST_SAMPLES, t.size // 2):
-        raise InputError(
-            f"{locator.path}: expected at least half of the {t.size} rows, and"
-            f" {FEWEST_SAMPLES}, without missing values to interpolate from, got only"
-            f" {whole.size}; leave out the column that is mostly empty"
-        )
-
+    whole = _whole_rows(channels, locator)
     kept = slice(int(whole[0]), int(whole[-1]) + 1)
     locator = replace(locator, rows=locator.rows[kept])
+    t = t[kept]
     filled, counts = {}, {}
-    for name, values in channels.items():
-        gaps = missing[name][kept]
-        filled[name] = values[kept]
-        counts[name] = int(gaps.sum())
+    for name, every in channels.items():
+        values = every[kept]
+        is_missing = ~np.isfinite(values)
+        counts[name] = np.count_nonzero(is_missing)
         if counts[name]:
-            _check_holes(t[kept], gaps, name, locator)
-            filled[name] = _interpolated(t[kept], values[kept], gaps, name == "psi")
-    return FilledChannels(t[kept], filled, locator, counts)
+            _check_holes(t, is_missing, name, locator)
+            values = _interpolated(t, values, is_missing, is_heading=name == "psi")
+        filled[name] = values
+    return FilledChannels(t, filled, locator, counts)
 
 
-def _refuse_missing(
-    t: Floats,
-    channels: Mapping[str, Floats],
-    locator: Locator,
-    rows: int,
-    repair: str | None,
+def _check_present(
+    t: Floats, channels: Mapping[str, Floats], locator: Locator, repair: str | None
 ) -> None:
-    """Name the first missing value; a missing time first where the others could be filled."""
-    names = ["t"] if repair is not None else ["t", *channels]
-    table = np.array([t, *channels.values()])[: len(names)]
-    k, column = (int(one) for one in np.argwhere(~np.isfinite(table.T))[0])
-    name = names[column]
+    """Refuse missing times, and without `repair` every missing value, naming the first."""
+    table = {"t": t, **channels}
+    is_missing = ~np.isfinite(np.column_stack(list(table.values())))
+    refused = is_missing if repair is None else is_missing[:, :1]
+    if not refused.any():
+        return
+    row, column = np.argwhere(refused)[0]
+    name = list(table)[column]
     remedy = 'repair = "interpolate" fills it from its neighbours, or remove the row'
     if name == "t":
         remedy = "time cannot be interpolated, remove the row"
+    lacking = np.count_nonzero(is_missing.any(axis=1))
     raise InputError(
-        f"{locator.place(k, name)}: expected a number, got no value"
-        f" ({table[column, k]:g}); {remedy} ({rows} of {t.size} rows lack a value)",
+        f"{locator.place(row, name)}: expected a number, got no value"
+        f" ({table[name][row]:g}); {remedy} ({lacking} of {t.size} rows lack a value)",
         () if name == "t" else (REPAIR,),
     )
 
 
-def _check_holes(t: Floats, missing: Flags, channel: str, locator: Locator) -> None:
+def _whole_rows(
+    channels: Mapping[str, Floats], locator: Locator
+) -> npt.NDArray[np.intp]:
+    """Rows that lack no value; InputError where they are less than half, or less than three."""
+    present = [np.isfinite(values) for values in channels.values()]
+    is_whole = np.all(present, axis=0)
+    rows = np.flatnonzero(is_whole)
+    if rows.size < max(FEWEST_SAMPLES, is_whole.size // 2):
+        raise InputError(
+            f"{locator.path}: expected at least half of the {is_whole.size} rows, and"
+            f" {FEWEST_SAMPLES}, without missing values to interpolate from, got only"
+            f" {rows.size}; leave out the column that is mostly empty"
+        )
+    return rows
+
+
+def _check_holes(t: Floats, is_missing: Flags, channel: str, locator: Locator) -> None:
     """Refuse to fill a hole of many rows; the first and the last row are whole."""
-    edges = np.flatnonzero(np.diff(missing))
+    edges = np.flatnonzero(np.diff(is_missing))
     first, after = edges[::2] + 1, edges[1::2] + 1
     rows = after - first
     spans = t[after] - t[first - 1]
-    longest = LONGEST_HOLE_STEPS * np.median(np.diff(t))
-    too_long = (rows > LONGEST_HOLE_ROWS) & (spans > longest)
+    is_long = spans > LONGEST_HOLE_STEPS * usual_step(t)
+    too_long = is_long & (rows > LONGEST_HOLE_ROWS)
     if not too_long.any():
         return
-    i = int(np.argmax(too_long))
-    span = locator.in_file("t", float(spans[i]))
+    k = np.argmax(too_long)
     raise InputError(
-        f"{locator.place(int(first[i]), channel)}: expected a hole of at most"
-        f" {LONGEST_HOLE_STEPS:g} time steps to interpolate over, got {rows[i]} rows"
-        f" without a value, over {span:g} {locator.columns['t'].unit}; split the file"
-        " there, or leave out the rows or the column"
+        f"{locator.place(first[k], channel)}: expected a hole of at most"
+        f" {LONGEST_HOLE_STEPS:g} time steps to interpolate over, got {rows[k]} rows"
+        f" without a value, over {locator.in_file('t', spans[k])}; split the file there,"
+        " or leave out the rows or the column"
     )
 
 
-def _interpolated(t: Floats, values: Floats, gaps: Flags, is_heading: bool) -> Floats:
+def _interpolated(
+    t: Floats, values: Floats, is_missing: Flags, *, is_heading: bool
+) -> Floats:
     """Values with their gaps filled; headings without jumps."""
     from scipy.interpolate import PchipInterpolator
 
-    known = values[~gaps]
+    known = values[~is_missing]
     if is_heading:
         known = np.unwrap(known)
+    curve = PchipInterpolator(t[~is_missing], known)
     filled = values.copy()
-    filled[~gaps] = known
-    filled[gaps] = PchipInterpolator(t[~gaps], known)(t[gaps])
+    filled[~is_missing] = known
+    filled[is_missing] = curve(t[is_missing])
     return filled

@@ -27,11 +27,11 @@ def local_metres(
     along_meridian = _EQUATOR * (1.0 - _ECCENTRICITY_2) / curvature**1.5
     across_meridian = _EQUATOR / math.sqrt(curvature)
 
-    north = along_meridian * (lat - origin_lat) * DEGREE
-    middle = 0.5 * (lat * DEGREE + phi)
-    turned = (lon - origin_lon + 180.0) % 360.0 - 180.0
-    east = across_meridian * np.cos(middle) * turned * DEGREE
-    return north, east
+    turned_north = (lat - origin_lat) * DEGREE
+    turned_east = (lon - origin_lon + 180.0) % 360.0 - 180.0
+    middle = phi + 0.5 * turned_north
+    parallel = across_meridian * np.cos(middle)
+    return along_meridian * turned_north, parallel * turned_east * DEGREE
 
 
 def rotate_to_body(north: Any, east: Any, psi: Any) -> tuple[Any, Any]:

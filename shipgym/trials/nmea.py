@@ -131,13 +131,17 @@ def parse_sentence(line: str) -> Sentence:
     match = _SENTENCE.fullmatch(line)
     if match is None:
         raise ValueError(f"expected a sentence with a checksum, got {line!r}")
-    expected = checksum(match["text"])
-    if expected != match["checksum"].upper():
-        raise ValueError(f"expected the checksum {expected}, got {match['checksum']}")
+    expected, found = checksum(match["text"]), match["checksum"]
+    if expected != found.upper():
+        raise ValueError(f"expected the checksum {expected}, got {found}")
 
-    address = match["address"]
+    address, fields = match["address"], match["fields"]
     letters = 1 if address.startswith("P") else 2
-    return Sentence(address[:letters], address[letters:], match["fields"].split(","))
+    return Sentence(
+        talker=address[:letters],
+        kind=address[letters:],
+        fields=fields.split(","),
+    )
 
 
 def steering_numbers(sentence: Sentence) -> dict[str, float]:

@@ -16,10 +16,9 @@ from shipgym.trials.navigation import local_metres
 from shipgym.trials.plausibility.finding import settle
 from shipgym.trials.plausibility.headings import check_heading
 from shipgym.trials.plausibility.positions import (
-    check_one_ship,
-    outlier_finding,
-    outliers,
-    too_fast_steps,
+    check_outliers,
+    check_track,
+    find_outliers,
 )
 from shipgym.trials.plausibility.ranges import check_ranges
 from shipgym.trials.readers.log_table import LogTable, is_number
@@ -31,7 +30,7 @@ from shipgym.trials.resampling import (
 )
 from shipgym.trials.units import si_factor
 
-_PAIRS = (("lat", "lon"), ("sog", "cog"))  # of which none is of use alone
+_PAIRS = {"lat": "lon", "lon": "lat", "sog": "cog", "cog": "sog"}  # of no use alone
 
 
 @dataclass(frozen=True)
@@ -49,23 +48,33 @@ class Recording:
     start : float or None
         Clock at t = 0 in UTC, s since 1970 or of the day; None where the time is no
         clock's.
-    has_positions : bool
-        Whether x and y are positions of GNSS.
     """
 
     signals: Signals
     locator: Locator
     filled: Mapping[str, int]
     start: float | None
-    has_positions: bool
+
+    @property
+    def has_positions(self) -> bool:
+        """Whether x and y are positions of GNSS."""
+        return "lat" in self.locator.columns
 
 
-class _RowTimes(NamedTuple):
+class _Times(NamedTuple):
     """Times of the rows of a table."""
 
     t: Floats  # s
-    column: Column  # with the unit of `t` in messages
+    unit: str  # in which messages name them
     start: float | None  # as in `Recording`
+
+
+class _Track(NamedTuple):
+    """Positions of the rows, m from the first one; nan where there is none."""
+
+    north: Floats
+    east: Floats
+    outliers: int
 
 
 def read_recording(
@@ -83,66 +92,87 @@ def read_recording(
     chosen = choose_columns(table, columns, part=part)
     _check_pairs(table, chosen)
     times = _read_times(table, chosen["t"])
-    chosen["t"] = times.column
-    channels = {
-        channel: si_factor(channel, column.unit) * table.numbers(column.name)
-        for channel, column in chosen.items()
-        if channel not in ("t", "lat", "lon")
-    }
-    filled: dict[str, int] = {}
-    has_positions = "lat" in chosen
-    if has_positions:
-        track, count = _local_track(table, chosen, times.t, repair)
-        channels |= track
-        filled = dict.fromkeys(track, count)
-        chosen["x"] = replace(chosen.pop("lat"), unit="m")
-        chosen["y"] = replace(chosen.pop("lon"), unit="m")
-
+    chosen["t"] = replace(chosen["t"], unit=times.unit)
     locator = Locator(table, chosen, np.arange(times.t.size))
-    is_whole = all(np.isfinite(one).all() for one in (times.t, *channels.values()))
+
+    channels = _read_numbers(locator)
+    outliers = 0
+    if "lat" in chosen:
+        track = _local_track(locator, times.t, repair)
+        channels |= {"x": track.north, "y": track.east}
+        chosen["x"] = replace(chosen["lat"], unit="m")
+        chosen["y"] = replace(chosen["lon"], unit="m")
+        outliers = track.outliers
+    signals, locator, filled = _signals(times.t, channels, locator, repair)
+    if outliers:
+        filled |= {"x": outliers, "y": outliers}
+    if "sog" in signals:
+        _make_velocity(signals, locator)
+    return Recording(signals, locator, filled, times.start)
+
+
+def _signals(
+    t: Floats, channels: dict[str, Floats], locator: Locator, repair: str | None
+) -> tuple[Signals, Locator, dict[str, int]]:
+    """Channels on the clock of the rows, what is missing filled and counted, or each on a clock of its own."""
+    filled: dict[str, int] = {}
+    is_whole = all(np.isfinite(values).all() for values in (t, *channels.values()))
+    has_own_clocks = not is_whole and have_own_clocks(t, channels)
     if is_whole:
-        check_time(times.t, locator)
-        signals = _signals(times.t, channels, locator)
-    elif _at_own_rates(times.t, channels):
-        signals = _signals_at_own_rates(times.t, channels, locator)
-    else:
-        whole = fill_missing(times.t, channels, locator, repair)
-        locator, filled = whole.locator, whole.counts
-        signals = _signals(whole.t, whole.channels, locator)
-    _add_ground_velocity(table, signals)
-    return Recording(signals, locator, filled, times.start, has_positions)
+        check_time(t, locator)
+    elif not has_own_clocks:
+        t, channels, locator, filled = fill_missing(t, channels, locator, repair)
+
+    settle(check_ranges({"t": t, **channels}, locator))
+    make_signal = _own_signal if has_own_clocks else _signal
+    signals = {
+        channel: make_signal(channel, t, values, locator)
+        for channel, values in channels.items()
+    }
+    return signals, locator, filled
 
 
 def _check_pairs(table: LogTable, chosen: Mapping[str, Column]) -> None:
-    for pair in _PAIRS:
-        present = [name for name in pair if name in chosen]
-        if len(present) == 1:
+    for name in chosen:
+        other = _PAIRS.get(name, name)
+        if other not in chosen:
             raise InputError(
-                f"{table.path}: columns: expected {' and '.join(pair)}, got"
-                f" {present[0]} alone; name the column of the other"
+                f"{table.path}: columns: expected {name} and {other}, got {name} alone;"
+                " name the column of the other"
             )
 
 
-def _read_times(table: LogTable, column: Column) -> _RowTimes:
+def _read_numbers(locator: Locator) -> dict[str, Floats]:
+    """Channels that are numbers in the file, in SI units."""
+    channels = {}
+    for channel, column in locator.columns.items():
+        if channel not in ("t", "lat", "lon"):
+            numbers = locator.table.numbers(column.name)
+            channels[channel] = si_factor(channel, column.unit) * numbers
+    return channels
+
+
+def _read_times(table: LogTable, column: Column) -> _Times:
     """Times of the rows: numbers in their unit, or clock times, which begin at zero."""
     cells = table.texts(column.name)
     if column.date is not None:
         dates = table.texts(column.date)
-        cells = [
-            f"{date} {time}".strip() for date, time in zip(dates, cells, strict=True)
-        ]
+        pairs = zip(dates, cells, strict=True)
+        cells = [f"{date} {time}".strip() for date, time in pairs]
 
     first = next((cell for cell in cells if cell), "0")
     if is_number(first.replace(",", ".")):
-        clock = table.numbers(column.name) * si_factor("t", column.unit)
+        numbers = table.numbers(column.name)
+        clock = si_factor("t", column.unit) * numbers
         if not column.unit.startswith("unix"):
-            return _RowTimes(clock, column, None)
+            return _Times(clock, column.unit, None)
     else:
         clock = _read_clock_cells(table, column, cells)
+
     known = clock[np.isfinite(clock)]
     zero = float(known[0]) if known.size else 0.0
-    start = zero - zone_seconds(column.zone, str(table.path))
-    return _RowTimes(clock - zero, replace(column, unit="s"), start)
+    ahead = zone_seconds(column.zone, str(table.path))
+    return _Times(clock - zero, "s", zero - ahead)
 
 
 def _read_clock_cells(table: LogTable, column: Column, cells: list[str]) -> Floats:
@@ -150,128 +180,95 @@ def _read_clock_cells(table: LogTable, column: Column, cells: list[str]) -> Floa
     try:
         return read_clock(cells).seconds
     except ValueError as error:
-        row = cells.index(str(error)) if str(error) in cells else 0
-        raise InputError(
-            f"{table.path}: {table.place(row)}, column '{column.name}': expected a"
-            " number, ISO 8601 (2024-05-31T09:30:00), or a time of day with its date in"
-            f' another column: t = {{ column = "{column.name}", date = "..." }}, got'
-            f" {cells[row][:40]!r}"
-        ) from None
+        wrong = str(error)
+    row = cells.index(wrong) if wrong in cells else 0
+    raise InputError(
+        f"{table.cell(row, column.name)}: expected a number, ISO 8601"
+        " (2024-05-31T09:30:00), or a time of day with its date in another column:"
+        f' t = {{ column = "{column.name}", date = "..." }}, got {cells[row][:40]!r}'
+    )
 
 
-def _read_position(table: LogTable, column: Column) -> Floats:
+def _read_position(locator: Locator, channel: str) -> Floats:
     """Degrees of latitude or longitude in any of their forms."""
+    table, column = locator.table, locator.columns[channel]
     cells = table.texts(column.name)
     try:
         return read_angles(cells, minutes=column.unit != "deg")
     except ValueError as error:
-        cell = str(error)
-    if is_number(cell):  # such as 1e-05
+        wrong = str(error)
+    if is_number(wrong):  # such as 1e-05
         return table.numbers(column.name)
-    row = cells.index(cell) if cell in cells else 0
+    row = cells.index(wrong) if wrong in cells else 0
     raise InputError(
-        f"{table.path}: {table.place(row)}, column '{column.name}': expected degrees"
-        " (57.6872), degrees and minutes (57°41.234'N) or ddmm.mmm (5741.234N), got"
-        f" {cell!r}"
+        f"{locator.place(row, channel)}: expected degrees (57.6872), degrees and minutes"
+        f" (57°41.234'N) or ddmm.mmm (5741.234N), got {wrong!r}"
     )
 
 
-def _local_track(
-    table: LogTable, chosen: Mapping[str, Column], t: Floats, repair: str | None
-) -> tuple[dict[str, Floats], int]:
-    """North and east of the first position, m, nan where there is none, and the number of outliers."""
-    lat, lon = (_read_position(table, chosen[name]) for name in ("lat", "lon"))
-    x, y = np.full((2, t.size), np.nan)
-    known = np.flatnonzero(np.isfinite(lat) & np.isfinite(lon) & np.isfinite(t))
-    if not known.size:
-        return {"x": x, "y": y}, 0
-
-    locator = Locator(table, chosen, np.arange(t.size))
+def _local_track(locator: Locator, t: Floats, repair: str | None) -> _Track:
+    """Positions by north and east of the first one; outliers are refused unless they are to be filled."""
+    lat = _read_position(locator, "lat")
+    lon = _read_position(locator, "lon")
     settle(check_ranges({"lat": lat, "lon": lon}, locator))
-    origin = lat[known[0]], lon[known[0]]
-    x[known], y[known] = local_metres(lat[known], lon[known], origin)
-    settle(check_one_ship(t[known], x[known], y[known], known, locator))
-    too_fast = too_fast_steps(t[known], x[known], y[known])
-    far = known[outliers(too_fast)]
-    if far.size and repair is None:
-        settle([outlier_finding(lat, lon, far, known.size, locator)])
-    x[far] = y[far] = np.nan
-    return {"x": x, "y": y}, far.size
+    is_known = np.isfinite(lat) & np.isfinite(lon) & np.isfinite(t)
+    rows = np.flatnonzero(is_known)
+    north, east = np.full((2, t.size), np.nan)
+    if not rows.size:
+        return _Track(north, east, 0)
+
+    origin = lat[rows[0]], lon[rows[0]]
+    x, y = local_metres(lat[rows], lon[rows], origin)
+    here = replace(locator, rows=rows)
+    settle(check_track(t[rows], x, y, here))
+    is_far = find_outliers(t[rows], x, y)
+    if repair is None:
+        settle(check_outliers(lat[rows], lon[rows], is_far, here))
+    north[rows] = np.where(is_far, np.nan, x)
+    east[rows] = np.where(is_far, np.nan, y)
+    return _Track(north, east, np.count_nonzero(is_far))
 
 
-def _at_own_rates(t: Floats, channels: Mapping[str, Floats]) -> bool:
-    """Tell whether what is missing are rows between those of channels at different rates."""
-    if not np.isfinite(t).all():
-        return False
-    return have_own_clocks(~np.isfinite(values) for values in channels.values())
-
-
-def _signals(t: Floats, channels: Mapping[str, Floats], locator: Locator) -> Signals:
-    """Checked channels on the clock of the rows."""
-    settle(check_ranges({"t": t, **channels}, locator))
-    signals = {channel: Signal(t, values) for channel, values in channels.items()}
-    _unwrap(signals, locator)
-    return signals
-
-
-def _signals_at_own_rates(
-    t: Floats, channels: Mapping[str, Floats], locator: Locator
-) -> Signals:
-    """Checked channels, each on the clock of the rows in which it has a value."""
-    settle(check_ranges({"t": t, **channels}, locator))
-    signals = {
-        channel: _own_signal(channel, t, values, locator)
-        for channel, values in channels.items()
-    }
-    if "psi" in channels:
-        rows = locator.rows[np.isfinite(channels["psi"])]
-        locator = replace(locator, rows=rows)
-    _unwrap(signals, locator)
-    return signals
+def _signal(channel: str, t: Floats, values: Floats, locator: Locator) -> Signal:
+    """A channel on the clock of the rows, headings and directions of the wind without jumps."""
+    if channel not in ("psi", "wind_from"):
+        return Signal(t, values)
+    unwrapped = np.unwrap(values)
+    if channel == "psi":
+        settle(check_heading(t, unwrapped, values, locator))
+    return Signal(t, unwrapped)
 
 
 def _own_signal(channel: str, t: Floats, values: Floats, locator: Locator) -> Signal:
-    """Values of a channel where it has some; InputError for too few or time that goes back."""
+    """A channel where it has values; InputError for too few or time that goes back."""
     rows = np.flatnonzero(np.isfinite(values))
-    clock, name = t[rows], locator.columns[channel].name
+    column = locator.columns[channel].name
     if rows.size < FEWEST_SAMPLES:
         raise InputError(
-            f"{locator.path}: column '{name}': expected {FEWEST_SAMPLES} values or"
+            f"{locator.path}: column '{column}': expected {FEWEST_SAMPLES} values or"
             f" more, got {rows.size}; leave it out"
         )
+    clock = t[rows]
+    here = replace(locator, rows=locator.rows[rows])
     stands_still = np.diff(clock) <= 0.0
     if stands_still.any():
-        k = int(np.argmax(stands_still))
+        k = np.argmax(stands_still)
+        before, after = clock[k : k + 2]
         raise InputError(
-            f"{locator.place(int(rows[k + 1]), 't')}: expected time to increase between"
-            f" values of '{name}', got {clock[k]:.10g} and then {clock[k + 1]:.10g} s;"
-            " sort the rows, or, where two ships or receivers are in the file, keep"
-            " those of one"
+            f"{here.place(k + 1, 't')}: expected time to increase between values of"
+            f" '{column}', got {before:.10g} and then {after:.10g} s; sort the rows, or,"
+            " where two ships or receivers are in the file, keep those of one"
         )
-    return Signal(clock, values[rows])
+    return _signal(channel, clock, values[rows], here)
 
 
-def _unwrap(signals: Signals, locator: Locator) -> None:
-    """Take the jumps at north out of headings and wind directions; refuse headings that turn too fast."""
-    if "wind_from" in signals:
-        t, logged = signals["wind_from"]
-        signals["wind_from"] = Signal(t, np.unwrap(logged))
-    if "psi" in signals:
-        t, logged = signals["psi"]
-        psi = np.unwrap(logged)
-        settle(check_heading(t, psi, logged, locator))
-        signals["psi"] = Signal(t, psi)
-
-
-def _add_ground_velocity(table: LogTable, signals: Signals) -> None:
+def _make_velocity(signals: Signals, locator: Locator) -> None:
     """Replace speed and course over ground by velocities to the north and east."""
-    if "sog" not in signals:
-        return
     t, speed = signals.pop("sog")
     course = signals.pop("cog").values
     if speed.size != course.size:
         raise InputError(
-            f"{table.path}: expected sog and cog in the same rows, got {speed.size}"
+            f"{locator.path}: expected sog and cog in the same rows, got {speed.size}"
             f" values of sog and {course.size} of cog"
         )
     signals["ground_north"] = Signal(t, speed * np.cos(course))

@@ -1,6 +1,6 @@
 """Channels that were logged at different rates, each on a clock of its own, and one clock for all of them."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -74,17 +74,18 @@ def usual_step(t: Floats) -> float:
     return float(np.median(np.diff(t)))
 
 
-def have_own_clocks(missing: Iterable[Flags]) -> bool:
-    """Tell whether missing values are those of channels at different rates, from the flags of each channel.
+def have_own_clocks(t: Floats, channels: Mapping[str, Floats]) -> bool:
+    """Tell whether missing values are those of channels at different rates.
 
-    Then every row has some value, and the values of some channel stand two rows or more
-    apart as a rule.
+    Then every row has a time and some value, and the values of some channel stand two
+    rows or more apart as a rule.
     """
-    flags = list(missing)
-    if np.all(flags, axis=0).any():
+    present = [np.isfinite(values) for values in channels.values()]
+    has_value = np.any(present, axis=0)
+    if not (np.isfinite(t) & has_value).all():
         return False
-    for is_missing in flags:
-        rows = np.flatnonzero(~is_missing)
+    for is_present in present:
+        rows = np.flatnonzero(is_present)
         if rows.size >= FEWEST_SAMPLES and usual_step(rows) >= 2.0:
             return True
     return False
@@ -106,9 +107,10 @@ def on_one_clock(signals: Mapping[str, Signal], where: str) -> Log:
     """
     if not share_clock(signals):
         return _resampled(signals, where)
-    channels = {name: signal.values for name, signal in signals.items()}
-    first = next(iter(signals.values()))
-    return Log(first.t, channels, where, [])
+    channels = {}
+    for name, signal in signals.items():
+        t, channels[name] = signal
+    return Log(t, channels, where, [])
 
 
 def _resampled(signals: Mapping[str, Signal], where: str) -> Log:

@@ -27,12 +27,10 @@ def check_scale(trial: Trial, ship: Particulars, where: str) -> None:
     """
     settle(_check_slenderness(ship, where))
     if "u" in trial:
-        sway = trial.channels.get("v", np.zeros(1))
-        speed = np.hypot(trial["u"], sway)
+        speed = np.hypot(trial["u"], trial.channels.get("v", 0.0))
+        settle(_check_speed(speed, ship, where))
         if "r" in trial:
             settle(_check_turning(trial["r"], speed, ship, where))
-        if ship.speed is not None and "speed" not in ship.estimated:
-            settle(_check_speed(speed, ship.speed, ship.length, where))
     if "n" in trial and ship.propeller_diameter is not None:
         settle(_check_shaft(trial["n"], ship.propeller_diameter, where))
 
@@ -65,13 +63,14 @@ def _check_turning(
         )
 
 
-def _check_speed(
-    speed: Floats, service_speed: float, length: float, where: str
-) -> Iterator[LogFinding]:
+def _check_speed(speed: Floats, ship: Particulars, where: str) -> Iterator[LogFinding]:
+    service_speed = ship.speed
+    if service_speed is None or "speed" in ship.estimated:
+        return
     fastest = float(np.quantile(speed, _MOST))
     in_knots = service_speed * KNOT
-    is_fast = service_speed > _FASTEST_FROUDE * math.sqrt(9.81 * length)
-    if is_fast and abs(fastest / in_knots - 1.0) < 0.1:
+    froude = service_speed / math.sqrt(9.81 * ship.length)
+    if froude > _FASTEST_FROUDE and abs(fastest / in_knots - 1.0) < 0.1:
         yield LogFinding(
             where,
             f"expected [ship] speed in m/s, got {service_speed:g}, which in knots is"

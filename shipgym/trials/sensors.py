@@ -84,11 +84,11 @@ def gauss_markov(
     """
     decay = np.exp(-np.diff(t) / correlation_time_s)
     spread = np.sqrt(1.0 - decay**2)
-    shocks = rng.standard_normal(len(t))
-    process = np.empty(len(t))
-    process[0] = shocks[0]
-    for k in range(len(t) - 1):
-        process[k + 1] = decay[k] * process[k] + spread[k] * shocks[k + 1]
+    shocks = rng.standard_normal(t.size)
+    process = shocks.copy()
+    for k in range(t.size - 1):
+        kept = decay[k] * process[k]
+        process[k + 1] = kept + spread[k] * shocks[k + 1]
     return process
 
 
@@ -193,8 +193,7 @@ class Sensors:
         if channel in ORDERS:
             return orders_at(times, t, signal)
         sensor = self.by_channel.get(channel, Sensor())
-        rng = np.random.default_rng([seed, CHANNELS.index(channel)])
-        return sensor.read(times, t, signal, rng)
+        return sensor.read(times, t, signal, _random(seed, channel))
 
     def _logged_times(self, trial: Trial) -> Floats:
         """Times at which the logger asks the sensors, s."""
@@ -211,13 +210,19 @@ class Sensors:
 
     def _outside_gaps(self, count: int, seed: int) -> Flags:
         """Which samples are not in a gap."""
-        rng = np.random.default_rng([seed, CHANNELS.index(SEA_CHANNELS[0])])
+        rng = _random(seed, SEA_CHANNELS[0])
         logged = np.ones(count, dtype=bool)
-        starts = np.flatnonzero(rng.random(count) < self.dropout_probability)
+        is_start = rng.random(count) < self.dropout_probability
+        starts = np.flatnonzero(is_start)
         lengths = rng.geometric(1.0 / self.dropout_samples, starts.size)
         for start, length in zip(starts, lengths, strict=True):
             logged[start : start + length] = False
         return logged
+
+
+def _random(seed: int, channel: str) -> np.random.Generator:
+    """Random numbers of a channel, whichever others are drawn."""
+    return np.random.default_rng([seed, CHANNELS.index(channel)])
 
 
 def _measurable(trial: Trial) -> dict[str, Floats]:

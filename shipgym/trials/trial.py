@@ -328,12 +328,14 @@ class Trial:
         The file, replaced where it exists, is never there in part. InputError if it
         cannot be written.
         """
-        columns = {"t": self.t, **self.channels}
-        rows = zip(*(values.tolist() for values in columns.values()), strict=True)
-        lines = [",".join(columns)]
-        for row in rows:
-            lines.append(",".join(map(repr, row)))
-        write_text("\n".join(lines) + "\n", Path(path))
+        names = ["t", *self.channels]
+        columns = [self[name].tolist() for name in names]
+        lines = [",".join(names)]
+        for row in zip(*columns, strict=True):
+            cells = map(repr, row)
+            lines.append(",".join(cells))
+        text = "\n".join(lines)
+        write_text(f"{text}\n", Path(path))
 
 
 def read_trials(

@@ -107,11 +107,18 @@ def _read_shared(path: Path, data: Mapping[str, Any], ship: Particulars) -> _Sha
     columns = check_table(data.get("columns", {}), f"{path}: [columns]")
     parse_columns(columns, f"{path}: [columns]")
     where = f"{path}: [conventions]"
-    conventions = check_table(data.get("conventions", {}), where, _CONVENTIONS)
+    conventions = data.get("conventions", {})
+    check_table(conventions, where, _CONVENTIONS)
     Conventions(**conventions, xg=ship.xg, where=where)
     sensors = data.get("sensors", {})
     Installation.from_mapping(sensors, f"{path}: [sensors]", ship)
-    return _Shared(path, ship, columns, conventions, sensors)
+    return _Shared(
+        path=path,
+        ship=ship,
+        columns=columns,
+        conventions=conventions,
+        sensors=sensors,
+    )
 
 
 def _read_entry(table: Any, where: str, shared: _Shared) -> TrialEntry:

@@ -114,7 +114,7 @@ def _check_motion(
     remarks = settle(check_steps(log.t, locator))
     if has_positions:
         remarks = settle(check_has_rudder(log)) + remarks
-    velocity = velocity_over_ground(log, has_positions)
+    velocity = velocity_over_ground(log, has_positions=has_positions)
     if velocity is not None:
         installation = conventions.installation
         remarks += settle(check_over_ground(log, velocity, installation, locator))

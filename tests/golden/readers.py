@@ -591,7 +591,10 @@ def one_clock() -> Answers:
         "few": lambda: own(np.where(t < 2.0, t, np.nan)),
         "back": lambda: own(sparse, np.where(t == 7.0, 2.5, t)),
         "own clocks": [
-            resampling.have_own_clocks(list(~one.T))
+            resampling.have_own_clocks(
+                np.zeros(len(one)),
+                {str(k): np.where(flags, 1.0, np.nan) for k, flags in enumerate(one.T)},
+            )
             for one in (*presents, halves, halves[:4], halves[:, :1], ~halves)
         ],
         "at": source.place(7, "r"),
@@ -842,7 +845,7 @@ def plausible() -> Answers:
 
     def checked(log: Log, here: columns.Locator) -> list[str]:
         found = settle(sampling.check_steps(log.t, here))
-        velocity = over_ground.velocity_over_ground(log, False)
+        velocity = over_ground.velocity_over_ground(log, has_positions=False)
         assert velocity is not None
         return found + settle(
             over_ground.check_over_ground(log, velocity, Installation(), here)
@@ -858,10 +861,10 @@ def plausible() -> Answers:
         apart: float, turned: float, sign: float = 1.0, offset: float = 0.0
     ) -> None:
         heading = np.linspace(0.0, turned, 300)
-        known = Installation(heading_offset=offset)
-        settle(
-            over_ground.check_course(heading, sign * heading + apart, known, source())
+        findings = over_ground.check_course(
+            heading, sign * heading + apart, source(), offset_is_known=bool(offset)
         )
+        settle(findings)
 
     def apart(begin: float, end: float) -> None:
         first, second = (
@@ -873,7 +876,7 @@ def plausible() -> Answers:
     def jumping(n: int, size: int) -> None:
         k = np.arange(size)
         track = np.stack([np.where(k % 10 < 1, 0.0, 900.0) * (k < n), 0.0 * k])
-        settle(positions.check_one_ship(1.0 * k, *track, k, source(lat="deg")))
+        settle(positions.check_track(1.0 * k, *track, source(lat="deg")))
 
     def noted(offset: float, noise: float) -> Any:
         random = np.random.default_rng(1).standard_normal((2, 400))
@@ -960,12 +963,10 @@ def plausible() -> Answers:
         ],
         "outliers": [
             lambda a=a: np.flatnonzero(
-                positions.outliers(
-                    positions.too_fast_steps(
-                        np.arange(40.0),
-                        np.where(np.arange(40) == 9, a, 0.0),
-                        np.zeros(40),
-                    )
+                positions.find_outliers(
+                    np.arange(40.0),
+                    np.where(np.arange(40) == 9, a, 0.0),
+                    np.zeros(40),
                 )
             )
             for a in (45.0, 49.0, 51.0, 55.0)

@@ -19,9 +19,9 @@ from shipgym.trials.plausibility.over_ground import (
 )
 from shipgym.trials.plausibility.overlap import check_overlap
 from shipgym.trials.plausibility.positions import (
-    check_one_ship,
-    outliers,
-    too_fast_steps,
+    check_outliers,
+    check_track,
+    find_outliers,
 )
 from shipgym.trials.plausibility.ranges import check_ranges
 from shipgym.trials.plausibility.rudder import check_has_rudder
@@ -104,8 +104,8 @@ def turning(step_deg, dt=1.0, n=1, every=4, size=101):
         (turning(59.0, n=9), None),
         (turning(61.0, dt=1.02, n=9), None),
         (turning(29.0, dt=0.1, n=2), None),
-        (turning(61.0), "got 0 to 61 deg within 1 s; empty the wrong cells"),
-        (turning(31.0, dt=0.1), "got 0 to 31 deg within 0.1 s; empty the wrong"),
+        (turning(61.0), "got 0 deg and then 61 deg within 1 s; empty the wrong"),
+        (turning(31.0, dt=0.1), "got 0 deg and then 31 deg within 0.1 s; empty the"),
         (turning(7.0, dt=0.1, n=3), "within 0.1 s; likely a wrong unit: declare"),
         (turning(7.0, dt=0.1, n=25, every=20, size=1001), None),  # 50 of 1000 steps
         (turning(7.0, dt=0.1, n=26, every=20, size=1001), "likely a wrong unit"),
@@ -201,12 +201,11 @@ def test_velocities_of_another_frame_are_found_where_they_follow_it_much_better(
 # --- over ground
 
 
-def courses(apart_deg, turned_deg, mirrored=False, known=0.0):
+def courses(apart_deg, turned_deg, mirrored=False, known=False):
     """Findings of a heading, and a course some degrees off it, in a turn."""
     psi = np.linspace(1.0, 1.0 + turned_deg * DEGREE, 50)
     course = (-psi if mirrored else psi) + apart_deg * DEGREE
-    installation = Installation(heading_offset=known)
-    return found(check_course(psi, course, installation, locator()))
+    return found(check_course(psi, course, locator(), offset_is_known=known))
 
 
 @pytest.mark.parametrize(
@@ -219,7 +218,7 @@ def courses(apart_deg, turned_deg, mirrored=False, known=0.0):
         ({"apart_deg": 24.9, "turned_deg": 30.0}, None),
         ({"apart_deg": 25.1, "turned_deg": 30.0}, "heading_offset_deg = -25"),
         ({"apart_deg": -25.1, "turned_deg": 30.0}, "over ground by 25 deg"),
-        ({"apart_deg": 30.0, "turned_deg": 40.0, "known": 0.5}, None),
+        ({"apart_deg": 30.0, "turned_deg": 40.0, "known": True}, None),
         ({"apart_deg": 6.0, "turned_deg": 40.0, "mirrored": True}, "the other way"),
     ],
 )
@@ -233,7 +232,7 @@ def test_a_heading_beside_the_course_over_ground(case, message):
 def test_a_heading_that_swings_about_the_course_is_not_compared(swing_deg, far):
     """The mean of cos(45 deg) is 0.71."""
     swing = swing_deg * DEGREE * np.where(np.arange(50) % 2, 1.0, -1.0)
-    texts = found(check_course(np.zeros(50), swing + 0.6, Installation(), locator()))
+    texts = found(check_course(np.zeros(50), swing + 0.6, locator()))
     assert ["by -34 deg" in one for one in texts] == [True] * far
 
 
@@ -308,24 +307,29 @@ def test_a_position_that_no_ship_reaches_is_an_outlier():
     for jump, expected in ((44.0, []), (56.0, [4])):
         x = 5.0 * t
         x[4] += jump
-        assert np.flatnonzero(outliers(too_fast_steps(t, x, zero))).tolist() == expected
-    assert not outliers(too_fast_steps(t[:2], 900.0 * t[:2], zero[:2])).any()
+        is_far = find_outliers(t, x, zero)
+        assert np.flatnonzero(is_far).tolist() == expected
+        texts = found(check_outliers(57.0 + 1e-5 * x, zero, is_far, locator()))
+        assert ["one of 1 outliers among 100" in one for one in texts] == [True] * len(
+            expected
+        )
+    assert not find_outliers(t[:2], 900.0 * t[:2], zero[:2]).any()
 
 
 def test_positions_within_a_tenth_of_a_second_are_as_far_apart_as_in_that_time():
     """GNSS receivers write times in tenths of a second: 5 m are no jump."""
     t, zero = 0.01 * np.arange(60.0), np.zeros(60)
-    for size, fast in ((4.9, 0), (5.1, 2)):
+    for size, count in ((4.9, 0), (5.1, 1)):
         x = np.where(np.arange(60) == 30, size, 0.0)
-        assert np.count_nonzero(too_fast_steps(t, x, zero)) == fast
+        assert np.count_nonzero(find_outliers(t, x, zero)) == count
 
 
 def test_a_tenth_of_the_steps_may_be_too_fast_for_one_ship():
-    t, x, rows = np.arange(201.0), np.zeros(201), np.arange(201)
+    t, x = np.arange(201.0), np.zeros(201)
     x[10:200:20] = 50.1
-    assert not found(check_one_ship(t, x, 0.0 * t, rows, locator()))
+    assert not found(check_track(t, x, 0.0 * t, locator()))
     x[-1] = 50.1
-    (one,) = check_one_ship(t, x, 0.0 * t, rows, locator())
+    (one,) = check_track(t, x, 0.0 * t, locator())
     assert "jumps 0.0501 km within 1 s, as in 21 of 200 steps" in one.evidence
     assert one.where == "log.csv: line 12 (data row 11), column 'lat'"
 

@@ -514,7 +514,7 @@ def test_text_in_a_number_is_named_with_line_column_and_value(tmp_path):
 def test_time_that_goes_back_or_stands_still_is_named_with_both_values(tmp_path):
     message = refusal(edited(tmp_path, 20, {0: "1.5"}))
     assert "line 20 (data row 19), column 't': expected time to increase" in message
-    assert "got one that goes back from 3.4 to 1.5 s" in message
+    assert "got one that goes back from 3.4 s to 1.5 s" in message
     stands_still = edited(tmp_path, 20, {0: repr(float(T[17]))})
     assert "got one that stands still at 3.4 s" in refusal(stands_still)
 

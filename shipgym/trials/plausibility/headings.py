@@ -5,7 +5,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from shipgym.arrays import Floats
+from shipgym.arrays import Flags, Floats
 from shipgym.trials.columns import Locator
 from shipgym.trials.plausibility.finding import LogFinding, Proposal
 from shipgym.trials.plausibility.sampling import likelier_time_units
@@ -27,46 +27,45 @@ def check_heading(
     logged in rad, each of shape (n_samples,).
     """
     steps = np.abs(np.diff(psi))
-    fast = steps > FASTEST_TURN * np.diff(t)
-    jumps = fast & (steps > LARGEST_JUMP)
+    is_fast = steps > FASTEST_TURN * np.diff(t)
+    jumps = is_fast & (steps > LARGEST_JUMP)
     several_turns = np.abs(np.diff(logged)) > _TURN_AND_JUMP
 
-    if several_turns.any() or np.mean(fast) > MOST_FAST_STEPS:
-        worst = several_turns if several_turns.any() else fast
+    if several_turns.any() or is_fast.mean() > MOST_FAST_STEPS:
+        worst = several_turns if several_turns.any() else is_fast
         proposal = _likelier_unit(t, logged, locator)
-        remedy = f"likely a wrong unit: declare {locator.declaration(*proposal)}"
-        yield _too_fast(int(np.argmax(worst)), t, logged, locator, remedy, proposal)
-    elif jumps.any():
-        remedy = (
-            'empty the wrong cells and import with repair = "interpolate", or correct'
-            " them"
+        yield LogFinding(
+            where=locator.place(np.argmax(worst) + 1, "psi"),
+            evidence=_evidence(t, logged, worst, locator),
+            remedy=f"likely a wrong unit: declare {locator.declaration(*proposal)}",
+            proposals=(proposal,),
         )
-        yield _too_fast(int(np.argmax(jumps)), t, logged, locator, remedy)
+    elif jumps.any():
+        yield LogFinding(
+            where=locator.place(np.argmax(jumps) + 1, "psi"),
+            evidence=_evidence(t, logged, jumps, locator),
+            remedy=(
+                'empty the wrong cells and import with repair = "interpolate", or'
+                " correct them"
+            ),
+        )
+
+
+def _evidence(t: Floats, logged: Floats, wrong: Flags, locator: Locator) -> str:
+    """The first of the wrong steps, in the unit of the file."""
+    k = np.argmax(wrong)
+    before = locator.in_file("psi", logged[k])
+    after = locator.in_file("psi", logged[k + 1])
+    return (
+        f"expected a heading that turns by at most 60 deg/s, got {before} and then"
+        f" {after} within {t[k + 1] - t[k]:g} s"
+    )
 
 
 def _likelier_unit(t: Floats, logged: Floats, locator: Locator) -> Proposal:
     """Another unit of time where the heading stays within a turn, else of the heading."""
-    if np.ptp(logged) < _TURN_AND_JUMP:
-        for unit in likelier_time_units(t, locator):
-            return Proposal("t", unit)
-    other = "deg" if locator.columns["psi"].unit == "rad" else "rad"
-    return Proposal("psi", other)
-
-
-def _too_fast(
-    k: int,
-    t: Floats,
-    logged: Floats,
-    locator: Locator,
-    remedy: str,
-    *proposals: Proposal,
-) -> LogFinding:
-    """The step from sample k to the next, in the unit of the file."""
-    before, after = (locator.in_file("psi", float(one)) for one in logged[k : k + 2])
-    return LogFinding(
-        locator.place(k + 1, "psi"),
-        f"expected a heading that turns by at most 60 deg/s, got {before:g} to"
-        f" {after:g} {locator.columns['psi'].unit} within {t[k + 1] - t[k]:g} s",
-        remedy,
-        proposals,
-    )
+    units = list(likelier_time_units(t, locator))
+    if units and np.ptp(logged) < _TURN_AND_JUMP:
+        return Proposal("t", units[0])
+    declared = locator.columns["psi"].unit
+    return Proposal("psi", "deg" if declared == "rad" else "rad")

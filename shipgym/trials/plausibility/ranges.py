@@ -5,7 +5,7 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
-from shipgym.arrays import Floats
+from shipgym.arrays import Flags, Floats
 from shipgym.trials.columns import Locator
 from shipgym.trials.plausibility.finding import LogFinding, Proposal
 from shipgym.trials.units import LARGEST_MAGNITUDES, QUANTITIES, UNITS, si_factor
@@ -23,42 +23,50 @@ def check_ranges(
     for channel, largest in LARGEST_MAGNITUDES.items():
         if channel not in channels:
             continue
-        values = channels[channel]
-        too_large = np.abs(values) > largest * (1.0 + _ROUNDING)
+        size = np.abs(channels[channel])
+        too_large = size > largest * (1.0 + _ROUNDING)
         if too_large.any():
-            first = int(np.argmax(too_large))
-            yield _out_of_range(channel, values, first, locator)
+            yield _out_of_range(channel, channels[channel], too_large, locator)
 
 
 def _out_of_range(
-    channel: str, values: Floats, first: int, locator: Locator
+    channel: str, values: Floats, too_large: Flags, locator: Locator
 ) -> LogFinding:
-    largest = LARGEST_MAGNITUDES[channel]
+    first = np.argmax(too_large)
     unit = locator.columns[channel].unit
-    factor = si_factor(channel, unit)
-    size = float(np.nanmax(np.abs(values))) / factor
-    proposals = [
-        Proposal(channel, other)
-        for other, in_si in UNITS[QUANTITIES[channel]].items()
-        if in_si < factor and size * in_si <= largest
-    ]
+    largest = LARGEST_MAGNITUDES[channel]
+    proposals = _smaller_units(channel, unit, np.nanmax(np.abs(values)))
     remedy = "check the column and its unit, or correct the value"
     if proposals:
         remedy = f"likely a wrong unit: declare {locator.declaration(*proposals[0])}"
     return LogFinding(
-        locator.place(first, channel),
-        f"expected {channel} of at most {_spelled(largest, channel, unit)}, got"
-        f" {_spelled(float(values[first]), channel, unit)}",
-        remedy,
-        tuple(proposals),
+        where=locator.place(first, channel),
+        evidence=(
+            f"expected {channel} of at most {_spelled(largest, channel, unit)}, got"
+            f" {_spelled(values[first], channel, unit)}"
+        ),
+        remedy=remedy,
+        proposals=tuple(proposals),
     )
+
+
+def _smaller_units(channel: str, declared: str, size: float) -> list[Proposal]:
+    """Units in which the largest value of a channel is no larger than that of a ship."""
+    largest = LARGEST_MAGNITUDES[channel]
+    own = si_factor(channel, declared)
+    proposals = []
+    for unit, factor in UNITS[QUANTITIES[channel]].items():
+        ratio = factor / own
+        if ratio < 1.0 and size * ratio <= largest:
+            proposals.append(Proposal(channel, unit))
+    return proposals
 
 
 def _spelled(value: float, channel: str, unit: str) -> str:
     """A value in SI units as the file has it, with degrees in brackets where that is in radians."""
-    in_unit = value / si_factor(channel, unit)
-    text = f"{in_unit:g} {unit}"
-    is_angle = QUANTITIES[channel] in ("angle", "angular rate")
-    if is_angle and unit.startswith("rad"):
-        return f"{text} ({math.degrees(in_unit):g} {unit.replace('rad', 'deg')})"
-    return text
+    number = value / si_factor(channel, unit)
+    text = f"{number:g} {unit}"
+    if unit not in ("rad", "rad/s"):
+        return text
+    degrees = unit.replace("rad", "deg")
+    return f"{text} ({math.degrees(number):g} {degrees})"

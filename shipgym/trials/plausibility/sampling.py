@@ -2,11 +2,10 @@
 
 from collections.abc import Iterator
 
-import numpy as np
-
 from shipgym.arrays import Floats
 from shipgym.trials.columns import Locator
 from shipgym.trials.plausibility.finding import LogFinding, Proposal
+from shipgym.trials.resampling import usual_step
 from shipgym.trials.units import UNITS, si_factor
 
 #: Usual steps between the rows of a log, s.
@@ -18,29 +17,38 @@ def likelier_time_units(t: Floats, locator: Locator) -> dict[str, float]:
 
     None where the steps of the times, s, are usual already.
     """
-    step = float(np.median(np.diff(t)))
-    if SHORTEST_STEP_S <= step <= LONGEST_STEP_S:
-        return {}
+    step = usual_step(t)
+    likelier: dict[str, float] = {}
+    if is_usual(step):
+        return likelier
     own = si_factor("t", locator.columns["t"].unit)
-    likelier = {}
-    for unit, factor in UNITS["time"].items():
-        scale = factor / own
-        is_usual = SHORTEST_STEP_S <= step * scale <= LONGEST_STEP_S
-        if is_usual and "unix" not in unit:
+    for unit in ("s", "ms", "min", "h"):
+        scale = UNITS["time"][unit] / own
+        if is_usual(step * scale):
             likelier[unit] = scale
     return likelier
+
+
+def is_usual(step: float) -> bool:
+    """Tell whether rows are usual in a manoeuvre that are so far apart, s."""
+    return SHORTEST_STEP_S <= step <= LONGEST_STEP_S
 
 
 def check_steps(t: Floats, locator: Locator) -> Iterator[LogFinding]:
     """Remark on rows that are so far apart that the unit of time, s, may be wrong."""
     units = list(likelier_time_units(t, locator))
     if units:
+        proposal = Proposal("t", units[0])
         yield LogFinding(
-            locator.path,
-            f"the rows are {np.median(np.diff(t)):.4g} s apart, which is unusual in a"
-            " manoeuvre",
-            "if the unit of time is wrong, declare"
-            f" {locator.declaration('t', units[0])}",
-            (Proposal("t", units[0]),),
+            where=locator.path,
+            evidence=(
+                f"the rows are {usual_step(t):.4g} s apart, which is unusual in a"
+                " manoeuvre"
+            ),
+            remedy=(
+                "if the unit of time is wrong, declare"
+                f" {locator.declaration(*proposal)}"
+            ),
+            proposals=(proposal,),
             is_remark=True,
         )

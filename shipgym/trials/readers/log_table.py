@@ -68,6 +68,10 @@ class LogTable:
         """Place of a row, counted from 0, for a message: ``line 12 (data row 11)``."""
         return self.place_words.format(line=self.rows[row], row=row + 1)
 
+    def cell(self, row: int, column: str) -> str:
+        """Place of a cell for a message: ``run.csv: line 12 (data row 11), column 'yaw'``."""
+        return f"{self.path}: {self.place(row)}, column '{column}'"
+
     def column(self, name: str) -> Any:
         """Cells of a column; InputError if there is none of this name."""
         if name not in self.header:
@@ -91,11 +95,10 @@ class LogTable:
         cells = self.column(name)
         if isinstance(cells, np.ndarray) and cells.dtype.kind in "fiub":
             return cells.astype(np.float64)
-
-        numbers = plain_numbers(cells)
-        if numbers is None:
-            numbers = self._numbers_of_texts(name)
-        return numbers
+        try:
+            return plain_numbers(cells)
+        except (ValueError, TypeError):
+            return self._numbers_of_texts(name)
 
     def _numbers_of_texts(self, name: str) -> Floats:
         """Numbers with decimal commas and words for "no value"; InputError names the first other text."""
@@ -108,22 +111,19 @@ class LogTable:
                 text = text.replace(",", ".")
             if not is_number(text):
                 raise InputError(
-                    f"{self.path}: {self.place(row)}, column '{name}': expected a"
-                    f" number, got '{texts[row]}'; correct the cell, or leave it empty"
-                    ' where the value is missing and import with repair = "interpolate"'
+                    f"{self.cell(row, name)}: expected a number, got '{texts[row]}';"
+                    " correct the cell, or leave it empty where the value is missing"
+                    ' and import with repair = "interpolate"'
                 )
             numbers[row] = float(text)
         return numbers
 
 
-def plain_numbers(cells: Sequence[Any]) -> Floats | None:
-    """Numbers of cells that are all written plainly or empty, as in most files; None of others."""
+def plain_numbers(cells: Sequence[Any]) -> Floats:
+    """Numbers of cells that are all written plainly or empty, as in most files; ValueError for others."""
     if "_" in "".join(map(str, cells)):
-        return None
-    try:
-        return np.array([float("nan" if cell == "" else cell) for cell in cells])
-    except (ValueError, TypeError):
-        return None
+        raise ValueError("underscores, which Python reads in a number")
+    return np.array([float("nan" if cell == "" else cell) for cell in cells])
 
 
 def is_number(text: str) -> bool:

@@ -202,20 +202,23 @@ def _main_clock(times: _BySource) -> _Track:
     """Times of the best source, s, which never go back, and go on at midnight."""
     best = max(times, key=lambda source: _rank(source, times[source]))
     lines, clock, _ = np.array(times[best]).T
-    dated = clock[0] > 2.0 * DAY
-    if not dated:
+    is_dated = clock[0] > 2.0 * DAY
+    if not is_dated:
         clock = np.unwrap(clock, period=DAY)
-    t, first = np.unique(np.maximum.accumulate(clock), return_index=True)
+    never_back = np.maximum.accumulate(clock)
+    t, first = np.unique(never_back, return_index=True)
     return _Track(t, lines[first], t)
 
 
 def _track(values: list[_Value], clock: _Track) -> _Track:
     """Values of a source at their own times, else at those of the lines between which they stand."""
-    lines, own, numbers = np.array(values).T
+    lines, t, numbers = np.array(values).T
     by_line = np.interp(lines, clock.lines, clock.t)
-    days = np.round((by_line - own) / DAY)
-    t = np.where(np.isfinite(own), own + DAY * days, by_line)
-    t, first = np.unique(np.round(t, 3), return_index=True)
+    # a time of the day is that of the day on which its line stands
+    days = np.round((by_line - t) / DAY)
+    t = np.where(np.isnan(t), by_line, t + DAY * days)
+    milliseconds = np.round(t, 3)
+    t, first = np.unique(milliseconds, return_index=True)
     return _Track(t, lines[first], numbers[first])
 
 
