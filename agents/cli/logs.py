@@ -13,7 +13,6 @@ NO_FILE_YET = (
     "; new-ship has written no ship file in which to do so: write one as in"
     " docs/ship_file.md"
 )
-HISTORIES = ("psi", "r", "delta", "u", "v", "n", "phi", "wind_speed")
 
 
 @answered
@@ -118,8 +117,7 @@ def look_command(
     from agents.cli.terminal import answer, say, warn
     from agents.output import check_page
     from shipgym.files import write_text
-    from shipgym.pages import render
-    from shipgym.plots import history_figure, path_figure
+    from shipgym.pages.look import look_page
     from shipgym.trials.guesses import guess_trial
     from shipgym.trials.ship_file import ShipFile
 
@@ -129,13 +127,7 @@ def look_command(
         if log.suffix == ".toml"
         else [guess_trial(log).trial]
     )
-    tracks = [
-        path_figure({"measured": one}) if {"x", "y"} <= one.channels.keys() else None
-        for one in trials
-    ]
-    histories = [history_figure({"measured": one}, HISTORIES) for one in trials]
-    shown = zip(trials, tracks, histories, strict=True)
-    write_text(render("shipgym.pages/look.html", name=log.name, trials=shown), out)
+    write_text(look_page(log.name, trials), out)
     fields = [
         {
             "name": one.name,

@@ -110,16 +110,15 @@ def _rudder_offset(log: Log, rate: ClockOffset | None) -> ClockOffset | None:
     """How late the rudder is against the yaw rate on the clock of the heading."""
     t, delta = log.t, log.channels["delta"]
     if "r" in log.channels:
-        delay = rate.late if rate else 0.0
+        delay = 0.0 if rate is None else rate.late
         r = np.interp(t + delay, t, log.channels["r"])
     else:
         r = time_derivative(t, log.channels["psi"])
     rudder = rudder_clock_offset(t, r, delta)
-    without_history = clock_offset(t, r, delta, {"r": r})
-
-    rate_contradicts = rate is not None and _is_against(rate)
-    if not rate_contradicts and _is_against(rudder) and _is_against(without_history):
-        settle([_wrong_sign(log, "a yaw acceleration that follows the rudder")])
+    if _is_against(rudder) and not _is_against(rate):
+        without_history = clock_offset(t, r, delta, {"r": r})
+        if _is_against(without_history):
+            settle([_wrong_sign(log, "a yaw acceleration that follows the rudder")])
     return rudder
 
 

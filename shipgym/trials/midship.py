@@ -9,7 +9,7 @@ from shipgym.arrays import Floats
 from shipgym.errors import InputError
 from shipgym.trials.conventions import Conventions
 from shipgym.trials.derivatives import time_derivative
-from shipgym.trials.installation import Installation
+from shipgym.trials.installation import AS_LOGGED, Installation
 from shipgym.trials.instrument_offsets import DISTINCT_COURSES, correct_offsets
 from shipgym.trials.navigation import rotate_to_body
 from shipgym.trials.resampling import Log
@@ -25,12 +25,15 @@ def to_project_conventions(log: Log, conventions: Conventions) -> None:
     no position is recorded. Raises InputError where a channel is missing.
     """
     channels = log.channels
+    is_earth = conventions.velocity_frame == "earth" and "u" in channels
     if "stw" in channels:
         log.over_ground = False
-    elif conventions.velocity_frame == "earth" and "u" in channels:
+    elif is_earth:
         log.over_ground = True
 
-    correct_offsets(log, conventions.installation)
+    installation = conventions.installation
+    if installation != AS_LOGGED:
+        correct_offsets(log, installation)
     if "psi" in channels and "r" not in channels:
         log.derive("r", time_derivative(log.t, channels["psi"]))
     elif "r" in channels and not {"psi", "x", "y"} & channels.keys():
@@ -40,7 +43,10 @@ def to_project_conventions(log: Log, conventions: Conventions) -> None:
         _earth_to_body(log)
     if conventions.origin == "cg":
         _cg_to_midship(log, conventions.xg or 0.0)
-    to_midship(log, conventions.installation)
+    is_complete = {"u", "v"} <= channels.keys()
+    has_gnss = "ground_north" in channels or not installation.is_at_midship
+    if has_gnss or "stw" in channels or not is_complete:
+        to_midship(log, installation)
 
 
 def _heading_from_start(log: Log) -> Floats:
@@ -96,19 +102,16 @@ def to_midship(log: Log, installation: Installation) -> None:
     for GNSS without a heading.
     """
     channels = log.channels
-    are_logged = {"u", "v"} <= channels.keys()
     has_gnss = "ground_north" in channels or not installation.is_at_midship
-    if are_logged and not has_gnss and "stw" not in channels:
-        return
     if has_gnss and "psi" not in channels:
         raise InputError(
             f"{log.where}: expected a column psi, the heading, with positions or"
             " velocities of GNSS, got none"
         )
-
-    if "x" in channels and "y" in channels and not installation.is_at_midship:
+    if not installation.is_at_midship and {"x", "y"} <= channels.keys():
         _move_positions(channels, installation)
-    velocity = _velocity(log, installation, are_logged)
+
+    velocity = _velocity(log, installation)
     water = channels.pop("stw", None)
     if water is not None:
         channels["u"] = water
@@ -131,12 +134,14 @@ def _move_positions(channels: dict[str, Floats], installation: Installation) -> 
     channels["y"] = channels["y"] - east
 
 
-def _velocity(
-    log: Log, installation: Installation, are_logged: bool
-) -> tuple[Floats, Floats] | None:
-    """Surge and sway of midship over ground, by GNSS velocities or else positions; None without a heading."""
+def _velocity(log: Log, installation: Installation) -> tuple[Floats, Floats] | None:
+    """Surge and sway of midship over ground, by GNSS velocities or else positions.
+
+    None without a heading, and where both were logged.
+    """
     channels = log.channels
-    north, east = (channels.pop(f"ground_{one}", None) for one in ("north", "east"))
+    north = channels.pop("ground_north", None)
+    east = channels.pop("ground_east", None)
     if "psi" not in channels:
         return None
     psi = channels["psi"]
@@ -144,10 +149,12 @@ def _velocity(
         u, v = rotate_to_body(north, east, psi)
         r = channels["r"]
         return u + installation.starboard * r, v - installation.forward * r
-    if {"x", "y"} <= channels.keys() and not are_logged:
-        north, east = (time_derivative(log.t, channels[name]) for name in ("x", "y"))
-        return rotate_to_body(north, east, psi)
-    return None
+    are_logged = {"u", "v"} <= channels.keys()
+    if are_logged or not {"x", "y"} <= channels.keys():
+        return None
+    north = time_derivative(log.t, channels["x"])
+    east = time_derivative(log.t, channels["y"])
+    return rotate_to_body(north, east, psi)
 
 
 def _sway_through_water(log: Log, water: Floats, u: Floats, v: Floats) -> Floats:

@@ -18,7 +18,7 @@ from shipgym.ships.particulars import Particulars
 from shipgym.trials.columns import parse_columns
 from shipgym.trials.conventions import Conventions
 from shipgym.trials.cuts import check_cut
-from shipgym.trials.installation import Installation
+from shipgym.trials.installation import AS_LOGGED, Installation
 from shipgym.trials.trial import KINDS, USES
 
 _CONVENTIONS = ("rudder_positive", "velocity_frame", "origin", "repair")
@@ -110,8 +110,9 @@ def _read_shared(path: Path, data: Mapping[str, Any], ship: Particulars) -> _Sha
     conventions = data.get("conventions", {})
     check_table(conventions, where, _CONVENTIONS)
     Conventions(**conventions, xg=ship.xg, where=where)
-    sensors = data.get("sensors", {})
-    Installation.from_mapping(sensors, f"{path}: [sensors]", ship)
+    sensors = check_table(data.get("sensors", {}), f"{path}: [sensors]")
+    if sensors:
+        Installation.from_mapping(sensors, f"{path}: [sensors]", ship)
     return _Shared(
         path=path,
         ship=ship,
@@ -162,18 +163,22 @@ def _files(table: Mapping[str, Any], where: str) -> list[str]:
 def _conventions(table: Mapping[str, Any], where: str, shared: _Shared) -> Conventions:
     """Conventions of an entry, where nothing else stands those of the file."""
     own = {key: table[key] for key in _CONVENTIONS if key in table}
-    sensors = {
-        **shared.sensors,
-        **check_table(table.get("sensors", {}), f"{where} sensors"),
-    }
     return Conventions(
         **{**shared.conventions, **own},
         xg=shared.ship.xg,
         where=where,
-        installation=Installation.from_mapping(
-            sensors, f"{where} sensors", shared.ship
-        ),
+        installation=_installation(table, where, shared),
     )
+
+
+def _installation(
+    table: Mapping[str, Any], where: str, shared: _Shared
+) -> Installation:
+    own = check_table(table.get("sensors", {}), f"{where} sensors")
+    sensors = {**shared.sensors, **own}
+    if not sensors:
+        return AS_LOGGED
+    return Installation.from_mapping(sensors, f"{where} sensors", shared.ship)
 
 
 def _check_entries(path: Path, entries: Sequence[TrialEntry]) -> None:

@@ -17,10 +17,17 @@ from shipgym.trials.plausibility.over_ground import (
 )
 from shipgym.trials.plausibility.overlap import check_overlap
 from shipgym.trials.plausibility.rudder import check_has_rudder
-from shipgym.trials.plausibility.sampling import check_steps
+from shipgym.trials.plausibility.sampling import check_steps, is_usual
 from shipgym.trials.readers.log_table import LogTable
 from shipgym.trials.recording import Recording, read_recording
-from shipgym.trials.resampling import Log, Signal, Signals, on_one_clock, share_clock
+from shipgym.trials.resampling import (
+    Log,
+    Signal,
+    Signals,
+    on_one_clock,
+    share_clock,
+    usual_step,
+)
 from shipgym.trials.units import QUANTITIES
 
 
@@ -110,14 +117,17 @@ def _check_motion(
     log: Log, first: Recording, conventions: Conventions, *, has_positions: bool
 ) -> list[str]:
     """Remarks on rudder, time and motion over ground; InputError for what cannot be right."""
-    locator = first.locator
-    remarks = settle(check_steps(log.t, locator))
+    remarks = []
     if has_positions:
-        remarks = settle(check_has_rudder(log)) + remarks
+        remarks += settle(check_has_rudder(log))
+    if not is_usual(usual_step(log.t)):
+        remarks += settle(check_steps(log.t, first.locator))
     velocity = velocity_over_ground(log, has_positions=has_positions)
     if velocity is not None:
-        installation = conventions.installation
-        remarks += settle(check_over_ground(log, velocity, installation, locator))
+        findings = check_over_ground(
+            log, velocity, conventions.installation, first.locator
+        )
+        remarks += settle(findings)
     return remarks
 
 

@@ -9,17 +9,23 @@ from shipgym.trials.readers.csv_file import read_csv
 from shipgym.trials.readers.excel import read_excel
 from shipgym.trials.readers.log_table import LogTable
 from shipgym.trials.readers.matlab import read_matlab
-from shipgym.trials.readers.nmea_log import read_nmea
 from shipgym.trials.readers.parquet import read_parquet
 
 #: Bytes of a text file by which its kind is recognised.
 BEGINNING = 4096
 
+
+def _read_nmea(path: Path) -> LogTable:
+    from shipgym.trials.readers.nmea_log import read_nmea  # with its table of sentences
+
+    return read_nmea(path)
+
+
 READERS: dict[str, Callable[[Path], LogTable]] = {
     "csv": read_csv,
     "excel": read_excel,
     "matlab": read_matlab,
-    "nmea": read_nmea,
+    "nmea": _read_nmea,
     "parquet": read_parquet,
 }
 _ENDINGS = {".xlsx": "excel", ".mat": "matlab", ".parquet": "parquet"}
