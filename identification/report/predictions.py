@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from shipgym import Trial
-from shipgym.plots import AXES, MEASURED, MODEL, Panel, axis, line, panels
+from shipgym.plots import CHANNEL_AXES, MEASURED, MODEL, Panel, axis, line, panels
 from shipgym.plots.style import Figure
 from shipgym.trials.navigation import rotate_to_body
 
@@ -53,7 +53,7 @@ def prediction_figure(measured: Trial, predicted: Trial | None) -> Figure:
     """A recorded trial and its open-loop prediction: five channels and the path."""
     shown = []
     for k, channel in enumerate(("psi", "r", "u", "v", "delta")):
-        title, factor = AXES[channel]
+        title, factor = CHANNEL_AXES[channel]
         given = channel == "delta"
         lines = [
             line(run.t, factor * run[channel], *style)

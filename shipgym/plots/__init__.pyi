@@ -23,6 +23,6 @@ from .style import panels as panels
 from .style import points as points
 from .style import subplots as subplots
 from .style import translucent as translucent
-from .trials import AXES as AXES
+from .trials import CHANNEL_AXES as CHANNEL_AXES
 from .trials import history_figure as history_figure
 from .trials import path_figure as path_figure

@@ -1,7 +1,7 @@
 """Figures of the standard manoeuvres, each with what its indices are read from."""
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -23,10 +23,8 @@ from shipgym.plots.style import (
     line,
     panels,
 )
-from shipgym.plots.trials import AXES, history_figure, quantity, thinned
+from shipgym.plots.trials import CHANNEL_AXES, history_figure, quantity, thinned
 from shipgym.trials.trial import Trial
-
-ORDERS = ("delta_command", "delta", "n_command", "n")
 
 
 def zigzag_figure(trial: Trial, height: int = 320) -> Figure:
@@ -35,24 +33,21 @@ def zigzag_figure(trial: Trial, height: int = 320) -> Figure:
     Of a trial with psi and delta; height in pixels.
     """
     heading = np.degrees(trial["psi"] - trial["psi"][0])
-    hover, dotted = (
-        {"hovertemplate": "%{y:.2f} deg"},
-        {"line_dash": "dot", "hoverinfo": "skip"},
-    )
+    rudder_deg = np.degrees(trial["delta"])
+    hover = {"hovertemplate": "%{y:.2f} deg"}
     lines = [
         line(trial.t, heading, "heading change", MODEL, 2.0, **hover),
-        line(trial.t, np.degrees(trial["delta"]), "rudder", MUTED, 1.4, **hover),
+        line(trial.t, rudder_deg, "rudder", MUTED, 1.4, **hover),
     ]
-    if (switch := switch_heading_deg(trial)) is not None:
+    switch = switch_heading_deg(trial)
+    if switch is not None:
         ends = trial.t[[0, -1]]
-        lines += [
-            line(ends, [at] * 2, "switch heading", LIMIT, 1.1, **dotted)
-            for at in (switch, -switch)
-        ]
-    return panels(
-        [Panel(lines, "time, s", axis("heading change and rudder, deg", zero=True))],
-        height,
-    )
+        dotted = {"line_dash": "dot", "hoverinfo": "skip"}
+        for level in (switch, -switch):
+            levels = [level, level]
+            lines.append(line(ends, levels, "switch heading", LIMIT, 1.1, **dotted))
+    title = axis("heading change and rudder, deg", zero=True)
+    return panels([Panel(lines, "time, s", title)], height)
 
 
 def turning_figure(
@@ -65,32 +60,28 @@ def turning_figure(
     that between perpendiculars, m, by default the trial's own. Raises InputError if a
     channel or the length is missing.
     """
-    indices, lpp = turning_indices(trial, length), ship_length(trial, length)
-    ahead, aside, turned = track_from_order(trial, lpp)
+    indices = turning_indices(trial, length)
+    ahead, aside, turned = track_from_order(trial, ship_length(trial, length))
     side = 1.0 if turned[-1] >= 0.0 else -1.0
     lines = [line(aside, ahead, "path", MODEL, 2.0)]
+
     advance, transfer = indices.advance_lengths, indices.transfer_lengths
     if advance is not None and transfer is not None:
-        far = side * transfer
-        lines += [
-            _dimension(
-                [far, far], [0.0, advance], f"advance {advance:.2f} L", PALETTE[1]
-            ),
-            _dimension(
-                [0.0, far], [advance, advance], f"transfer {transfer:.2f} L", PALETTE[2]
-            ),
-        ]
-    if (diameter := indices.tactical_diameter_lengths) is not None:
-        level, name = (
-            float(np.interp(np.pi, side * turned, ahead)),
-            f"tactical diameter {diameter:.2f} L",
-        )
-        lines.append(
-            _dimension([0.0, side * diameter], [level, level], name, PALETTE[3])
-        )
+        corner = side * transfer
+        up = [corner, corner], [0.0, advance]
+        across = [0.0, corner], [advance, advance]
+        lines.append(_dimension(*up, f"advance {advance:.2f} L", PALETTE[1]))
+        lines.append(_dimension(*across, f"transfer {transfer:.2f} L", PALETTE[2]))
+    diameter = indices.tactical_diameter_lengths
+    if diameter is not None:
+        level = float(np.interp(np.pi, side * turned, ahead))
+        across = [0.0, side * diameter], [level, level]
+        name = f"tactical diameter {diameter:.2f} L"
+        lines.append(_dimension(*across, name, PALETTE[3]))
+
     ahead_axis = axis("ahead, ship lengths", zero=True, scaleanchor="x", scaleratio=1)
-    seen = Panel(lines, axis("to starboard, ship lengths", zero=True), ahead_axis)
-    return panels([seen], height, hovermode="closest")
+    aside_axis = axis("to starboard, ship lengths", zero=True)
+    return panels([Panel(lines, aside_axis, ahead_axis)], height, hovermode="closest")
 
 
 def _dimension(x: list[float], y: list[float], name: str, colour: str) -> Any:
@@ -103,32 +94,44 @@ def _dimension(x: list[float], y: list[float], name: str, colour: str) -> Any:
 def spiral_figure(spiral: Spiral, height: int = 420) -> Figure:
     """Yaw rate over rudder angle of a spiral, with the width of its loop; a direct one in two lines."""
     angles, rates = spiral.rudder_deg, spiral.yaw_rate_deg_s
-    points = {"marker": {"size": 5}, "hovertemplate": "%{x:.2f} deg, %{y:.3f} deg/s"}
-    ways = {"reverse spiral": (slice(None), MODEL)}
-    if spiral.method == "direct":
+    is_direct = spiral.method == "direct"
+    parts = {"reverse spiral": (slice(None), MODEL)}
+    if is_direct:
         turn = turning_point(angles)
-        ways = {
+        parts = {
             "there": (slice(0, turn + 1), MODEL),
             "and back": (slice(turn, None), PALETTE[1]),
         }
-    lines = [
-        line(angles[part], rates[part], name, colour, 1.6, "lines+markers", **points)
-        for name, (part, colour) in ways.items()
-    ]
+    points = {"marker": {"size": 5}, "hovertemplate": "%{x:.2f} deg, %{y:.3f} deg/s"}
+    lines = []
+    for name, (part, colour) in parts.items():
+        x, y = angles[part], rates[part]
+        lines.append(line(x, y, name, colour, 1.6, "lines+markers", **points))
+
+    loop = _loop(spiral)
+    smallest_step = np.abs(np.diff(angles)).min() if is_direct else 0.0
+    if loop.width > smallest_step:
+        name = f"loop, {loop.width:.2f} deg wide"
+        ends = [loop.middle - loop.width / 2, loop.middle + loop.width / 2]
+        lines.append(line(ends, [0.0, 0.0], name, LIMIT, 2.6, hoverinfo="name"))
+    rudder_axis = axis("rudder, deg", zero=True)
+    rate_axis = axis("yaw rate, deg/s", zero=True)
+    return panels([Panel(lines, rudder_axis, rate_axis)], height, hovermode="closest")
+
+
+class _Loop(NamedTuple):
+    """Rudder angles between which a spiral has two yaw rates, deg."""
+
+    width: float = 0.0
+    middle: float = 0.0
+
+
+def _loop(spiral: Spiral) -> _Loop:
     try:
         indices = spiral_indices(spiral)
-        width, middle = indices.loop_width_deg, indices.loop_middle_deg
-    except InputError:  # turns to one side only have no loop to mark
-        width = middle = 0.0
-    step = float(np.abs(np.diff(angles)).min()) if spiral.method == "direct" else 0.0
-    if width > step:
-        ends, name = (
-            [middle - width / 2, middle + width / 2],
-            f"loop, {width:.2f} deg wide",
-        )
-        lines.append(line(ends, [0.0, 0.0], name, LIMIT, 2.6, hoverinfo="name"))
-    axes = axis("rudder, deg", zero=True), axis("yaw rate, deg/s", zero=True)
-    return panels([Panel(lines, *axes)], height, hovermode="closest")
+    except InputError:  # turns to one side only
+        return _Loop()
+    return _Loop(indices.loop_width_deg, indices.loop_middle_deg)
 
 
 def pull_out_figure(trials: dict[str, Trial], height: int = 340) -> Figure:
@@ -138,19 +141,22 @@ def pull_out_figure(trials: dict[str, Trial], height: int = 340) -> Figure:
     one has no pull-out.
     """
     lines = []
-    for (name, trial), colour in zip(trials.items(), PALETTE, strict=False):
+    for (label, trial), colour in zip(trials.items(), PALETTE, strict=False):
         left = pull_out_indices(trial).residual_rate_deg_s
-        angle = np.abs(rudder(trial))
-        release = trial.t[int(np.flatnonzero(angle > 0.5 * angle.max())[-1]) + 1]
         part = thinned(trial)
-        residual = f"{name}: {left:.3f} deg/s left"
-        lines.append(
-            line(
-                trial.t[part] - release, np.degrees(trial["r"][part]), residual, colour
-            )
-        )
+        since = trial.t[part] - _release(trial)
+        rate = np.degrees(trial["r"][part])
+        lines.append(line(since, rate, f"{label}: {left:.3f} deg/s left", colour))
     time_axis = axis("time since the rudder was put amidships, s", zero=True)
-    return panels([Panel(lines, time_axis, axis("yaw rate, deg/s", zero=True))], height)
+    rate_axis = axis("yaw rate, deg/s", zero=True)
+    return panels([Panel(lines, time_axis, rate_axis)], height)
+
+
+def _release(trial: Trial) -> float:
+    """When the rudder was below half of its largest angle for good, s."""
+    angle = np.abs(rudder(trial))
+    laid = np.flatnonzero(angle > 0.5 * angle.max())
+    return float(trial.t[laid[-1] + 1])
 
 
 def speed_figure(
@@ -163,23 +169,23 @@ def speed_figure(
     """
     sailed = distance_sailed(trial) / ship_length(trial, length)
     part = thinned(trial)
-    t, u, shaft = trial.t[part], trial["u"][part], quantity(trial, "n")
-    speed_axis, plain = axis(AXES["u"][0], zero=True), axis(zero=True)
+    t, u = trial.t[part], trial["u"][part]
+    over_distance = line(sailed[part], u, "surge speed", MODEL)
+    over_time = line(t, u, "surge speed", MODEL)
+    speed_axis = axis(CHANNEL_AXES["u"].title, zero=True)
     shown = [
-        Panel(
-            [line(sailed[part], u, "surge speed", MODEL)],
-            "distance sailed, ship lengths",
-            speed_axis,
-        ),
-        Panel([line(t, u, "surge speed", MODEL)], "time, s", plain),
+        Panel([over_distance], "distance sailed, ship lengths", speed_axis),
+        Panel([over_time], "time, s", axis(zero=True)),
     ]
+    shaft = quantity(trial, "n")
     if shaft is not None:
         turned = line(t, shaft[part], "shaft", MEASURED)
-        shown.append(Panel([turned], "time, s", axis(AXES["n"][0], zero=True)))
+        shaft_axis = axis(CHANNEL_AXES["n"].title, zero=True)
+        shown.append(Panel([turned], "time, s", shaft_axis))
     return panels(
         shown,
         height,
-        len(shown),
+        columns=len(shown),
         grid={"horizontal_spacing": 0.09},
         hovermode="closest",
     )
@@ -187,12 +193,12 @@ def speed_figure(
 
 def excitation_figure(trial: Trial) -> Figure:
     """A manoeuvre for identification, such as `prbs_rudder`: orders above the ship's response."""
-    orders = [
-        name for name in ORDERS if name in trial.channels and np.ptp(trial[name]) > 0.0
-    ]
-    figure = history_figure(
-        {"simulated": trial}, (*orders, "psi", "r", "speed", "drift")
-    )
+    shown = []
+    for name in ("delta_command", "delta", "n_command", "n"):
+        if name in trial and np.ptp(trial[name]) > 0.0:
+            shown.append(name)
+    shown += ["psi", "r", "speed", "drift"]
+    figure = history_figure({"simulated": trial}, shown)
     figure.update_layout(showlegend=False)
     return figure
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeAlias
 
@@ -20,21 +21,23 @@ Axis: TypeAlias = "str | dict[str, Any]"  # a title, or an `axis` with more than
 INK, MUTED, GRID = "#1f2a37", "#64748b", "#e5e9ef"
 MEASURED, MODEL, LIMIT = "#1f2a37", "#1d70b8", "#c2412d"
 PALETTE = (MODEL, "#d9822b", "#0f8a7e", "#a1478f", "#6b7a1e", "#7a5c45")
-USE = "figures and reports need it"  # of plotly
-UNTITLED = {"title": {"text": ""}}  # of an axis
-FONT = "Inter, 'Segoe UI', 'Helvetica Neue', Arial, 'Liberation Sans', sans-serif"
+_FONT = "Inter, 'Segoe UI', 'Helvetica Neue', Arial, 'Liberation Sans', sans-serif"
 
 
 def graph_objects() -> Any:
     """The module `plotly.graph_objects`; InputError if plotly is not installed."""
-    return library("plotly.graph_objects", "report", USE)
+    return _plotly("graph_objects")
+
+
+def _plotly(module: str) -> Any:
+    return library(f"plotly.{module}", "report", "figures and reports need it")
 
 
 def subplots(
     rows: int, columns: int, titles: Sequence[str] = (), **settings: Any
 ) -> Figure:
     """A figure of panels, rows by columns, with a title above each where given."""
-    figure = library("plotly.subplots", "report", USE).make_subplots(
+    figure = _plotly("subplots").make_subplots(
         rows=rows, cols=columns, subplot_titles=list(titles) or None, **settings
     )
     figure.update_annotations(font={"size": 12.5, "color": INK})
@@ -65,36 +68,54 @@ def panels(
     beside the first column only. `grid` has settings of plotly's `make_subplots`, and
     `changes` those of `layout`.
     """
-    columns = min(columns, len(shown)) or 1
-    rows = -(-len(shown) // columns) or 1
-    titles = (
-        [panel.title for panel in shown] if any(panel.title for panel in shown) else []
-    )
-    spacing = {"vertical_spacing": 0.36 / max(rows, 2)} | dict(grid or {})
+    columns = max(min(columns, len(shown)), 1)
+    rows = max(math.ceil(len(shown) / columns), 1)
+    titles = [panel.title for panel in shown]
+    is_titled = any(titles)
+    settings = {"vertical_spacing": 0.36 / max(rows, 2), **(grid or {})}
+    figure = subplots(rows, columns, titles if is_titled else (), **settings)
+
     # as plain dicts, since plotly checks a whole figure faster than one change after
     # the other
-    figure = subplots(rows, columns, titles, **spacing)
     drawn = figure.layout.to_plotly_json()
-    traces, names = [], set[str]()
+    last_row = columns * (rows - 1)
     for k, panel in enumerate(shown):
-        number = str(k + 1) if k else ""
-        for trace in panel.traces:
-            if trace.legendgroup is not None and trace.showlegend is not False:
-                trace.showlegend = trace.legendgroup not in names
-                names.add(trace.legendgroup)
-            traces.append(
-                trace.to_plotly_json() | {"xaxis": f"x{number}", "yaxis": f"y{number}"}
-            )
-        x, y = (
-            axis(told) if isinstance(told, str) else told for told in (panel.x, panel.y)
-        )
-        drawn[f"xaxis{number}"] |= (
-            x | UNTITLED if outer and k // columns < rows - 1 else x
-        )
-        drawn[f"yaxis{number}"] |= y | UNTITLED if outer and k % columns else y
-    figure.layout = drawn | layout(height, titled=bool(titles), **changes)
-    figure.add_traces(traces)
+        number = _axis_number(k)
+        x, y = _axis(panel.x), _axis(panel.y)
+        if outer and k < last_row:
+            x["title"] = {"text": ""}
+        if outer and k % columns:
+            y["title"] = {"text": ""}
+        drawn[f"xaxis{number}"] |= x
+        drawn[f"yaxis{number}"] |= y
+    figure.layout = drawn | layout(height, titled=is_titled, **changes)
+    figure.add_traces(_placed_traces(shown))
     return figure
+
+
+def _axis_number(k: int) -> str:
+    """The number of the k-th panel's axes, as plotly names them: x, x2, x3, ..."""
+    return str(k + 1) if k else ""
+
+
+def _axis(told: Axis) -> dict[str, Any]:
+    return axis(told) if isinstance(told, str) else dict(told)
+
+
+def _placed_traces(shown: Sequence[Panel]) -> list[dict[str, Any]]:
+    """Lines and points on the axes of their panels, the first of each name in the legend."""
+    traces = []
+    names = set[str]()
+    for k, panel in enumerate(shown):
+        number = _axis_number(k)
+        axes = {"xaxis": f"x{number}", "yaxis": f"y{number}"}
+        for trace in panel.traces:
+            name = trace.legendgroup
+            if name is not None and trace.showlegend is not False:
+                trace.showlegend = name not in names
+                names.add(name)
+            traces.append(trace.to_plotly_json() | axes)
+    return traces
 
 
 def layout(
@@ -109,7 +130,7 @@ def layout(
     shared = {
         "height": height,
         "template": "none",
-        "font": {"family": FONT, "size": 12, "color": INK},
+        "font": {"family": _FONT, "size": 12, "color": INK},
         "paper_bgcolor": "white",
         "plot_bgcolor": "white",
         "margin": {"l": left, "r": 18, "t": 64 if titled else 36, "b": 46},
@@ -121,7 +142,7 @@ def layout(
             "yanchor": "top",
             "font": {"size": 12},
         },
-        "hoverlabel": {"font": {"family": FONT, "size": 12}},
+        "hoverlabel": {"font": {"family": _FONT, "size": 12}},
         "hovermode": "x unified",
     }
     return shared | changes
@@ -151,22 +172,21 @@ def compact(values: ArrayLike) -> NDArray[np.float32]:
 
 def line_styles(labels: Iterable[str]) -> dict[str, dict[str, Any]]:
     """Line of each label: measurements thin and dark, the others by the palette in their order."""
-    labels = list(labels)
-    others = [label for label in labels if label != "measured"]
-    styles = {
-        label: {"colour": PALETTE[k % len(PALETTE)], "width": 2.0}
-        for k, label in enumerate(others)
-    }
-    return styles | {
-        label: {"colour": MEASURED, "width": 1.5}
-        for label in labels
-        if label == "measured"
-    }
+    styles: dict[str, dict[str, Any]] = {}
+    coloured = 0
+    for label in labels:
+        if label == "measured":
+            styles[label] = {"colour": MEASURED, "width": 1.5}
+        else:
+            colour = PALETTE[coloured % len(PALETTE)]
+            styles[label] = {"colour": colour, "width": 2.0}
+            coloured += 1
+    return styles
 
 
 def translucent(colour: str, opacity: float) -> str:
     """A colour "#rrggbb" with an opacity, as CSS knows it."""
-    red, green, blue = (int(colour[k : k + 2], 16) for k in (1, 3, 5))
+    red, green, blue = bytes.fromhex(colour.removeprefix("#"))
     return f"rgba({red},{green},{blue},{opacity})"
 
 

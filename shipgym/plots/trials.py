@@ -1,48 +1,72 @@
 """Figures of any trial: time histories and paths, measured beside predicted."""
 
+import math
 from collections.abc import Mapping, Sequence
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from shipgym.arrays import Floats
 from shipgym.errors import InputError
-from shipgym.files import shipped_toml
 from shipgym.plots.style import Figure, Panel, axis, line, line_styles, panels
 from shipgym.trials.trial import Trial
 
-#: Axis title and factor from SI of each channel and of what u and v give; m/s and
-#: degrees.
-AXES: dict[str, tuple[str, float]] = {
-    name: (title, 180.0 / np.pi if "deg" in title else 1.0)
-    for name, title in shipped_toml("shipgym.plots", "axes.toml").items()
+
+class ChannelAxis(NamedTuple):
+    """The axis on which a channel is drawn."""
+
+    title: str
+    factor: float = 1.0  # from SI units
+
+
+_IN_DEGREES = 180.0 / math.pi
+
+#: Axis of each channel, and of what u and v give; m/s and degrees.
+CHANNEL_AXES = {
+    "x": ChannelAxis("north, m"),
+    "y": ChannelAxis("east, m"),
+    "psi": ChannelAxis("heading, deg", _IN_DEGREES),
+    "u": ChannelAxis("surge, m/s"),
+    "v": ChannelAxis("sway, m/s"),
+    "r": ChannelAxis("yaw rate, deg/s", _IN_DEGREES),
+    "p": ChannelAxis("roll rate, deg/s", _IN_DEGREES),
+    "phi": ChannelAxis("heel, deg", _IN_DEGREES),
+    "delta": ChannelAxis("rudder, deg", _IN_DEGREES),
+    "delta_command": ChannelAxis("rudder order, deg", _IN_DEGREES),
+    "n": ChannelAxis("shaft, rev/s"),
+    "n_command": ChannelAxis("shaft order, rev/s"),
+    "speed": ChannelAxis("speed, m/s"),
+    "drift": ChannelAxis("drift angle, deg", _IN_DEGREES),
+    "wind_speed": ChannelAxis("wind, m/s"),
 }
 
 ROW_HEIGHT = 150  # of one channel's time history, pixels
-MOST_SAMPLES = (
-    1500  # drawn of one line, more than a page has pixels; spirals have many more
-)
+#: Samples of one line that are drawn, more than a page has pixels; spirals have many
+#: more.
+MOST_SAMPLES = 1500
 
 
-def quantity(trial: Trial, name: str) -> NDArray[np.float64] | None:
+def quantity(trial: Trial, name: str) -> Floats | None:
     """A channel of a trial, or speed (m/s) or drift angle (rad) from u and v; None without them.
 
     The drift angle is positive where the ship moves to port of her heading.
     """
     if name in trial.channels:
         return trial[name]
-    if (
-        name not in ("speed", "drift")
-        or "u" not in trial.channels
-        or "v" not in trial.channels
-    ):
+    if "u" not in trial or "v" not in trial:
         return None
     u, v = trial["u"], trial["v"]
-    return np.hypot(u, v) if name == "speed" else np.arctan2(-v, u)
+    if name == "speed":
+        return np.hypot(u, v)
+    if name == "drift":
+        return np.arctan2(-v, u)
+    return None
 
 
 def thinned(trial: Trial) -> slice:
     """The samples that a figure draws."""
-    return slice(None, None, -(-len(trial) // MOST_SAMPLES))
+    step = math.ceil(len(trial) / MOST_SAMPLES)
+    return slice(None, None, step)
 
 
 def history_figure(
@@ -54,31 +78,31 @@ def history_figure(
     The trial called "measured" is drawn dark; channels that no trial has are left out;
     InputError if all are.
     """
-    shown = [
-        name
-        for name in channels
-        if any(quantity(trial, name) is not None for trial in trials.values())
-    ]
+    histories = [_history(trials, name) for name in channels]
+    shown = [panel for panel in histories if panel.traces]
     if not shown:
         raise InputError(
-            f"figure: no trial with any of the channels {', '.join(channels)}"
+            f"figure: expected a trial with any of the channels {', '.join(channels)},"
+            " got none"
         )
-    styles = line_styles(trials)
-    found = {name: Panel([], "time, s", AXES[name][0]) for name in shown}
-    for channel, panel in found.items():
-        for name, trial in trials.items():
-            if (values := quantity(trial, channel)) is not None:
-                t, drawn = (
-                    trial.t[thinned(trial)],
-                    AXES[channel][1] * values[thinned(trial)],
-                )
-                panel.traces.append(
-                    line(t, drawn, name, **styles[name], hovertemplate="%{y:.3g}")
-                )
     grid = {"shared_xaxes": True, "vertical_spacing": 0.16 / len(shown)}
-    return panels(
-        [*found.values()], ROW_HEIGHT * len(shown) + 70, outer=True, grid=grid
-    )
+    height = ROW_HEIGHT * len(shown) + 70
+    return panels(shown, height, outer=True, grid=grid)
+
+
+def _history(trials: Mapping[str, Trial], channel: str) -> Panel:
+    """One channel of all trials that have it, over time."""
+    title, factor = CHANNEL_AXES[channel]
+    styles = line_styles(trials)
+    lines = []
+    for label, trial in trials.items():
+        values = quantity(trial, channel)
+        if values is not None:
+            part = thinned(trial)
+            drawn = factor * values[part]
+            style = {**styles[label], "hovertemplate": "%{y:.3g}"}
+            lines.append(line(trial.t[part], drawn, label, **style))
+    return Panel(lines, "time, s", title)
 
 
 def path_figure(trials: Mapping[str, Trial], height: int = 460) -> Figure:
@@ -87,21 +111,15 @@ def path_figure(trials: Mapping[str, Trial], height: int = 460) -> Figure:
     Trials without x and y are left out; InputError if no trial has a position. Height
     in pixels.
     """
-    located = {
-        name: trial
-        for name, trial in trials.items()
-        if {"x", "y"} <= set(trial.channels)
-    }
-    if not located:
-        raise InputError("figure: no trial with the channels x and y")
-    styles, north = (
-        line_styles(trials),
-        axis(AXES["x"][0], scaleanchor="x", scaleratio=1),
-    )
-    tracks = [
-        line(
-            trial["y"][thinned(trial)], trial["x"][thinned(trial)], name, **styles[name]
-        )
-        for name, trial in located.items()
-    ]
-    return panels([Panel(tracks, AXES["y"][0], north)], height, hovermode="closest")
+    styles = line_styles(trials)
+    tracks = []
+    for label, trial in trials.items():
+        if "x" in trial and "y" in trial:
+            part = thinned(trial)
+            east, north = trial["y"][part], trial["x"][part]
+            tracks.append(line(east, north, label, **styles[label]))
+    if not tracks:
+        raise InputError("figure: expected a trial with the channels x and y, got none")
+    to_scale = axis(CHANNEL_AXES["x"].title, scaleanchor="x", scaleratio=1)
+    shown = Panel(tracks, CHANNEL_AXES["y"].title, to_scale)
+    return panels([shown], height, hovermode="closest")

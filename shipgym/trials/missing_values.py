@@ -76,7 +76,7 @@ def fill_missing(
     for name, every in channels.items():
         values = every[kept]
         is_missing = ~np.isfinite(values)
-        counts[name] = np.count_nonzero(is_missing)
+        counts[name] = int(is_missing.sum())
         if counts[name]:
             _check_holes(t, is_missing, name, locator)
             values = _interpolated(t, values, is_missing, is_heading=name == "psi")

@@ -226,7 +226,7 @@ def _local_track(locator: Locator, t: Floats, repair: str | None) -> _Track:
         settle(check_outliers(lat[rows], lon[rows], is_far, here))
     north[rows] = np.where(is_far, np.nan, x)
     east[rows] = np.where(is_far, np.nan, y)
-    return _Track(north, east, np.count_nonzero(is_far))
+    return _Track(north, east, int(is_far.sum()))
 
 
 def _signal(channel: str, t: Floats, values: Floats, locator: Locator) -> Signal:

@@ -2,9 +2,10 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from shipgym.arrays import Flags, Floats
 from shipgym.errors import InputError
@@ -69,8 +70,8 @@ class Log:
         self.derived.add(channel)
 
 
-def usual_step(t: Floats) -> float:
-    """Median time between samples, s."""
+def usual_step(t: npt.NDArray[Any]) -> float:
+    """Median step between samples, such as times in s."""
     return float(np.median(np.diff(t)))
 
 

@@ -31,7 +31,7 @@ from shipgym.plots.style import (
     points,
     translucent,
 )
-from shipgym.plots.trials import AXES, thinned
+from shipgym.plots.trials import CHANNEL_AXES, thinned
 from tests.golden.texts import flat, same_text
 
 DERIVED = ("speed", "drift")  # channels that u and v give
@@ -83,10 +83,10 @@ def test_every_channel_is_drawn_in_its_unit():
     t = np.arange(4000.0)  # so many that not all are drawn
     channels = {
         name: 0.01 * (k + 1.0) + 1e-5 * t
-        for k, name in enumerate(AXES)
+        for k, name in enumerate(CHANNEL_AXES)
         if name not in DERIVED
     }
-    figure = history_figure({"run": Trial(t, channels)}, [*AXES])
+    figure = history_figure({"run": Trial(t, channels)}, [*CHANNEL_AXES])
     assert same_figure("every channel", figure)
     factors = [values(figure, "y", k)[0] / (0.01 * (k + 1.0)) for k in (0, 2)]
     assert factors == pytest.approx([1.0, np.degrees(1.0)], rel=1e-6)
@@ -108,7 +108,7 @@ def test_a_channel_that_no_trial_has_is_left_out(circle):
 
 
 def test_without_any_of_the_channels_there_is_no_figure(circle):
-    with pytest.raises(InputError, match="no trial with any of the channels n, phi"):
+    with pytest.raises(InputError, match="any of the channels n, phi, got none"):
         history_figure({"predicted": circle}, ["n", "phi"])
 
 

@@ -45,7 +45,8 @@ def split_unit(name: str) -> NameEnd:
     """Part a column's name, in lower case with blanks for underscores, from the unit with which it ends."""
     text = name.replace(" per ", "/").rstrip("]) ")
     starts = [0, *(k + 1 for k, letter in enumerate(text) if letter in "[( ")]
-    bare, units = text, []
+    bare = text
+    units: list[str] = []
     for start in starts:
         spelled = [
             unit

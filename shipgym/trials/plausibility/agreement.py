@@ -189,7 +189,7 @@ def _at_windows(values: npt.NDArray[Any]) -> npt.NDArray[Any]:
     """The values at the edges of at most `MOST_WINDOWS` windows."""
     edges = np.linspace(0, values.size - 1, MOST_WINDOWS + 1)
     samples = np.unique(edges.round().astype(int))
-    return values[samples]
+    return values.take(samples)
 
 
 def _without_trend(t: Floats, values: Floats) -> Floats:

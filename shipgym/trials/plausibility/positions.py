@@ -25,7 +25,8 @@ def find_outliers(t: Floats, x: Floats, y: Floats) -> Flags:
         return np.zeros(t.size, dtype=bool)
     before = np.r_[True, too_fast]
     after = np.r_[too_fast, True]
-    return before & after
+    is_outlier: Flags = before & after
+    return is_outlier
 
 
 def check_track(
