@@ -15,10 +15,10 @@ from shipgym.engine.random import DRAW, mix, normal, stream
 from shipgym.sea.open_sea import Sea
 from shipgym.tasks.contract import Interval, Random, Readings
 
-INSTRUMENTS_STREAM = np.uint64(
-    0xE7037ED1A0B428DB
-)  # apart from the draws of task and weather
-DEEP, WIDE = 0.1, 0.7  # damping ratios of the notch's numerator and denominator
+#: Random numbers of the instruments, apart from those of task and weather.
+INSTRUMENTS_STREAM = np.uint64(0xE7037ED1A0B428DB)
+#: Damping ratios a and b of the notch's numerator and denominator.
+DEEP, WIDE = 0.1, 0.7
 STEEPEST = 2.8  # largest angle between samples that the filter is tuned to, rad
 
 HAS_NOISE, HAS_FILTER = True, True  # known when compiled
@@ -34,7 +34,7 @@ class Settings(NamedTuple):
 
 
 class Notch(NamedTuple):
-    """Last two signals, and last two that were taken away."""
+    """Memory of the filter: the last two signals, and the last two that were taken away."""
 
     signal_1: float
     signal_2: float
@@ -43,7 +43,7 @@ class Notch(NamedTuple):
 
 
 class Memory(NamedTuple):
-    """What is shown beyond the ship's slow motion, and the filters' memory."""
+    """What the instruments add to the ship's slow motion, and the filters' memory."""
 
     x: float
     y: float
@@ -65,31 +65,32 @@ def measure(
     random: Random,
 ) -> Memory:
     """First-order motion, noise, and what the filter takes away (see `shipgym.instruments.perfect`)."""
-    psi, r, x, y, u, v = sea.psi_wave, sea.r_wave, 0.0, 0.0, 0.0, 0.0
+    psi = sea.psi_wave
+    r = sea.r_wave
+    x, y, u, v = 0.0, 0.0, 0.0, 0.0
     if HAS_NOISE:
         word = stream(random.key, random.episode) ^ INSTRUMENTS_STREAM
         word = mix(word + np.uint64(interval.steps) * DRAW[1])
         psi += settings.heading * normal(word, DRAW[0])
         r += settings.yaw_rate * normal(word, DRAW[1])
-        u, v = (
-            settings.speed * normal(word, DRAW[2]),
-            settings.speed * normal(word, DRAW[3]),
-        )
-        x, y = (
-            settings.position * normal(word, DRAW[4]),
-            settings.position * normal(word, DRAW[5]),
-        )
+        u = settings.speed * normal(word, DRAW[2])
+        v = settings.speed * normal(word, DRAW[3])
+        x = settings.position * normal(word, DRAW[4])
+        y = settings.position * normal(word, DRAW[5])
     if not HAS_FILTER:
         return Memory(x, y, psi, u, v, r, memory.heading, memory.rate)
+
     turn = clip(frequency * interval.dt, 0.0, STEEPEST)
     first = interval.steps == 0.0
     heading = notched(motion.psi + psi, turn, first, memory.heading)
     rate = notched(motion.r + r, turn, first, memory.rate)
-    return Memory(x, y, psi - heading.taken_1, u, v, r - rate.taken_1, heading, rate)
+    psi -= heading.taken_1
+    r -= rate.taken_1
+    return Memory(x, y, psi, u, v, r, heading, rate)
 
 
 def notched(signal: float, turn: float, first: bool, memory: Notch) -> Notch:
-    """A notch filter after a sample, around `turn` rad a sample; `taken_1` is what it takes away.
+    """Memory of a notch filter after a sample, around `turn` rad a sample; `taken_1` is taken away.
 
     The notch is 1 less a band-pass, discretised bilinearly with its frequency kept. In
     the episode's first sample nothing is taken away.
@@ -112,7 +113,7 @@ def notched(signal: float, turn: float, first: bool, memory: Notch) -> Notch:
 
 
 def readings(motion: Motion, sea: Sea, memory: Memory) -> Readings:
-    """The ship's motion, and what the instruments add."""
+    """Readings: the ship's motion, and what the instruments add."""
     ahead, aside = ground_velocity(motion, sea.current_north, sea.current_east)
     return Readings(
         motion.x + memory.x,

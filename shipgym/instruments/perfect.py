@@ -8,13 +8,13 @@ from shipgym.tasks.contract import Interval, Random, Readings
 
 
 class Settings(NamedTuple):
-    """There are none."""
+    """Settings of the sensor set: none."""
 
     unused: float = 0.0
 
 
 class Memory(NamedTuple):
-    """There is none."""
+    """Memory from sample to sample: none."""
 
     unused: float
 
@@ -28,30 +28,30 @@ def measure(
     settings: Settings,
     random: Random,
 ) -> Memory:
-    """What is remembered from sample to sample.
+    """Take a sample: the memory of the instruments after it.
 
     Parameters
     ----------
     motion : Motion
-        The ship.
+        Motion of the ship.
     sea : Sea
-        Around her.
+        Current, wind and waves around her.
     memory : Memory
-        Of the sample before; zeros at the beginning of an episode.
+        Memory after the sample before; zeros at the beginning of an episode.
     frequency : float
-        At which she meets the waves, rad/s.
+        Frequency at which she meets the waves, rad/s.
     interval : Interval
-        That is over.
+        The control interval that ends with the sample.
     settings : Settings
-        Of the sensor set.
+        Settings of the sensor set.
     random : Random
-        Of the episode.
+        Key of the episode's random numbers.
     """
     return memory
 
 
 def readings(motion: Motion, sea: Sea, memory: Memory) -> Readings:
-    """What is shown."""
+    """Readings that the task is given: the motion itself."""
     ahead, aside = ground_velocity(motion, sea.current_north, sea.current_east)
     return Readings(
         motion.x,

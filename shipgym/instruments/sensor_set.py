@@ -1,4 +1,4 @@
-"""Sensor sets: those beside this file, and a user's own, each a file of plain functions on named records."""
+"""Sensor sets, shipped and a user's own: each a file of plain functions on named records."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -9,6 +9,7 @@ from shipgym.engine.records import Record
 from shipgym.instruments import bridge, perfect
 from shipgym.tasks.source import Configurable, check_namespace, read_source
 
+#: Functions of a sensor set with their arguments, as `perfect` explains them.
 FUNCTIONS = {
     "measure": (
         "motion",
@@ -25,18 +26,21 @@ FUNCTIONS = {
 
 @dataclass(frozen=True)
 class SensorSet(Configurable):
-    """Records and functions of a sensor set (`shipgym/instruments/perfect.py`)."""
+    """Records and functions of a sensor set (`shipgym/instruments/perfect.py`).
+
+    `noise` and `filter`: whether a bridge's instruments are noisy, and whether they
+    filter.
+    """
 
     Memory: Record
     measure: Callable[..., Any]
     readings: Callable[..., Any]
-    # whether a bridge's instruments are noisy, and whether they filter
     noise: bool = False
     filter: bool = False
 
 
 def read_sensors(source: Any) -> SensorSet:
-    """The sensor set of a file or module; InputError names what is missing or of another form."""
+    """Read the sensor set of a file or module; InputError names what is missing or of another form."""
     if isinstance(source, SensorSet):
         return source
     namespace, where = read_source(source)
@@ -49,7 +53,7 @@ def read_sensors(source: Any) -> SensorSet:
 
 @cache
 def shipped_sensors(windy: bool, noise: bool, filtered: bool) -> SensorSet:
-    """The sensor set for what is asked: without error in calm water, else a bridge's."""
+    """Choose a shipped sensor set: without error in calm water, else a bridge's."""
     if windy or noise or filtered:
         return replace(read_sensors(bridge), noise=noise, filter=filtered)
     return read_sensors(perfect)
