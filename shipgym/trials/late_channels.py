@@ -144,10 +144,14 @@ def _turns_away(psi: Floats, delta: Floats) -> bool:
 
 def _wrong_sign(log: Log, found: str) -> LogFinding:
     return LogFinding(
-        log.where,
-        f"expected a positive rudder to turn the bow to starboard, got {found} with the"
-        " opposite sign",
-        'write rudder_positive = "port" in [conventions], or take it out if it stands'
-        " there",
-        (Proposal("rudder_positive", "port"),),
+        where=log.where,
+        evidence=(
+            f"expected a positive rudder to turn the bow to starboard, got {found} with"
+            " the opposite sign"
+        ),
+        remedy=(
+            'write rudder_positive = "port" in [conventions], or take it out if it'
+            " stands there"
+        ),
+        proposals=(Proposal("rudder_positive", "port"),),
     )

@@ -38,11 +38,15 @@ def check_scale(trial: Trial, ship: Particulars, where: str) -> None:
 def _check_slenderness(ship: Particulars, where: str) -> Iterator[LogFinding]:
     if ship.beam is not None and ship.length < _LEAST_SLENDERNESS * ship.beam:
         yield LogFinding(
-            where,
-            f"expected a ship at least {_LEAST_SLENDERNESS:g} times as long as broad,"
-            f" got {ship.length:g} m by {ship.beam:g} m",
-            "likely [ship] length is something else, such as an antenna's height: write"
-            " the length between perpendiculars",
+            where=where,
+            evidence=(
+                f"expected a ship at least {_LEAST_SLENDERNESS:g} times as long as"
+                f" broad, got {ship.length:g} m by {ship.beam:g} m"
+            ),
+            remedy=(
+                "likely [ship] length is something else, such as an antenna's height:"
+                " write the length between perpendiculars"
+            ),
         )
 
 
@@ -54,12 +58,16 @@ def _check_turning(
     limit = _FASTEST_TURN_PRIME * largest_speed / ship.length
     if fastest > limit:
         yield LogFinding(
-            where,
-            f"expected a yaw rate of at most {math.degrees(limit):.4g} deg/s at up to"
-            f" {largest_speed:.4g} m/s for a length of {ship.length:g} m, got up to"
-            f" {math.degrees(fastest):.4g} deg/s",
-            "likely the trial of another ship or scale, or a wrong unit of r, psi, u or"
-            " v in [columns], or of [ship] length",
+            where=where,
+            evidence=(
+                f"expected a yaw rate of at most {math.degrees(limit):.4g} deg/s at up"
+                f" to {largest_speed:.4g} m/s for a length of {ship.length:g} m, got up"
+                f" to {math.degrees(fastest):.4g} deg/s"
+            ),
+            remedy=(
+                "likely the trial of another ship or scale, or a wrong unit of r, psi,"
+                " u or v in [columns], or of [ship] length"
+            ),
         )
 
 
@@ -72,19 +80,25 @@ def _check_speed(speed: Floats, ship: Particulars, where: str) -> Iterator[LogFi
     froude = service_speed / math.sqrt(9.81 * ship.length)
     if froude > _FASTEST_FROUDE and abs(fastest / in_knots - 1.0) < 0.1:
         yield LogFinding(
-            where,
-            f"expected [ship] speed in m/s, got {service_speed:g}, which in knots is"
-            f" {in_knots:.4g} m/s, as fast as she sails here",
-            f"write speed = {in_knots:.4g}",
+            where=where,
+            evidence=(
+                f"expected [ship] speed in m/s, got {service_speed:g}, which in knots"
+                f" is {in_knots:.4g} m/s, as fast as she sails here"
+            ),
+            remedy=f"write speed = {in_knots:.4g}",
         )
     low, high = _SLOWEST_SHARE * service_speed, _FASTEST_SHARE * service_speed
     if not low <= fastest <= high:
         yield LogFinding(
-            where,
-            f"expected a speed of {low:.4g} to {high:.4g} m/s for a service speed of"
-            f" {service_speed:g} m/s, got up to {fastest:.4g} m/s",
-            "likely the trial of another ship or scale, or a wrong unit of u; if it is"
-            " this ship's, give its speed as sailed",
+            where=where,
+            evidence=(
+                f"expected a speed of {low:.4g} to {high:.4g} m/s for a service speed"
+                f" of {service_speed:g} m/s, got up to {fastest:.4g} m/s"
+            ),
+            remedy=(
+                "likely the trial of another ship or scale, or a wrong unit of u; if it"
+                " is this ship's, give its speed as sailed"
+            ),
         )
 
 
@@ -93,9 +107,13 @@ def _check_shaft(n: Floats, diameter: float, where: str) -> Iterator[LogFinding]
     limit = _FASTEST_TIP / (math.pi * diameter)
     if fastest > limit:
         yield LogFinding(
-            where,
-            f"expected a shaft speed of at most {limit:.4g} rps for a propeller of"
-            f" {diameter:g} m, got up to {fastest:.4g} rps",
-            'likely a wrong unit: declare n = { column = "...", unit = "rpm" } in'
-            " [columns]",
+            where=where,
+            evidence=(
+                f"expected a shaft speed of at most {limit:.4g} rps for a propeller of"
+                f" {diameter:g} m, got up to {fastest:.4g} rps"
+            ),
+            remedy=(
+                'likely a wrong unit: declare n = { column = "...", unit = "rpm" } in'
+                " [columns]"
+            ),
         )

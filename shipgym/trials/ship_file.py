@@ -78,12 +78,12 @@ class ShipFile:
         if "structure" in data:
             structure = own_structure(data["structure"], f"{path}: [structure]")
         return cls(
-            path,
-            particulars,
-            steering,
-            _read_options(path, data),
-            read_entries(path, data, particulars),
-            structure,
+            path=path,
+            particulars=particulars,
+            steering=steering,
+            identify=_read_options(path, data),
+            entries=read_entries(path, data, particulars),
+            structure=structure,
         )
 
     def completed_particulars(self) -> Particulars:

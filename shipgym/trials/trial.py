@@ -303,10 +303,10 @@ class Trial:
         conventions = Conventions(
             rudder_positive, velocity_frame, origin, xg, repair, where, installation
         )
-        name = table.path.name if name is None else name
-        return read_trials(
-            [table], columns, conventions, name=name, kind=kind, use=use, length=length
-        )[0]
+        facts = {"kind": kind, "use": use, "length": length}
+        own_name = table.path.name if name is None else name
+        (trial,) = read_trials([table], columns, conventions, name=own_name, **facts)
+        return trial
 
     @classmethod
     def from_frame(

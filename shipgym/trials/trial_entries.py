@@ -140,14 +140,14 @@ def _read_entry(table: Any, where: str, shared: _Shared) -> TrialEntry:
     columns = check_table(table.get("columns", {}), f"{where} columns")
     parse_columns(columns, f"{where} columns")
     return TrialEntry(
-        " + ".join(files),
-        paths,
-        cut,
-        kind,
-        use,
-        {**shared.columns, **columns} or None,
-        _conventions(table, where, shared),
-        where,
+        file=" + ".join(files),
+        paths=paths,
+        cut=cut,
+        kind=kind,
+        use=use,
+        columns={**shared.columns, **columns} or None,
+        conventions=_conventions(table, where, shared),
+        where=where,
     )
 
 

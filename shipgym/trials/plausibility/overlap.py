@@ -34,10 +34,12 @@ def check_overlap(
             f' zone = "{_zone(shift)}" }}'
         )
     yield LogFinding(
-        str(path),
-        "expected a file of the same time as the other of this log, got one that begins"
-        f" {begin - first:.6g} s after it and does not overlap with it",
-        remedy,
+        where=str(path),
+        evidence=(
+            "expected a file of the same time as the other of this log, got one that"
+            f" begins {begin - first:.6g} s after it and does not overlap with it"
+        ),
+        remedy=remedy,
     )
 
 
