@@ -21,8 +21,7 @@ LAT, LON = 57.687, 11.74
 
 
 def sail(n=1201, step=0.5, current=(0.3, -0.4)):
-    """A ship of 150 m in zigzags on two courses with straight parts, in a current; ground track at "
-    "midship."""
+    """A ship of 150 m in zigzags on two courses with straight parts, in a current, at midship."""
     t = step * np.arange(n)
     order = (
         15
@@ -86,8 +85,7 @@ COLUMNS = {
 
 
 def bridge_log(path, keep=lambda row: row, gyro=1.0):
-    """ISO time, decimal comma, Latin-1; GNSS at 1 Hz beside gyro and rudder (to port, half degrees) at 2 "
-    "Hz."""
+    """ISO time, decimal comma, Latin-1; GNSS at 1 Hz, gyro and rudder (to port, half degrees) at 2 Hz."""
     lines = ["Zeit;Breite;Länge;SOG [kn];COG [°];Gyro [°];Ruder [°]"]
     for k, t in enumerate(SAILED["t"]):
         here = ["", "", "", ""]
@@ -241,8 +239,7 @@ def nmea_log(path, rudder=True, end=600):
 
 
 def test_an_nmea_log_becomes_a_trial(tmp_path):
-    """The gyro's heading, not the compass's; speed through the water as u and sway with the current taken "
-    "out."""
+    """The gyro's heading, not the compass's; speed through the water as u, the current out of sway."""
     trial = Trial.from_csv(nmea_log(tmp_path / "log.nmea"), sensors=ANTENNA)
     assert error(trial, "psi") < 0.5 * DEGREE
     assert error(trial, "delta") < 1.0 * DEGREE

@@ -9,7 +9,6 @@ from pathlib import Path
 
 import pytest
 
-from shipgym import files
 from shipgym.errors import InputError
 from shipgym.files import (
     abandoned_drafts,
@@ -137,22 +136,22 @@ def test_a_folder_is_removed_unless_it_was_renamed(tmp_path, dead):
     assert [path.name for path in tmp_path.iterdir()] == ["result"]
 
 
-def test_a_process_is_dead_where_the_system_knows_none_of_its_number(monkeypatch, dead):
-    host = files._host()
-    assert [
-        files._is_dead(host, str(number)) for number in (dead, os.getpid(), 10**30)
-    ] == [
-        True,
-        False,
-        True,
-    ]
-    assert not files._is_dead("00000000", str(dead))
+def test_a_draft_is_abandoned_where_the_system_knows_no_process_of_its_number(
+    tmp_path, monkeypatch, dead
+):
+    own, lost, none = (
+        draft(tmp_path / "a", number) for number in (os.getpid(), dead, 10**30)
+    )
+    elsewhere = draft(tmp_path / "b", dead, "00000000")
+    assert own.exists()
+    assert elsewhere.exists()
+    assert sorted(abandoned_drafts(tmp_path)) == sorted([lost, none])
 
     def refused(*_):
         raise PermissionError  # of another user's, which is alive
 
     monkeypatch.setattr(os, "kill", refused)
-    assert files._is_dead(host, "1") is False
+    assert abandoned_drafts(tmp_path) == []
 
 
 def test_drafts_of_this_computer_and_of_others_count_as_abandoned_after_a_week(
