@@ -17,12 +17,6 @@ from shipgym.arrays import Floats, integral
 from shipgym.trials.resampling import usual_step
 
 LONGEST_DELAY_S = 10.0  # that is looked for
-DELAY_STEP_S = 0.25
-WINDOW_S = 5.0
-FEWEST_WINDOWS, MOST_WINDOWS = 60, 200_000
-MEMORIES_S = (20.0, 80.0)  # of rudder and yaw rate, by which the ship's history counts
-LEAST_DIRECTION = 0.02  # of what explains the change with the channel; less is rounding
-_TINY = 1e-300
 
 
 class ClockOffset(NamedTuple):
@@ -93,17 +87,18 @@ def clock_offset(
         regressor = _unexplained(windows.slope(channel, delay), known)
         return _fit(change, regressor)
 
-    delays = np.arange(-LONGEST_DELAY_S, LONGEST_DELAY_S + 0.1, DELAY_STEP_S)
+    step = 0.25
+    delays = np.arange(-LONGEST_DELAY_S, LONGEST_DELAY_S + 0.1, step)
     squares = [fit(delay).squares for delay in delays]
     minimum = _minimum(squares)
     power = float(change @ change)
     if minimum is None or minimum.curvature <= 1e-12 * power:
         return None
 
-    delay = DELAY_STEP_S * minimum.place - LONGEST_DELAY_S
+    delay = step * minimum.place - LONGEST_DELAY_S
     best = fit(delay)
     free = _independent_samples(best)
-    curvature = minimum.curvature / DELAY_STEP_S**2
+    curvature = minimum.curvature / step**2
     error = math.sqrt(2.0 * best.squares / free / curvature)
     explained = max(power / best.squares - 1.0, 0.0)
     return ClockOffset(delay, error, best.gain, math.sqrt(free * explained))
@@ -111,14 +106,15 @@ def clock_offset(
 
 def _windows(t: Floats) -> _Windows | None:
     """Windows a sample apart, within the record however late a channel is; None of too few or many."""
+    length = 5.0
+    margin = LONGEST_DELAY_S + length
+    first, last = t[0] + margin, t[-1] - margin
     step = max(usual_step(t), 0.5)
-    first = t[0] + LONGEST_DELAY_S + WINDOW_S
-    last = t[-1] - LONGEST_DELAY_S - WINDOW_S
     count = (last - first) / step
-    if not FEWEST_WINDOWS < count < MOST_WINDOWS:
+    if not 60.0 < count < 200_000.0:
         return None
     centres = np.arange(first, last, step)
-    return _Windows(t, centres, max(0.5 * WINDOW_S, step))
+    return _Windows(t, centres, half=max(0.5 * length, step))
 
 
 def _known_directions(windows: _Windows, others: Mapping[str, Floats]) -> Floats:
@@ -130,7 +126,8 @@ def _known_directions(windows: _Windows, others: Mapping[str, Floats]) -> Floats
     directions = np.column_stack(columns)
     directions /= np.linalg.norm(directions, axis=0)
     basis, sizes, _ = np.linalg.svd(directions, full_matrices=False)
-    kept: Floats = basis[:, sizes > LEAST_DIRECTION]
+    smallest = 0.02  # what is less follows from the others
+    kept: Floats = basis[:, sizes > smallest]
     return kept
 
 
@@ -142,11 +139,12 @@ def _unexplained(values: Floats, directions: Floats) -> Floats:
 
 
 def _fit(change: Floats, regressor: Floats) -> _Fit:
-    power = max(float(regressor @ regressor), _TINY)
+    tiny = 1e-300  # in place of zero, by which is divided
+    power = max(float(regressor @ regressor), tiny)
     gain = float(regressor @ change) / power
     residual = change - gain * regressor
     squares = float(residual @ residual)
-    return _Fit(gain, residual, max(squares, _TINY))
+    return _Fit(gain, residual, max(squares, tiny))
 
 
 def _minimum(values: list[float]) -> _Minimum | None:
@@ -172,7 +170,7 @@ def _independent_samples(fit: _Fit) -> float:
 def rudder_clock_offset(t: Floats, r: Floats, delta: Floats) -> ClockOffset | None:
     """How late the rudder is against the yaw acceleration, given yaw rate and the history of both."""
     others = {"r": r, "r3": r**3}
-    for memory in MEMORIES_S:
+    for memory in (20.0, 80.0):
         others[f"r, {memory:g} s"] = _remembered(t, r, memory)
         others[f"delta, {memory:g} s"] = _remembered(t, delta, memory)
     return clock_offset(t, r, delta, others)

@@ -10,14 +10,6 @@ from shipgym.trials.clock_texts import DAY, clock_text, read_clock
 from shipgym.trials.resampling import FEWEST_SAMPLES, Log
 from shipgym.trials.units import DEGREE
 
-#: A rudder this far, rad, from its usual place is active; quiet for this long, s, it
-#: ends a manoeuvre.
-ACTIVE, QUIET_S = 3.0 * DEGREE, 60.0
-
-#: A manoeuvre lasts longer than this, s, and a trial begins and ends so much outside
-#: it.
-SHORTEST_S, MARGIN_S = 30.0, 30.0
-
 _EXPECTED = (
     'expected cut = "rudder", or stretches in seconds or clock time: [[60, 360],'
     ' ["09:30:00", "09:41:30"]]'
@@ -108,19 +100,21 @@ def _seconds(moment: float | str, log: Log, where: str) -> float:
 
 def _active_stretches(log: Log, where: str) -> list[Stretch]:
     """From before the rudder leaves its usual place until it is quiet again."""
+    largest_swing = 3.0 * DEGREE  # of a rudder that is at its usual place
+    longest_pause, shortest, margin = 60.0, 30.0, 30.0  # s, of a manoeuvre
     delta = log.channels.get("delta", np.zeros(log.t.size))
-    is_active = np.abs(delta - np.median(delta)) > ACTIVE
-    active = log.t[is_active]
-    breaks = np.flatnonzero(np.diff(active) > QUIET_S) + 1
+    swing = np.abs(delta - np.median(delta))
+    active = log.t[swing > largest_swing]
+    is_pause = np.diff(active) > longest_pause
     stretches = []
-    for moments in np.split(active, breaks):
-        if moments.size and moments[-1] - moments[0] > SHORTEST_S:
+    for moments in np.split(active, np.flatnonzero(is_pause) + 1):
+        if moments.size and np.ptp(moments) > shortest:
             first, last = float(moments[0]), float(moments[-1])
-            stretches.append(Stretch(first - MARGIN_S, last + MARGIN_S))
+            stretches.append(Stretch(first - margin, last + margin))
     if not stretches:
         raise InputError(
             f'{where} cut: expected with "rudder" manoeuvres, in which the rudder is'
-            f" more than 3 deg from its usual place for over {SHORTEST_S:g} s, got none;"
+            f" more than 3 deg from its usual place for over {shortest:g} s, got none;"
             " give the stretches, or read another log"
         )
     return stretches

@@ -7,11 +7,6 @@ import numpy as np
 
 from shipgym.arrays import Floats
 
-_DEGREE = 5  # of the splines
-_FEWEST_SPANS = 8
-# of noise, as a power of the distance of knots: that of a random walk has a half
-_STEEPEST_GROWTH = 0.8
-
 
 def time_derivative(t: Floats, values: Floats) -> Floats:
     """Differentiate a sampled signal, in units per second; smoothed as far as its noise asks for.
@@ -26,6 +21,9 @@ def time_derivative(t: Floats, values: Floats) -> Floats:
     """
     from scipy.interpolate import make_interp_spline
 
+    fewest_spans = 8
+    # of noise, as a power of the distance of knots: that of a random walk has a half
+    steepest_growth = 0.8
     n = t.size
     step = (t[-1] - t[0]) / (n - 1)
     samples = (t - t[0]) / step
@@ -33,11 +31,11 @@ def time_derivative(t: Floats, values: Floats) -> Floats:
 
     noise_before, spacing_before = 0.0, 0
     spacing = 2
-    while n // spacing >= _FEWEST_SPANS:
+    while n // spacing >= fewest_spans:
         spline, noise = _smoothed(samples, values, spacing)
         if spacing_before:
             growth = math.log(noise / noise_before)
-            if growth > _STEEPEST_GROWTH * math.log(spacing / spacing_before):
+            if growth > steepest_growth * math.log(spacing / spacing_before):
                 break
             best = spline
         noise_before, spacing_before = noise, spacing
@@ -49,14 +47,15 @@ def _smoothed(samples: Floats, values: Floats, spacing: int) -> tuple[Any, float
     """Quintic spline with a knot at every so many samples, and the noise that it leaves."""
     from scipy.interpolate import make_lsq_spline
 
+    degree = 5
     n = samples.size
     inner = samples[np.arange(spacing, n - spacing, spacing)]
-    ends = np.repeat([samples[0], samples[-1]], _DEGREE + 1)
+    ends = np.repeat([samples[0], samples[-1]], degree + 1)
     knots = np.sort(np.concatenate([ends, inner]))
-    spline = make_lsq_spline(samples, values, knots, k=_DEGREE)
+    spline = make_lsq_spline(samples, values, knots, k=degree)
 
     residual = np.linalg.norm(values - spline(samples))
-    free = max(n - inner.size - _DEGREE - 1, 1)
+    free = max(n - inner.size - degree - 1, 1)
     largest = max(np.abs(values).max(), 1e-290)
     noise = residual * math.sqrt(n) / free
     return spline, float(noise + 1e-15 * largest)

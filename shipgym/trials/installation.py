@@ -13,7 +13,6 @@ from shipgym.trials.units import DEGREE
 if TYPE_CHECKING:
     from shipgym.ships.particulars import Particulars
 
-ESTIMATE = "estimate"
 _KEYS = ("gnss_antenna", "heading_offset_deg", "rudder_offset_deg", "clock_offsets")
 
 
@@ -91,11 +90,10 @@ def _check_aboard(distance: float, size: float, ship: Particulars, where: str) -
 def _offset(table: Mapping[str, Any], key: str, where: str) -> float | str:
     """An offset in rad, of one in degrees, or that it is to be estimated."""
     value = table.get(key, 0.0)
-    if value == ESTIMATE:
-        return ESTIMATE
-    hint = f'or "{ESTIMATE}"'
+    if value == "estimate":
+        return "estimate"
     degrees = check_number(
-        value, f"{where} {key}", at_least=-180.0, at_most=180.0, hint=hint
+        value, f"{where} {key}", at_least=-180.0, at_most=180.0, hint='or "estimate"'
     )
     return DEGREE * degrees
 

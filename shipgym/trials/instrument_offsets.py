@@ -20,15 +20,17 @@ STRAIGHT_S, STRAIGHT_RANGE = 20.0, 2.0 * DEGREE
 #: other.
 DISTINCT_COURSES = 60.0 * DEGREE
 
-_FEWEST_SAMPLES = 10
-_STRAIGHT_BEND = 0.3  # of the heading, by that at the overshoots
-
 
 class HeadingOffset(NamedTuple):
     """What a heading shows too much, rad."""
 
     offset: float
     error: float  # standard error
+
+    @property
+    def is_certain(self) -> bool:
+        """Whether it is more than 2 deg, and more than four standard errors."""
+        return abs(self.offset) > max(2.0 * DEGREE, 4.0 * self.error)
 
 
 def straight_parts(t: Floats, channels: Mapping[str, Floats]) -> Flags:
@@ -55,7 +57,7 @@ def heading_offset(
     straight parts on several courses.
     """
     psi = channels["psi"][straight]
-    are_distinct = psi.size >= _FEWEST_SAMPLES and np.ptp(psi) >= DISTINCT_COURSES
+    are_distinct = psi.size >= 10 and np.ptp(psi) >= DISTINCT_COURSES
     if "ground_north" not in channels or not are_distinct:
         return None
     north = channels["ground_north"][straight]
@@ -103,7 +105,7 @@ def rudder_offset(
     held = np.split(by_rudder, np.flatnonzero(is_step) + 1)
     bends = [_bend(channels["psi"], part, half) for part in held]
     straightest = bends.index(min(bends))
-    is_distinct = bends[straightest] <= _STRAIGHT_BEND * max(bends)
+    is_distinct = bends[straightest] <= 0.3 * max(bends)
     if len(held) > 1 and not is_distinct:
         return None
     return float(delta[held[straightest]].mean())

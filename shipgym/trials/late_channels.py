@@ -19,10 +19,7 @@ from shipgym.trials.plausibility.finding import LogFinding, Proposal, settle
 from shipgym.trials.resampling import Log
 from shipgym.trials.units import DEGREE
 
-SIGNIFICANT = 2.5  # standard errors from which on a delay is believed
 CERTAIN = 5.0  # standard errors by which a channel must explain the other
-SMALLEST_RUDDER = 2.0 * DEGREE  # range of a rudder that tells a clock
-CIRCLE_RUDDER, CIRCLE_TURN = 8.0 * DEGREE, 60.0 * DEGREE  # that tell a sign
 
 
 class _Comparison(NamedTuple):
@@ -58,12 +55,13 @@ def find_late_channels(
     wrong sign an InputError, which is judged by a yaw rate only where this does not
     contradict the heading.
     """
+    significant = 2.5  # standard errors
     late = LateChannels({}, [])
     for channel, offset in _offsets(log).items():
         comparison = _COMPARISONS[channel]
         delay = abs(offset.late)
         error = math.hypot(offset.error, comparison.dynamics_s)
-        if offset.certainty < CERTAIN or delay < SIGNIFICANT * error:
+        if offset.certainty < CERTAIN or delay < significant * error:
             continue
 
         side = "late" if offset.late > 0.0 else "early"
@@ -97,7 +95,7 @@ def _offsets(log: Log) -> dict[str, ClockOffset]:
         offsets["r"] = rate
 
     if "delta" in channels and {"psi", "r"} & channels.keys():
-        if reverses(channels["delta"], SMALLEST_RUDDER):
+        if reverses(channels["delta"], least=2.0 * DEGREE):
             rudder = _rudder_offset(log, rate)
         elif "psi" in channels:
             settle(check_circle(log))
@@ -136,10 +134,11 @@ def check_circle(log: Log) -> Iterator[LogFinding]:
 def _turns_away(psi: Floats, delta: Floats) -> bool:
     rudder = np.median(delta)
     side = np.sign(rudder)
-    is_hard_over = abs(rudder) > CIRCLE_RUDDER
+    is_laid = abs(rudder) > 8.0 * DEGREE
     stays_there = np.quantile(side * delta, 0.1) > 0.0
     turned = side * (psi[-1] - psi[0])
-    return bool(is_hard_over and stays_there and turned < -CIRCLE_TURN)
+    turns_away = turned < -60.0 * DEGREE
+    return bool(is_laid and stays_there and turns_away)
 
 
 def _wrong_sign(log: Log, found: str) -> LogFinding:

@@ -12,13 +12,6 @@ from shipgym.errors import InputError
 from shipgym.trials.columns import Locator
 from shipgym.trials.resampling import FEWEST_SAMPLES, usual_step
 
-#: A hole of more rows that lasts more median time steps is too long to fill.
-LONGEST_HOLE_ROWS = 10
-LONGEST_HOLE_STEPS = 20.0
-
-#: Time that goes on by less stands still.
-SHORTEST_STEP_S = 1e-9
-
 #: The setting with which missing values are filled.
 REPAIR = ("repair", "interpolate")
 
@@ -39,7 +32,8 @@ def check_time(t: Floats, locator: Locator) -> None:
             f"{locator.path}: expected at least {FEWEST_SAMPLES} rows below the header,"
             f" got {t.size}; export the whole manoeuvre"
         )
-    stands_still = np.diff(t) <= SHORTEST_STEP_S
+    nanosecond = 1e-9
+    stands_still = np.diff(t) <= nanosecond
     if stands_still.any():
         k = int(np.argmax(stands_still))
         _refuse_time(t[k], t[k + 1], locator.place(k + 1, "t"), locator)
@@ -124,18 +118,19 @@ def _whole_rows(
 
 def _check_holes(t: Floats, is_missing: Flags, channel: str, locator: Locator) -> None:
     """Refuse to fill a hole of many rows; the first and the last row are whole."""
+    most_rows, most_steps = 10, 20.0  # both are exceeded by a hole too long to fill
     edges = np.flatnonzero(np.diff(is_missing))
     first, after = edges[::2] + 1, edges[1::2] + 1
     rows = after - first
     spans = t[after] - t[first - 1]
-    is_long = spans > LONGEST_HOLE_STEPS * usual_step(t)
-    too_long = is_long & (rows > LONGEST_HOLE_ROWS)
+    is_long = spans > most_steps * usual_step(t)
+    too_long = is_long & (rows > most_rows)
     if not too_long.any():
         return
     k = np.argmax(too_long)
     raise InputError(
         f"{locator.place(first[k], channel)}: expected a hole of at most"
-        f" {LONGEST_HOLE_STEPS:g} time steps to interpolate over, got {rows[k]} rows"
+        f" {most_steps:g} time steps to interpolate over, got {rows[k]} rows"
         f" without a value, over {locator.in_file('t', spans[k])}; split the file there,"
         " or leave out the rows or the column"
     )

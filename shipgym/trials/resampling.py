@@ -10,13 +10,6 @@ import numpy.typing as npt
 from shipgym.arrays import Flags, Floats
 from shipgym.errors import InputError
 
-#: The slowest of these channels gives the common clock, so that nothing of the motion
-#: is invented between samples.
-MOTION = ("x", "ground_north", "u", "psi", "r", "delta")
-
-#: A step this many times the usual one of a channel is a hole, not a slow clock.
-HOLE_STEPS = 6.0
-
 #: Fewest samples of a trial, and of a channel.
 FEWEST_SAMPLES = 3
 
@@ -115,11 +108,14 @@ def on_one_clock(signals: Mapping[str, Signal], where: str) -> Log:
 
 
 def _resampled(signals: Mapping[str, Signal], where: str) -> Log:
-    names = [name for name in signals if name in MOTION] or list(signals)
+    # the slowest of these, so that nothing of the motion is invented between samples
+    motion = {"x", "ground_north", "u", "psi", "r", "delta"}
+    names = [name for name in signals if name in motion] or list(signals)
     clocks = {name: signals[name].t for name in names}
     steps = {name: usual_step(clock) for name, clock in clocks.items()}
     slowest = max(steps, key=steps.__getitem__)
-    t, longest_step = clocks[slowest], HOLE_STEPS * steps[slowest]
+    t = clocks[slowest]
+    longest_step = 6.0 * steps[slowest]  # a longer one is a hole
 
     is_known = np.ones(t.size, dtype=bool)
     notes = []

@@ -11,11 +11,8 @@ from shipgym.trials.plausibility.finding import LogFinding, settle
 from shipgym.trials.trial import Trial
 from shipgym.trials.units import KNOT
 
-_MOST = 0.95  # share of the samples that count: the others may be outliers
-_FASTEST_TURN_PRIME = 3.0  # |r| L / U; a ship in its tightest turn stays below about 1
-_FASTEST_TIP = 100.0  # m/s, of a propeller
-_SLOWEST_SHARE, _FASTEST_SHARE = 0.2, 2.0  # of the service speed
-_LEAST_SLENDERNESS, _FASTEST_FROUDE = 1.5, 0.3  # of ships that displace water
+#: Share of the samples that count: the others may be outliers.
+_MOST = 0.95
 
 
 def check_scale(trial: Trial, ship: Particulars, where: str) -> None:
@@ -36,11 +33,12 @@ def check_scale(trial: Trial, ship: Particulars, where: str) -> None:
 
 
 def _check_slenderness(ship: Particulars, where: str) -> Iterator[LogFinding]:
-    if ship.beam is not None and ship.length < _LEAST_SLENDERNESS * ship.beam:
+    least = 1.5  # of ships that displace water
+    if ship.beam is not None and ship.length < least * ship.beam:
         yield LogFinding(
             where=where,
             evidence=(
-                f"expected a ship at least {_LEAST_SLENDERNESS:g} times as long as"
+                f"expected a ship at least {least:g} times as long as"
                 f" broad, got {ship.length:g} m by {ship.beam:g} m"
             ),
             remedy=(
@@ -55,7 +53,8 @@ def _check_turning(
 ) -> Iterator[LogFinding]:
     fastest = float(np.quantile(np.abs(r), _MOST))
     largest_speed = float(speed.max())
-    limit = _FASTEST_TURN_PRIME * largest_speed / ship.length
+    # |r| L / U; a ship in its tightest turn stays below about 1
+    limit = 3.0 * largest_speed / ship.length
     if fastest > limit:
         yield LogFinding(
             where=where,
@@ -78,7 +77,8 @@ def _check_speed(speed: Floats, ship: Particulars, where: str) -> Iterator[LogFi
     fastest = float(np.quantile(speed, _MOST))
     in_knots = service_speed * KNOT
     froude = service_speed / math.sqrt(9.81 * ship.length)
-    if froude > _FASTEST_FROUDE and abs(fastest / in_knots - 1.0) < 0.1:
+    is_fast = froude > 0.3  # for a ship that displaces water
+    if is_fast and abs(fastest / in_knots - 1.0) < 0.1:
         yield LogFinding(
             where=where,
             evidence=(
@@ -87,7 +87,7 @@ def _check_speed(speed: Floats, ship: Particulars, where: str) -> Iterator[LogFi
             ),
             remedy=f"write speed = {in_knots:.4g}",
         )
-    low, high = _SLOWEST_SHARE * service_speed, _FASTEST_SHARE * service_speed
+    low, high = 0.2 * service_speed, 2.0 * service_speed
     if not low <= fastest <= high:
         yield LogFinding(
             where=where,
@@ -104,7 +104,8 @@ def _check_speed(speed: Floats, ship: Particulars, where: str) -> Iterator[LogFi
 
 def _check_shaft(n: Floats, diameter: float, where: str) -> Iterator[LogFinding]:
     fastest = float(np.quantile(np.abs(n), _MOST))
-    limit = _FASTEST_TIP / (math.pi * diameter)
+    fastest_tip = 100.0  # m/s
+    limit = fastest_tip / (math.pi * diameter)
     if fastest > limit:
         yield LogFinding(
             where=where,

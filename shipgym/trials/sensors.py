@@ -113,9 +113,6 @@ SEA_TRIAL: Mapping[str, Sensor] = MappingProxyType(
 )
 
 
-ORDERS = ("delta_command", "n_command")
-
-
 @dataclass(frozen=True)
 class Sensors:
     """The sensors of a ship and her logger; InputError for an unknown channel, or a number out of range.
@@ -190,7 +187,7 @@ class Sensors:
     def _read(
         self, channel: str, times: Floats, t: Floats, signal: Floats, seed: int
     ) -> Floats:
-        if channel in ORDERS:
+        if channel in ("delta_command", "n_command"):
             return orders_at(times, t, signal)
         sensor = self.by_channel.get(channel, Sensor())
         return sensor.read(times, t, signal, _random(seed, channel))

@@ -17,11 +17,6 @@ from shipgym.trials.plausibility.sampling import likelier_time_units
 from shipgym.trials.resampling import Log
 from shipgym.trials.units import DEGREE, QUANTITIES, UNITS, si_factor
 
-MOST_WINDOWS = 30
-SMALLEST_TURN = 2.0 * DEGREE  # of which heading and yaw rate are compared
-#: Logarithm of the ratio of two rates that are the same in the right units.
-_SAME_RATE = 0.5
-
 
 class Fit(NamedTuple):
     """Least squares of a target by one regressor."""
@@ -39,7 +34,7 @@ def check_yaw_rate(log: Log, locator: Locator) -> Iterator[LogFinding]:
     integrated = integral(log.t, log.channels["r"])
     expected = _without_trend(log.t, integrated)
     largest_turn = max(np.ptp(turned), np.ptp(expected))
-    if largest_turn < SMALLEST_TURN:
+    if largest_turn < 2.0 * DEGREE:
         return
 
     fit = _fit(np.diff(expected), np.diff(turned))
@@ -103,7 +98,8 @@ def _nearest_units(gain: float, t: Floats, locator: Locator) -> list[Proposal]:
 
     distances = {one: abs(math.log(changed)) for one, changed in gains.items()}
     nearest = min(distances.values())
-    if times and nearest > _SAME_RATE:
+    far = 0.5  # logarithm of the ratio of two rates that are not the same
+    if times and nearest > far:
         return list(times)[:1]
     return [one for one, distance in distances.items() if distance < nearest + 0.01]
 
@@ -186,8 +182,8 @@ def _other_speed(gain: float, t: Floats, locator: Locator) -> LogFinding:
 
 
 def _at_windows(values: npt.NDArray[Any]) -> npt.NDArray[Any]:
-    """The values at the edges of at most `MOST_WINDOWS` windows."""
-    edges = np.linspace(0, values.size - 1, MOST_WINDOWS + 1)
+    """The values at the edges of at most 30 windows."""
+    edges = np.linspace(0, values.size - 1, 30 + 1)
     samples = np.unique(edges.round().astype(int))
     return values.take(samples)
 

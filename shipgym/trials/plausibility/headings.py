@@ -11,10 +11,8 @@ from shipgym.trials.plausibility.finding import LogFinding, Proposal
 from shipgym.trials.plausibility.sampling import likelier_time_units
 from shipgym.trials.units import DEGREE
 
-FASTEST_TURN = 60.0 * DEGREE  # rad/s
-LARGEST_JUMP = 30.0 * DEGREE  # of a single outlier that passes
-MOST_FAST_STEPS = 0.05  # share of the steps
-_TURN_AND_JUMP = 2.0 * math.pi + LARGEST_JUMP
+_LARGEST_JUMP = 30.0 * DEGREE  # of a single outlier that passes
+_TURN_AND_JUMP = 2.0 * math.pi + _LARGEST_JUMP
 
 
 def check_heading(
@@ -26,12 +24,13 @@ def check_heading(
     which many are too fast, do not. Time in s, heading without jumps at north and as
     logged in rad, each of shape (n_samples,).
     """
+    fastest_turn = 60.0 * DEGREE
     steps = np.abs(np.diff(psi))
-    is_fast = steps > FASTEST_TURN * np.diff(t)
-    jumps = is_fast & (steps > LARGEST_JUMP)
+    is_fast = steps > fastest_turn * np.diff(t)
+    jumps = is_fast & (steps > _LARGEST_JUMP)
     several_turns = np.abs(np.diff(logged)) > _TURN_AND_JUMP
 
-    if several_turns.any() or is_fast.mean() > MOST_FAST_STEPS:
+    if several_turns.any() or is_fast.mean() > 0.05:
         worst = several_turns if several_turns.any() else is_fast
         proposal = _likelier_unit(t, logged, locator)
         yield LogFinding(

@@ -15,14 +15,6 @@ from shipgym.trials.plausibility.finding import LogFinding
 from shipgym.trials.resampling import Log
 from shipgym.trials.units import DEGREE
 
-SLOWEST = 0.3  # m/s over ground, of any manoeuvre
-MOVING = 0.3  # share of the largest speed from which on a ship has a course
-SMALLEST_TURN_DEG = 20.0  # in which a ship drifts
-SAME_COURSE_DEG = 0.3
-CONTRADICTION_DEG = 25.0
-COMPASS_OFFSET = 2.0 * DEGREE  # from which on, and from so many standard errors,
-COMPASS_CERTAINTY = 4.0  # an offset is remarked
-
 
 def velocity_over_ground(
     log: Log, *, has_positions: bool
@@ -52,9 +44,10 @@ def check_over_ground(
 
     The channels are as logged, in SI units, the heading without jumps.
     """
+    slowest = 0.3  # m/s, of any manoeuvre
     speed = np.abs(velocity)
     fastest = np.quantile(speed, 0.95)
-    if fastest < SLOWEST:
+    if fastest < slowest:
         yield LogFinding(
             where=locator.path,
             evidence=(
@@ -63,7 +56,7 @@ def check_over_ground(
             ),
             remedy="read another log",
         )
-    moving = speed > MOVING * fastest
+    moving = speed > 0.3 * fastest  # a slow ship has no course
     if "psi" not in log.channels or np.count_nonzero(moving) < 3:
         return
     psi = log.channels["psi"][moving]
@@ -88,8 +81,8 @@ def check_course(
     offset_deg = -math.degrees(np.angle(apart.mean()))
     turned_deg = math.degrees(np.ptp(psi))
 
-    is_turning = turned_deg > SMALLEST_TURN_DEG
-    if is_turning and drift_deg < SAME_COURSE_DEG:
+    is_turning = turned_deg > 20.0
+    if is_turning and drift_deg < 0.3:
         yield LogFinding(
             where=locator.path,
             evidence=(
@@ -108,7 +101,7 @@ def check_course(
             ),
             remedy="change the sign of its column",
         )
-    is_far = abs(offset_deg) > CONTRADICTION_DEG and agreement > 0.7
+    is_far = abs(offset_deg) > 25.0 and agreement > 0.7
     if is_far and not offset_is_known:
         yield LogFinding(
             where=locator.path,
@@ -125,11 +118,9 @@ def check_course(
 
 def check_compass(log: Log, locator: Locator) -> Iterator[LogFinding]:
     """Remark on a heading that shows too much on every course, or is magnetic by its name."""
-    found = heading_offset(log.channels, straight_parts(log.t, log.channels))
-    is_certain = found is not None and abs(found.offset) > max(
-        COMPASS_OFFSET, COMPASS_CERTAINTY * found.error
-    )
-    if found is not None and is_certain:
+    straight = straight_parts(log.t, log.channels)
+    found = heading_offset(log.channels, straight)
+    if found is not None and found.is_certain:
         offset_deg = f"{found.offset / DEGREE:.1f}"
         yield LogFinding(
             where=locator.path,

@@ -10,10 +10,6 @@ from shipgym.trials.columns import Locator
 from shipgym.trials.missing_values import REPAIR
 from shipgym.trials.plausibility.finding import LogFinding, Proposal
 
-FASTEST = 50.0  # m/s, of any ship
-SHORTEST_STEP_S = 0.1  # in which receivers write their times
-MOST_FAST_STEPS = 0.1  # share; more are two ships in turn
-
 
 def find_outliers(t: Floats, x: Floats, y: Floats) -> Flags:
     """Positions that no ship reaches from the one before, nor the next one from them.
@@ -35,7 +31,7 @@ def check_track(
     """Find a track that jumps so often that two ships must be in the log; units as in `find_outliers`."""
     too_fast = _too_fast(t, x, y)
     count = np.count_nonzero(too_fast)
-    if too_fast.size < 2 or count <= MOST_FAST_STEPS * too_fast.size:
+    if too_fast.size < 2 or count <= 0.1 * too_fast.size:
         return
     k = np.argmax(too_fast)
     distance = math.hypot(x[k + 1] - x[k], y[k + 1] - y[k])
@@ -77,7 +73,9 @@ def check_outliers(
 
 def _too_fast(t: Floats, x: Floats, y: Floats) -> Flags:
     """Steps between positions that are faster than any ship, shape (n_positions - 1,)."""
+    fastest = 50.0  # m/s
+    shortest_step = 0.1  # s, in which receivers write their times
     distance = np.hypot(np.diff(x), np.diff(y))
-    duration = np.maximum(np.diff(t), SHORTEST_STEP_S)
-    too_fast: Flags = distance > FASTEST * duration
+    duration = np.maximum(np.diff(t), shortest_step)
+    too_fast: Flags = distance > fastest * duration
     return too_fast

@@ -8,9 +8,6 @@ from shipgym.trials.plausibility.finding import LogFinding, Proposal
 from shipgym.trials.resampling import usual_step
 from shipgym.trials.units import UNITS, si_factor
 
-#: Usual steps between the rows of a log, s.
-SHORTEST_STEP_S, LONGEST_STEP_S = 0.01, 10.0
-
 
 def likelier_time_units(t: Floats, locator: Locator) -> dict[str, float]:
     """Units of time, by how much longer they are, with which unusual steps become usual ones.
@@ -31,7 +28,7 @@ def likelier_time_units(t: Floats, locator: Locator) -> dict[str, float]:
 
 def is_usual(step: float) -> bool:
     """Tell whether rows are usual in a manoeuvre that are so far apart, s."""
-    return SHORTEST_STEP_S <= step <= LONGEST_STEP_S
+    return 0.01 <= step <= 10.0
 
 
 def check_steps(t: Floats, locator: Locator) -> Iterator[LogFinding]:

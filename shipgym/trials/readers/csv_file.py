@@ -9,9 +9,6 @@ from shipgym.errors import InputError
 from shipgym.files import LARGEST_CSV, read_text
 from shipgym.trials.readers.log_table import LogTable, is_number
 
-#: Most lines of a file, columns, and characters of a line.
-MOST_LINES, MOST_COLUMNS, LONGEST_LINE = 1_000_000, 1000, 100_000
-
 
 def read_csv(path: str | Path) -> LogTable:
     """Read a CSV file in UTF-8 or Latin-1 with one header line; delimiter comma, semicolon or tab.
@@ -49,13 +46,14 @@ def read_csv(path: str | Path) -> LogTable:
 
 
 def read_lines(path: Path, what: str) -> list[str]:
-    """Lines of a text file, at most `MOST_LINES`; `what` is expected there, as "CSV file"."""
+    """Lines of a text file, at most a million; `what` is expected there, as "CSV file"."""
+    most = 1_000_000
     text = read_text(path, what, LARGEST_CSV, latin=True)
-    lines = text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
-    if len(lines) > MOST_LINES:
+    text = text.replace("\r\n", "\n").replace("\r", "\n")
+    lines = text.split("\n")
+    if len(lines) > most:
         raise InputError(
-            f"{path}: expected at most {MOST_LINES} lines, got {len(lines)}; split the"
-            " file"
+            f"{path}: expected at most {most} lines, got {len(lines)}; split the file"
         )
     return lines
 
@@ -69,23 +67,25 @@ def _cells(line: str, delimiter: str, most: int = -1) -> list[str]:
 
 def _check_lines(path: Path, lines: list[str]) -> None:
     """Refuse zero bytes, and lines that are too long for a table."""
+    longest = 100_000
     for number, line in enumerate(lines, start=1):
-        if "\0" not in line and len(line) <= LONGEST_LINE:
+        if "\0" not in line and len(line) <= longest:
             continue
         fault = "binary content (a zero byte)"
         if "\0" not in line:
             fault = f"{len(line)} characters"
         raise InputError(
-            f"{path}: line {number}: expected text of at most {LONGEST_LINE}"
+            f"{path}: line {number}: expected text of at most {longest}"
             f" characters, got {fault}; save the table as comma-separated text in UTF-8"
         )
 
 
 def _check_header(path: Path, header: tuple[str, ...], line: int) -> None:
+    most = 1000
     where = f"{path}: line {line}"
-    if len(header) > MOST_COLUMNS:
+    if len(header) > most:
         raise InputError(
-            f"{where}: expected at most {MOST_COLUMNS} columns, got {len(header)};"
+            f"{where}: expected at most {most} columns, got {len(header)};"
             " leave out those that are not needed"
         )
     for name, count in Counter(header).items():

@@ -11,9 +11,6 @@ from shipgym.trials.readers.log_table import LogTable
 from shipgym.trials.readers.matlab import read_matlab
 from shipgym.trials.readers.parquet import read_parquet
 
-#: Bytes of a text file by which its kind is recognised.
-BEGINNING = 4096
-
 
 def _read_nmea(path: Path) -> LogTable:
     from shipgym.trials.readers.nmea_log import read_nmea  # with its table of sentences
@@ -42,8 +39,9 @@ def recognise_kind(path: Path) -> str:
         return by_ending
 
     content = read_bytes(path, "CSV file", LARGEST_CSV)
-    beginning = content[:BEGINNING].decode("latin-1").replace("\r", "\n")
-    if len(_NMEA_LINE.findall(beginning)) >= 2:
+    beginning = content[:4096].decode("latin-1")
+    sentences = _NMEA_LINE.findall(beginning.replace("\r", "\n"))
+    if len(sentences) >= 2:
         return "nmea"
     return "csv"
 

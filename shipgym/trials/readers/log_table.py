@@ -12,7 +12,7 @@ from shipgym.checks import did_you_mean, quoted
 from shipgym.errors import InputError
 
 #: Cells that stand for "no value".
-MISSING_WORDS = frozenset(
+_MISSING_WORDS = frozenset(
     {"", "nan", "na", "n/a", "#n/a", "null", "none", "nat", "<na>"}
 )
 
@@ -87,7 +87,7 @@ class LogTable:
         texts = []
         for cell in self.column(name):
             text = "" if cell is None else str(cell).strip()
-            texts.append("" if text.lower() in MISSING_WORDS else text)
+            texts.append("" if text.lower() in _MISSING_WORDS else text)
         return texts
 
     def numbers(self, name: str) -> Floats:

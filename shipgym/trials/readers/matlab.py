@@ -23,8 +23,7 @@ from shipgym.trials.readers.damage import (
 )
 from shipgym.trials.readers.log_table import LogTable
 
-MOST_VARIABLES = 10_000
-HEADER_BYTES = 128
+_HEADER_BYTES = 128
 
 #: Types of elements: matrices, compressed ones, and those of numbers as numpy names
 #: them.
@@ -59,16 +58,16 @@ def read_matlab(path: Path) -> LogTable:
     vectors, and complex numbers.
     """
     content = read_bytes(path, "MATLAB file", LARGEST_PACKED)
-    if content[:8] == b"\x89HDF\r\n\x1a\n" or b"MATLAB 7.3" in content[:HEADER_BYTES]:
+    if content[:8] == b"\x89HDF\r\n\x1a\n" or b"MATLAB 7.3" in content[:_HEADER_BYTES]:
         raise InputError(
             f"{path}: expected a MATLAB file of version 5 to 7, got MATLAB 7.3 (HDF5);"
             " save(..., '-v7')"
         )
     remedy = "save the vectors again with save(..., '-v7')"
     with damage_reported(path, "MATLAB (.mat)", remedy):
-        order = "<" if content[126:HEADER_BYTES] == b"IM" else ">"
+        order = "<" if content[126:_HEADER_BYTES] == b"IM" else ">"
         vectors: dict[str, Floats] = {}
-        for matrix in _matrices(path, content[HEADER_BYTES:], order):
+        for matrix in _matrices(path, content[_HEADER_BYTES:], order):
             vectors |= _vector(path, matrix, order)
 
     lengths = [values.size for values in vectors.values()]
@@ -86,11 +85,12 @@ def read_matlab(path: Path) -> LogTable:
 
 def _matrices(path: Path, content: bytes, order: str) -> Iterator[bytes]:
     """Contents of the matrices of a file, unpacked; `order` is that of its bytes, "<" or ">"."""
+    most = 10_000  # a file of zeros holds millions of empty ones
     unpacked = 0
     for number, element in enumerate(_elements(content, order)):
-        if number == MOST_VARIABLES:
+        if number == most:
             raise InputError(
-                f"{path}: expected at most {MOST_VARIABLES} variables, got more; save a"
+                f"{path}: expected at most {most} variables, got more; save a"
                 " few vectors: save('run.mat', 't', 'psi', '-v7')"
             )
         if element.type == _COMPRESSED:

@@ -26,9 +26,6 @@ from shipgym.trials.nmea import (
 from shipgym.trials.readers.csv_file import read_lines
 from shipgym.trials.readers.log_table import LogTable
 
-#: Share of damaged sentences from which on a log is refused.
-MOST_DAMAGED = 0.1
-
 #: Preferred kinds of sentences: true headings, and of speeds through the water the log
 #: with two axes.
 _PREFERENCE = {"HDT": 3, "THS": 2, "VHW": 1, "VBW": 2}
@@ -159,7 +156,7 @@ def _channel_values(sentence: Sentence) -> dict[str, float]:
 def _check_damage(path: Path, heard: _Heard) -> list[str]:
     """Refuse a log of many damaged sentences; a note of few."""
     damaged = len(heard.damaged)
-    if damaged > MOST_DAMAGED * heard.count:
+    if damaged > 0.1 * heard.count:
         raise InputError(
             f"{path}: line {heard.damaged[0]}: expected hardly any damaged sentences,"
             f" got {damaged} of {heard.count} with a wrong checksum or broken fields,"

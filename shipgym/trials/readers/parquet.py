@@ -8,8 +8,6 @@ from shipgym.trials.readers.damage import check_unpacked, damage_reported
 from shipgym.trials.readers.frames import read_frame
 from shipgym.trials.readers.log_table import LogTable
 
-BYTES_PER_VALUE = 8
-
 
 def read_parquet(path: Path) -> LogTable:
     """Read a Parquet file; InputError for a damaged one, or one that unpacks to too much."""
@@ -21,7 +19,8 @@ def read_parquet(path: Path) -> LogTable:
         about = file.metadata
         groups = [about.row_group(k) for k in range(about.num_row_groups)]
         check_unpacked(path, sum(group.total_byte_size for group in groups))
-        check_unpacked(path, BYTES_PER_VALUE * about.num_rows * about.num_columns)
+        cells = about.num_rows * about.num_columns
+        check_unpacked(path, 8 * cells)
 
         table = file.read()
         table.validate(full=True)  # offsets beyond the data
