@@ -161,10 +161,11 @@ def _minimum(values: list[float]) -> _Minimum | None:
 
 def _independent_samples(fit: _Fit) -> float:
     """Number of independent residuals, by the correlation of each with the next."""
-    covariance = float(fit.residual[1:] @ fit.residual[:-1])
+    residual = fit.residual
+    covariance = float(residual[1:] @ residual[:-1])
     correlation = max(covariance / fit.squares, 0.0)
-    independent = fit.residual.size * (1.0 - correlation) / (1.0 + correlation)
-    return max(independent, 2.0)
+    share = (1.0 - correlation) / (1.0 + correlation)
+    return max(residual.size * share, 2.0)
 
 
 def rudder_clock_offset(t: Floats, r: Floats, delta: Floats) -> ClockOffset | None:
@@ -181,7 +182,8 @@ def _remembered(t: Floats, values: Floats, memory: float) -> Floats:
     from scipy.signal import lfilter
 
     even = np.linspace(t[0], t[-1], t.size)
-    decay = math.exp(-(even[1] - even[0]) / memory)
+    step = even[1] - even[0]
+    decay = math.exp(-step / memory)
     resampled = np.interp(even, t, values)
     lagged = lfilter([1.0 - decay], [1.0, -decay], resampled)
     return np.interp(t, even, lagged)

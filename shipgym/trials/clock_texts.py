@@ -66,7 +66,8 @@ def _times_of_day(series: Any) -> Floats:
     """Seconds since midnight, nan for what is no time."""
     import pandas as pd
 
-    with_seconds = series.where(series.str.count(":") == 2, series + ":00")
+    is_whole = series.str.count(":") == 2
+    with_seconds = series.where(is_whole, series + ":00")
     times = pd.to_timedelta(with_seconds, errors="coerce")
     return np.array(times.dt.total_seconds(), dtype=np.float64)
 
@@ -81,13 +82,16 @@ def _dated_times(series: Any, first: str) -> Floats:
         moments = pd.to_datetime(
             series, utc=True, format="mixed", dayfirst=day_first, errors="coerce"
         )
-        candidates.append((moments - pd.Timestamp(0, tz="UTC")).dt.total_seconds())
+        since_1970 = moments - pd.Timestamp(0, tz="UTC")
+        candidates.append(since_1970.dt.total_seconds())
     return np.array(min(candidates, key=_implausibility), dtype=np.float64)
 
 
 def _implausibility(seconds: Any) -> tuple[int, float]:
     """How many texts are no dates, then how long a time the others span."""
-    return int(seconds.isna().sum()), float(seconds.max() - seconds.min())
+    missing = seconds.isna()
+    span = seconds.max() - seconds.min()
+    return int(missing.sum()), float(span)
 
 
 def clock_text(seconds: float) -> str:

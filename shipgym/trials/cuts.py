@@ -95,7 +95,8 @@ def _seconds(moment: float | str, log: Log, where: str) -> float:
     if clock.dated:
         return after
     after %= DAY
-    return after if after < log.t[-1] + 0.5 * DAY else after - DAY
+    is_before = after >= log.t[-1] + 0.5 * DAY
+    return after - DAY if is_before else after
 
 
 def _active_stretches(log: Log, where: str) -> list[Stretch]:

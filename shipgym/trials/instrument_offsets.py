@@ -113,8 +113,9 @@ def rudder_offset(
 
 def _bend(psi: Floats, rows: npt.NDArray[np.intp], half: int) -> float:
     """Mean second difference of the heading over so many samples to both sides."""
-    bends = psi[rows + half] - 2.0 * psi[rows] + psi[rows - half]
-    return abs(float(np.mean(bends)))
+    before, after = psi[rows - half], psi[rows + half]
+    bends = before - 2.0 * psi[rows] + after
+    return abs(float(bends.mean()))
 
 
 def correct_offsets(log: Log, installation: Installation) -> None:

@@ -84,14 +84,17 @@ def _cg_to_midship(log: Log, xg: float) -> None:
                 f'{log.where}: origin = "cg": expected {other} to move {name} to'
                 " midship, got none; name its column"
             )
+    changes = {}
     if "v" in channels:
-        channels["v"] = channels["v"] - xg * channels["r"]
+        changes["v"] = -channels["r"]
     if "x" in channels:
-        channels["x"] = channels["x"] - xg * np.cos(channels["psi"])
+        changes["x"] = -np.cos(channels["psi"])
     if "y" in channels:
-        channels["y"] = channels["y"] - xg * np.sin(channels["psi"])
+        changes["y"] = -np.sin(channels["psi"])
     if "N" in channels:
-        channels["N"] = channels["N"] + xg * channels["Y"]
+        changes["N"] = channels["Y"]
+    for name, change in changes.items():
+        channels[name] = channels[name] + xg * change
 
 
 def to_midship(log: Log, installation: Installation) -> None:

@@ -36,7 +36,8 @@ def check_time(t: Floats, locator: Locator) -> None:
     stands_still = np.diff(t) <= nanosecond
     if stands_still.any():
         k = int(np.argmax(stands_still))
-        _refuse_time(t[k], t[k + 1], locator.place(k + 1, "t"), locator)
+        place = locator.place(k + 1, "t")
+        _refuse_time(t[k], t[k + 1], place, locator)
 
 
 def _refuse_time(before: float, after: float, place: str, locator: Locator) -> None:
@@ -63,7 +64,8 @@ def fill_missing(
     _check_present(t, channels, locator, repair)
     check_time(t, locator)
     whole = _whole_rows(channels, locator)
-    kept = slice(int(whole[0]), int(whole[-1]) + 1)
+    first, last = int(whole[0]), int(whole[-1])
+    kept = slice(first, last + 1)
     locator = replace(locator, rows=locator.rows[kept])
     t = t[kept]
     filled, counts = {}, {}
@@ -83,7 +85,8 @@ def _check_present(
 ) -> None:
     """Refuse missing times, and without `repair` every missing value, naming the first."""
     table = {"t": t, **channels}
-    is_missing = ~np.isfinite(np.column_stack(list(table.values())))
+    values = np.column_stack(list(table.values()))
+    is_missing = ~np.isfinite(values)
     refused = is_missing if repair is None else is_missing[:, :1]
     if not refused.any():
         return
@@ -95,7 +98,7 @@ def _check_present(
     lacking = np.count_nonzero(is_missing.any(axis=1))
     raise InputError(
         f"{locator.place(row, name)}: expected a number, got no value"
-        f" ({table[name][row]:g}); {remedy} ({lacking} of {t.size} rows lack a value)",
+        f" ({values[row, column]:g}); {remedy} ({lacking} of {t.size} rows lack a value)",
         () if name == "t" else (REPAIR,),
     )
 
@@ -119,8 +122,8 @@ def _whole_rows(
 def _check_holes(t: Floats, is_missing: Flags, channel: str, locator: Locator) -> None:
     """Refuse to fill a hole of many rows; the first and the last row are whole."""
     most_rows, most_steps = 10, 20.0  # both are exceeded by a hole too long to fill
-    edges = np.flatnonzero(np.diff(is_missing))
-    first, after = edges[::2] + 1, edges[1::2] + 1
+    edges = np.flatnonzero(np.diff(is_missing)) + 1
+    first, after = edges[::2], edges[1::2]
     rows = after - first
     spans = t[after] - t[first - 1]
     is_long = spans > most_steps * usual_step(t)

@@ -192,8 +192,9 @@ def logged_numbers(sentence: Sentence) -> dict[str, float]:
 
 def _number(place: NumberField, fields: Sequence[str], needed: Letters) -> float | None:
     """One number in SI units; None where its field is empty or the letters needed are not there."""
-    if any(fields[at] not in letters for at, letters in needed.items()):
-        return None
+    for at, letters in needed.items():
+        if fields[at] not in letters:
+            return None
     text = fields[place.at]
     if not text:
         return None
@@ -201,7 +202,9 @@ def _number(place: NumberField, fields: Sequence[str], needed: Letters) -> float
         raise ValueError(f"expected a number, got {text!r}")
 
     value = float(text)
-    unit = place.unit if place.unit_at is None else _SPEED_UNITS[fields[place.unit_at]]
+    unit = place.unit
+    if place.unit_at is not None:
+        unit = _SPEED_UNITS[fields[place.unit_at]]
     if unit == "ddmm.mm":  # 5430.5 is 54 degrees and 30.5 minutes
         degrees, minutes = divmod(value, 100.0)
         value, unit = degrees + minutes / 60.0, "deg"

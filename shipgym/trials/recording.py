@@ -116,7 +116,8 @@ def _signals(
 ) -> tuple[Signals, Locator, dict[str, int]]:
     """Channels on the clock of the rows, what is missing filled and counted, or each on a clock of its own."""
     filled: dict[str, int] = {}
-    is_whole = all(np.isfinite(values).all() for values in (t, *channels.values()))
+    present = [np.isfinite(values) for values in (t, *channels.values())]
+    is_whole = np.all(present)
     has_own_clocks = not is_whole and have_own_clocks(t, channels)
     if is_whole:
         check_time(t, locator)

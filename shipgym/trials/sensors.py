@@ -51,8 +51,8 @@ class Sensor:
 
     def __post_init__(self) -> None:
         for item in fields(self):
-            where, value = f"sensor {item.name}", getattr(self, item.name)
-            check_number(value, where, at_least=0.0)
+            value = getattr(self, item.name)
+            check_number(value, f"sensor {item.name}", at_least=0.0)
         check_number(self.drift_time_s, "sensor drift_time_s", above=0.0)
         probability = self.outlier_probability
         check_number(probability, "sensor outlier_probability", at_most=1.0)
@@ -203,7 +203,8 @@ class Sensors:
                 f"sensors sampling_s: expected at most half of the {trial.duration:g} s"
                 f" of trial {trial.name!r}, got {self.sampling_s:g} s"
             )
-        return np.asarray(trial.t[0] + self.sampling_s * np.arange(count))
+        times: Floats = trial.t[0] + self.sampling_s * np.arange(count)
+        return times
 
     def _outside_gaps(self, count: int, seed: int) -> Flags:
         """Which samples are not in a gap."""

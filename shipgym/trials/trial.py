@@ -210,8 +210,10 @@ class Trial:
     def _settings(self) -> dict[str, Any]:
         """The keyword arguments that make this trial of its channels."""
         names = ("name", "kind", "use", "derived", "length", "over_ground", "notes")
-        own = {name: getattr(self, name) for name in names}
-        return own | {"repaired": dict(self.repaired), "raw": vars(self)["_raw"]}
+        settings = {name: getattr(self, name) for name in names}
+        settings["repaired"] = dict(self.repaired)
+        settings["raw"] = vars(self)["_raw"]
+        return settings
 
     def with_(self, **changes: Any) -> Trial:
         """Return a copy with another ``name``, ``kind``, ``use``, ``length`` or ``over_ground``."""
@@ -243,8 +245,11 @@ class Trial:
 
     def part(self, rows: slice, name: str | None = None) -> Trial:
         """Trial of some of the samples, which are no manoeuvre any more, by the same name or another."""
-        channels = {channel: values[rows] for channel, values in self.channels.items()}
-        return Trial(self.t[rows], channels, name=self.name if name is None else name)
+        channels = {}
+        for channel, values in self.channels.items():
+            channels[channel] = values[rows]
+        own_name = self.name if name is None else name
+        return Trial(self.t[rows], channels, name=own_name)
 
     @classmethod
     def from_csv(
@@ -356,7 +361,10 @@ def read_trials(
     trials = []
     for part in cut_log(cut, log, conventions.where):
         t = log.t[part]
-        part_name = name if cut is None else f"{name} {t[0]:.0f}-{t[-1]:.0f} s"
+        part_name = name
+        if cut is not None:
+            first, last = t[0], t[-1]
+            part_name = f"{name} {first:.0f}-{last:.0f} s"
         trial = Trial(
             t,
             {channel: values[part] for channel, values in log.channels.items()},

@@ -77,9 +77,9 @@ def _unit_where_fitting(
     """The unit of a column where its name is one of a channel; None where it is not."""
     text = column.lower().replace("_", " ")
     bare, units = split_unit(text)
-    unit = named_unit(units, channel)
-    if unit is None and names_another_quantity(units, channel):
+    if names_another_quantity(units, channel):
         return None
+    unit = named_unit(units, channel)
 
     forms = [_plain(text), _plain(re.sub(r"[\[(].*", "", text))]
     if unit is not None:

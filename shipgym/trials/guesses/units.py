@@ -44,19 +44,25 @@ class NameEnd(NamedTuple):
 def split_unit(name: str) -> NameEnd:
     """Part a column's name, in lower case with blanks for underscores, from the unit with which it ends."""
     text = name.replace(" per ", "/").rstrip("]) ")
-    starts = [0, *(k + 1 for k, letter in enumerate(text) if letter in "[( ")]
     bare = text
     units: list[str] = []
-    for start in starts:
-        spelled = [
-            unit
-            for unit, spellings in _SPELLINGS.items()
-            if any(fnmatchcase(text[start:], one) for one in spellings)
-        ]
+    for start, before in enumerate(f" {text[:-1]}"):
+        if before not in "[( ":
+            continue
+        spelled = _spelled_units(text[start:])
         if spelled and not units:
             bare = text[:start].rstrip("[( ")
         units += spelled
     return NameEnd(bare, units)
+
+
+def _spelled_units(text: str) -> list[str]:
+    """Units that may be spelled so."""
+    units = []
+    for unit, spellings in _SPELLINGS.items():
+        if any(fnmatchcase(text, spelling) for spelling in spellings):
+            units.append(unit)
+    return units
 
 
 def named_unit(units: list[str], channel: str) -> UnitGuess | None:
@@ -69,8 +75,9 @@ def named_unit(units: list[str], channel: str) -> UnitGuess | None:
 
 def names_another_quantity(units: list[str], channel: str) -> bool:
     """Tell whether a name ends with a unit of another quantity; one letter may be none: "Heading M"."""
-    of_channel = UNITS[QUANTITIES[channel]]
-    return any(len(unit) > 1 for unit in units) and not of_channel.keys() & set(units)
+    if named_unit(units, channel) is not None:
+        return False
+    return any(len(unit) > 1 for unit in units)
 
 
 def unit_by_size(values: Floats | None, channel: str) -> UnitGuess:
@@ -78,7 +85,8 @@ def unit_by_size(values: Floats | None, channel: str) -> UnitGuess:
     unit = si_unit(channel)
     if values is None:
         return UnitGuess(unit, "from its content")
-    largest = float(np.max(np.abs(values[np.isfinite(values)]), initial=0.0))
+    known = values[np.isfinite(values)]
+    largest = np.abs(known).max(initial=0.0)
     limit, other = _BY_SIZE.get(channel) or _BY_SIZE.get(
         QUANTITIES[channel], (np.inf, "")
     )

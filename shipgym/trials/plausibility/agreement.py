@@ -121,8 +121,10 @@ def check_velocity(log: Log, frame: str, locator: Locator) -> Iterator[LogFindin
     The channels are in SI units, the heading without jumps; `frame`, "body" or "earth",
     is the declared one of u and v.
     """
-    velocity = log.channels["u"] + 1j * log.channels["v"]
-    of_body = _fit_track(log, velocity * np.exp(1j * log.channels["psi"]))
+    channels = log.channels
+    velocity = channels["u"] + 1j * channels["v"]
+    turned = velocity * np.exp(1j * channels["psi"])
+    of_body = _fit_track(log, turned)
     of_earth = _fit_track(log, velocity)
     declared, other, other_frame = of_body, of_earth, "earth"
     if frame == "earth":
@@ -168,8 +170,8 @@ def _other_speed(gain: float, t: Floats, locator: Locator) -> LogFinding:
     if times:
         wrong = f"time, declare {locator.declaration(*times[0])}"
     else:
-        x, y, u, v = (locator.columns[channel].name for channel in "xyuv")
-        wrong = f"'{x}', '{y}' or of '{u}', '{v}' (a knot is 0.514 m/s): declare it"
+        x, y, u, v = (f"'{locator.columns[channel].name}'" for channel in "xyuv")
+        wrong = f"{x}, {y} or of {u}, {v} (a knot is 0.514 m/s): declare it"
     return LogFinding(
         where=locator.path,
         evidence=(

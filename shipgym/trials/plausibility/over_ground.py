@@ -76,9 +76,12 @@ def check_course(
     """
     apart = np.exp(1j * (course - psi))
     mirrored = np.exp(1j * (course + psi))
-    agreement, mirrored_agreement = abs(apart.mean()), abs(mirrored.mean())
-    drift_deg = math.degrees(np.sqrt(np.mean(np.angle(apart) ** 2)))
-    offset_deg = -math.degrees(np.angle(apart.mean()))
+    mean = apart.mean()
+    agreement = abs(mean)
+    mirrored_agreement = abs(mirrored.mean())
+    offset_deg = -math.degrees(np.angle(mean))
+    drift = np.angle(apart)
+    drift_deg = math.degrees(np.sqrt(np.mean(drift**2)))
     turned_deg = math.degrees(np.ptp(psi))
 
     is_turning = turned_deg > 20.0

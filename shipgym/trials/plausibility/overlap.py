@@ -44,9 +44,10 @@ def check_overlap(
 
 
 def _span(signals: Mapping[str, Signal]) -> tuple[float, float]:
-    first = min(float(signal.t[0]) for signal in signals.values())
-    last = max(float(signal.t[-1]) for signal in signals.values())
-    return first, last
+    clocks = [signal.t for signal in signals.values()]
+    first = min(clock[0] for clock in clocks)
+    last = max(clock[-1] for clock in clocks)
+    return float(first), float(last)
 
 
 def _zone(shift: float) -> str:

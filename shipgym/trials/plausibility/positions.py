@@ -1,6 +1,5 @@
 """Positions that no ship reaches from those before and after, and tracks of two ships in one log."""
 
-import math
 from collections.abc import Iterator
 
 import numpy as np
@@ -34,12 +33,13 @@ def check_track(
     if too_fast.size < 2 or count <= 0.1 * too_fast.size:
         return
     k = np.argmax(too_fast)
-    distance = math.hypot(x[k + 1] - x[k], y[k + 1] - y[k])
+    distance = np.hypot(np.diff(x), np.diff(y))[k] / 1000.0
+    duration = np.diff(t)[k]
     yield LogFinding(
         where=locator.place(k + 1, "lat"),
         evidence=(
             f"expected the track of one ship, got a position that jumps"
-            f" {distance / 1e3:.4g} km within {t[k + 1] - t[k]:g} s, as in {count} of"
+            f" {distance:.4g} km within {duration:g} s, as in {count} of"
             f" {too_fast.size} steps"
         ),
         remedy=(

@@ -28,18 +28,21 @@ def read_csv(path: str | Path) -> LogTable:
 
     unquoted = re.sub('"[^"]*"', "", lines[first])
     delimiter = max(",;\t", key=unquoted.count)
-    header = tuple(name.strip() for name in _cells(lines[first], delimiter))
+    names = _cells(lines[first], delimiter)
+    header = tuple(name.strip() for name in names)
     _check_header(path, header, first + 1)
 
     blank = delimiter + " \t"
-    filled = [k for k in range(first + 1, len(lines)) if lines[k].strip(blank)]
-    rows = [lines[k] for k in filled]
+    rows, line_numbers = [], []
+    for number, line in enumerate(lines[first + 1 :], start=first + 2):
+        if line.strip(blank):
+            rows.append(line)
+            line_numbers.append(number)
 
     def column(name: str) -> list[str]:
         index = header.index(name)
         return [_cells(row, delimiter, index + 1)[index] for row in rows]
 
-    line_numbers = [k + 1 for k in filled]
     table = LogTable(path, header, column, line_numbers, decimal_comma=delimiter != ",")
     _check_rows(table, rows, delimiter)
     return table

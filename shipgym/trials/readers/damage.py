@@ -24,7 +24,9 @@ def damage_reported(path: Path, kind: str, remedy: str) -> Iterator[None]:
             " 'shipgym[logs]'"
         ) from None
     except Exception as error:
-        reason = " ".join(f"{type(error).__name__}: {error}".split())[:200]
+        kind_of_error = type(error).__name__
+        words = f"{kind_of_error}: {error}".split()
+        reason = " ".join(words)[:200]
         raise InputError(f"{path}: expected {kind}, got {reason}; {remedy}") from None
 
 

@@ -123,7 +123,8 @@ def plain_numbers(cells: Sequence[Any]) -> Floats:
     """Numbers of cells that are all written plainly or empty, as in most files; ValueError for others."""
     if "_" in "".join(map(str, cells)):
         raise ValueError("underscores, which Python reads in a number")
-    return np.array([float("nan" if cell == "" else cell) for cell in cells])
+    numbers = [cell if cell != "" else "nan" for cell in cells]
+    return np.array([float(number) for number in numbers])
 
 
 def is_number(text: str) -> bool:

@@ -114,7 +114,8 @@ def _vector(path: Path, matrix: bytes, order: str) -> dict[str, Floats]:
     values = np.frombuffer(numbers.content, f"{order}{_NUMBER_TYPES[numbers.type]}")
     about = struct.unpack(f"{order}I", flags.content[:4])[0]
 
-    is_vector = np.count_nonzero(sizes != 1) == 1 and sizes.max() == values.size
+    has_one_size = np.count_nonzero(sizes != 1) == 1
+    is_vector = has_one_size and sizes.max() == values.size
     if not is_vector or (about & _CLASS) < _FIRST_NUMERIC:
         return {}
     label = name.content.decode("ascii")
@@ -131,12 +132,12 @@ def _elements(content: bytes, order: str) -> Iterator[Element]:
     at = 0
     while at + 8 <= len(content):
         kind, size = struct.unpack(f"{order}II", content[at : at + 8])
-        begin = at + 8
-        small = kind >> 16  # size of an element within its own tag
-        if small:
-            yield Element(kind & 0xFFFF, content[at + 4 : at + 4 + min(small, 4)])
-            at = begin
-            continue
-        yield Element(kind, content[begin : begin + size])
+        small_size = kind >> 16  # of an element within its own tag
+        if small_size:
+            kind, size = kind & 0xFFFF, 0
+            begin, end = at + 4, at + 4 + min(small_size, 4)
+        else:
+            begin, end = at + 8, at + 8 + size
+        yield Element(kind, content[begin:end])
         padding = 0 if kind == _COMPRESSED else -size % 8
-        at = begin + size + padding
+        at += 8 + size + padding

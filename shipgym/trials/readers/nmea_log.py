@@ -239,7 +239,8 @@ def _with_wind_over_ground(tracks: dict[str, _Track]) -> dict[str, _Track]:
         angle = tracks["apparent_wind_angle"]
         bearing = angle.values + at("psi", angle.t)
         apparent = tracks["apparent_wind_speed"].values * np.exp(1j * bearing)
-        headwind = at("sog", angle.t) * np.exp(1j * at("cog", angle.t))
+        course = at("cog", angle.t)
+        headwind = at("sog", angle.t) * np.exp(1j * course)
         wind = apparent - headwind
         found["wind_from"] = angle._replace(values=np.angle(wind))
         found["wind_speed"] = angle._replace(values=np.abs(wind))
@@ -248,7 +249,8 @@ def _with_wind_over_ground(tracks: dict[str, _Track]) -> dict[str, _Track]:
 
 def _table(path: Path, tracks: dict[str, _Track], notes: list[str]) -> LogTable:
     """One row for each time at which some channel has a value."""
-    t = np.unique(np.concatenate([track.t for track in tracks.values()]))
+    times = [track.t for track in tracks.values()]
+    t = np.unique(np.concatenate(times))
     columns = {"t": t}
     lines = np.zeros(t.size, dtype=int)
     for channel, track in tracks.items():
