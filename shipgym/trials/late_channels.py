@@ -37,51 +37,64 @@ _COMPARISONS = {
 }
 
 
-class LateChannels(NamedTuple):
-    """What is done about late channels."""
+class LateChannel(NamedTuple):
+    """A channel that is believed to be late, or early where the delay is negative."""
 
-    delays: dict[str, float]  # to take off their clocks, s, by channel
-    notes: list[str]
+    channel: str
+    delay: float  # s
+    error: float  # standard error, ships of other dynamics included, s
+
+    @property
+    def evidence(self) -> str:
+        """What was found, in words."""
+        comparison = _COMPARISONS[self.channel]
+        side = "late" if self.delay > 0.0 else "early"
+        return (
+            f"{comparison.name} is {abs(self.delay):.2f} s {side} against"
+            f" {comparison.target} (standard error {self.error:.2f} s)"
+        )
+
+    @property
+    def is_small(self) -> bool:
+        """Whether it is left on one clock where nobody decided."""
+        return abs(self.delay) <= _COMPARISONS[self.channel].refused_s
 
 
-def find_late_channels(
-    log: Log, choice: str | None, *, is_one_clock: bool
-) -> LateChannels:
-    """Delays of yaw rate and rudder that are to be corrected, and remarks on these and on others.
+def find_late_channels(log: Log) -> list[LateChannel]:
+    """Yaw rate and rudder where a log shows that they are late.
 
-    By `choice`, "correct" or "keep", of :class:`.installation.Installation`. Without
-    one, large delays of channels on one clock are an InputError, small ones are left,
-    and those of channels with clocks of their own are corrected. So is a rudder of the
-    wrong sign an InputError, which is judged by a yaw rate only where this does not
-    contradict the heading.
+    Raises InputError for a rudder of the wrong sign, which is judged by a yaw rate only
+    where this does not contradict the heading.
     """
     significant = 2.5  # standard errors
-    late = LateChannels({}, [])
+    late = []
     for channel, offset in _offsets(log).items():
-        comparison = _COMPARISONS[channel]
-        delay = abs(offset.late)
-        error = math.hypot(offset.error, comparison.dynamics_s)
-        if offset.certainty < CERTAIN or delay < significant * error:
-            continue
-
-        side = "late" if offset.late > 0.0 else "early"
-        evidence = (
-            f"{comparison.name} is {delay:.2f} s {side} against {comparison.target}"
-            f" (standard error {error:.2f} s)"
-        )
-        is_open = choice is None and is_one_clock
-        if choice == "keep" or (is_open and delay <= comparison.refused_s):
-            late.notes.append(f"{evidence}; left as logged")
-        elif is_open:
-            raise InputError(
-                f"{log.where}: expected one clock, got one of which {evidence}; to have"
-                ' it corrected write clock_offsets = "correct" in [sensors] of the ship'
-                ' file, or "keep" if it is so'
-            )
-        else:
-            late.delays[channel] = offset.late
-            late.notes.append(f"{evidence}; corrected")
+        dynamics = _COMPARISONS[channel].dynamics_s
+        error = math.hypot(offset.error, dynamics)
+        is_significant = abs(offset.late) >= significant * error
+        if is_significant and offset.certainty >= CERTAIN:
+            late.append(LateChannel(channel, offset.late, error))
     return late
+
+
+def is_corrected(
+    late: LateChannel, choice: str | None, where: str, *, is_one_clock: bool
+) -> bool:
+    """Decide whether a late channel is corrected, by `choice`, "correct" or "keep".
+
+    Without one, large delays of channels on one clock are an InputError, which begins
+    with `where`, small ones are left, and those of channels with clocks of their own
+    are corrected.
+    """
+    if choice is not None or not is_one_clock:
+        return choice != "keep"
+    if late.is_small:
+        return False
+    raise InputError(
+        f"{where}: expected one clock, got one of which {late.evidence}; to have it"
+        ' corrected write clock_offsets = "correct" in [sensors] of the ship file, or'
+        ' "keep" if it is so'
+    )
 
 
 def _offsets(log: Log) -> dict[str, ClockOffset]:

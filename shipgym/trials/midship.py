@@ -25,13 +25,12 @@ def to_project_conventions(log: Log, conventions: Conventions) -> None:
     no position is recorded. Raises InputError where a channel is missing.
     """
     channels = log.channels
-    is_earth = conventions.velocity_frame == "earth" and "u" in channels
+    installation = conventions.installation
+    is_earth = conventions.velocity_frame == "earth"
     if "stw" in channels:
         log.over_ground = False
-    elif is_earth:
+    elif is_earth and "u" in channels:
         log.over_ground = True
-
-    installation = conventions.installation
     if installation != AS_LOGGED:
         correct_offsets(log, installation)
     if "psi" in channels and "r" not in channels:
@@ -39,7 +38,7 @@ def to_project_conventions(log: Log, conventions: Conventions) -> None:
     elif "r" in channels and not {"psi", "x", "y"} & channels.keys():
         log.derive("psi", _heading_from_start(log))
 
-    if conventions.velocity_frame == "earth" and {"u", "v"} & channels.keys():
+    if is_earth and {"u", "v"} & channels.keys():
         _earth_to_body(log)
     if conventions.origin == "cg":
         _cg_to_midship(log, conventions.xg or 0.0)

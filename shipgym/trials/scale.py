@@ -38,8 +38,8 @@ def _check_slenderness(ship: Particulars, where: str) -> Iterator[LogFinding]:
         yield LogFinding(
             where=where,
             evidence=(
-                f"expected a ship at least {least:g} times as long as"
-                f" broad, got {ship.length:g} m by {ship.beam:g} m"
+                f"expected a ship at least {least:g} times as long as broad, got"
+                f" {ship.length:g} m by {ship.beam:g} m"
             ),
             remedy=(
                 "likely [ship] length is something else, such as an antenna's height:"
@@ -56,12 +56,13 @@ def _check_turning(
     # |r| L / U; a ship in its tightest turn stays below about 1
     limit = 3.0 * largest_speed / ship.length
     if fastest > limit:
+        limit_deg, fastest_deg = math.degrees(limit), math.degrees(fastest)
         yield LogFinding(
             where=where,
             evidence=(
-                f"expected a yaw rate of at most {math.degrees(limit):.4g} deg/s at up"
-                f" to {largest_speed:.4g} m/s for a length of {ship.length:g} m, got up"
-                f" to {math.degrees(fastest):.4g} deg/s"
+                f"expected a yaw rate of at most {limit_deg:.4g} deg/s at up to"
+                f" {largest_speed:.4g} m/s for a length of {ship.length:g} m, got up to"
+                f" {fastest_deg:.4g} deg/s"
             ),
             remedy=(
                 "likely the trial of another ship or scale, or a wrong unit of r, psi,"
@@ -75,31 +76,40 @@ def _check_speed(speed: Floats, ship: Particulars, where: str) -> Iterator[LogFi
     if service_speed is None or "speed" in ship.estimated:
         return
     fastest = float(np.quantile(speed, _MOST))
-    in_knots = service_speed * KNOT
+    ratio = fastest / service_speed
     froude = service_speed / math.sqrt(9.81 * ship.length)
     is_fast = froude > 0.3  # for a ship that displaces water
-    if is_fast and abs(fastest / in_knots - 1.0) < 0.1:
-        yield LogFinding(
-            where=where,
-            evidence=(
-                f"expected [ship] speed in m/s, got {service_speed:g}, which in knots"
-                f" is {in_knots:.4g} m/s, as fast as she sails here"
-            ),
-            remedy=f"write speed = {in_knots:.4g}",
-        )
+    if is_fast and abs(ratio / KNOT - 1.0) < 0.1:
+        yield _speed_in_knots(service_speed, where)
+    elif not 0.2 <= ratio <= 2.0:
+        yield _other_speed(fastest, service_speed, where)
+
+
+def _speed_in_knots(service_speed: float, where: str) -> LogFinding:
+    in_knots = service_speed * KNOT
+    return LogFinding(
+        where=where,
+        evidence=(
+            f"expected [ship] speed in m/s, got {service_speed:g}, which in knots is"
+            f" {in_knots:.4g} m/s, as fast as she sails here"
+        ),
+        remedy=f"write speed = {in_knots:.4g}",
+    )
+
+
+def _other_speed(fastest: float, service_speed: float, where: str) -> LogFinding:
     low, high = 0.2 * service_speed, 2.0 * service_speed
-    if not low <= fastest <= high:
-        yield LogFinding(
-            where=where,
-            evidence=(
-                f"expected a speed of {low:.4g} to {high:.4g} m/s for a service speed"
-                f" of {service_speed:g} m/s, got up to {fastest:.4g} m/s"
-            ),
-            remedy=(
-                "likely the trial of another ship or scale, or a wrong unit of u; if it"
-                " is this ship's, give its speed as sailed"
-            ),
-        )
+    return LogFinding(
+        where=where,
+        evidence=(
+            f"expected a speed of {low:.4g} to {high:.4g} m/s for a service speed of"
+            f" {service_speed:g} m/s, got up to {fastest:.4g} m/s"
+        ),
+        remedy=(
+            "likely the trial of another ship or scale, or a wrong unit of u; if it is"
+            " this ship's, give its speed as sailed"
+        ),
+    )
 
 
 def _check_shaft(n: Floats, diameter: float, where: str) -> Iterator[LogFinding]:

@@ -191,14 +191,16 @@ class Trial:
     def __getitem__(self, channel: str) -> Floats:
         if channel == "t":
             return self.t
-        try:
-            return self.channels[channel]
-        except KeyError:
-            raise InputError(
-                f"trial '{self.name}': no channel"
-                f" '{channel}'.{did_you_mean(str(channel), self.channels)} Channels"
-                f" present: {quoted(self.channels)}"
-            ) from None
+        if channel not in self.channels:
+            raise self._no_channel(channel)
+        return self.channels[channel]
+
+    def _no_channel(self, channel: str) -> InputError:
+        hint = did_you_mean(str(channel), self.channels)
+        return InputError(
+            f"trial '{self.name}': no channel '{channel}'.{hint} Channels present:"
+            f" {quoted(self.channels)}"
+        )
 
     def __repr__(self) -> str:
         return (

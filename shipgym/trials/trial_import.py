@@ -7,7 +7,11 @@ from shipgym.checks import quoted
 from shipgym.errors import InputError
 from shipgym.trials.clock_texts import zone_seconds
 from shipgym.trials.conventions import Conventions
-from shipgym.trials.late_channels import find_late_channels
+from shipgym.trials.late_channels import (
+    LateChannel,
+    find_late_channels,
+    is_corrected,
+)
 from shipgym.trials.midship import to_project_conventions
 from shipgym.trials.plausibility.agreement import check_velocity, check_yaw_rate
 from shipgym.trials.plausibility.finding import settle
@@ -56,13 +60,12 @@ def import_tables(
     log = on_one_clock(signals, first.locator.path)
     has_positions = any(one.has_positions for one in recordings)
     remarks = _check_motion(log, first, conventions, has_positions=has_positions)
-    late = find_late_channels(
-        log, conventions.installation.clock_offsets, is_one_clock=share_clock(signals)
-    )
-    if late.delays:
-        log = on_one_clock(_corrected(signals, late.delays), log.where)
+    late = find_late_channels(log)
+    if late:
+        log, notes = _corrected(log, signals, late, conventions)
+        remarks += notes
     reader_notes = [note for table in tables for note in table.notes]
-    log.notes = [*reader_notes, *log.notes, *remarks, *late.notes]
+    log.notes = [*reader_notes, *log.notes, *remarks]
 
     _check_agreement(log, first, conventions)
     to_project_conventions(log, conventions)
@@ -140,13 +143,25 @@ def _check_agreement(log: Log, first: Recording, conventions: Conventions) -> No
         settle(check_velocity(log, conventions.velocity_frame, first.locator))
 
 
-def _corrected(signals: Signals, delays: Mapping[str, float]) -> Signals:
-    """Signals whose clocks are put right by their delays, s."""
+def _corrected(
+    log: Log,
+    signals: Signals,
+    late: Sequence[LateChannel],
+    conventions: Conventions,
+) -> tuple[Log, list[str]]:
+    """The log with those late channels put right that are to be, and remarks on all."""
+    choice = conventions.installation.clock_offsets
+    is_one_clock = share_clock(signals)
     corrected = dict(signals)
-    for name, delay in delays.items():
-        t, values = signals[name]
-        corrected[name] = Signal(t - delay, values)
-    return corrected
+    notes = []
+    for one in late:
+        if is_corrected(one, choice, log.where, is_one_clock=is_one_clock):
+            t, values = signals[one.channel]
+            corrected[one.channel] = Signal(t - one.delay, values)
+            notes.append(f"{one.evidence}; corrected")
+        else:
+            notes.append(f"{one.evidence}; left as logged")
+    return on_one_clock(corrected, log.where), notes
 
 
 def _filled(recordings: Sequence[Recording], log: Log) -> dict[str, int]:

@@ -222,7 +222,7 @@ def test_trials_of_a_ship_of_another_speed(
 ) -> None:
     fast = changed(cao_zigzag, "frigate", u=3.0 * cao_zigzag["u"])
     assert (
-        "expected 1.544 to 15.44 m/s of a ship with a service speed of 7.7175 m/s"
+        "expected a speed of 1.544 to 15.44 m/s for a service speed of 7.7175 m/s"
         in refusal(fast)
     )
 

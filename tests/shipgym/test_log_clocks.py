@@ -8,7 +8,11 @@ import pytest
 from shipgym.errors import InputError
 from shipgym.trials.clock_offsets import clock_offset, reverses, rudder_clock_offset
 from shipgym.trials.cuts import check_cut, cut_log
-from shipgym.trials.late_channels import check_circle, find_late_channels
+from shipgym.trials.late_channels import (
+    check_circle,
+    find_late_channels,
+    is_corrected,
+)
 from shipgym.trials.resampling import Log, Signal, have_own_clocks, on_one_clock
 from shipgym.trials.trial import Trial
 
@@ -136,31 +140,33 @@ def test_a_delay_is_found_within_its_error(zigzag, delay):
 
 
 @pytest.mark.parametrize(
-    ("delay", "choice", "is_one_clock", "delays", "words"),
+    ("delay", "choice", "is_one_clock", "corrected"),
     [
-        (0.2, None, True, 0, None),
-        (0.55, None, True, 0, "left as logged"),
-        (4.0, "keep", True, 0, "left as logged"),
-        (4.0, "correct", True, 1, "corrected"),
-        (4.0, None, False, 1, "corrected"),
+        (0.55, None, True, False),
+        (4.0, "keep", True, False),
+        (4.0, "correct", True, True),
+        (4.0, None, False, True),
     ],
 )
 def test_a_late_yaw_rate_is_left_or_corrected(
-    zigzag, delay, choice, is_one_clock, delays, words
+    zigzag, delay, choice, is_one_clock, corrected
 ):
-    found = find_late_channels(late(zigzag, r=delay), choice, is_one_clock=is_one_clock)
-    assert list(found.delays.values()) == pytest.approx([delay] * delays, abs=0.3)
-    rate = [note for note in found.notes if note.startswith("the yaw rate is")]
-    assert [note.rpartition("; ")[2] for note in rate] == [words] * (words is not None)
+    rate, *_ = find_late_channels(late(zigzag, r=delay))
+    assert rate.channel == "r"
+    assert rate.delay == pytest.approx(delay, abs=0.3)
+    assert rate.evidence.startswith(f"the yaw rate is {rate.delay:.2f} s late against")
+    assert is_corrected(rate, choice, "log", is_one_clock=is_one_clock) == corrected
 
 
 def test_a_large_delay_on_one_clock_and_a_rudder_of_the_other_sign_are_refused(zigzag):
-    with pytest.raises(InputError, match="got one of which the yaw rate is 4"):
-        find_late_channels(late(zigzag, r=4.0), None, is_one_clock=True)
+    assert [one for one in find_late_channels(late(zigzag)) if one.channel == "r"] == []
+    rate, *_ = find_late_channels(late(zigzag, r=4.0))
+    with pytest.raises(InputError, match="log: expected one clock, got one of which"):
+        is_corrected(rate, None, "log", is_one_clock=True)
     log = late(zigzag)
     log.channels["delta"] *= -1.0
     with pytest.raises(InputError, match="a yaw acceleration that follows the rudder"):
-        find_late_channels(log, None, is_one_clock=True)
+        find_late_channels(log)
 
 
 @pytest.mark.parametrize(("others", "against"), [(10, True), (11, False)])

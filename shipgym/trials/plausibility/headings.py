@@ -29,25 +29,35 @@ def check_heading(
     is_fast = steps > fastest_turn * np.diff(t)
     jumps = is_fast & (steps > _LARGEST_JUMP)
     several_turns = np.abs(np.diff(logged)) > _TURN_AND_JUMP
-
-    if several_turns.any() or is_fast.mean() > 0.05:
-        worst = several_turns if several_turns.any() else is_fast
-        proposal = _likelier_unit(t, logged, locator)
-        yield LogFinding(
-            where=locator.place(np.argmax(worst) + 1, "psi"),
-            evidence=_evidence(t, logged, worst, locator),
-            remedy=f"likely a wrong unit: declare {locator.declaration(*proposal)}",
-            proposals=(proposal,),
-        )
+    if several_turns.any():
+        yield _in_another_unit(t, logged, several_turns, locator)
+    elif is_fast.mean() > 0.05:
+        yield _in_another_unit(t, logged, is_fast, locator)
     elif jumps.any():
-        yield LogFinding(
-            where=locator.place(np.argmax(jumps) + 1, "psi"),
-            evidence=_evidence(t, logged, jumps, locator),
-            remedy=(
-                'empty the wrong cells and import with repair = "interpolate", or'
-                " correct them"
-            ),
-        )
+        yield _jumping(t, logged, jumps, locator)
+
+
+def _in_another_unit(
+    t: Floats, logged: Floats, wrong: Flags, locator: Locator
+) -> LogFinding:
+    proposal = _likelier_unit(t, logged, locator)
+    return LogFinding(
+        where=locator.place(np.argmax(wrong) + 1, "psi"),
+        evidence=_evidence(t, logged, wrong, locator),
+        remedy=f"likely a wrong unit: declare {locator.declaration(*proposal)}",
+        proposals=(proposal,),
+    )
+
+
+def _jumping(t: Floats, logged: Floats, wrong: Flags, locator: Locator) -> LogFinding:
+    return LogFinding(
+        where=locator.place(np.argmax(wrong) + 1, "psi"),
+        evidence=_evidence(t, logged, wrong, locator),
+        remedy=(
+            'empty the wrong cells and import with repair = "interpolate", or correct'
+            " them"
+        ),
+    )
 
 
 def _evidence(t: Floats, logged: Floats, wrong: Flags, locator: Locator) -> str:
@@ -55,9 +65,10 @@ def _evidence(t: Floats, logged: Floats, wrong: Flags, locator: Locator) -> str:
     k = np.argmax(wrong)
     before = locator.in_file("psi", logged[k])
     after = locator.in_file("psi", logged[k + 1])
+    duration = t[k + 1] - t[k]
     return (
         f"expected a heading that turns by at most 60 deg/s, got {before} and then"
-        f" {after} within {t[k + 1] - t[k]:g} s"
+        f" {after} within {duration:g} s"
     )
 
 
