@@ -45,7 +45,7 @@ class _Windows:
         return slope
 
 
-class _Fit(NamedTuple):
+class _DelayFit(NamedTuple):
     """Least squares of a change by one regressor."""
 
     gain: float
@@ -83,7 +83,7 @@ def clock_offset(
     change = _unexplained(windows.slope(target), known)
     channel = integral(t, late)
 
-    def fit(delay: float) -> _Fit:
+    def fit(delay: float) -> _DelayFit:
         regressor = _unexplained(windows.slope(channel, delay), known)
         return _fit(change, regressor)
 
@@ -138,13 +138,13 @@ def _unexplained(values: Floats, directions: Floats) -> Floats:
     return left
 
 
-def _fit(change: Floats, regressor: Floats) -> _Fit:
+def _fit(change: Floats, regressor: Floats) -> _DelayFit:
     tiny = 1e-300  # in place of zero, by which is divided
     power = max(float(regressor @ regressor), tiny)
     gain = float(regressor @ change) / power
     residual = change - gain * regressor
     squares = float(residual @ residual)
-    return _Fit(gain, residual, max(squares, tiny))
+    return _DelayFit(gain, residual, max(squares, tiny))
 
 
 def _minimum(values: list[float]) -> _Minimum | None:
@@ -159,7 +159,7 @@ def _minimum(values: list[float]) -> _Minimum | None:
     return _Minimum(k + 0.5 * (before - after) / curvature, curvature)
 
 
-def _independent_samples(fit: _Fit) -> float:
+def _independent_samples(fit: _DelayFit) -> float:
     """Number of independent residuals, by the correlation of each with the next."""
     residual = fit.residual
     covariance = float(residual[1:] @ residual[:-1])

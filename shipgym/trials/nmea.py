@@ -60,7 +60,7 @@ class SentenceKind:
 
 
 @dataclass(frozen=True)
-class Quantity:
+class NmeaQuantity:
     """What a number in a sentence measures, in SI units and radians."""
 
     largest: float
@@ -93,10 +93,10 @@ def _sentence_kind(entry: Mapping[str, Any]) -> SentenceKind:
     return SentenceKind(**{**_with_letters(entry), "fields": fields})
 
 
-def _quantity(entry: Mapping[str, Any]) -> Quantity:
+def _quantity(entry: Mapping[str, Any]) -> NmeaQuantity:
     largest = _si(*entry["largest"])
     tolerance = _si(*entry["tolerance"]) if "tolerance" in entry else None
-    return Quantity(largest, tolerance, entry.get("channel"))
+    return NmeaQuantity(largest, tolerance, entry.get("channel"))
 
 
 def _si(number: float, unit: str) -> float:

@@ -25,9 +25,9 @@ def check_scale(trial: Trial, ship: Particulars, where: str) -> None:
     settle(_check_slenderness(ship, where))
     if "u" in trial:
         speed = np.hypot(trial["u"], trial.channels.get("v", 0.0))
-        settle(_check_speed(speed, ship, where))
         if "r" in trial:
             settle(_check_turning(trial["r"], speed, ship, where))
+        settle(_check_speed(speed, ship, where))
     if "n" in trial and ship.propeller_diameter is not None:
         settle(_check_shaft(trial["n"], ship.propeller_diameter, where))
 

@@ -213,7 +213,7 @@ def test_trials_of_a_model_at_another_scale(
     speed = {c: 0.1 * cao_zigzag[c] for c in ("u", "v")}
     channels = {**cao_zigzag.channels, **speed, "r": 10.0 * cao_zigzag["r"]}
     told = refusal(Trial(0.1 * cao_zigzag.t, channels, name="tank"))
-    assert "trial 'tank': yaw rate up to" in told
+    assert "trial 'tank': expected a yaw rate of" in told
     assert "likely the trial of another ship or scale" in told
 
 

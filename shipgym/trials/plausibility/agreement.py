@@ -18,7 +18,7 @@ from shipgym.trials.resampling import Log
 from shipgym.trials.units import DEGREE, QUANTITIES, UNITS, si_factor
 
 
-class Fit(NamedTuple):
+class GainFit(NamedTuple):
     """Least squares of a target by one regressor."""
 
     gain: complex
@@ -139,7 +139,7 @@ def check_velocity(log: Log, frame: str, locator: Locator) -> Iterator[LogFindin
         yield _other_speed(gain, log.t, locator)
 
 
-def _fit_track(log: Log, velocity: npt.NDArray[np.complex128]) -> Fit:
+def _fit_track(log: Log, velocity: npt.NDArray[np.complex128]) -> GainFit:
     """Fit the change of position, north + i east, by that which a velocity gives."""
     position = log.channels["x"] + 1j * log.channels["y"]
     moved = _at_windows(position)
@@ -199,12 +199,12 @@ def _without_trend(t: Floats, values: Floats) -> Floats:
     return left
 
 
-def _fit(regressor: npt.NDArray[Any], target: npt.NDArray[Any]) -> Fit:
+def _fit(regressor: npt.NDArray[Any], target: npt.NDArray[Any]) -> GainFit:
     """Fit target = gain * regressor by least squares."""
     power = np.vdot(regressor, regressor).real
     size = np.linalg.norm(target)
     if power == 0.0 or size == 0.0:
-        return Fit(gain=1.0 + 0.0j, misfit=1.0)
+        return GainFit(gain=1.0 + 0.0j, misfit=1.0)
     gain = complex(np.vdot(regressor, target) / power)
     residual = np.linalg.norm(target - gain * regressor)
-    return Fit(gain, float(residual / size))
+    return GainFit(gain, float(residual / size))
