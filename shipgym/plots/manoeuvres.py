@@ -68,20 +68,23 @@ def turning_figure(
     advance, transfer = indices.advance_lengths, indices.transfer_lengths
     if advance is not None and transfer is not None:
         corner = side * transfer
-        up = [corner, corner], [0.0, advance]
-        across = [0.0, corner], [advance, advance]
-        lines.append(_dimension(*up, f"advance {advance:.2f} L", PALETTE[1]))
-        lines.append(_dimension(*across, f"transfer {transfer:.2f} L", PALETTE[2]))
+        name = f"advance {advance:.2f} L"
+        lines.append(_dimension([corner, corner], [0.0, advance], name, PALETTE[1]))
+        name = f"transfer {transfer:.2f} L"
+        lines.append(_dimension([0.0, corner], [advance, advance], name, PALETTE[2]))
     diameter = indices.tactical_diameter_lengths
     if diameter is not None:
         level = float(np.interp(np.pi, side * turned, ahead))
-        across = [0.0, side * diameter], [level, level]
+        across = side * diameter
         name = f"tactical diameter {diameter:.2f} L"
-        lines.append(_dimension(*across, name, PALETTE[3]))
+        lines.append(_dimension([0.0, across], [level, level], name, PALETTE[3]))
 
-    ahead_axis = axis("ahead, ship lengths", zero=True, scaleanchor="x", scaleratio=1)
-    aside_axis = axis("to starboard, ship lengths", zero=True)
-    return panels([Panel(lines, aside_axis, ahead_axis)], height, hovermode="closest")
+    shown = Panel(
+        lines,
+        x=axis("to starboard, ship lengths", zero=True),
+        y=axis("ahead, ship lengths", zero=True, scaleanchor="x", scaleratio=1),
+    )
+    return panels([shown], height, hovermode="closest")
 
 
 def _dimension(x: list[float], y: list[float], name: str, colour: str) -> Any:
@@ -114,9 +117,12 @@ def spiral_figure(spiral: Spiral, height: int = 420) -> Figure:
         name = f"loop, {loop.width:.2f} deg wide"
         ends = [loop.middle - loop.width / 2, loop.middle + loop.width / 2]
         lines.append(line(ends, [0.0, 0.0], name, LIMIT, 2.6, hoverinfo="name"))
-    rudder_axis = axis("rudder, deg", zero=True)
-    rate_axis = axis("yaw rate, deg/s", zero=True)
-    return panels([Panel(lines, rudder_axis, rate_axis)], height, hovermode="closest")
+    shown = Panel(
+        lines,
+        x=axis("rudder, deg", zero=True),
+        y=axis("yaw rate, deg/s", zero=True),
+    )
+    return panels([shown], height, hovermode="closest")
 
 
 class _Loop(NamedTuple):
@@ -142,14 +148,18 @@ def pull_out_figure(trials: dict[str, Trial], height: int = 340) -> Figure:
     """
     lines = []
     for (label, trial), colour in zip(trials.items(), PALETTE, strict=False):
-        left = pull_out_indices(trial).residual_rate_deg_s
         part = thinned(trial)
-        since = trial.t[part] - _release(trial)
+        since_release = trial.t[part] - _release(trial)
         rate = np.degrees(trial["r"][part])
-        lines.append(line(since, rate, f"{label}: {left:.3f} deg/s left", colour))
-    time_axis = axis("time since the rudder was put amidships, s", zero=True)
-    rate_axis = axis("yaw rate, deg/s", zero=True)
-    return panels([Panel(lines, time_axis, rate_axis)], height)
+        left = pull_out_indices(trial).residual_rate_deg_s
+        name = f"{label}: {left:.3f} deg/s left"
+        lines.append(line(since_release, rate, name, colour))
+    shown = Panel(
+        lines,
+        x=axis("time since the rudder was put amidships, s", zero=True),
+        y=axis("yaw rate, deg/s", zero=True),
+    )
+    return panels([shown], height)
 
 
 def _release(trial: Trial) -> float:
