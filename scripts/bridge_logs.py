@@ -47,7 +47,7 @@ from identification.validation.warnings import why_unstable  # noqa: E402
 from shipgym import ShipModel, Trial  # noqa: E402
 from shipgym.errors import InputError  # noqa: E402
 from shipgym.manoeuvres import turning_circle, zigzag  # noqa: E402
-from shipgym.sea.conditions import Current, Weather, Wind  # noqa: E402
+from shipgym.sea import Current, Weather, Wind  # noqa: E402
 from shipgym.tasks.task import course_keeping_task  # noqa: E402
 from shipgym.trials.conventions import Conventions  # noqa: E402
 from shipgym.trials.identify_table import Options  # noqa: E402

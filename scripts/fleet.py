@@ -25,7 +25,7 @@ from agents.training.residual import ResidualVecEnv
 from shipgym.envs.engine import Engine, episode_keys
 from shipgym.envs.environment import spaces as spaces_of
 from shipgym.errors import InputError, UnstableModelError
-from shipgym.sea.conditions import Current, Weather
+from shipgym.sea import Current, Weather
 from shipgym.ships import ShipModel, load_model
 from shipgym.ships.term_table import Structure
 from shipgym.tasks.task import Task

@@ -60,7 +60,7 @@ from agents.training.settings import load_settings  # noqa: E402
 from identification import identify  # noqa: E402
 from shipgym.envs.engine import Engine  # noqa: E402
 from shipgym.files import read_json, write_json  # noqa: E402
-from shipgym.sea.conditions import Current, Weather  # noqa: E402
+from shipgym.sea import Current, Weather  # noqa: E402
 from tests.ships.mmg import MMG_SHIPS, mmg_ship  # noqa: E402
 
 #: The shipped models around which the fleet is drawn.

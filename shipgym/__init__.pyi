@@ -1,7 +1,6 @@
 from . import interchange as interchange
 from . import manoeuvres as manoeuvres
 from . import plots as plots
-from . import weather as weather
 from .envs.checker import check_vector_env as check_vector_env
 from .envs.episode import Episode as Episode
 from .envs.recording import RecordEpisode as RecordEpisode
@@ -14,11 +13,11 @@ from .errors import ManoeuvreError as ManoeuvreError
 from .errors import UnstableModelError as UnstableModelError
 from .examples import example_ship as example_ship
 from .manoeuvres import towing_tank as towing_tank
-from .sea.conditions import Current as Current
-from .sea.conditions import Waves as Waves
 from .sea.conditions import Weather as Weather
-from .sea.conditions import Wind as Wind
-from .sea.conditions import sea_states as sea_states
+from .sea.current_wind_waves import Current as Current
+from .sea.current_wind_waves import Waves as Waves
+from .sea.current_wind_waves import Wind as Wind
+from .sea.sea_states import sea_states as sea_states
 from .ships import ShipEquations as ShipEquations
 from .ships import ShipModel as ShipModel
 from .ships import list_models as list_models

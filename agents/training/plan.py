@@ -20,8 +20,8 @@ from agents.training.settings import (
 from shipgym.checks import check_choice, check_keys, check_whole
 from shipgym.envs.registration import environments
 from shipgym.errors import InputError
-from shipgym.sea.conditions import Weather
-from shipgym.sea.weather_column import as_weather, weather_column
+from shipgym.sea.conditions import Weather, as_weather
+from shipgym.sea.weather_column import weather_column
 
 #: Seeds below those that are scored: of training a thousand for each `seed`, then those
 #: held out.

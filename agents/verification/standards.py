@@ -24,7 +24,7 @@ from agents.verification.tracks import Track, track_task
 from shipgym.arrays import Floats
 from shipgym.errors import InputError
 from shipgym.files import read_toml
-from shipgym.sea.conditions import sea_states
+from shipgym.sea.sea_states import sea_states
 from shipgym.sea.waves import encounter_frequency
 from shipgym.ships import ShipModel
 

@@ -15,7 +15,8 @@ from agents.rollouts.metrics import path_following
 from agents.rollouts.rollout import rollout
 from shipgym.arrays import Floats
 from shipgym.envs.engine import Engine
-from shipgym.sea.conditions import Current, Weather
+from shipgym.sea.conditions import Weather
+from shipgym.sea.current_wind_waves import Current
 from shipgym.ships import ShipModel
 from shipgym.tasks.task import Task
 

@@ -8,7 +8,8 @@ import numpy as np
 from identification.regression.samples import Samples
 from shipgym import InputError, Particulars, Trial
 from shipgym.checks import check_flag, check_keys
-from shipgym.sea.wind import AIR_DENSITY, WindTable, wind_curves
+from shipgym.sea.wind import AIR_DENSITY, wind_curves
+from shipgym.sea.wind_coefficients import WindTable
 from shipgym.ships.inertia import particulars_inertia
 from shipgym.ships.mmg import MMG
 from shipgym.ships.simulate import WIND

@@ -1,9 +1,7 @@
-from .conditions import Current as Current
-from .conditions import SeaState as SeaState
-from .conditions import Waves as Waves
 from .conditions import Weather as Weather
-from .conditions import Wind as Wind
-from .conditions import sea_states as sea_states
+from .current_wind_waves import Current as Current
+from .current_wind_waves import Waves as Waves
+from .current_wind_waves import Wind as Wind
 from .drift import WaveDrift as WaveDrift
 from .drift import wave_drift as wave_drift
 from .estimates import weather_particulars as weather_particulars
@@ -13,6 +11,8 @@ from .gusts import gust_spectrum as gust_spectrum
 from .gusts import gust_variance as gust_variance
 from .motions import WaveMotion as WaveMotion
 from .motions import wave_motion as wave_motion
+from .sea_states import SeaState as SeaState
+from .sea_states import sea_states as sea_states
 from .waves import WaveFilter as WaveFilter
 from .waves import encounter_frequency as encounter_frequency
 from .waves import jonswap as jonswap
@@ -22,5 +22,5 @@ from .waves import wave_filter as wave_filter
 from .waves import wave_spectrum as wave_spectrum
 from .wind import AIR_DENSITY as AIR_DENSITY
 from .wind import WindCurves as WindCurves
-from .wind import WindTable as WindTable
 from .wind import wind_curves as wind_curves
+from .wind_coefficients import WindTable as WindTable

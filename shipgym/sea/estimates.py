@@ -1,4 +1,4 @@
-"""What wind and waves need of a ship's particulars, estimated where it is not given."""
+"""Particulars that wind and waves need, estimated where they are not given."""
 
 import math
 
@@ -7,15 +7,11 @@ from shipgym.ships.particulars import Estimates, Particulars, with_estimates
 
 GRAVITY = 9.80665
 
-#: Accommodation of the estimated ship, by length: height above deck, length; and its
-#: width by beam.
-_HOUSE_HEIGHT, _HOUSE_LENGTH, _HOUSE_WIDTH = 0.07, 0.15, 0.6
-
 
 def weather_particulars(particulars: Particulars) -> Particulars:
-    """Return particulars with all that the weather needs, estimated where absent, and marked so.
+    """Return particulars with all that the weather needs.
 
-    Beside :meth:`Particulars.completed`:
+    What is absent is estimated and marked so, as in :meth:`Particulars.completed`, and:
 
     * length overall 1.03 length;
     * areas above the water: a hull of freeboard T (1.3 - 1.05 CB), a straight line near
@@ -48,40 +44,55 @@ def freeboard(ship: Particulars) -> float:
     return ship.require("draught") * (1.3 - 1.05 * ship.require("block_coefficient"))
 
 
+def house_height(ship: Particulars) -> float:
+    """Estimated height of the superstructure above the deck, m."""
+    return 0.07 * ship.length
+
+
 def house_area(ship: Particulars) -> float:
     """Estimated lateral area of the superstructure, m2."""
-    return _HOUSE_LENGTH * _HOUSE_HEIGHT * ship.length**2
+    return 0.15 * ship.length * house_height(ship)
+
+
+def _frontal_area(ship: Particulars) -> float:
+    # the house is 0.6 of the beam wide
+    return ship.require("beam") * (freeboard(ship) + 0.6 * house_height(ship))
+
+
+def _lateral_area(ship: Particulars) -> float:
+    hull = ship.require("length_overall") * freeboard(ship)
+    return hull + house_area(ship)
 
 
 def _lateral_centroid(ship: Particulars) -> float:
-    house_at = -0.42 * ship.length if ship.require("block_coefficient") >= 0.75 else 0.0
+    full = ship.require("block_coefficient") >= 0.75
+    house_at = -0.42 * ship.length if full else 0.0
     return house_at * house_area(ship) / ship.require("lateral_area")
 
 
 def _centroid_height(ship: Particulars) -> float:
-    deck, house = freeboard(ship), house_area(ship)
+    deck = freeboard(ship)
     hull = ship.require("length_overall") * deck
-    middle_of_house = deck + 0.5 * _HOUSE_HEIGHT * ship.length
-    return (hull * 0.5 * deck + house * middle_of_house) / (hull + house)
+    house = house_area(ship)
+    middle_of_hull = 0.5 * deck
+    middle_of_house = deck + 0.5 * house_height(ship)
+    return (hull * middle_of_hull + house * middle_of_house) / (hull + house)
 
 
 def _roll_period(ship: Particulars) -> float:
-    beam, draught = ship.require("beam"), ship.require("draught")
+    B = ship.require("beam")
+    T = ship.require("draught")
     # the Code's length is in metres and of ships: smaller hulls, as models, are taken
     # for one of 100 m
-    C = 0.373 + 0.023 * beam / draught - 0.043 * max(ship.length, 100.0) / 100.0
-    return 2.0 * max(C, 0.3) * beam / math.sqrt(ship.require("metacentric_height"))
+    L = max(ship.length, 100.0)
+    C = 0.373 + 0.023 * B / T - 0.043 * L / 100.0
+    return 2.0 * max(C, 0.3) * B / math.sqrt(ship.require("metacentric_height"))
 
 
 _ESTIMATES: Estimates = {  # in this order
     "length_overall": lambda ship: 1.03 * ship.length,
-    "frontal_area": lambda ship: (
-        ship.require("beam")
-        * (freeboard(ship) + _HOUSE_WIDTH * _HOUSE_HEIGHT * ship.length)
-    ),
-    "lateral_area": lambda ship: (
-        ship.require("length_overall") * freeboard(ship) + house_area(ship)
-    ),
+    "frontal_area": _frontal_area,
+    "lateral_area": _lateral_area,
     "lateral_centroid": _lateral_centroid,
     "lateral_centroid_height": _centroid_height,
     "metacentric_height": lambda ship: 0.05 * ship.require("beam"),

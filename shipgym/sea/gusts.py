@@ -7,13 +7,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from shipgym.arrays import Floats
-from shipgym.sea.conditions import Wind
+from shipgym.sea.current_wind_waves import Wind
 
 #: Surface drag coefficient of Harris's and Davenport's spectra for a rough sea.
 SURFACE_DRAG = 0.003
-LENGTHS = {"harris": 1800.0, "davenport": 1200.0}  # m
-#: Frequencies for which NORSOK N-003 gives its spectrum, Hz.
-NORSOK_BAND = (1.0 / 2400.0, 0.5)
+LENGTH_SCALES = {"harris": 1800.0, "davenport": 1200.0}  # m
 
 
 class GaussMarkov(NamedTuple):
@@ -29,35 +27,49 @@ class GaussMarkov(NamedTuple):
     def spectrum(self, frequency: ArrayLike) -> Floats:
         """One-sided spectral density at frequencies in Hz."""
         T = self.time_constant
-        f = np.asarray(frequency, dtype=float)
-        return 4.0 * self.standard_deviation**2 * T / (1.0 + (2.0 * np.pi * f * T) ** 2)
+        variance = self.standard_deviation**2
+        omega = 2.0 * np.pi * np.asarray(frequency, dtype=float)
+        return 4.0 * variance * T / (1.0 + (omega * T) ** 2)
 
 
 def gust_spectrum(
     frequency: ArrayLike, speed: float, spectrum: str = "harris"
 ) -> Floats:
-    """One-sided spectral density of the wind speed about its mean, 10 m above the sea, (m/s)^2 / Hz.
+    """One-sided spectral density of the wind speed about its mean, (m/s)^2 / Hz.
 
-    Frequency in Hz, above 0, mean speed in m/s. With x = f L / V and the surface drag
-    coefficient k: Harris 1971, f S / (k V^2) = 4 x / (2 + x^2)^(5/6), L = 1800 m;
-    Davenport 1961, 4 x^2 / (1 + x^2)^(4/3) with L = 1200 m; NORSOK N-003 (2007), Froya
-    spectrum, S = 320 (V/10)^2 / (1 + y^n)^(5/(3n)) with y = 172 f (V/10)^(-3/4), n =
-    0.468.
+    It is that 10 m above the sea, for frequencies in Hz, above 0, and a mean speed V
+    in m/s. With x = f L / V and the surface drag coefficient k:
+
+    * Harris 1971: f S / (k V^2) = 4 x / (2 + x^2)^(5/6), L = 1800 m;
+    * Davenport 1961: f S / (k V^2) = 4 x^2 / (1 + x^2)^(4/3), L = 1200 m;
+    * NORSOK N-003 (2007), Froya spectrum: S = 320 (V/10)^2 / (1 + y^n)^(5/(3n)) with
+      y = 172 f (V/10)^(-3/4), n = 0.468.
     """
     f = np.asarray(frequency, dtype=float)
     if spectrum == "norsok":
-        y = 172.0 * f * (speed / 10.0) ** -0.75
-        froya: Floats = (
-            320.0 * (speed / 10.0) ** 2 / (1.0 + y**0.468) ** (5.0 / (3.0 * 0.468))
-        )
-        return froya
-    x = f * LENGTHS[spectrum] / speed
-    shape = (
-        x / (1.0 + x * x) ** (4.0 / 3.0)
-        if spectrum == "davenport"
-        else (2.0 + x * x) ** (-5.0 / 6.0)
-    )
-    return 4.0 * SURFACE_DRAG * speed * LENGTHS[spectrum] * shape
+        return froya_spectrum(f, speed)
+
+    L = LENGTH_SCALES[spectrum]
+    x = f * L / speed
+    if spectrum == "davenport":
+        shape = x / (1.0 + x * x) ** (4.0 / 3.0)
+    else:
+        shape = (2.0 + x * x) ** (-5.0 / 6.0)
+    return 4.0 * SURFACE_DRAG * speed * L * shape
+
+
+def froya_spectrum(f: Floats, speed: float) -> Floats:
+    """NORSOK's density at frequencies in Hz (`gust_spectrum`)."""
+    n = 0.468
+    relative = speed / 10.0
+    y = 172.0 * f * relative**-0.75
+    density: Floats = 320.0 * relative**2 / (1.0 + y**n) ** (5.0 / (3.0 * n))
+    return density
+
+
+def froya_frequencies(number: int) -> Floats:
+    """Frequencies over the band for which NORSOK N-003 gives its spectrum, Hz."""
+    return np.geomspace(1.0 / 2400.0, 0.5, number)
 
 
 def gust_variance(speed: float, spectrum: str = "harris") -> float:
@@ -71,26 +83,26 @@ def gust_variance(speed: float, spectrum: str = "harris") -> float:
     if spectrum == "harris":
         beta = math.gamma(1.0 / 2.0) * math.gamma(1.0 / 3.0) / math.gamma(5.0 / 6.0)
         return float(2.0 ** (2.0 / 3.0) * beta * SURFACE_DRAG * speed**2)
-    f = np.geomspace(*NORSOK_BAND, 400)
-    return float(np.trapezoid(f * gust_spectrum(f, speed, "norsok"), np.log(f)))
+    f = froya_frequencies(400)
+    return float(np.trapezoid(f * froya_spectrum(f, speed), np.log(f)))
 
 
 def gust_filter(wind: Wind) -> GaussMarkov:
-    """First-order process with the variance of the gusts (m/s)^2 and the same most energetic frequency.
+    """First-order process with the variance of the gusts and their most energetic frequency.
 
     f S(f) of a Gauss-Markov process is largest at f = 1 / (2 pi T); Harris's at sqrt(3)
     V / 1800 m, Davenport's at sqrt(3) V / 1200 m, so T = 165.4 m / V and 110.3 m / V;
     NORSOK's is found by search. `docs/weather.md` says how far the filter is from the
-    full spectra. Without gusts the deviation is 0.
+    full spectra. Without gusts the deviation, m/s, is 0.
     """
     if not wind.gust or wind.calm:
         return GaussMarkov(1.0, 0.0)
     if wind.spectrum == "norsok":
-        f = np.geomspace(*NORSOK_BAND, 2000)
-        peak = float(f[np.argmax(f * gust_spectrum(f, wind.speed, "norsok"))])
+        f = froya_frequencies(2000)
+        energy = f * froya_spectrum(f, wind.speed)
+        peak = float(f[np.argmax(energy)])
     else:
-        peak = math.sqrt(3.0) * wind.speed / LENGTHS[wind.spectrum]
-    return GaussMarkov(
-        1.0 / (2.0 * math.pi * peak),
-        math.sqrt(gust_variance(wind.speed, wind.spectrum)),
-    )
+        peak = math.sqrt(3.0) * wind.speed / LENGTH_SCALES[wind.spectrum]
+    time_constant = 1.0 / (2.0 * math.pi * peak)
+    deviation = math.sqrt(gust_variance(wind.speed, wind.spectrum))
+    return GaussMarkov(time_constant, deviation)

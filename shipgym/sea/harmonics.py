@@ -7,9 +7,6 @@ from numpy.typing import ArrayLike
 
 from shipgym.arrays import Floats
 
-#: Points of the grid over the full circle on which curves are tabulated.
-POINTS = 360
-
 
 class Harmonics(NamedTuple):
     """Fourier coefficients of the forces on a ship with port-starboard symmetry."""
@@ -22,24 +19,31 @@ class Harmonics(NamedTuple):
     K: Floats
 
 
-def circle(points: int = POINTS) -> Floats:
+def circle(points: int = 360) -> Floats:
     """Angles from 0 to below 2 pi, equally spaced, rad."""
     return np.linspace(0.0, 2.0 * np.pi, points, endpoint=False)
 
 
+def half_circle() -> Floats:
+    """Angles of :func:`circle` from 0 to pi, of which :func:`mirrored` makes the rest."""
+    angles = circle()
+    return angles[: len(angles) // 2 + 1]
+
+
 def mirrored(half: ArrayLike, sign: float = 1.0) -> Floats:
-    """A curve over :func:`circle` from its values from 0 to pi: even for a sign of 1, odd for -1."""
+    """Complete a curve from 0 to pi over :func:`circle`: even for a sign of 1, odd for -1."""
     values = np.asarray(half, dtype=float)
-    return np.concatenate([values, sign * values[-2:0:-1]])
+    other_side = values[-2:0:-1]
+    return np.concatenate([values, sign * other_side])
 
 
-def cosine_series(curve: Floats, n: int) -> Floats:
-    """Coefficients of the cosine series of an even curve over :func:`circle`: the mean, then n harmonics."""
+def cosine_coefficients(curve: Floats, n: int) -> Floats:
+    """Coefficients of an even curve over :func:`circle`: the mean, then n of cosines."""
     series: Floats = np.fft.rfft(curve).real[: n + 1] * 2.0 / len(curve)
     series[0] *= 0.5
     return series
 
 
-def sine_series(curve: Floats, n: int) -> Floats:
+def sine_coefficients(curve: Floats, n: int) -> Floats:
     """Coefficients of sin(angle), sin(2 angle), ... of an odd curve, shape (n,)."""
     return -np.fft.rfft(curve).imag[1 : n + 1] * 2.0 / len(curve)

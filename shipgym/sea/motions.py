@@ -1,4 +1,4 @@
-"""First-order heading and roll in waves: closed-form transfer functions, integrated over the spectrum."""
+"""First-order heading and roll in waves: closed-form responses over the spectrum."""
 
 from dataclasses import dataclass
 
@@ -6,9 +6,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from shipgym.arrays import Floats
-from shipgym.sea.conditions import Waves
+from shipgym.sea.current_wind_waves import Waves
 from shipgym.sea.estimates import GRAVITY, weather_particulars
-from shipgym.sea.harmonics import circle, cosine_series, mirrored
+from shipgym.sea.harmonics import circle, cosine_coefficients, half_circle, mirrored
 from shipgym.sea.waves import (
     encounter_frequency,
     frequencies,
@@ -16,10 +16,6 @@ from shipgym.sea.waves import (
     wave_spectrum,
 )
 from shipgym.ships.particulars import Particulars
-
-#: Relative damping of roll of a ship under way, with bilge keels (0.05 to 0.15 in the
-#: literature).
-ROLL_DAMPING = 0.1
 
 
 def heading_response(
@@ -36,44 +32,40 @@ def heading_response(
     """
     from scipy.special import spherical_jn
 
-    L, T = particulars.length, particulars.require("draught")
+    L = particulars.length
+    T = particulars.require("draught")
     k = np.asarray(omega, dtype=float) ** 2 / GRAVITY
     q = np.abs(0.5 * k * L * np.cos(chi))
-    return (
-        np.abs(np.sin(chi))
-        * np.exp(-0.5 * k * T)
-        * 6.0
-        / L
-        * np.abs(spherical_jn(1, q))
-    )
+    sideways = np.abs(np.sin(chi)) * np.exp(-0.5 * k * T)
+    return sideways * 6.0 / L * np.abs(spherical_jn(1, q))
 
 
 def roll_response(
     omega: ArrayLike, chi: ArrayLike, particulars: Particulars, speed: float
 ) -> Floats:
-    """Amplitude of roll by wave amplitude, rad/m; arguments as in :func:`heading_response`, speed in m/s.
+    """Amplitude of roll by wave amplitude, rad/m.
 
     A linear oscillator driven by the effective wave slope: k |sin chi| exp(-k T / 2),
     averaged over length and beam, times the amplification 1 / sqrt((1 - a^2)^2 + (2 z
     a)^2), a = encounter by natural frequency (Conolly 1969, Rolling and its
     stabilisation by active fins, Transactions of RINA 111; Lloyd 1989, Seakeeping). In
-    long waves it is the wave slope across the ship.
+    long waves it is the wave slope across the ship. The relative damping z is 0.1, of
+    a ship under way, with bilge keels (0.05 to 0.15 in the literature). Arguments are
+    those of :func:`heading_response`, and the speed, m/s.
     """
-    L, B, T = (
-        particulars.length,
-        particulars.require("beam"),
-        particulars.require("draught"),
-    )
+    L = particulars.length
+    B = particulars.require("beam")
+    T = particulars.require("draught")
     k = np.asarray(omega, dtype=float) ** 2 / GRAVITY
-    along, across = 0.5 * k * L * np.cos(chi) / np.pi, 0.5 * k * B * np.sin(chi) / np.pi
-    slope = (
-        k
-        * np.abs(np.sin(chi) * np.sinc(along) * np.sinc(across))
-        * np.exp(-0.5 * k * T)
-    )
+    over_length = np.sinc(0.5 * k * L * np.cos(chi) / np.pi)
+    over_beam = np.sinc(0.5 * k * B * np.sin(chi) / np.pi)
+    across = np.abs(np.sin(chi) * over_length * over_beam)
+    slope = k * across * np.exp(-0.5 * k * T)
+
     natural = 2.0 * np.pi / particulars.require("roll_period")
     a = encounter_frequency(omega, speed, chi) / natural
-    return slope / np.hypot(1.0 - a * a, 2.0 * ROLL_DAMPING * a)
+    z = 0.1
+    return slope / np.hypot(1.0 - a * a, 2.0 * z * a)
 
 
 @dataclass(frozen=True)
@@ -86,9 +78,7 @@ class WaveMotion:
     # shape (points,); rad2
     heading_variance: Floats
     roll_variance: Floats
-    estimated: tuple[
-        str, ...
-    ] = ()  # names of the particulars that were estimated for it
+    estimated: tuple[str, ...] = ()  # particulars that were estimated for it
 
     def heading_variance_harmonics(self, n: int = 8) -> Floats:
         """Cosine series of the heading's variance, mean first, shape (n + 1,).
@@ -96,36 +86,35 @@ class WaveMotion:
         A sum may be slightly negative where the variance is 0 (waves from ahead and
         astern): clip it there.
         """
-        return cosine_series(self.heading_variance, n)
+        return cosine_coefficients(self.heading_variance, n)
 
     def roll_variance_harmonics(self, n: int = 8) -> Floats:
-        """Cosine series of the roll's variance, mean first, shape (n + 1,); to be clipped at 0 as well."""
-        return cosine_series(self.roll_variance, n)
+        """Cosine series of the roll's variance, shape (n + 1,); clip it likewise."""
+        return cosine_coefficients(self.roll_variance, n)
 
 
 def wave_motion(
     waves: Waves, particulars: Particulars, speed: float | None = None
 ) -> WaveMotion:
-    """Variance of wave-induced heading and roll for waves from all directions; see `wave_drift`.
+    """Variance of wave-induced heading and roll for waves from all directions.
 
-    Roll meets the waves at `speed`, m/s, by default that of service, or 0 where that is
+    Particulars are estimated where absent, as in :func:`shipgym.sea.wave_drift`. Roll meets the waves at `speed`, m/s, by default that of service, or 0 where that is
     not known.
     """
     ship = weather_particulars(particulars)
-    chi = circle()
-    quarter = chi[: len(chi) // 2 + 1]  # symmetric: port as starboard
+    U = (ship.speed or 0.0) if speed is None else speed
+    chi = half_circle()[:, None]
     omega = frequencies(waves)
     spectrum = wave_spectrum(waves, omega)
-    U = (ship.speed or 0.0) if speed is None else speed
-    heading = heading_response(omega, quarter[:, None], ship)
-    roll = roll_response(omega, quarter[:, None], ship, U)
-    heading_variance, roll_variance = (
-        over_directions(
-            mirrored(np.trapezoid(response**2 * spectrum, omega, axis=-1)), waves
-        )
-        for response in (heading, roll)
-    )
+
+    def variance(response: Floats) -> Floats:
+        in_long_crests = np.trapezoid(response**2 * spectrum, omega, axis=-1)
+        return over_directions(mirrored(in_long_crests), waves)
+
     used = {"metacentric_height", "roll_period", "block_coefficient"}
     return WaveMotion(
-        chi, heading_variance, roll_variance, tuple(sorted(ship.estimated & used))
+        circle(),
+        heading_variance=variance(heading_response(omega, chi, ship)),
+        roll_variance=variance(roll_response(omega, chi, ship, U)),
+        estimated=tuple(sorted(ship.estimated & used)),
     )

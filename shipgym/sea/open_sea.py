@@ -1,16 +1,13 @@
-"""Current, wind and waves around one ship: the state of the sea, what it does to her, how it goes on.
+"""Current, wind and waves around one ship: state, forces and evolution.
 
 The ship's u, v are through the water. A current that is the same everywhere then only
 moves the frame; where it varies in time, the ship is carried along like the water she
 displaces (Froude-Krylov force and added mass; Fossen 2011, 8.3), so that u, v do not
 feel it either.
 
-Wind and drift forces are worked out at the start of a step and held over it. Random
-processes are linear filters of white noise, taken from step to step by their exact
-discrete form (Van Loan 1978, Computing integrals involving the matrix exponential):
-their variances do not depend on the step.
-
-Forces are Fourier series over an angle, already divided by the ship's inertia.
+Wind and drift forces are computed at the start of a step and held over it. Random
+processes are those of `filters`. Forces are Fourier series over an angle (`series`),
+already divided by the ship's inertia.
 """
 
 from math import fabs, pi, sqrt
@@ -22,46 +19,23 @@ from shipgym.engine.random import DRAW, S11, TO_UNIT, mix, normal
 from shipgym.engine.record_code import loader, storer
 from shipgym.engine.records import LANES, Layout
 from shipgym.engine.specialise import Part
-
-SLOWEST_ENCOUNTER = (
-    0.1  # of the wave frequency: in a following sea the filter keeps turning
+from shipgym.sea.filters import (
+    Filter,
+    Oscillator,
+    first_order_step,
+    oscillator_step,
+    stepped,
 )
-LEAST = 1e-12
+from shipgym.sea.series import Cosines, Sines, sum_of_cosines, sum_of_sines
 
-
-class Sines(NamedTuple):
-    """A series of sines: the amplitudes of six harmonics."""
-
-    first: float
-    second: float
-    third: float
-    fourth: float
-    fifth: float
-    sixth: float
-
-
-class Cosines(NamedTuple):
-    """A series of cosines: its mean, and the amplitudes of six harmonics."""
-
-    mean: float
-    first: float
-    second: float
-    third: float
-    fourth: float
-    fifth: float
-    sixth: float
-
-
-class Filter(NamedTuple):
-    """A first-order random process in its discrete form."""
-
-    kept: float  # part of the value that is left after a step
-    shock: float  # standard deviation of what is added in a step
-    deviation: float  # standard deviation of the process
+#: Lowest frequency of encounter by that of the waves: in a following sea the filter
+#: keeps turning.
+SLOWEST_ENCOUNTER = 0.1
+SLOWEST_WIND = 1e-6  # m/s, below which the relative wind has no direction
 
 
 class SeaParameters(NamedTuple):
-    """The sea that a ship meets; a direction that is not a number is drawn for each episode."""
+    """The sea of a ship; a direction that is NaN is drawn for each episode."""
 
     current_speed: float  # m/s
     current_towards: float  # rad
@@ -104,97 +78,98 @@ class Sea(NamedTuple):
     current_east: float
     gust: float  # m/s
     drift: float  # part of the mean drift force
-    heading_1: float  # oscillators of unit variance: displacement and velocity
-    heading_2: float
-    roll_1: float
-    roll_2: float
+    # oscillators of unit variance
+    heading_displacement: float
+    heading_velocity: float
+    roll_displacement: float
+    roll_velocity: float
     psi_wave: float  # first-order motion, rad, rad/s
     r_wave: float
     phi_wave: float
     p_wave: float
 
 
-def sine_series(cosine: float, sine: float, a: Sines) -> float:
-    """Sum of the sines of an angle's multiples, by the angle's cosine and sine (Chebyshev's recurrence)."""
-    d = 2.0 * cosine
-    s2 = d * sine
-    s3 = d * s2 - sine
-    s4 = d * s3 - s2
-    s5 = d * s4 - s3
-    s6 = d * s5 - s4
-    return (
-        a.first * sine
-        + a.second * s2
-        + a.third * s3
-        + a.fourth * s4
-        + a.fifth * s5
-        + a.sixth * s6
-    )
+class FromBow(NamedTuple):
+    """Angle from the bow to where wind or waves come from, to starboard positive."""
+
+    cosine: float
+    sine: float
 
 
-def cosine_series(cosine: float, a: Cosines) -> float:
-    """Mean and sum of the cosines of an angle's multiples."""
-    d = 2.0 * cosine
-    c2 = d * cosine - 1.0
-    c3 = d * c2 - cosine
-    c4 = d * c3 - c2
-    c5 = d * c4 - c3
-    c6 = d * c5 - c4
-    return a.mean + (
-        a.first * cosine
-        + a.second * c2
-        + a.third * c3
-        + a.fourth * c4
-        + a.fifth * c5
-        + a.sixth * c6
-    )
+class RelativeWind(NamedTuple):
+    """Wind as felt on board."""
+
+    squared_speed: float  # m2/s2
+    angle: FromBow
+
+
+class FirstOrderMotion(NamedTuple):
+    """First-order motion in waves: angles, rad, and their rates, rad/s."""
+
+    psi: float
+    r: float
+    phi: float
+    p: float
+
+
+def from_bow(sine: float, cosine: float, north: float, east: float) -> FromBow:
+    """Angle from the bow to a direction, by sine and cosine of the ship's heading."""
+    return FromBow(north * cosine + east * sine, east * cosine - north * sine)
+
+
+def relative_wind(
+    motion: Motion, sine: float, cosine: float, sea: Sea, p: SeaParameters
+) -> RelativeWind:
+    """Wind against that over the sea and against the ship's way over ground."""
+    speed = p.wind_speed + sea.gust
+    north = speed * sea.wind_north + sea.current_north
+    east = speed * sea.wind_east + sea.current_east
+    ahead = north * cosine + east * sine + motion.u
+    aside = east * cosine - north * sine + motion.v
+
+    squared = ahead * ahead + aside * aside
+    per_speed = 1.0 / sqrt(max(squared, SLOWEST_WIND * SLOWEST_WIND))
+    return RelativeWind(squared, FromBow(ahead * per_speed, aside * per_speed))
 
 
 def push(motion: Motion, sea: Sea, p: SeaParameters) -> Push:
     """Accelerations by wind and waves now, and the current; none in calm water."""
     if not HAS_SEA:
         return Push(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-    u, v = motion.u, motion.v
     sine, cosine = sin_cos(motion.psi)
-    speed = p.wind_speed + sea.gust
-    # where the air comes from, as felt on board: against the wind and against her way
-    # over ground
-    north = speed * sea.wind_north + sea.current_north
-    east = speed * sea.wind_east + sea.current_east
-    ahead = north * cosine + east * sine + u
-    aside = east * cosine - north * sine + v
-    square = ahead * ahead + aside * aside
-    per_speed = 1.0 / sqrt(max(square, LEAST))
-    c, s = ahead * per_speed, aside * per_speed
-    bow, beam = from_bow(sine, cosine, sea)
+    wind = relative_wind(motion, sine, cosine, sea, p)
+    waves = from_bow(sine, cosine, sea.waves_north, sea.waves_east)
+    squared = wind.squared_speed
+    wc, ws = wind.angle.cosine, wind.angle.sine
     drift = 1.0 + sea.drift
-    surge = square * cosine_series(c, p.wind_surge) + u * fabs(u) * p.still_air
-    sway = square * sine_series(c, s, p.wind_sway)
-    yaw = square * sine_series(c, s, p.wind_yaw)
+
+    still_air = motion.u * fabs(motion.u) * p.still_air
+    surge_by_wind = squared * sum_of_cosines(wc, p.wind_surge) + still_air
+    sway_by_wind = squared * sum_of_sines(wc, ws, p.wind_sway)
+    yaw_by_wind = squared * sum_of_sines(wc, ws, p.wind_yaw)
+
+    surge_by_waves = drift * sum_of_cosines(waves.cosine, p.drift_surge)
+    sway_by_waves = drift * sum_of_sines(waves.cosine, waves.sine, p.drift_sway)
+    yaw_by_waves = drift * sum_of_sines(waves.cosine, waves.sine, p.drift_yaw)
+
     roll = 0.0
     if HAS_ROLL:
-        roll = square * sine_series(c, s, p.wind_roll) + drift * sine_series(
-            bow, beam, p.drift_roll
-        )
+        roll_by_waves = drift * sum_of_sines(waves.cosine, waves.sine, p.drift_roll)
+        roll = squared * sum_of_sines(wc, ws, p.wind_roll) + roll_by_waves
     return Push(
-        surge + drift * cosine_series(bow, p.drift_surge),
-        sway + drift * sine_series(bow, beam, p.drift_sway),
-        yaw + drift * sine_series(bow, beam, p.drift_yaw),
+        surge_by_wind + surge_by_waves,
+        sway_by_wind + sway_by_waves,
+        yaw_by_wind + yaw_by_waves,
         roll,
         sea.current_north,
         sea.current_east,
     )
 
 
-def from_bow(sine: float, cosine: float, sea: Sea) -> tuple[float, float]:
-    """Cosine and sine of the angle from the bow to where the waves come from, to starboard positive."""
-    north, east = sea.waves_north, sea.waves_east
-    return north * cosine + east * sine, east * cosine - north * sine
-
-
-def encounter(bow: float, beam: float, u: float, v: float, p: SeaParameters) -> float:
-    """Frequency at which the ship meets the waves of the peak, rad/s (Fossen 2011, equation 8.106)."""
-    met = p.wave_frequency + p.wave_number * (u * bow + v * beam)
+def encounter(waves: FromBow, u: float, v: float, p: SeaParameters) -> float:
+    """Frequency at which a ship meets the waves of the peak, rad/s; Fossen 2011, (8.106)."""
+    ahead = u * waves.cosine + v * waves.sine
+    met = p.wave_frequency + p.wave_number * ahead
     return max(fabs(met), SLOWEST_ENCOUNTER * p.wave_frequency)
 
 
@@ -203,171 +178,125 @@ def encounter_frequency(motion: Motion, sea: Sea, p: SeaParameters) -> float:
     if not HAS_SEA:
         return 0.0
     sine, cosine = sin_cos(motion.psi)
-    bow, beam = from_bow(sine, cosine, sea)
-    return encounter(bow, beam, motion.u, motion.v, p)
+    waves = from_bow(sine, cosine, sea.waves_north, sea.waves_east)
+    return encounter(waves, motion.u, motion.v, p)
 
 
-def decay(x: float) -> float:
-    """exp(-x) for x >= 0, to 1e-7 up to 1."""
-    y = 0.25 * min(x, 8.0)
-    e = 1.0 / 720.0 - y * (1.0 / 5040.0)
-    e = 1.0 / 6.0 - y * (1.0 / 24.0 - y * (1.0 / 120.0 - y * e))
-    e = 1.0 - y * (1.0 - y * (1.0 / 2.0 - y * e))
-    return e * e * e * e
-
-
-def ring(
-    turn: float, p: SeaParameters
-) -> tuple[float, float, float, float, float, float]:
-    """Exact step of a lightly damped oscillator driven by white noise, with both states of variance 1.
-
-    z1' = w z2, z2' = -w z1 - 2 lambda w z2 + sqrt(4 lambda w) noise, over an angle w h
-    of `turn`. Returns P11, P12 = -P21 and P22 of the transition P, and the factors of
-    the noise, whose covariance is I - P P'.
-    """
-    kept = decay(p.wave_damping * turn)
-    sine, cosine = sin_cos(p.wave_ringing * turn)
-    swing, stay = kept * sine / p.wave_ringing, kept * cosine
-    p11, p22 = stay + p.wave_damping * swing, stay - p.wave_damping * swing
-    first = 1.0 - p11 * p11 - swing * swing
-    shared = swing * (p11 - p22)
-    second = 1.0 - swing * swing - p22 * p22
-    n22 = sqrt(max(second, LEAST))
-    n12 = shared / n22
-    n11 = sqrt(max(first - n12 * n12, 0.0))
-    return p11, swing, p22, n11, n12, n22
-
-
-def oscillated(
-    z1: float, z2: float, w1: float, w2: float, step: Any
-) -> tuple[float, float]:
-    """An oscillator after a step of `ring` with two numbers of noise."""
-    p11, p12, p22, n11, n12, n22 = step
-    return p11 * z1 + p12 * z2 + n11 * w1 + n12 * w2, p22 * z2 - p12 * z1 + n22 * w2
-
-
-def with_waves(
-    bow: float, beam: float, frequency: float, sea: Sea, p: SeaParameters
-) -> Sea:
-    """The sea with the first-order motion of a ship at an angle to the waves.
+def first_order_motion(
+    waves: FromBow,
+    frequency: float,
+    heading: Oscillator,
+    roll: Oscillator,
+    p: SeaParameters,
+) -> FirstOrderMotion:
+    """First-order motion of a ship at an angle to the waves, met at a frequency in rad/s.
 
     The angle is the oscillator's velocity, which is white noise through gain s / (s^2 +
     2 lambda w s + w^2). Its own derivative has no finite variance, so the rate is the
     part of it that swings, -w times the displacement: of variance w^2 and a quarter of
     a period ahead, as in waves of one frequency.
     """
-    heading = sqrt(max(cosine_series(bow, p.heading_variance), 0.0))
-    heel = sqrt(max(cosine_series(bow, p.roll_variance), 0.0)) if HAS_ROLL else 0.0
-    return Sea(
-        sea.mean_north,
-        sea.mean_east,
-        sea.wind_north,
-        sea.wind_east,
-        sea.waves_north,
-        sea.waves_east,
-        sea.current_north,
-        sea.current_east,
-        sea.gust,
-        sea.drift,
-        sea.heading_1,
-        sea.heading_2,
-        sea.roll_1,
-        sea.roll_2,
-        psi_wave=heading * sea.heading_2,
-        r_wave=-heading * frequency * sea.heading_1,
-        phi_wave=heel * sea.roll_2 if HAS_ROLL else 0.0,
-        p_wave=-heel * frequency * sea.roll_1 if HAS_ROLL else 0.0,
-    )
-
-
-def wandered(now: float, mean: float, filter: Filter, noise: float) -> float:
-    """A first-order process after a step."""
-    return mean + filter.kept * (now - mean) + filter.shock * noise
+    yaw = sqrt(max(sum_of_cosines(waves.cosine, p.heading_variance), 0.0))
+    psi = yaw * heading.velocity
+    r = -yaw * frequency * heading.displacement
+    if not HAS_ROLL:
+        return FirstOrderMotion(psi, r, 0.0, 0.0)
+    heel = sqrt(max(sum_of_cosines(waves.cosine, p.roll_variance), 0.0))
+    phi = heel * roll.velocity
+    return FirstOrderMotion(psi, r, phi, -heel * frequency * roll.displacement)
 
 
 def evolve(motion: Motion, h: float, sea: Sea, word: Any, p: SeaParameters) -> Sea:
-    """Current, gusts, drift force and first-order motion after a step of h seconds (as of the filters).
+    """Sea after a step of h seconds, which are those of the filters.
 
     `motion` is the ship at the end of the step, `sea` that at its beginning, `word`
     (uint64) the state of its random numbers, which then goes on by `EVOLVE_WORDS`.
     """
     sine, cosine = sin_cos(motion.psi)
-    bow, beam = from_bow(sine, cosine, sea)
-    frequency = encounter(bow, beam, motion.u, motion.v, p)
-    step = ring(frequency * h, p)
-    heading_1, heading_2 = oscillated(
-        sea.heading_1, sea.heading_2, normal(word, DRAW[4]), normal(word, DRAW[5]), step
-    )
-    roll_1, roll_2 = 0.0, 0.0
+    waves = from_bow(sine, cosine, sea.waves_north, sea.waves_east)
+    frequency = encounter(waves, motion.u, motion.v, p)
+
+    step = oscillator_step(frequency * h, p.wave_damping, p.wave_ringing)
+    heading = Oscillator(sea.heading_displacement, sea.heading_velocity)
+    heading = stepped(heading, normal(word, DRAW[4]), normal(word, DRAW[5]), step)
+    roll = Oscillator(0.0, 0.0)
     if HAS_ROLL:
-        roll_1, roll_2 = oscillated(
-            sea.roll_1, sea.roll_2, normal(word, DRAW[6]), normal(word, DRAW[7]), step
-        )
-    after = Sea(
-        sea.mean_north,
-        sea.mean_east,
-        sea.wind_north,
-        sea.wind_east,
-        sea.waves_north,
-        sea.waves_east,
-        wandered(sea.current_north, sea.mean_north, p.current, normal(word, DRAW[0])),
-        wandered(sea.current_east, sea.mean_east, p.current, normal(word, DRAW[1])),
-        p.gust.kept * sea.gust + p.gust.shock * normal(word, DRAW[2]),
-        p.drift.kept * sea.drift + p.drift.shock * normal(word, DRAW[3]),
-        heading_1,
-        heading_2,
-        roll_1,
-        roll_2,
-        0.0,
-        0.0,
-        0.0,
-        0.0,
+        roll = Oscillator(sea.roll_displacement, sea.roll_velocity)
+        roll = stepped(roll, normal(word, DRAW[6]), normal(word, DRAW[7]), step)
+    first_order = first_order_motion(waves, frequency, heading, roll, p)
+
+    north = first_order_step(
+        sea.current_north, sea.mean_north, p.current, normal(word, DRAW[0])
     )
-    return with_waves(bow, beam, frequency, after, p)
+    east = first_order_step(
+        sea.current_east, sea.mean_east, p.current, normal(word, DRAW[1])
+    )
+    return Sea(
+        mean_north=sea.mean_north,
+        mean_east=sea.mean_east,
+        wind_north=sea.wind_north,
+        wind_east=sea.wind_east,
+        waves_north=sea.waves_north,
+        waves_east=sea.waves_east,
+        current_north=north,
+        current_east=east,
+        gust=first_order_step(sea.gust, 0.0, p.gust, normal(word, DRAW[2])),
+        drift=first_order_step(sea.drift, 0.0, p.drift, normal(word, DRAW[3])),
+        heading_displacement=heading.displacement,
+        heading_velocity=heading.velocity,
+        roll_displacement=roll.displacement,
+        roll_velocity=roll.velocity,
+        psi_wave=first_order.psi,
+        r_wave=first_order.r,
+        phi_wave=first_order.phi,
+        p_wave=first_order.p,
+    )
 
 
 def direction(given: float, word: Any, draw: Any) -> float:
-    """A given direction, or one drawn from the full circle, rad."""
+    """Return a given direction, or one drawn from the full circle where it is NaN, rad."""
     drawn = 2.0 * pi * TO_UNIT * float(mix(word + draw) >> S11)
     return drawn if given != given else given
 
 
 def begin_sea(motion: Motion, word: Any, p: SeaParameters) -> Sea:
-    """Directions, and processes from their stationary distributions, as if the weather had always been there.
+    """Draw directions, and processes from their stationary distributions.
 
-    Wind and waves without a direction come from the same one. `word` then goes on by
-    `BEGIN_WORDS`.
+    The weather begins as if it had always been there. Wind and waves without a
+    direction come from the same one. `word` then goes on by `BEGIN_WORDS`.
     """
     towards_east, towards_north = sin_cos(direction(p.current_towards, word, DRAW[0]))
-    mean_north, mean_east = (
-        p.current_speed * towards_north,
-        p.current_speed * towards_east,
-    )
     wind_east, wind_north = sin_cos(direction(p.wind_from, word, DRAW[1]))
     waves_east, waves_north = sin_cos(direction(p.waves_from, word, DRAW[1]))
-    sea = Sea(
-        mean_north,
-        mean_east,
-        wind_north,
-        wind_east,
-        waves_north,
-        waves_east,
-        mean_north + p.current.deviation * normal(word, DRAW[2]),
-        mean_east + p.current.deviation * normal(word, DRAW[3]),
-        p.gust.deviation * normal(word, DRAW[4]),
-        p.drift.deviation * normal(word, DRAW[5]),
-        normal(word, DRAW[6]),
-        normal(word, DRAW[7]),
-        normal(word, DRAW[8]),
-        normal(word, DRAW[9]),
-        0.0,
-        0.0,
-        0.0,
-        0.0,
-    )
+    mean_north = p.current_speed * towards_north
+    mean_east = p.current_speed * towards_east
+
+    heading = Oscillator(normal(word, DRAW[6]), normal(word, DRAW[7]))
+    roll = Oscillator(normal(word, DRAW[8]), normal(word, DRAW[9]))
     sine, cosine = sin_cos(motion.psi)
-    bow, beam = from_bow(sine, cosine, sea)
-    return with_waves(bow, beam, encounter(bow, beam, motion.u, motion.v, p), sea, p)
+    waves = from_bow(sine, cosine, waves_north, waves_east)
+    frequency = encounter(waves, motion.u, motion.v, p)
+    first_order = first_order_motion(waves, frequency, heading, roll, p)
+    return Sea(
+        mean_north=mean_north,
+        mean_east=mean_east,
+        wind_north=wind_north,
+        wind_east=wind_east,
+        waves_north=waves_north,
+        waves_east=waves_east,
+        current_north=mean_north + p.current.deviation * normal(word, DRAW[2]),
+        current_east=mean_east + p.current.deviation * normal(word, DRAW[3]),
+        gust=p.gust.deviation * normal(word, DRAW[4]),
+        drift=p.drift.deviation * normal(word, DRAW[5]),
+        heading_displacement=heading.displacement,
+        heading_velocity=heading.velocity,
+        roll_displacement=roll.displacement,
+        roll_velocity=roll.velocity,
+        psi_wave=first_order.psi,
+        r_wave=first_order.r,
+        phi_wave=first_order.phi,
+        p_wave=first_order.p,
+    )
 
 
 def sea_records(windy: bool) -> tuple[Any, Any]:

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from shipgym.arrays import Floats
-from shipgym.sea.conditions import Waves
+from shipgym.sea.current_wind_waves import Waves
 from shipgym.sea.estimates import GRAVITY, weather_particulars
 from shipgym.sea.gusts import GaussMarkov
 from shipgym.sea.harmonics import circle
@@ -27,11 +27,12 @@ class WaveFilter(NamedTuple):
 
     def spectrum(self, omega: ArrayLike) -> Floats:
         """One-sided spectral density of the output per rad/s, whose integral is 1."""
-        w, w0 = np.asarray(omega, dtype=float), self.peak_frequency
-        power = (self.gain * w) ** 2 / (
-            (w0**2 - w**2) ** 2 + (2.0 * self.damping * w0 * w) ** 2
-        )
-        return power / np.pi
+        w = np.asarray(omega, dtype=float)
+        w0 = self.peak_frequency
+        stiffness = w0**2 - w**2
+        damping = 2.0 * self.damping * w0 * w
+        response = (self.gain * w) ** 2 / (stiffness**2 + damping**2)
+        return response / np.pi
 
 
 def pierson_moskowitz(omega: ArrayLike, Hs: float, Tp: float) -> Floats:
@@ -41,10 +42,10 @@ def pierson_moskowitz(omega: ArrayLike, Hs: float, Tp: float) -> Floats:
     integral is Hs^2 / 16.
     """
     peak = 2.0 * np.pi / Tp
-    ratio = (
-        np.maximum(np.asarray(omega, dtype=float), 0.02 * peak) / peak
-    )  # exp(-1.25 * 50^4) is 0
-    density: Floats = 5.0 / 16.0 * Hs**2 / peak * ratio**-5 * np.exp(-1.25 * ratio**-4)
+    # the density is 0 below a fiftieth of the peak: exp(-1.25 * 50^4)
+    ratio = np.maximum(np.asarray(omega, dtype=float), 0.02 * peak) / peak
+    at_high_frequencies = 5.0 / 16.0 * Hs**2 / peak * ratio**-5
+    density: Floats = at_high_frequencies * np.exp(-1.25 * ratio**-4)
     return density
 
 
@@ -55,26 +56,26 @@ def jonswap(omega: ArrayLike, Hs: float, Tp: float, gamma: float = 3.3) -> Float
     exact integral; a peak enhancement gamma of 1 gives :func:`pierson_moskowitz`.
     """
     ratio = np.asarray(omega, dtype=float) * Tp / (2.0 * np.pi)
-    return (
-        pierson_moskowitz(omega, Hs, Tp) * _enhancement(ratio, gamma) / _enhanced(gamma)
-    )
+    plain = pierson_moskowitz(omega, Hs, Tp)
+    return plain * _enhancement(ratio, gamma) / _enhanced_variance(gamma)
 
 
 def _enhancement(ratio: Floats, gamma: float) -> Floats:
-    width = np.where(ratio <= 1.0, 0.07, 0.09)
-    return gamma ** np.exp(-0.5 * ((ratio - 1.0) / width) ** 2)
+    """gamma^r over frequency by peak frequency."""
+    sigma = np.where(ratio <= 1.0, 0.07, 0.09)
+    r = np.exp(-0.5 * ((ratio - 1.0) / sigma) ** 2)
+    return gamma**r
 
 
 @lru_cache(maxsize=64)
-def _enhanced(gamma: float) -> float:
-    """What the peak enhancement multiplies the variance with."""
+def _enhanced_variance(gamma: float) -> float:
+    """Variance with peak enhancement by that without."""
     logarithm = np.linspace(np.log(0.2), np.log(50.0), 4001)
     ratio = np.exp(logarithm)
     plain = pierson_moskowitz(ratio, 4.0, 2.0 * np.pi) * ratio
-    return float(
-        np.trapezoid(plain * _enhancement(ratio, gamma), logarithm)
-        / np.trapezoid(plain, logarithm)
-    )
+    enhanced = plain * _enhancement(ratio, gamma)
+    variance = np.trapezoid(enhanced, logarithm)
+    return float(variance / np.trapezoid(plain, logarithm))
 
 
 def wave_spectrum(waves: Waves, omega: ArrayLike) -> Floats:
@@ -88,28 +89,30 @@ def frequencies(waves: Waves) -> Floats:
 
 
 def over_directions(curve: Floats, waves: Waves) -> Floats:
-    """A curve over :func:`shipgym.sea.harmonics.circle` averaged over the directions of a sea's waves.
+    """Average a curve over the directions of a sea's waves.
 
-    The curve is what waves from one direction do (a variance or a mean force, which add
-    up), the average over the mean direction.
+    The curve, over :func:`shipgym.sea.harmonics.circle`, is the effect of waves from
+    one direction (a variance or a mean force, which add up); the average is over the
+    mean direction.
     """
     if waves.spreading == "long-crested":
         return curve
-    mu = circle(len(curve))
-    weight = np.where(np.cos(mu) > 0.0, np.cos(mu) ** 2, 0.0)
-    return np.fft.irfft(
-        np.fft.rfft(curve) * np.fft.rfft(weight / weight.sum()), n=len(curve)
-    )
+    toward = np.cos(circle(len(curve)))
+    weight = np.where(toward > 0.0, toward**2, 0.0)
+    share = weight / weight.sum()
+    convolution = np.fft.rfft(curve) * np.fft.rfft(share)
+    return np.fft.irfft(convolution, n=len(curve))
 
 
 def encounter_frequency(omega: ArrayLike, speed: ArrayLike, chi: ArrayLike) -> Floats:
-    """Frequency of encounter of a ship under way in deep water: |omega + omega^2 U cos(chi) / g|, rad/s.
+    """Frequency of encounter in deep water: |omega + omega^2 U cos(chi) / g|, rad/s.
 
     `omega` is of the waves, rad/s, `speed` the ship's, m/s; `chi`, rad, is where the
     waves come from, seen from the bow: 0 ahead, pi / 2 from starboard.
     """
     w = np.asarray(omega, dtype=float)
-    met: Floats = np.abs(w + w * w * np.asarray(speed) * np.cos(chi) / GRAVITY)
+    ahead = np.asarray(speed) * np.cos(chi)
+    met: Floats = np.abs(w + w * w * ahead / GRAVITY)
     return met
 
 
@@ -134,14 +137,16 @@ def _fitted_damping(gamma: float) -> float:
     target = jonswap(w, 4.0, 2.0 * np.pi, gamma)
 
     def misfit(damping: float) -> float:
-        error = WaveFilter(1.0, damping, 2.0 * damping**0.5).spectrum(w) - target
+        filtered = WaveFilter(1.0, damping, gain=2.0 * damping**0.5)
+        error = filtered.spectrum(w) - target
         return float(error @ error)
 
-    return float(minimize_scalar(misfit, bounds=(0.01, 1.0), method="bounded").x)
+    fitted = minimize_scalar(misfit, bounds=(0.01, 1.0), method="bounded")
+    return float(fitted.x)
 
 
 def draught_attenuation(omega: ArrayLike, draught: float) -> Floats:
-    """Share of the drift force of an infinitely deep hull that one of this draught (m) takes up.
+    """Drift force on a hull of this draught (m) by that on an infinitely deep one.
 
     pi^2 I1^2 / (pi^2 I1^2 + K1^2) of k T, from 0 in long to 1 in short waves (Fujii &
     Takahashi 1975, Experimental study on the resistance increase of a ship in regular
@@ -150,12 +155,13 @@ def draught_attenuation(omega: ArrayLike, draught: float) -> Floats:
     from scipy.special import i1e, k1e
 
     kT = np.asarray(omega, dtype=float) ** 2 * draught / GRAVITY
-    ratio = k1e(kT) * np.exp(-2.0 * np.minimum(kT, 300.0)) / (np.pi * i1e(kT))
+    K1_by_I1 = k1e(kT) * np.exp(-2.0 * np.minimum(kT, 300.0)) / i1e(kT)
+    ratio = K1_by_I1 / np.pi
     return 1.0 / (1.0 + ratio**2)
 
 
 def slow_drift(waves: Waves, particulars: Particulars) -> GaussMarkov:
-    """Process s(t) of the slowly varying drift force, mean force * (1 + s); s is without unit.
+    """Process s(t), without unit, of the slowly varying drift force: mean force * (1 + s).
 
     By Newman's approximation (Newman 1974, Second order slowly varying forces on
     vessels in irregular waves) the force is the squared envelope of a narrow-banded
@@ -171,11 +177,9 @@ def slow_drift(waves: Waves, particulars: Particulars) -> GaussMarkov:
         return GaussMarkov(1.0, 0.0)
     omega = frequencies(waves)
     draught = weather_particulars(particulars).require("draught")
-    shape = jonswap(
-        omega, 1.0, waves.peak_period, waves.gamma
-    )  # the height does not matter
-    weighted = shape * draught_attenuation(omega, draught)
-    time_constant = (
-        np.pi * np.trapezoid(weighted**2, omega) / np.trapezoid(weighted, omega) ** 2
-    )
+    # the height does not matter
+    shape = jonswap(omega, 1.0, waves.peak_period, waves.gamma)
+    Sc = shape * draught_attenuation(omega, draught)
+    at_zero = np.trapezoid(Sc**2, omega)
+    time_constant = np.pi * at_zero / np.trapezoid(Sc, omega) ** 2
     return GaussMarkov(float(time_constant), 1.0)

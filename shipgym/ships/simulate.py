@@ -12,9 +12,9 @@ from shipgym.engine.loops import ship_loop
 from shipgym.engine.records import leaves
 from shipgym.engine.trajectories import SEA_CHANNELS
 from shipgym.errors import InputError, UnstableModelError
-from shipgym.sea.conditions import Weather
+from shipgym.sea.conditions import Weather, as_weather
 from shipgym.sea.open_sea import Sea
-from shipgym.sea.weather_column import as_weather, weather_column
+from shipgym.sea.weather_column import weather_column
 from shipgym.ships.manoeuvring_model import (
     ManoeuvringModel,
     checked_orders,

@@ -13,8 +13,7 @@ from shipgym.engine.motion import Ship
 from shipgym.errors import InputError
 from shipgym.instruments.sensor_set import SensorSet, read_sensors, shipped_sensors
 from shipgym.python_files import asked
-from shipgym.sea.conditions import Weather
-from shipgym.sea.weather_column import as_weather
+from shipgym.sea.conditions import Weather, as_weather
 from shipgym.ships import ShipModel
 from shipgym.ships.manoeuvring_model import ship_of
 from shipgym.tasks.definition import TaskDefinition, read_definition

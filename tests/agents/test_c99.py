@@ -42,7 +42,7 @@ from shipgym.engine import mathematics
 from shipgym.engine.motion import Motion
 from shipgym.engine.specialise import Specialisation
 from shipgym.errors import InputError
-from shipgym.sea.conditions import Current, Weather, Wind
+from shipgym.sea import Current, Weather, Wind
 from shipgym.sea.open_sea import sea_functions
 from shipgym.sea.weather_column import CALM
 from shipgym.ships import load_model

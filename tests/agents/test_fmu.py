@@ -13,7 +13,7 @@ from agents.deployment.autopilot import Autopilot
 from agents.deployment.c99 import autopilot_source, ship_source
 from agents.deployment.fmu import write_fmu
 from shipgym.errors import InputError
-from shipgym.sea.conditions import Current, Weather, Wind
+from shipgym.sea import Current, Weather, Wind
 from shipgym.tasks.task import Task
 from tests.agents.policies import MARINER
 

@@ -15,7 +15,7 @@ from agents import (
 )
 from shipgym.envs.engine import Engine
 from shipgym.errors import InputError
-from shipgym.sea.conditions import Current, Weather
+from shipgym.sea import Current, Weather
 from shipgym.ships import load_model
 from shipgym.tasks.task import Task, path_following_task
 

@@ -10,7 +10,7 @@ from agents.controllers.preview_mpc import FAR, Ahead
 from agents.rollouts.rollout import episode_costs
 from shipgym.envs.engine import Engine
 from shipgym.errors import InputError
-from shipgym.sea.conditions import Current, Weather
+from shipgym.sea import Current, Weather
 from shipgym.ships import load_model
 from shipgym.tasks.task import path_following_task
 

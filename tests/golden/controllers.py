@@ -33,7 +33,7 @@ from agents.controllers.registry import controller_class
 from agents.controllers.robustness import margin_uncertainty
 from agents.suites.suite import BenchmarkTask, load_suite
 from shipgym import ShipModel, load_model
-from shipgym.sea.conditions import Current, Weather
+from shipgym.sea import Current, Weather
 from shipgym.ships.conversions import nomoto2_ship
 from shipgym.ships.linear import nomoto
 from shipgym.tasks.task import Task, course_keeping_task, path_following_task

@@ -48,7 +48,7 @@ from agents.suites.suite import (
 )
 from agents.verification.monte_carlo import monte_carlo
 from shipgym import InputError, load_model
-from shipgym.sea.conditions import Current, Weather
+from shipgym.sea import Current, Weather
 from shipgym.ships.conversions import nomoto2_ship
 from shipgym.ships.linear import nomoto
 from shipgym.tasks.task import Task, course_keeping_task, path_following_task

@@ -9,16 +9,13 @@ import numpy as np
 
 import shipgym
 from shipgym import sea
-from shipgym.sea.drift import (
-    added_resistance,
-    end_angle,
-    reflection_coefficients,
-    waterline,
-)
+from shipgym.sea.added_resistance import added_resistance, end_angle
+from shipgym.sea.drift import reflection_coefficients, waterline
+from shipgym.sea.mobility import mobility_matrix
 from shipgym.sea.motions import heading_response, roll_response
 from shipgym.sea.waves import draught_attenuation, over_directions
-from shipgym.sea.weather_column import mobility_matrix, weather_column
-from shipgym.sea.wind import coefficient_names
+from shipgym.sea.weather_column import weather_column
+from shipgym.sea.wind_coefficients import coefficient_names
 from shipgym.trials.sensors import SEA_TRIAL, Sensor, Sensors
 from tests.golden.store import Floats, numbers_in
 

@@ -19,7 +19,7 @@ from shipgym import ShipModel, Trial
 from shipgym.errors import InputError
 from shipgym.manoeuvres import turning_circle, zigzag
 from shipgym.sea.conditions import Current, Weather, Wind
-from shipgym.sea.weather_column import mobility_matrix
+from shipgym.sea.mobility import mobility_matrix
 from shipgym.sea.wind import AIR_DENSITY, wind_curves
 from shipgym.ships.simulate import open_loop
 from shipgym.trials.conventions import Conventions

@@ -76,12 +76,11 @@ def test_every_public_name_is_there(package):
         _ = package.weathr
 
 
-def test_weather_and_towing_tank_are_reached_by_their_names():
+def test_wind_and_towing_tank_are_reached_by_their_names():
     from shipgym.manoeuvres import towing_tank
-    from shipgym.weather import Wind
 
     assert shipgym.towing_tank is towing_tank
-    assert shipgym.weather.Wind is Wind is shipgym.Wind is shipgym.sea.Wind
+    assert shipgym.Wind is shipgym.sea.Wind
 
 
 def test_the_import_registers_environments_and_loads_nothing_that_compiles():

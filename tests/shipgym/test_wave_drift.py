@@ -9,15 +9,11 @@ from hypothesis import strategies as st
 
 from shipgym import InputError, Particulars, Waves, load_model, sea_states
 from shipgym.sea import slow_drift, wave_drift, wave_motion, wave_spectrum
-from shipgym.sea.drift import (
-    _speed_factor,
-    added_resistance,
-    end_angle,
-    reflection_coefficients,
-)
+from shipgym.sea.added_resistance import added_resistance, end_angle, speed_factor
+from shipgym.sea.drift import reflection_coefficients
 from shipgym.sea.estimates import GRAVITY, weather_particulars
+from shipgym.sea.mobility import mobility_matrix, roll_inertia
 from shipgym.sea.waves import draught_attenuation
-from shipgym.sea.weather_column import mobility_matrix, roll_inertia
 from shipgym.ships import get_structure
 from shipgym.ships.inertia import inertia
 from tests.shipgym.harmonics import evaluate_cosines, evaluate_sines
@@ -117,7 +113,7 @@ def test_the_factor_of_speed_changes_its_law_at_a_froude_number_of_0_12():
     froude = np.array([0.0, 0.1, 0.1199, 0.1201, 0.13, 0.3])
     slow, fast = 0.0072 + 0.1676 * froude, froude**1.5 * np.exp(-3.5 * froude)
     np.testing.assert_allclose(
-        _speed_factor(froude), np.r_[slow[:3], fast[3:]], rtol=1e-12
+        speed_factor(froude), np.r_[slow[:3], fast[3:]], rtol=1e-12
     )
     assert slow[2] == pytest.approx(fast[3], rel=2e-3)
 

@@ -26,14 +26,16 @@ from shipgym.sea import (
     Waves,
     Weather,
     Wind,
+    filters,
     gust_filter,
     open_sea,
+    series,
     wave_motion,
     wind_curves,
 )
 from shipgym.sea.drift import wave_drift
+from shipgym.sea.mobility import mobility_matrix
 from shipgym.sea.open_sea import Sea, SeaParameters
-from shipgym.sea.weather_column import mobility_matrix
 from shipgym.ships.simulate import Conditions, Passage, open_loop, simulate
 from shipgym.tasks.task import course_keeping_task
 from shipgym.trials.sensors import Sensors
@@ -228,7 +230,7 @@ def test_heading_in_waves_has_the_variance_and_the_rhythm_of_the_filter(
 ):
     """With a body on which nothing acts, so that it keeps its course: variance, correlation and yaw rate."""
     none = lambda waves, ship: replace(wave_drift(waves, ship), X=ZERO, Y=ZERO, N=ZERO)  # noqa: E731
-    monkeypatch.setattr("shipgym.sea.weather_column.wave_drift", none)
+    monkeypatch.setattr("shipgym.sea.ship_in_weather.wave_drift", none)
     waves, steps = Waves(3.25, 9.7, 60.0), 40000
     model, state = inert(mariner, mariner.particulars["speed"])
     trial = ahead(model, Weather(waves=waves), steps, dt, state=state)
@@ -287,8 +289,8 @@ def test_numbers_of_the_generator_are_normal():
     assert abs(np.mean(white[1:] * white[:-1])) < 4.0 / np.sqrt(n)
 
 
-NO_SINES, NO_COSINES = open_sea.Sines(*[0.0] * 6), open_sea.Cosines(*[0.0] * 7)
-NO_FILTER = open_sea.Filter(1.0, 0.0, 0.0)
+NO_SINES, NO_COSINES = series.Sines(*[0.0] * 6), series.Cosines(*[0.0] * 7)
+NO_FILTER = filters.Filter(1.0, 0.0, 0.0)
 
 
 def parameters(**given):
@@ -317,21 +319,21 @@ angle, few = st.floats(-3.1, 3.1), st.floats(-2.0, 2.0)
 def test_series_over_an_angle_are_fouriers(angle, a):
     cosine, sine, k = np.cos(angle), np.sin(angle), np.arange(1, 7)
     expected = a[0] + np.cos(k * angle) @ a[1:]
-    assert open_sea.cosine_series(cosine, open_sea.Cosines(*a)) == pytest.approx(
+    assert series.sum_of_cosines(cosine, series.Cosines(*a)) == pytest.approx(
         expected, abs=1e-9
     )
-    sines = open_sea.sine_series(cosine, sine, open_sea.Sines(*a[1:]))
+    sines = series.sum_of_sines(cosine, sine, series.Sines(*a[1:]))
     assert sines == pytest.approx(np.sin(k * angle) @ a[1:], abs=1e-9)
 
 
 def test_what_decays_does_so_exponentially_and_is_gone_after_eight_time_constants():
     x = np.linspace(0.0, 1.0, 41)
     np.testing.assert_allclose(
-        [open_sea.decay(one) for one in x], np.exp(-x), rtol=0.0, atol=1.2e-9
+        [filters.decay(one) for one in x], np.exp(-x), rtol=0.0, atol=1.2e-9
     )
-    assert open_sea.decay(2.0) == pytest.approx(np.exp(-2.0), abs=1e-6)
-    assert open_sea.decay(20.0) == open_sea.decay(8.5) == open_sea.decay(8.0) < 4e-4
-    assert open_sea.decay(7.9) > open_sea.decay(8.0)
+    assert filters.decay(2.0) == pytest.approx(np.exp(-2.0), abs=1e-6)
+    assert filters.decay(20.0) == filters.decay(8.5) == filters.decay(8.0) < 4e-4
+    assert filters.decay(7.9) > filters.decay(8.0)
 
 
 def test_a_ship_meets_the_waves_at_a_tenth_of_their_frequency_at_least():
@@ -347,24 +349,29 @@ def test_a_ship_meets_the_waves_at_a_tenth_of_their_frequency_at_least():
         (1.09 * w / k, 0.1 * w),
         (3.0 * w / k, 2.0 * w),
     ):
-        assert open_sea.encounter(-1.0, 0.0, speed, 0.3, p) == pytest.approx(met)
-        assert open_sea.encounter(0.0, -1.0, 0.3, speed, p) == pytest.approx(met)
-    assert open_sea.encounter(0.6, 0.8, 5.0, -2.0, p) == pytest.approx(
-        w + k * (3.0 - 1.6)
-    )
+        assert open_sea.encounter(
+            open_sea.FromBow(-1.0, 0.0), speed, 0.3, p
+        ) == pytest.approx(met)
+        assert open_sea.encounter(
+            open_sea.FromBow(0.0, -1.0), 0.3, speed, p
+        ) == pytest.approx(met)
+    assert open_sea.encounter(
+        open_sea.FromBow(0.6, 0.8), 5.0, -2.0, p
+    ) == pytest.approx(w + k * (3.0 - 1.6))
 
 
 @given(st.floats(0.0, 2.0))
 def test_an_oscillator_in_waves_steps_exactly(turn):
     """Its transition is the matrix exponential; its noise keeps both variances at 1."""
     p = parameters()
-    p11, p12, p22, n11, n12, n22 = open_sea.ring(turn, p)
+    step = filters.oscillator_step(turn, p.wave_damping, p.wave_ringing)
+    p11, p12, p22, n11, n12, n22 = step
     transition = np.array([[p11, p12], [-p12, p22]])
     exact = expm(turn * np.array([[0.0, 1.0], [-1.0, -2.0 * p.wave_damping]]))
     np.testing.assert_allclose(transition, exact, atol=2e-7)
     noise = np.array([[n11, n12], [0.0, n22]])
     np.testing.assert_allclose(noise @ noise.T, np.eye(2) - exact @ exact.T, atol=2e-6)
-    stepped = open_sea.oscillated(0.3, -0.7, 0.5, 1.1, (p11, p12, p22, n11, n12, n22))
+    stepped = filters.stepped(filters.Oscillator(0.3, -0.7), 0.5, 1.1, step)
     np.testing.assert_allclose(
         stepped, exact @ [0.3, -0.7] + noise @ [0.5, 1.1], atol=1e-6
     )
@@ -374,14 +381,14 @@ def test_an_oscillator_in_waves_steps_exactly(turn):
 def test_wind_and_waves_push_by_where_they_come_from(psi, blows, u, v, speed, gust):
     """Worked with vectors north and east: the air that the ship meets, and the waves from the bow."""
     coefficients = {
-        "wind_surge": open_sea.Cosines(0.2, -0.5, *[0.0] * 5),
-        "wind_sway": open_sea.Sines(0.9, *[0.0] * 5),
-        "wind_yaw": open_sea.Sines(0.0, 0.3, *[0.0] * 4),
-        "drift_surge": open_sea.Cosines(-0.4, 0.1, *[0.0] * 5),
-        "drift_sway": open_sea.Sines(0.7, *[0.0] * 5),
-        "drift_yaw": open_sea.Sines(0.0, 0.2, *[0.0] * 4),
-        "wind_roll": open_sea.Sines(0.6, *[0.0] * 5),
-        "drift_roll": open_sea.Sines(0.8, *[0.0] * 5),
+        "wind_surge": series.Cosines(0.2, -0.5, *[0.0] * 5),
+        "wind_sway": series.Sines(0.9, *[0.0] * 5),
+        "wind_yaw": series.Sines(0.0, 0.3, *[0.0] * 4),
+        "drift_surge": series.Cosines(-0.4, 0.1, *[0.0] * 5),
+        "drift_sway": series.Sines(0.7, *[0.0] * 5),
+        "drift_yaw": series.Sines(0.0, 0.2, *[0.0] * 4),
+        "wind_roll": series.Sines(0.6, *[0.0] * 5),
+        "drift_roll": series.Sines(0.8, *[0.0] * 5),
     }
     current, waves_from = 0.7 - 0.4j, blows + 0.5
     sea = Sea(
@@ -448,11 +455,11 @@ def test_a_sea_begins_and_goes_on_as_it_always_was():
         current_towards=2.0,
         wind_from=np.nan,
         waves_from=np.nan,
-        current=open_sea.Filter(0.9, 0.3 * np.sqrt(0.19), 0.3),
-        gust=open_sea.Filter(0.8, 2.0 * 0.6, 2.0),
-        drift=open_sea.Filter(0.6, 0.5 * 0.8, 0.5),
-        heading_variance=open_sea.Cosines(0.04, *[0.0] * 6),
-        roll_variance=open_sea.Cosines(0.09, *[0.0] * 6),
+        current=filters.Filter(0.9, 0.3 * np.sqrt(0.19), 0.3),
+        gust=filters.Filter(0.8, 2.0 * 0.6, 2.0),
+        drift=filters.Filter(0.6, 0.5 * 0.8, 0.5),
+        heading_variance=series.Cosines(0.04, *[0.0] * 6),
+        roll_variance=series.Cosines(0.09, *[0.0] * 6),
     )
     motion, n = Motion(0.0, 0.0, 0.3, 5.0, *[0.0] * 7), 3000
     begun, later = [], []
@@ -469,10 +476,10 @@ def test_a_sea_begins_and_goes_on_as_it_always_was():
         "current_east": (0.8 * np.sin(2.0), 0.3),
         "gust": (0.0, 2.0),
         "drift": (0.0, 0.5),
-        "heading_1": (0.0, 1.0),
-        "heading_2": (0.0, 1.0),
-        "roll_1": (0.0, 1.0),
-        "roll_2": (0.0, 1.0),
+        "heading_displacement": (0.0, 1.0),
+        "heading_velocity": (0.0, 1.0),
+        "roll_displacement": (0.0, 1.0),
+        "roll_velocity": (0.0, 1.0),
         "psi_wave": (0.0, 0.2),
         "phi_wave": (0.0, 0.3),
         "wind_north": (0.0, np.sqrt(0.5)),
@@ -497,10 +504,10 @@ def test_a_sea_begins_and_goes_on_as_it_always_was():
     np.testing.assert_array_equal(by_name[0]["wind_north"], by_name[0]["waves_north"])
     met = np.array([open_sea.encounter_frequency(motion, sea, p) for sea in later])
     np.testing.assert_allclose(
-        by_name[1]["r_wave"], -0.2 * met * by_name[1]["heading_1"], rtol=1e-9
+        by_name[1]["r_wave"], -0.2 * met * by_name[1]["heading_displacement"], rtol=1e-9
     )
     np.testing.assert_allclose(
-        by_name[1]["p_wave"], -0.3 * met * by_name[1]["roll_1"], rtol=1e-9
+        by_name[1]["p_wave"], -0.3 * met * by_name[1]["roll_displacement"], rtol=1e-9
     )
     columns = second[:, [Sea._fields.index(name) for name in list(expected)[:8]]]
     assert np.abs(np.corrcoef(columns.T) - np.eye(8)).max() < 5.0 / np.sqrt(n)
@@ -691,10 +698,10 @@ def test_wrong_weather(mariner):
     with pytest.raises(InputError, match="weather without the particulars it needs"):
         engine(bare, 1)
     with pytest.raises(
-        InputError, match=r"weather: .*'rugh' found.*Did you mean 'rough'"
+        InputError, match=r"weather: .*got 'rugh'.*Did you mean 'rough'"
     ):
         ahead(mariner, "rugh", 2)
-    with pytest.raises(InputError, match="sea: 7 found"):
+    with pytest.raises(InputError, match="sea: expected a Weather"):
         course_keeping_task(sea=7)
     with pytest.raises(InputError, match="seed: -1 found"):
         ahead(mariner, "rough", 2, seed=-1)

@@ -1,0 +1,97 @@
+"""Random processes as linear filters of white noise, from step to step.
+
+Steps are exact (Van Loan 1978, Computing integrals involving the matrix exponential):
+the variance of a process does not depend on their length.
+"""
+
+from math import sqrt
+from typing import NamedTuple
+
+from shipgym.engine.mathematics import sin_cos
+
+SMALLEST_VARIANCE = 1e-12
+
+
+class Filter(NamedTuple):
+    """A first-order process in its discrete form."""
+
+    kept: float  # part of the value that is left after a step
+    shock: float  # standard deviation of what is added in a step
+    deviation: float  # standard deviation of the process
+
+
+class Oscillator(NamedTuple):
+    """State of an oscillator driven by white noise; both have a variance of 1."""
+
+    displacement: float
+    velocity: float  # by its frequency
+
+
+class OscillatorStep(NamedTuple):
+    """Transition P of an oscillator's state over a step, and factors N of the noise.
+
+    Displacement and velocity z become P z + N w, with w two independent numbers of
+    noise of variance 1. N N' is the covariance that the step adds, I - P P'.
+    """
+
+    p11: float
+    p12: float  # -p21
+    p22: float
+    n11: float
+    n12: float  # n21 is 0
+    n22: float
+
+
+def first_order_step(now: float, mean: float, filter: Filter, noise: float) -> float:
+    """Value of a first-order process after a step."""
+    return mean + filter.kept * (now - mean) + filter.shock * noise
+
+
+def decay(x: float) -> float:
+    """exp(-x) for x from 0 to 8, as at 8 above: its series in x / 4, to 1e-7 up to 1."""
+    y = 0.25 * min(x, 8.0)
+    series = 1.0 / 720.0 - y * (1.0 / 5040.0)
+    series = 1.0 / 120.0 - y * series
+    series = 1.0 / 24.0 - y * series
+    series = 1.0 / 6.0 - y * series
+    series = 1.0 / 2.0 - y * series
+    series = 1.0 - y * series
+    quarter = 1.0 - y * series
+    return quarter * quarter * quarter * quarter
+
+
+def oscillator_step(turn: float, damping: float, ringing: float) -> OscillatorStep:
+    """Exact step of a lightly damped oscillator driven by white noise.
+
+    z1' = w z2, z2' = -w z1 - 2 lambda w z2 + sqrt(4 lambda w) noise, over an angle w h
+    of `turn`; `damping` is lambda, `ringing` sqrt(1 - lambda^2).
+    """
+    decayed = decay(damping * turn)
+    sine, cosine = sin_cos(ringing * turn)
+    swing = decayed * sine / ringing
+    stay = decayed * cosine
+    p11 = stay + damping * swing
+    p22 = stay - damping * swing
+
+    # Cholesky factor of the covariance I - P P', whose entries these are
+    first = 1.0 - p11 * p11 - swing * swing
+    shared = swing * (p11 - p22)
+    second = 1.0 - swing * swing - p22 * p22
+    n22 = sqrt(max(second, SMALLEST_VARIANCE))
+    n12 = shared / n22
+    n11 = sqrt(max(first - n12 * n12, 0.0))
+    return OscillatorStep(p11, swing, p22, n11, n12, n22)
+
+
+def stepped(
+    now: Oscillator, first_noise: float, second_noise: float, step: OscillatorStep
+) -> Oscillator:
+    """State of an oscillator after a step."""
+    z1 = now.displacement
+    z2 = now.velocity
+    moved = step.p11 * z1 + step.p12 * z2
+    turned = step.p22 * z2 - step.p12 * z1
+    return Oscillator(
+        moved + step.n11 * first_noise + step.n12 * second_noise,
+        turned + step.n22 * second_noise,
+    )

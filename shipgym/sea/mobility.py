@@ -1,0 +1,64 @@
+"""Inverse of a ship's inertia, which makes accelerations of the forces of weather."""
+
+import numpy as np
+
+from shipgym.arrays import Floats
+from shipgym.errors import InputError
+from shipgym.sea.estimates import GRAVITY, weather_particulars
+from shipgym.ships.inertia import inertia
+from shipgym.ships.manoeuvring_model import ManoeuvringModel
+from shipgym.ships.term_table import Structure
+
+
+def mobility_matrix(model: ManoeuvringModel, water_depth: float = np.inf) -> Floats:
+    """Inverse of mass and added mass, from X, Y, N, K to accelerations, SI units, shape (4, 4).
+
+    The accelerations are those in surge, sway, yaw and roll. An identified model
+    divides by the inertia of its particulars, given or estimated, a reference ship by
+    that of its own equations (the tanker's depends on the depth, m). A structure
+    without an equation of surge keeps its speed, one without sway or yaw does not drift
+    or turn: their rows and columns are 0. So is roll where the model has none; a
+    structure with an equation of roll, or a ship of the user's that rolls, has the
+    inertia that follows from roll period and metacentric height. Raises InputError that
+    names what mass and added mass lack.
+    """
+    axes = _axes(model)
+    mass = np.zeros((4, 4))
+    try:
+        mass[:3] = inertia(model, water_depth)
+    except InputError as error:
+        raise InputError(f"weather without the particulars it needs: {error}") from None
+    if model.structure == "container":
+        mass[3] = _container_roll(model, mass)
+    elif 3 in axes:
+        mass[3, 3] = roll_inertia(model)
+
+    matrix = np.zeros((4, 4))
+    among = np.ix_(axes, axes)
+    matrix[among] = np.linalg.inv(mass[among])
+    return matrix
+
+
+def _axes(model: ManoeuvringModel) -> list[int]:
+    """Axes in which a model moves: 0 surge, 1 sway, 2 yaw, 3 roll."""
+    if not isinstance(model.dynamics, Structure):
+        return [0, 1, 2, 3] if "phi" in model.state_names else [0, 1, 2]
+    weather_particulars(model.particulars)  # raises for those that are missing
+    velocities = "uvrp"
+    equations = [name for name in model.dynamics.equations if name in velocities]
+    return [velocities.index(name) for name in equations]
+
+
+def roll_inertia(model: ManoeuvringModel) -> float:
+    """Inertia in roll of the ship and the water that rolls with it, kg m2: m g GM (T / 2 pi)^2."""
+    ship = weather_particulars(model.particulars)
+    stiffness = ship.require("mass") * GRAVITY * ship.require("metacentric_height")
+    return stiffness * (ship.require("roll_period") / (2.0 * np.pi)) ** 2
+
+
+def _container_roll(model: ManoeuvringModel, mass: Floats) -> Floats:
+    """Row of roll in Son & Nomoto's equations, whose inertia is symmetric."""
+    numbers = model.coefficients
+    density = model.particulars.require("water_density")
+    unit = 0.5 * density * model.particulars.length**5
+    return np.array([0.0, mass[1, 3], 0.0, (numbers["Ix"] + numbers["Jx"]) * unit])

@@ -1,0 +1,228 @@
+"""Wind coefficients: published ones, and tables of a user's own ship.
+
+The published ones are by Blendermann 1994 for types of ship and by Isherwood 1972 from
+a regression (`wind.toml`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from shipgym.arrays import Floats
+from shipgym.checks import check_number, check_table, did_you_mean, quoted
+from shipgym.errors import InputError
+from shipgym.files import shipped_toml
+
+
+class Blendermann(NamedTuple):
+    """One row of Blendermann's table."""
+
+    CD_t: float  # transverse resistance, by lateral area
+    # longitudinal resistance in head and in following wind, by frontal area
+    CD_l_bow: float
+    CD_l_stern: float
+    delta: float  # cross-force parameter
+    kappa: float  # rolling-moment factor
+
+
+class WindCoefficients(NamedTuple):
+    """Coefficients at some angles of the relative wind, arrays of one shape."""
+
+    CX: Floats  # surge force by frontal area
+    CY: Floats  # sway force to lee by lateral area
+    # yaw moment about midship, bow to lee, by lateral area and length overall
+    CN: Floats
+    # heeling moment about the waterline, to lee, by lateral area and a height
+    CK: Floats
+
+
+_TABLES = shipped_toml("shipgym.sea", "wind.toml")
+#: By type of ship.
+BLENDERMANN = {ship: Blendermann(*row) for ship, row in _TABLES["blendermann"].items()}
+#: Rows of CX, CY and CN every 10 degrees from the bow; columns of the regression.
+ISHERWOOD = {name: np.array(rows) for name, rows in _TABLES["isherwood"].items()}
+
+
+@dataclass(frozen=True)
+class WindTable:
+    """Measured or computed wind coefficients of your own ship.
+
+    Raises InputError for angles that do not rise from 0 to 180, rows of another length,
+    and forces to one side of a wind from ahead or astern.
+
+    Parameters
+    ----------
+    angles_deg : tuple of float
+        Where the relative wind comes from, degrees from the bow, rising from 0 to 180;
+        the other side is the mirror image.
+    CX : tuple of float
+        Surge force divided by the frontal area; negative in head wind.
+    CY : tuple of float
+        Sway force to the LEE side divided by the lateral area, positive.
+    CN : tuple of float
+        Yaw moment about midship by lateral area and length overall, positive where the
+        bow turns to lee.
+    CK : tuple of float, optional
+        Heeling moment about the waterline to lee by lateral area and its mean height
+        (area by length overall); none is taken where it is not given.
+    """
+
+    angles_deg: tuple[float, ...]
+    CX: tuple[float, ...]
+    CY: tuple[float, ...]
+    CN: tuple[float, ...]
+    CK: tuple[float, ...] | None = None
+
+    def __post_init__(self) -> None:
+        lateral = ["CY", "CN"]
+        if self.CK is not None:
+            lateral.append("CK")
+        for name in ("angles_deg", "CX", *lateral):
+            row = _numbers(getattr(self, name), f"wind table {name}")
+            object.__setattr__(self, name, row)
+        self._check_angles()
+        for name in ("CX", *lateral):
+            self._check_length(name)
+        for name in lateral:
+            self._check_symmetry(name)
+
+    def _check_angles(self) -> None:
+        angles = self.angles_deg
+        rising = len(angles) >= 3 and bool(np.all(np.diff(angles) > 0.0))
+        if not rising or angles[0] != 0.0 or angles[-1] != 180.0:
+            raise InputError(
+                "wind table angles_deg: expected at least three that rise from 0 to"
+                f" 180, got {angles}"
+            )
+
+    def _check_length(self, name: str) -> None:
+        expected = len(self.angles_deg)
+        row = getattr(self, name)
+        if len(row) != expected:
+            raise InputError(
+                f"wind table {name}: expected {expected} values, one for each angle,"
+                f" got {len(row)}"
+            )
+
+    def _check_symmetry(self, name: str) -> None:
+        row = getattr(self, name)
+        if row[0] != 0.0 or row[-1] != 0.0:
+            raise InputError(
+                f"wind table {name}: expected 0 at 0 and 180 degrees, for a ship with"
+                f" port-starboard symmetry, got {row[0]:g} and {row[-1]:g}"
+            )
+
+    @classmethod
+    def from_dict(
+        cls, mapping: Mapping[str, Any], where: str = "wind table"
+    ) -> WindTable:
+        """Read a table as it stands in JSON; InputError for an unknown or missing row."""
+        needed = ("angles_deg", "CX", "CY", "CN")
+        return cls(**check_table(mapping, where, (*needed, "CK"), needed))
+
+    def at(self, angle: Floats) -> WindCoefficients:
+        """Coefficients at angles from 0 to pi, straight between those of the table."""
+        CX, CY, CN, CK = (
+            np.interp(np.degrees(angle), self.angles_deg, row)
+            for row in (self.CX, self.CY, self.CN, self.CK or np.zeros(len(self.CX)))
+        )
+        return WindCoefficients(CX, CY, CN, CK)
+
+
+def _numbers(values: Any, where: str) -> tuple[float, ...]:
+    if not isinstance(values, list | tuple | np.ndarray):
+        raise InputError(f"{where}: expected a list of numbers, got {values!r}")
+    return tuple(check_number(value, f"{where}[{i}]") for i, value in enumerate(values))
+
+
+def coefficient_names() -> tuple[str, ...]:
+    """Words that `Wind(coefficients=...)` understands."""
+    types = [f"blendermann-{ship}" for ship in BLENDERMANN]
+    return ("blendermann", "isherwood", *types)
+
+
+def check_coefficients(value: Any, where: str) -> None:
+    """Raise InputError for what `Wind(coefficients=...)` does not understand."""
+    if isinstance(value, WindTable):
+        return
+    names = coefficient_names()
+    if isinstance(value, str) and value in names:
+        return
+    hint = did_you_mean(value, names) if isinstance(value, str) else ""
+    raise InputError(
+        f"{where}: expected a WindTable or one of {quoted(names)}, got {value!r}.{hint}"
+    )
+
+
+def blendermann_type(name: str, block_coefficient: float) -> str:
+    """Type of ship in :data:`BLENDERMANN` that a word asks for.
+
+    "blendermann" alone takes a full hull (block coefficient of 0.75 or more) for a
+    loaded tanker, a fine one (below 0.65) for a loaded container ship, and others for a
+    loaded cargo ship.
+    """
+    if name != "blendermann":
+        return name.removeprefix("blendermann-")
+    if block_coefficient >= 0.75:
+        return "tanker-loaded"
+    if block_coefficient < 0.65:
+        return "container-loaded"
+    return "cargo-loaded"
+
+
+def blendermann_coefficients(
+    row: Blendermann, angle: Floats, area_ratio: float, centroid_ratio: float
+) -> WindCoefficients:
+    """Blendermann's coefficients of a type of ship for wind of one side.
+
+    Fossen 2021, section 10.1.2. `angle` is from 0 (ahead) to pi
+    (astern), `area_ratio` the frontal by the lateral area, `centroid_ratio` the
+    centroid of the lateral area forward of midship by length overall. CK is by lateral
+    area and the height of its centroid.
+    """
+    CD_l_AF = np.where(angle <= np.pi / 2, row.CD_l_bow, row.CD_l_stern)
+    CD_l = CD_l_AF * area_ratio
+    cross = 0.5 * row.delta * (1.0 - CD_l / row.CD_t)
+    denominator = 1.0 - cross * np.sin(2.0 * angle) ** 2
+
+    CX = -CD_l_AF * np.cos(angle) / denominator
+    CY = row.CD_t * np.sin(angle) / denominator
+    CN = (centroid_ratio - 0.18 * (angle - np.pi / 2)) * CY
+    return WindCoefficients(CX, CY, CN, row.kappa * CY)
+
+
+def isherwood_coefficients(
+    length: float,
+    beam: float,
+    lateral_area: float,
+    frontal_area: float,
+    perimeter: float,
+    bow_to_centroid: float,
+    masts: float,
+    superstructure_area: float,
+) -> tuple[Floats, Floats, Floats]:
+    """Isherwood's coefficients every 10 degrees from 0 (ahead) to 180 (astern).
+
+    Lengths in m, projected areas above the water in m2; `length` is overall,
+    `perimeter` that of the lateral projection without waterline, masts and ventilators,
+    `bow_to_centroid` reaches to the centroid of the lateral area, `masts` are groups of
+    masts seen from the side, `superstructure_area` is that of the lateral area. Returns
+    CX by frontal area; CY to lee by lateral area; CN with the bow to lee by lateral
+    area and length; three arrays of shape (19,).
+    """
+    outline = [
+        1.0,
+        2.0 * lateral_area / length**2,
+        2.0 * frontal_area / beam**2,
+        length / beam,
+        perimeter / length,
+        bow_to_centroid / length,
+    ]
+    CX = -ISHERWOOD["CX"] @ np.array([*outline, masts])
+    CY = ISHERWOOD["CY"] @ np.array([*outline, superstructure_area / lateral_area])
+    CN = ISHERWOOD["CN"] @ np.array(outline)
+    return CX, CY, CN
