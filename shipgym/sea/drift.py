@@ -3,12 +3,13 @@
 from dataclasses import dataclass
 
 import numpy as np
+from numpy import cos, pi, sin, trapezoid
 from numpy.typing import ArrayLike
 
 from shipgym.arrays import Floats
 from shipgym.sea.added_resistance import added_resistance
 from shipgym.sea.current_wind_waves import Waves
-from shipgym.sea.estimates import GRAVITY, weather_particulars
+from shipgym.sea.estimates import GRAVITY, hull_of, weather_particulars
 from shipgym.sea.harmonics import (
     Harmonics,
     circle,
@@ -77,10 +78,10 @@ def wave_drift(
     spectrum = wave_spectrum(waves, omega)
 
     resistance = added_resistance(omega, chi[:, None], ship, U)
-    surge = -2.0 * np.trapezoid(resistance * spectrum, omega, axis=-1)
+    surge = -2.0 * trapezoid(resistance * spectrum, omega, axis=-1)
 
     share = draught_attenuation(omega, ship.require("draught"))
-    taken_up = float(np.trapezoid(share * spectrum, omega))
+    taken_up = float(trapezoid(share * spectrum, omega))
     pressure = ship.require("water_density") * GRAVITY * taken_up
     sway, yaw = reflection_coefficients(chi, ship)
 
@@ -104,11 +105,12 @@ def waterline(ship: Particulars) -> tuple[Floats, Floats]:
     waterplane coefficient, waterplane area by length * beam, is p / (p + 1) and
     estimated as (1 + 2 CB) / 3 (Schneekluth & Bertram 1998, section 1.6).
     """
-    cwp = (1.0 + 2.0 * ship.require("block_coefficient")) / 3.0
-    power = cwp / (1.0 - cwp)
-    xi = np.cos(np.linspace(0.0, np.pi, 401))
-    x = 0.5 * ship.length * xi
-    y = 0.5 * ship.require("beam") * (1.0 - np.abs(xi) ** power)
+    L, B, _, CB = hull_of(ship)
+    CWP = (1.0 + 2.0 * CB) / 3.0
+    p = CWP / (1.0 - CWP)
+    xi = cos(np.linspace(0.0, pi, 401))
+    x = 0.5 * L * xi
+    y = 0.5 * B * (1.0 - np.abs(xi) ** p)
     return x, y
 
 
@@ -134,7 +136,7 @@ def reflection_coefficients(chi: ArrayLike, ship: Particulars) -> tuple[Floats, 
         # outward normal
         nx = dy / length
         ny = -side * dx / length
-        sine = np.multiply.outer(np.cos(chi), nx) + np.multiply.outer(np.sin(chi), ny)
+        sine = np.multiply.outer(cos(chi), nx) + np.multiply.outer(sin(chi), ny)
         force = np.maximum(sine, 0.0) ** 2 * length
         Y = Y - force @ ny
         N = N - force @ (middle_x * ny - side * middle_y * nx)

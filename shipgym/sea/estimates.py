@@ -1,11 +1,31 @@
 """Particulars that wind and waves need, estimated where they are not given."""
 
 import math
+from typing import NamedTuple
 
 from shipgym.errors import InputError
 from shipgym.ships.particulars import Estimates, Particulars, with_estimates
 
 GRAVITY = 9.80665
+
+
+class Hull(NamedTuple):
+    """Main dimensions of a ship in the symbols of the formulas, SI units."""
+
+    L: float  # length between perpendiculars
+    B: float  # beam
+    T: float  # draught
+    CB: float  # block coefficient
+
+
+def hull_of(ship: Particulars) -> Hull:
+    """Main dimensions of a ship that has all that the weather needs."""
+    return Hull(
+        L=ship.length,
+        B=ship.require("beam"),
+        T=ship.require("draught"),
+        CB=ship.require("block_coefficient"),
+    )
 
 
 def weather_particulars(particulars: Particulars) -> Particulars:
@@ -41,7 +61,8 @@ def weather_particulars(particulars: Particulars) -> Particulars:
 
 def freeboard(ship: Particulars) -> float:
     """Estimated height of the deck above the water, m."""
-    return ship.require("draught") * (1.3 - 1.05 * ship.require("block_coefficient"))
+    hull = hull_of(ship)
+    return hull.T * (1.3 - 1.05 * hull.CB)
 
 
 def house_height(ship: Particulars) -> float:
@@ -80,13 +101,12 @@ def _centroid_height(ship: Particulars) -> float:
 
 
 def _roll_period(ship: Particulars) -> float:
-    B = ship.require("beam")
-    T = ship.require("draught")
+    L, B, T, _ = hull_of(ship)
     # the Code's length is in metres and of ships: smaller hulls, as models, are taken
     # for one of 100 m
-    L = max(ship.length, 100.0)
-    C = 0.373 + 0.023 * B / T - 0.043 * L / 100.0
-    return 2.0 * max(C, 0.3) * B / math.sqrt(ship.require("metacentric_height"))
+    C = 0.373 + 0.023 * B / T - 0.043 * max(L, 100.0) / 100.0
+    GM = ship.require("metacentric_height")
+    return 2.0 * max(C, 0.3) * B / math.sqrt(GM)
 
 
 _ESTIMATES: Estimates = {  # in this order

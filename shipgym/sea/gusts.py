@@ -1,6 +1,6 @@
 """Gust spectra of the wind over the sea, and the first-order filter that stands for them."""
 
-import math
+from math import gamma, pi, sqrt
 from typing import NamedTuple
 
 import numpy as np
@@ -28,7 +28,7 @@ class GaussMarkov(NamedTuple):
         """One-sided spectral density at frequencies in Hz."""
         T = self.time_constant
         variance = self.standard_deviation**2
-        omega = 2.0 * np.pi * np.asarray(frequency, dtype=float)
+        omega = 2.0 * pi * np.asarray(frequency, dtype=float)
         return 4.0 * variance * T / (1.0 + (omega * T) ** 2)
 
 
@@ -81,8 +81,8 @@ def gust_variance(speed: float, spectrum: str = "harris") -> float:
     if spectrum == "davenport":
         return 6.0 * SURFACE_DRAG * speed**2
     if spectrum == "harris":
-        beta = math.gamma(1.0 / 2.0) * math.gamma(1.0 / 3.0) / math.gamma(5.0 / 6.0)
-        return float(2.0 ** (2.0 / 3.0) * beta * SURFACE_DRAG * speed**2)
+        beta = gamma(1.0 / 2.0) * gamma(1.0 / 3.0) / gamma(5.0 / 6.0)
+        return float(2.0 ** (2.0 / 3.0)) * beta * SURFACE_DRAG * speed**2
     f = froya_frequencies(400)
     return float(np.trapezoid(f * froya_spectrum(f, speed), np.log(f)))
 
@@ -102,7 +102,7 @@ def gust_filter(wind: Wind) -> GaussMarkov:
         energy = f * froya_spectrum(f, wind.speed)
         peak = float(f[np.argmax(energy)])
     else:
-        peak = math.sqrt(3.0) * wind.speed / LENGTH_SCALES[wind.spectrum]
-    time_constant = 1.0 / (2.0 * math.pi * peak)
-    deviation = math.sqrt(gust_variance(wind.speed, wind.spectrum))
+        peak = sqrt(3.0) * wind.speed / LENGTH_SCALES[wind.spectrum]
+    time_constant = 1.0 / (2.0 * pi * peak)
+    deviation = sqrt(gust_variance(wind.speed, wind.spectrum))
     return GaussMarkov(time_constant, deviation)

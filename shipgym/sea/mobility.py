@@ -58,7 +58,7 @@ def roll_inertia(model: ManoeuvringModel) -> float:
 
 def _container_roll(model: ManoeuvringModel, mass: Floats) -> Floats:
     """Row of roll in Son & Nomoto's equations, whose inertia is symmetric."""
-    numbers = model.coefficients
     density = model.particulars.require("water_density")
     unit = 0.5 * density * model.particulars.length**5
-    return np.array([0.0, mass[1, 3], 0.0, (numbers["Ix"] + numbers["Jx"]) * unit])
+    prime = model.coefficients["Ix"] + model.coefficients["Jx"]
+    return np.array([0.0, mass[1, 3], 0.0, prime * unit])

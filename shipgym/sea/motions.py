@@ -3,16 +3,18 @@
 from dataclasses import dataclass
 
 import numpy as np
+from numpy import cos, exp, pi, sin, sinc, trapezoid
 from numpy.typing import ArrayLike
 
 from shipgym.arrays import Floats
 from shipgym.sea.current_wind_waves import Waves
-from shipgym.sea.estimates import GRAVITY, weather_particulars
+from shipgym.sea.estimates import hull_of, weather_particulars
 from shipgym.sea.harmonics import circle, cosine_coefficients, half_circle, mirrored
 from shipgym.sea.waves import (
     encounter_frequency,
     frequencies,
     over_directions,
+    wave_number,
     wave_spectrum,
 )
 from shipgym.ships.particulars import Particulars
@@ -32,12 +34,11 @@ def heading_response(
     """
     from scipy.special import spherical_jn
 
-    L = particulars.length
-    T = particulars.require("draught")
-    k = np.asarray(omega, dtype=float) ** 2 / GRAVITY
-    q = np.abs(0.5 * k * L * np.cos(chi))
-    sideways = np.abs(np.sin(chi)) * np.exp(-0.5 * k * T)
-    return sideways * 6.0 / L * np.abs(spherical_jn(1, q))
+    L, _, T, _ = hull_of(particulars)
+    k = wave_number(omega)
+    q = abs(0.5 * k * L * cos(chi))
+    sideways = abs(sin(chi)) * exp(-0.5 * k * T)
+    return sideways * 6.0 / L * abs(spherical_jn(1, q))
 
 
 def roll_response(
@@ -53,16 +54,14 @@ def roll_response(
     a ship under way, with bilge keels (0.05 to 0.15 in the literature). Arguments are
     those of :func:`heading_response`, and the speed, m/s.
     """
-    L = particulars.length
-    B = particulars.require("beam")
-    T = particulars.require("draught")
-    k = np.asarray(omega, dtype=float) ** 2 / GRAVITY
-    over_length = np.sinc(0.5 * k * L * np.cos(chi) / np.pi)
-    over_beam = np.sinc(0.5 * k * B * np.sin(chi) / np.pi)
-    across = np.abs(np.sin(chi) * over_length * over_beam)
-    slope = k * across * np.exp(-0.5 * k * T)
+    L, B, T, _ = hull_of(particulars)
+    k = wave_number(omega)
+    over_length = sinc(0.5 * k * L * cos(chi) / pi)
+    over_beam = sinc(0.5 * k * B * sin(chi) / pi)
+    across = abs(sin(chi) * over_length * over_beam)
+    slope = k * across * exp(-0.5 * k * T)
 
-    natural = 2.0 * np.pi / particulars.require("roll_period")
+    natural = 2.0 * pi / particulars.require("roll_period")
     a = encounter_frequency(omega, speed, chi) / natural
     z = 0.1
     return slope / np.hypot(1.0 - a * a, 2.0 * z * a)
@@ -108,7 +107,7 @@ def wave_motion(
     spectrum = wave_spectrum(waves, omega)
 
     def variance(response: Floats) -> Floats:
-        in_long_crests = np.trapezoid(response**2 * spectrum, omega, axis=-1)
+        in_long_crests = trapezoid(response**2 * spectrum, omega, axis=-1)
         return over_directions(mirrored(in_long_crests), waves)
 
     used = {"metacentric_height", "roll_period", "block_coefficient"}

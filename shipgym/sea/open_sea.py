@@ -103,6 +103,15 @@ class RelativeWind(NamedTuple):
     angle: FromBow
 
 
+class Accelerations(NamedTuple):
+    """Accelerations in the ship's axes, m/s2 and rad/s2."""
+
+    surge: float
+    sway: float
+    yaw: float
+    roll: float
+
+
 class FirstOrderMotion(NamedTuple):
     """First-order motion in waves: angles, rad, and their rates, rad/s."""
 
@@ -137,32 +146,40 @@ def push(motion: Motion, sea: Sea, p: SeaParameters) -> Push:
     if not HAS_SEA:
         return Push(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     sine, cosine = sin_cos(motion.psi)
-    wind = relative_wind(motion, sine, cosine, sea, p)
+    wind = by_wind(motion, relative_wind(motion, sine, cosine, sea, p), p)
     waves = from_bow(sine, cosine, sea.waves_north, sea.waves_east)
-    squared = wind.squared_speed
-    wc, ws = wind.angle.cosine, wind.angle.sine
-    drift = 1.0 + sea.drift
-
-    still_air = motion.u * fabs(motion.u) * p.still_air
-    surge_by_wind = squared * sum_of_cosines(wc, p.wind_surge) + still_air
-    sway_by_wind = squared * sum_of_sines(wc, ws, p.wind_sway)
-    yaw_by_wind = squared * sum_of_sines(wc, ws, p.wind_yaw)
-
-    surge_by_waves = drift * sum_of_cosines(waves.cosine, p.drift_surge)
-    sway_by_waves = drift * sum_of_sines(waves.cosine, waves.sine, p.drift_sway)
-    yaw_by_waves = drift * sum_of_sines(waves.cosine, waves.sine, p.drift_yaw)
-
-    roll = 0.0
-    if HAS_ROLL:
-        roll_by_waves = drift * sum_of_sines(waves.cosine, waves.sine, p.drift_roll)
-        roll = squared * sum_of_sines(wc, ws, p.wind_roll) + roll_by_waves
+    drift = by_waves(waves, 1.0 + sea.drift, p)
     return Push(
-        surge_by_wind + surge_by_waves,
-        sway_by_wind + sway_by_waves,
-        yaw_by_wind + yaw_by_waves,
-        roll,
+        wind.surge + drift.surge,
+        wind.sway + drift.sway,
+        wind.yaw + drift.yaw,
+        wind.roll + drift.roll if HAS_ROLL else 0.0,
         sea.current_north,
         sea.current_east,
+    )
+
+
+def by_wind(motion: Motion, wind: RelativeWind, p: SeaParameters) -> Accelerations:
+    """Accelerations by the relative wind, beyond those that the model has of itself."""
+    cosine, sine = wind.angle
+    squared = wind.squared_speed
+    still_air = motion.u * fabs(motion.u) * p.still_air
+    return Accelerations(
+        surge=squared * sum_of_cosines(cosine, p.wind_surge) + still_air,
+        sway=squared * sum_of_sines(cosine, sine, p.wind_sway),
+        yaw=squared * sum_of_sines(cosine, sine, p.wind_yaw),
+        roll=squared * sum_of_sines(cosine, sine, p.wind_roll) if HAS_ROLL else 0.0,
+    )
+
+
+def by_waves(waves: FromBow, drift: float, p: SeaParameters) -> Accelerations:
+    """Accelerations by the drift force, which is `drift` times its mean."""
+    cosine, sine = waves
+    return Accelerations(
+        surge=drift * sum_of_cosines(cosine, p.drift_surge),
+        sway=drift * sum_of_sines(cosine, sine, p.drift_sway),
+        yaw=drift * sum_of_sines(cosine, sine, p.drift_yaw),
+        roll=drift * sum_of_sines(cosine, sine, p.drift_roll) if HAS_ROLL else 0.0,
     )
 
 

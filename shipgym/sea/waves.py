@@ -4,6 +4,8 @@ from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
+from numpy import cos, exp, log, pi, sqrt, trapezoid, where
+from numpy.fft import irfft, rfft
 from numpy.typing import ArrayLike
 
 from shipgym.arrays import Floats
@@ -32,7 +34,7 @@ class WaveFilter(NamedTuple):
         stiffness = w0**2 - w**2
         damping = 2.0 * self.damping * w0 * w
         response = (self.gain * w) ** 2 / (stiffness**2 + damping**2)
-        return response / np.pi
+        return response / pi
 
 
 def pierson_moskowitz(omega: ArrayLike, Hs: float, Tp: float) -> Floats:
@@ -41,11 +43,11 @@ def pierson_moskowitz(omega: ArrayLike, Hs: float, Tp: float) -> Floats:
     One-sided density of the elevation, m2 s/rad, over omega, rad/s; 0 at 0. Its
     integral is Hs^2 / 16.
     """
-    peak = 2.0 * np.pi / Tp
+    peak = 2.0 * pi / Tp
     # the density is 0 below a fiftieth of the peak: exp(-1.25 * 50^4)
-    ratio = np.maximum(np.asarray(omega, dtype=float), 0.02 * peak) / peak
-    at_high_frequencies = 5.0 / 16.0 * Hs**2 / peak * ratio**-5
-    density: Floats = at_high_frequencies * np.exp(-1.25 * ratio**-4)
+    ratio = np.maximum(omega, 0.02 * peak) / peak
+    tail = 5.0 / 16.0 * Hs**2 / peak * ratio**-5
+    density: Floats = tail * exp(-1.25 * ratio**-4)
     return density
 
 
@@ -55,27 +57,26 @@ def jonswap(omega: ArrayLike, Hs: float, Tp: float, gamma: float = 3.3) -> Float
     The factor 1 - 0.287 ln(gamma) of the literature (DNV-RP-C205) is replaced by the
     exact integral; a peak enhancement gamma of 1 gives :func:`pierson_moskowitz`.
     """
-    ratio = np.asarray(omega, dtype=float) * Tp / (2.0 * np.pi)
+    ratio = np.asarray(omega, dtype=float) * Tp / (2.0 * pi)
     plain = pierson_moskowitz(omega, Hs, Tp)
     return plain * _enhancement(ratio, gamma) / _enhanced_variance(gamma)
 
 
 def _enhancement(ratio: Floats, gamma: float) -> Floats:
     """gamma^r over frequency by peak frequency."""
-    sigma = np.where(ratio <= 1.0, 0.07, 0.09)
-    r = np.exp(-0.5 * ((ratio - 1.0) / sigma) ** 2)
+    sigma = where(ratio <= 1.0, 0.07, 0.09)
+    r = exp(-0.5 * ((ratio - 1.0) / sigma) ** 2)
     return gamma**r
 
 
 @lru_cache(maxsize=64)
 def _enhanced_variance(gamma: float) -> float:
     """Variance with peak enhancement by that without."""
-    logarithm = np.linspace(np.log(0.2), np.log(50.0), 4001)
-    ratio = np.exp(logarithm)
-    plain = pierson_moskowitz(ratio, 4.0, 2.0 * np.pi) * ratio
+    logarithm = np.linspace(log(0.2), log(50.0), 4001)
+    ratio = exp(logarithm)
+    plain = pierson_moskowitz(ratio, 4.0, 2.0 * pi) * ratio
     enhanced = plain * _enhancement(ratio, gamma)
-    variance = np.trapezoid(enhanced, logarithm)
-    return float(variance / np.trapezoid(plain, logarithm))
+    return float(trapezoid(enhanced, logarithm) / trapezoid(plain, logarithm))
 
 
 def wave_spectrum(waves: Waves, omega: ArrayLike) -> Floats:
@@ -85,7 +86,12 @@ def wave_spectrum(waves: Waves, omega: ArrayLike) -> Floats:
 
 def frequencies(waves: Waves) -> Floats:
     """Frequencies for integrals over the spectrum, from 0.4 to 12 times that of the peak, rad/s."""
-    return 2.0 * np.pi / waves.peak_period * np.geomspace(0.4, 12.0, 400)
+    return 2.0 * pi / waves.peak_period * np.geomspace(0.4, 12.0, 400)
+
+
+def wave_number(omega: ArrayLike) -> Floats:
+    """Wave number k = omega^2 / g of a frequency (rad/s) in deep water, rad/m."""
+    return np.square(omega) / GRAVITY
 
 
 def over_directions(curve: Floats, waves: Waves) -> Floats:
@@ -97,11 +103,10 @@ def over_directions(curve: Floats, waves: Waves) -> Floats:
     """
     if waves.spreading == "long-crested":
         return curve
-    toward = np.cos(circle(len(curve)))
-    weight = np.where(toward > 0.0, toward**2, 0.0)
-    share = weight / weight.sum()
-    convolution = np.fft.rfft(curve) * np.fft.rfft(share)
-    return np.fft.irfft(convolution, n=len(curve))
+    toward = cos(circle(len(curve)))
+    weight = where(toward > 0.0, toward**2, 0.0)
+    convolution = rfft(curve) * rfft(weight / weight.sum())
+    return irfft(convolution, n=len(curve))
 
 
 def encounter_frequency(omega: ArrayLike, speed: ArrayLike, chi: ArrayLike) -> Floats:
@@ -111,8 +116,8 @@ def encounter_frequency(omega: ArrayLike, speed: ArrayLike, chi: ArrayLike) -> F
     waves come from, seen from the bow: 0 ahead, pi / 2 from starboard.
     """
     w = np.asarray(omega, dtype=float)
-    ahead = np.asarray(speed) * np.cos(chi)
-    met: Floats = np.abs(w + w * w * ahead / GRAVITY)
+    U = np.asarray(speed, dtype=float)
+    met: Floats = abs(w + wave_number(w) * U * cos(chi))
     return met
 
 
@@ -124,9 +129,9 @@ def wave_filter(waves: Waves) -> WaveFilter:
     analysis of a dynamic positioning system based on Kalman filtering and optimal
     control, IEEE Trans. Automatic Control 28); Fossen 2011, 8.2.
     """
-    peak = 2.0 * np.pi / waves.peak_period
+    peak = 2.0 * pi / waves.peak_period
     damping = _fitted_damping(waves.gamma)
-    return WaveFilter(peak, damping, float(2.0 * np.sqrt(damping * peak)))
+    return WaveFilter(peak, damping, gain=float(2.0 * sqrt(damping * peak)))
 
 
 @lru_cache(maxsize=64)
@@ -134,7 +139,7 @@ def _fitted_damping(gamma: float) -> float:
     from scipy.optimize import minimize_scalar
 
     w = np.linspace(0.02, 4.0, 2000)
-    target = jonswap(w, 4.0, 2.0 * np.pi, gamma)
+    target = jonswap(w, 4.0, 2.0 * pi, gamma)
 
     def misfit(damping: float) -> float:
         filtered = WaveFilter(1.0, damping, gain=2.0 * damping**0.5)
@@ -154,10 +159,10 @@ def draught_attenuation(omega: ArrayLike, draught: float) -> Floats:
     """
     from scipy.special import i1e, k1e
 
-    kT = np.asarray(omega, dtype=float) ** 2 * draught / GRAVITY
-    K1_by_I1 = k1e(kT) * np.exp(-2.0 * np.minimum(kT, 300.0)) / i1e(kT)
-    ratio = K1_by_I1 / np.pi
-    return 1.0 / (1.0 + ratio**2)
+    kT = wave_number(omega) * draught
+    scale = exp(-2.0 * np.minimum(kT, 300.0))
+    K1_by_I1 = k1e(kT) * scale / i1e(kT)
+    return 1.0 / (1.0 + (K1_by_I1 / pi) ** 2)
 
 
 def slow_drift(waves: Waves, particulars: Particulars) -> GaussMarkov:
@@ -180,6 +185,5 @@ def slow_drift(waves: Waves, particulars: Particulars) -> GaussMarkov:
     # the height does not matter
     shape = jonswap(omega, 1.0, waves.peak_period, waves.gamma)
     Sc = shape * draught_attenuation(omega, draught)
-    at_zero = np.trapezoid(Sc**2, omega)
-    time_constant = np.pi * at_zero / np.trapezoid(Sc, omega) ** 2
+    time_constant = pi * trapezoid(Sc**2, omega) / trapezoid(Sc, omega) ** 2
     return GaussMarkov(float(time_constant), 1.0)

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy import cos, degrees, interp, pi, sin, where
 
 from shipgym.arrays import Floats
 from shipgym.checks import check_number, check_table, did_you_mean, quoted
@@ -126,11 +127,10 @@ class WindTable:
 
     def at(self, angle: Floats) -> WindCoefficients:
         """Coefficients at angles from 0 to pi, straight between those of the table."""
-        CX, CY, CN, CK = (
-            np.interp(np.degrees(angle), self.angles_deg, row)
-            for row in (self.CX, self.CY, self.CN, self.CK or np.zeros(len(self.CX)))
-        )
-        return WindCoefficients(CX, CY, CN, CK)
+        CK = self.CK or (0.0,) * len(self.angles_deg)
+        rows = (self.CX, self.CY, self.CN, CK)
+        found = [interp(degrees(angle), self.angles_deg, row) for row in rows]
+        return WindCoefficients(*found)
 
 
 def _numbers(values: Any, where: str) -> tuple[float, ...]:
@@ -184,15 +184,16 @@ def blendermann_coefficients(
     centroid of the lateral area forward of midship by length overall. CK is by lateral
     area and the height of its centroid.
     """
-    CD_l_AF = np.where(angle <= np.pi / 2, row.CD_l_bow, row.CD_l_stern)
+    CD_t, CD_l_bow, CD_l_stern, delta, kappa = row
+    CD_l_AF = where(angle <= pi / 2, CD_l_bow, CD_l_stern)
     CD_l = CD_l_AF * area_ratio
-    cross = 0.5 * row.delta * (1.0 - CD_l / row.CD_t)
-    denominator = 1.0 - cross * np.sin(2.0 * angle) ** 2
+    cross = 0.5 * delta * (1.0 - CD_l / CD_t)
+    denominator = 1.0 - cross * sin(2.0 * angle) ** 2
 
-    CX = -CD_l_AF * np.cos(angle) / denominator
-    CY = row.CD_t * np.sin(angle) / denominator
-    CN = (centroid_ratio - 0.18 * (angle - np.pi / 2)) * CY
-    return WindCoefficients(CX, CY, CN, row.kappa * CY)
+    CX = -CD_l_AF * cos(angle) / denominator
+    CY = CD_t * sin(angle) / denominator
+    CN = (centroid_ratio - 0.18 * (angle - pi / 2)) * CY
+    return WindCoefficients(CX, CY, CN, kappa * CY)
 
 
 def isherwood_coefficients(
