@@ -47,7 +47,6 @@ GALE = Weather(
     waves=Waves(3.25, 9.7, 45.0),
     name="gale",
 )
-ZERO = np.zeros(720)
 STATE = ("x", "y", "psi", "u", "v", "r", "delta")
 
 
@@ -225,16 +224,12 @@ def test_gusts_have_the_variance_of_their_spectrum(mariner):
 
 
 @pytest.mark.parametrize("dt", [0.2, 1.0])
-def test_heading_in_waves_has_the_variance_and_the_rhythm_of_the_filter(
-    mariner, monkeypatch, dt
-):
-    """With a body on which nothing acts, so that it keeps its course: variance, correlation and yaw rate."""
-    none = lambda waves, ship: replace(wave_drift(waves, ship), X=ZERO, Y=ZERO, N=ZERO)  # noqa: E731
-    monkeypatch.setattr("shipgym.sea.ship_in_weather.wave_drift", none)
-    waves, steps = Waves(3.25, 9.7, 60.0), 40000
+def test_heading_in_waves_has_the_variance_and_the_rhythm_of_the_filter(mariner, dt):
+    """In waves too low to push a ship off her course: variance, correlation and yaw rate."""
+    waves, steps = Waves(1e-3, 9.7, 60.0), 40000
     model, state = inert(mariner, mariner.particulars["speed"])
     trial = ahead(model, Weather(waves=waves), steps, dt, state=state)
-    assert np.ptp(trial["psi"]) == 0.0
+    assert np.ptp(trial["psi"]) < 0.01
     motion = wave_motion(waves, model.particulars)
     variance = motion.heading_variance[np.argmin(np.abs(motion.chi - np.radians(60.0)))]
     w0 = 2.0 * np.pi / 9.7
