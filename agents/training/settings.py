@@ -2,17 +2,17 @@
 
 The files in `hyperparameters/` have the tuned ones, later tables before earlier ones:
 `defaults`, every setting of the algorithm to learn from scratch; those that differ
-beside a base in an environment (`residual`), on every task of a suite (`suites`), on
-one of them (`tasks`).
+with a base in an environment (`residual`), on every task of a suite (`suites`), on one
+of them (`tasks`).
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import MISSING, Field, dataclass, field, fields, replace
+from dataclasses import Field, dataclass, field, fields, replace
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any
 
 from agents.controllers.registry import controller_kinds
-from agents.policies.weights_file import as_json, present_names
+from agents.policies.weights_file import as_json
 from agents.suites.suite import ENVIRONMENTS, suite_of
 from shipgym.checks import (
     check_choice,
@@ -26,79 +26,107 @@ from shipgym.errors import InputError
 from shipgym.files import read_toml, shipped_toml
 from shipgym.tasks.task import ACTIONS
 
-RUNNING, LEARNED = "running", "learned"  # words in the place of numbers
-NUMBER_OR_WORD, WIDTHS = float | str, tuple[int, ...]  # types of settings
 
+def setting(
+    meaning: str,
+    *,
+    options: Sequence[str] = (),
+    word: str = "",
+    **bounds: float,
+) -> Any:
+    """Field of a setting: what it means, and which values it may have.
 
-def hyperparameters(name: str) -> dict[str, Any]:
-    """The content of a file of `hyperparameters/`."""
-    return shipped_toml("agents.training", f"hyperparameters/{name}.toml")
-
-
-#: What is known of each setting, by `Settings.section` and name.
-KNOWN = hyperparameters("settings")
+    A number has bounds, keywords of `check_number` or `check_whole`; a `word` may stand
+    for it, and one that ends in an underscore may have a positive number after it. A
+    word is one of the `options`, where there are any.
+    """
+    about = {"meaning": meaning, "options": options, "word": word, "bounds": bounds}
+    return field(metadata=about)
 
 
 @dataclass(frozen=True)
 class Settings:
-    """What all algorithms have; a decision lasts `action_repeat` control intervals."""
+    """Settings of all algorithms; a decision lasts `action_repeat` control intervals."""
 
-    section: ClassVar[str] = (
-        "all"  # of `hyperparameters/settings.toml`, which says what each setting is
+    total_steps: int = setting(
+        "decisions to learn from, of all ships together", at_least=1
     )
-
-    total_steps: int
-    evaluate_every: int
-    ships: int
-    batch_size: int
-    learning_rate: float
-    schedule: str
-    gamma: float
-    net_arch: tuple[int, ...]
-    activation: str
-    frame_stack: int
-    action_repeat: int
-    base: str
-    authority: float
-    rate_limit: float = field(default=2.0, kw_only=True)
-    model_uncertainty: str = field(default="none", kw_only=True)
-    reward_scale: float | str
+    evaluate_every: int = setting("decisions between evaluations", at_least=1)
+    ships: int = setting("ships that sail at once", at_least=1)
+    batch_size: int = setting("samples of one gradient step", at_least=1)
+    learning_rate: float = setting(
+        "learning rate of Adam at the beginning", above=0.0, at_most=1.0
+    )
+    schedule: str = setting(
+        "course of the learning rate; linear falls to 0 at the end of the training",
+        options=("constant", "linear"),
+    )
+    gamma: float = setting("discount of a decision", at_least=0.0, at_most=1.0)
+    net_arch: tuple[int, ...] = setting(
+        "widths of the hidden layers of the policy, and of PPO's value", at_least=1
+    )
+    activation: str = setting("function between the layers", options=("relu", "tanh"))
+    frame_stack: int = setting(
+        "observations that the policy sees, the newest last", at_least=1
+    )
+    action_repeat: int = setting(
+        "control intervals of a decision; a base goes on with its feedback in each of"
+        " them",
+        at_least=1,
+    )
+    base: str = setting(
+        "classical controller that the policy adds to: a kind, a controller's file that"
+        ' ends in .json, "none", or "tuned", the best of those tuned for the suite\'s'
+        " task (except `designs.NO_BASES`)"
+    )
+    authority: float = setting(
+        "share of the action's range by which it may differ from the base; 1 without a"
+        " base",
+        above=0.0,
+        at_most=2.0,
+    )
+    rate_limit: float = setting(
+        "largest change of the output in force in a control interval, so that the"
+        " rudder does not jump where a decision gives way to the next; 2 does not limit"
+        " it",
+        above=0.0,
+        at_most=2.0,
+    )
+    model_uncertainty: str = setting(
+        "covariance: the ships that learn are drawn from the model's covariance;"
+        " evaluation is on the model itself. Unlike `--randomise` it leaves seas and"
+        " speeds as the task has them",
+        options=("none", "covariance"),
+    )
+    reward_scale: float | str = setting(
+        "divisor of rewards before they are limited to [-10, 10]; running is the"
+        " standard deviation of their discounted sum so far",
+        above=0.0,
+        word="running",
+    )
 
     def __post_init__(self) -> None:
         for one in fields(self):
-            object.__setattr__(
-                self,
-                one.name,
-                _checked(getattr(self, one.name), one, self.allowed(one.name)),
-            )
+            value = _checked(getattr(self, one.name), one)
+            object.__setattr__(self, one.name, value)
         if not check_text(self.base, "base").endswith(".json"):
             check_choice(self.base, ("none", "tuned", *controller_kinds()), "base")
         if self.base == "none" and self.authority != 1.0:
             raise InputError(
-                f"authority: {self.authority:g} found without a base, expected 1, or a"
-                " base"
+                f"authority: expected 1 without a base, got {self.authority:g}"
             )
         self._check_together()
 
     def _check_together(self) -> None:
         """Refuse settings that do not fit each other."""
 
-    @classmethod
-    def allowed(cls, name: str) -> dict[str, Any]:
-        """What is allowed for a setting beside its type, as in `hyperparameters/settings.toml`."""
-        tables = (
-            KNOWN[kind.section] for kind in cls.__mro__ if issubclass(kind, Settings)
-        )
-        known = next(table[name] for table in tables if name in table)
-        return {key: value for key, value in known.items() if key != "meaning"}
-
     @property
     def rollout(self) -> int:
-        """Decisions of all ships between two updates; a training has whole ones."""
-        return self.ships * int(vars(self).get("n_steps") or vars(self)["train_freq"])
+        """Decisions of all ships between two updates; a training has whole rollouts."""
+        raise NotImplementedError
 
     def to_dict(self) -> dict[str, Any]:
-        """The settings by name, ready for JSON."""
+        """Return the settings by name, ready for JSON."""
         return dict(as_json(self))
 
 
@@ -106,45 +134,73 @@ class Settings:
 class PPOSettings(Settings):
     """Proximal policy optimisation (Schulman et al. 2017, arXiv:1707.06347)."""
 
-    section: ClassVar[str] = "ppo"
+    n_steps: int = setting("decisions of each ship in a rollout", at_least=1)
+    n_epochs: int = setting("uses of each sample of a rollout", at_least=1)
+    gae_lambda: float = setting(
+        "decay of the generalised advantage estimate", at_least=0.0, at_most=1.0
+    )
+    clip_range: float = setting(
+        "largest change of the ratio of probabilities", above=0.0
+    )
+    ent_coef: float = setting("weight of the entropy", at_least=0.0)
+    vf_coef: float = setting("weight of the value's error", above=0.0)
+    max_grad_norm: float = setting("longest gradient", above=0.0)
+    log_std_init: float = setting(
+        "logarithm of the action's standard deviation at the beginning",
+        at_least=-10.0,
+        at_most=3.0,
+    )
+    log_std_end: float | str = setting(
+        "value to which the logarithm of the standard deviation falls evenly over the"
+        " training. A rudder that chatters costs more than steering does, and the"
+        " policy that is best while it explores is not the one that is best without",
+        at_least=-10.0,
+        at_most=3.0,
+        word="learned",
+    )
 
-    n_steps: int
-    n_epochs: int
-    gae_lambda: float
-    clip_range: float
-    ent_coef: float
-    vf_coef: float
-    max_grad_norm: float
-    log_std_init: float
-    log_std_end: float | str
+    @property
+    def rollout(self) -> int:
+        """Decisions of all ships between two updates."""
+        return self.ships * self.n_steps
 
     def _check_together(self) -> None:
-        samples = self.ships * self.n_steps
-        if samples % self.batch_size or self.batch_size < 2:
+        if self.rollout % self.batch_size or self.batch_size < 2:
             raise InputError(
-                f"batch_size: {self.batch_size} found, expected a divisor above 1 of"
-                f" ships x n_steps, {samples}"
+                "batch_size: expected a divisor above 1 of ships x n_steps ="
+                f" {self.rollout}, got {self.batch_size}"
             )
 
 
 @dataclass(frozen=True)
 class OffPolicySettings(Settings):
-    """What the algorithms have that learn from a replay buffer."""
+    """Settings of the algorithms that learn from a replay buffer."""
 
-    section: ClassVar[str] = "off-policy"
+    buffer_size: int = setting("decisions that are remembered", at_least=1)
+    learning_starts: int = setting(
+        "decisions of all ships under random actions before learning begins", at_least=0
+    )
+    train_freq: int = setting("decisions of each ship between updates", at_least=1)
+    gradient_steps: int = setting("gradient steps of an update", at_least=1)
+    tau: float = setting(
+        "share by which the target network approaches the critic in an update",
+        above=0.0,
+        at_most=1.0,
+    )
+    critic_arch: tuple[int, ...] = setting(
+        "widths of the hidden layers of the critics", at_least=1
+    )
 
-    buffer_size: int
-    learning_starts: int
-    train_freq: int
-    gradient_steps: int
-    tau: float
-    critic_arch: tuple[int, ...]
+    @property
+    def rollout(self) -> int:
+        """Decisions of all ships between two updates."""
+        return self.ships * self.train_freq
 
     def _check_together(self) -> None:
         if self.buffer_size < self.ships:
             raise InputError(
-                f"buffer_size: {self.buffer_size} found, expected one for each of"
-                f" {self.ships} ships at least"
+                f"buffer_size: expected at least {self.ships}, one for each of the"
+                f" ships, got {self.buffer_size}"
             )
 
 
@@ -152,40 +208,53 @@ class OffPolicySettings(Settings):
 class SACSettings(OffPolicySettings):
     """Soft actor-critic (Haarnoja et al. 2018, arXiv:1812.05905)."""
 
-    section: ClassVar[str] = "sac"
-
-    ent_coef: float | str
-    target_entropy: float | str
+    ent_coef: float | str = setting(
+        "weight of the entropy; auto or auto_0.1 adapts it, from that value",
+        at_least=0.0,
+        word="auto_",
+    )
+    target_entropy: float | str = setting(
+        "entropy that the coefficient is adapted to; auto is -1 for each command. One"
+        " command has the standard deviation 0.09 with -1, 0.24 with 0",
+        at_most=1.0,
+        word="auto",
+    )
 
 
 @dataclass(frozen=True)
 class TD3Settings(OffPolicySettings):
     """Twin delayed deep deterministic policy gradient (Fujimoto et al. 2018, arXiv:1802.09477)."""
 
-    section: ClassVar[str] = "td3"
-
-    action_noise: float
-    policy_delay: int
-    target_policy_noise: float
-    target_noise_clip: float
+    action_noise: float = setting(
+        "standard deviation of what is added to actions to explore", above=0.0
+    )
+    policy_delay: int = setting(
+        "updates of the critics for one of the policy", at_least=1
+    )
+    target_policy_noise: float = setting(
+        "standard deviation of what is added to the target's actions", at_least=0.0
+    )
+    target_noise_clip: float = setting(
+        "largest noise added to the target's actions", at_least=0.0
+    )
 
 
 @dataclass(frozen=True)
 class TQCSettings(SACSettings):
     """Truncated quantile critics (Kuznetsov et al. 2020, arXiv:2005.04269)."""
 
-    section: ClassVar[str] = "tqc"
-
-    n_critics: int
-    n_quantiles: int
-    top_quantiles_to_drop: int
+    n_critics: int = setting("number of critics", at_least=1)
+    n_quantiles: int = setting("quantiles of each critic", at_least=1)
+    top_quantiles_to_drop: int = setting(
+        "quantiles of each critic that are dropped, the largest", at_least=0
+    )
 
     def _check_together(self) -> None:
         super()._check_together()
         if self.top_quantiles_to_drop >= self.n_quantiles:
             raise InputError(
-                f"top_quantiles_to_drop: {self.top_quantiles_to_drop} found, expected"
-                f" fewer than n_quantiles = {self.n_quantiles}"
+                f"top_quantiles_to_drop: expected fewer than n_quantiles ="
+                f" {self.n_quantiles}, got {self.top_quantiles_to_drop}"
             )
 
 
@@ -198,41 +267,44 @@ ALGORITHMS: Mapping[str, type[Settings]] = {
 }
 
 
-def _checked(value: Any, one: Field[Any], allowed: dict[str, Any]) -> Any:
-    """The value of a setting, if its type and bounds allow it."""
-    name = one.name
+def _checked(value: Any, one: Field[Any]) -> Any:
+    """Return the value of a setting, if its type and bounds allow it."""
+    name, about = one.name, one.metadata
     if one.type is int:
-        return check_whole(value, name, **allowed)
+        return check_whole(value, name, **about["bounds"])
     if one.type is float:
-        return check_number(value, name, **allowed)
-    if one.type == WIDTHS:
-        if isinstance(value, str) or not isinstance(value, Sequence):
-            raise InputError(
-                f"{name}: {value!r} found, expected widths of layers, such as [64, 64]"
-            )
-        return tuple(check_whole(width, name, **allowed) for width in value)
-    if one.type == NUMBER_OR_WORD:
-        return _number_or_word(value, name, allowed)
-    return check_choice(value, allowed["options"], name) if allowed else value
+        return check_number(value, name, **about["bounds"])
+    if about["options"]:
+        return check_choice(value, about["options"], name)
+    if one.type is str:
+        return value
+    if about["word"]:
+        return _number_or_word(value, name, about["word"], about["bounds"])
+
+    if isinstance(value, str) or not isinstance(value, Sequence):
+        raise InputError(
+            f"{name}: expected widths of layers, such as [64, 64], got {value!r}"
+        )
+    return tuple(check_whole(width, name, **about["bounds"]) for width in value)
 
 
-def _number_or_word(value: Any, name: str, allowed: dict[str, Any]) -> Any:
-    """A number, or a word; one that ends in an underscore has a positive number after it, or neither."""
-    word = allowed.pop("word")
+def _number_or_word(
+    value: Any, name: str, word: str, bounds: Mapping[str, float]
+) -> Any:
+    """Return a number or a word; after an underscore the word has a positive number."""
     alone = word.rstrip("_")
     if value == alone:
         return value
-    if word != alone and isinstance(value, str) and value.startswith(word):
+    if word.endswith("_") and isinstance(value, str) and value.startswith(word):
         try:
             check_number(float(value.removeprefix(word)), name, above=0.0)
         except (ValueError, InputError):
-            said = (
-                f"{name}: {value!r} found, expected a number, '{alone}' or such as"
-                f" '{word}0.1'"
-            )
-            raise InputError(said) from None
+            raise InputError(
+                f"{name}: expected a number, '{alone}' or such as '{word}0.1', got"
+                f" {value!r}"
+            ) from None
         return value
-    return check_number(value, name, **allowed, hint=f"or '{alone}'")
+    return check_number(value, name, **bounds, hint=f"or '{alone}'")
 
 
 def load_settings(
@@ -242,7 +314,7 @@ def load_settings(
     given: Mapping[str, Any] | None = None,
     action: str = "rudder",
 ) -> Settings:
-    """The tuned settings of an algorithm, with those given by name replaced.
+    """Return the tuned settings of an algorithm, with those given by name replaced.
 
     Returns settings of the algorithm's class in `ALGORITHMS`. Raises InputError for an
     unknown algorithm or setting, with the nearest known one, or a value out of its
@@ -264,9 +336,10 @@ def load_settings(
     check_choice(algorithm, ALGORITHMS, "algorithm")
     check_choice(environment, ENVIRONMENTS, "environment")
     check_choice(action, ACTIONS, "action")
-    content = hyperparameters(algorithm)
+    content = shipped_toml("agents.training", f"hyperparameters/{algorithm}.toml")
+    given = given or {}
     chosen = dict(content["defaults"])
-    if action == "rudder" and (given or {}).get("base") != "none":
+    if action == "rudder" and given.get("base") != "none":
         followed = environment.removesuffix("-v1")
         for table, name in (
             ("residual", followed),
@@ -274,55 +347,44 @@ def load_settings(
             ("tasks", task),
         ):
             chosen |= content.get(table, {}).get(name, {})
-    return make_settings(algorithm, chosen | dict(given or {}))
+    return make_settings(algorithm, {**chosen, **given})
 
 
 def settings_of(algorithm: str) -> type[Settings]:
-    """The class of an algorithm's settings; InputError for an unknown one, with the nearest known one."""
+    """Class of an algorithm's settings; InputError for an unknown one names the nearest."""
     return ALGORITHMS[check_choice(algorithm, ALGORITHMS, "algorithm")]
 
 
 def make_settings(algorithm: str, values: Mapping[str, Any]) -> Settings:
-    """Settings by name, all of them; InputError for one unknown or missing, or a value out of its range."""
-    kind, where = settings_of(algorithm), f"settings of {algorithm}"
-    table = _settings(values, kind, where)
-    check_keys(
-        table,
-        table,
-        where,
-        [one.name for one in fields(kind) if one.default is MISSING],
-    )
+    """Make settings of values by name, all of them.
+
+    Raises InputError for one unknown or missing, or a value out of its range.
+    """
+    kind = settings_of(algorithm)
+    where = f"settings of {algorithm}"
+    table = _known_settings(values, kind, where)
+    check_keys(table, table, where, [one.name for one in fields(kind)])
     return kind(**table)
 
 
 def changed(settings: Settings, given: Mapping[str, Any]) -> Settings:
-    """The settings with some replaced; InputError for an unknown one, or a value out of its range."""
-    return replace(settings, **_settings(given, type(settings), "settings"))
+    """Replace some settings; InputError for an unknown one, or a value out of its range."""
+    return replace(settings, **_known_settings(given, type(settings), "settings"))
 
 
 def read_settings_file(path: Path, algorithm: str) -> dict[str, Any]:
-    """Settings in a user's own TOML file; InputError if it cannot be read, or names an unknown setting."""
-    return _settings(
-        read_toml(path, "settings file"), settings_of(algorithm), str(path)
-    )
+    """Read a user's own TOML file; InputError if it cannot be read or names no setting."""
+    content = read_toml(path, "settings file")
+    return _known_settings(content, settings_of(algorithm), str(path))
 
 
-#: What settings mean that older runs do not have.
-LATER = {
-    one.name: one.default for one in fields(Settings) if one.default is not MISSING
-}
-
-
-def _settings(value: Any, kind: type[Settings], where: str) -> dict[str, Any]:
-    """A table that names settings only; whole numbers stand for decimal ones."""
-    table = present_names(check_table(value, where))
+def _known_settings(value: Any, kind: type[Settings], where: str) -> dict[str, Any]:
+    """Return a table that names settings only, with integers as decimal numbers."""
+    table = check_table(value, where)
     types = {one.name: one.type for one in fields(kind)}
     check_keys(table, tuple(types), where)
-    return {
-        name: (
-            float(given)
-            if types[name] in (float, NUMBER_OR_WORD) and type(given) is int
-            else given
-        )
-        for name, given in table.items()
-    }
+    settings = dict(table)
+    for name, given in table.items():
+        if type(given) is int and types[name] in (float, float | str):
+            settings[name] = float(given)
+    return settings
