@@ -5,7 +5,6 @@
 # make soak      long runs with extreme actions, kills at random moments, wrong command lines
 # make release-check  the wheel in clean environments, without extras and with each, lowest and newest versions
 # make ecosystem skrl, TorchRL, Tianshou, PufferLib and CleanRL's wrappers on our environments, shipmmg; for every night
-# make mutate    small faults put into MODULES, by default all: do the tests beside them notice?
 # make evidence  what the pages of docs/ claim, run again
 # make docs      the site, and whether its links, pictures and pages work in a browser
 # make site-test the latter alone
@@ -20,7 +19,7 @@ DATA ?= ../shared/data
 # Bytecode is kept (an empty value means unset): the many processes of the tests compile the same files but once.
 export PYTHONDONTWRITEBYTECODE =
 
-.PHONY: demo test lint format type bench soak fuzz release-check ecosystem mutate evidence docs site-test clean
+.PHONY: demo test lint format type bench soak fuzz release-check ecosystem evidence docs site-test clean
 
 demo: $(VENV)/demo-installed
 	$(BIN)/shipgym autopilot examples/mariner/ship.toml --agent mariner-calm-ppo --out report
@@ -63,9 +62,6 @@ fuzz: $(VENV)/dev-installed
 
 ecosystem: $(VENV)/ecosystem-installed
 	OMP_NUM_THREADS=1 $(VENV)/ecosystem/bin/python scripts/ecosystem.py
-
-mutate: $(VENV)/dev-installed
-	SHIPGYM_CACHE=$(CURDIR)/$(VENV)/mutated OMP_NUM_THREADS=1 $(BIN)/python scripts/mutate.py $(MODULES)
 
 evidence: $(VENV)/dev-installed
 	$(BIN)/python scripts/reproduce.py all --markdown docs/reproduction.md --images docs/images || test $$? = 1  # 1: aims missed, as the page says
