@@ -76,7 +76,6 @@ evidence: $(VENV)/dev-installed
 	$(BIN)/python scripts/bridge_logs.py
 	$(BIN)/python scripts/standards.py
 	$(BIN)/python scripts/run_notebooks.py
-	$(BIN)/python scripts/gallery.py
 	$(BIN)/python scripts/tutorial.py
 
 docs: $(VENV)/dev-installed
