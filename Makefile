@@ -4,7 +4,7 @@
 # make fuzz      a million mutated files of every kind that is read
 # make soak      long runs with extreme actions, kills at random moments, wrong command lines
 # make release-check  the wheel in clean environments, without extras and with each, lowest and newest versions
-# make ecosystem skrl, TorchRL, Tianshou, PufferLib and CleanRL's wrappers on our environments, shipmmg; for every night
+# make ecosystem skrl, TorchRL, Tianshou and CleanRL's wrappers on our environments; for every night
 # make evidence  what the pages of docs/ claim, run again
 # make docs      the site, and whether its links, pictures and pages work in a browser
 # make site-test the latter alone
@@ -106,12 +106,6 @@ $(VENV)/dev-installed: pyproject.toml constraints.txt | $(VENV)/bin/python
 $(VENV)/ecosystem-installed: pyproject.toml constraints.txt | $(VENV)/bin/python
 	$(PYTHON) -m venv $(VENV)/ecosystem
 	$(VENV)/ecosystem/bin/python -m pip install --quiet -c constraints.txt -e ".[rl]" skrl torchrl tianshou
-	# PufferLib's games need downloads from elsewhere; without them its setup misses a name, which the folder gives
-	$(VENV)/ecosystem/bin/python -m pip install --quiet wheel gym==0.23 pettingzoo==1.24.1 shimmy psutil
-	NO_OCEAN=1 NO_TRAIN=1 PYTHONPATH=$(CURDIR)/scripts/pufferlib_setup $(VENV)/ecosystem/bin/python -m pip install --quiet \
-		--no-deps --no-build-isolation pufferlib==3.0.0
-	$(VENV)/ecosystem/bin/python -m pip install --quiet matplotlib
-	$(VENV)/ecosystem/bin/python -m pip install --quiet --no-deps shipmmg
 	touch $@
 
 clean:

@@ -40,7 +40,7 @@ ROOMS: dict[str, tuple[float, int, str]] = {
     "identification.estimators": (1.33, 2, "LS-SVM, recursive, others"),
     "identification.search": (2.67, 2, "bee colony, swarm, grid"),
     "identification.regression": (4, 2, "samples, preprocessing"),
-    "shipgym.interchange": (1.75, 0, "pandas, xarray, MSS"),
+    "shipgym.interchange": (1.75, 0, "pandas, Minari"),
     "shipgym.envs": (0.7, 0, "Gymnasium, single and vector"),
     "shipgym.pages": (4, 0, "HTML from templates"),
     "shipgym.plots": (2.8, 0, "figures"),
@@ -66,6 +66,7 @@ TITLES = {
     "identification.pipeline": "pipeline.py",
     "identification.result": "result.py, fit.py",
     "shipgym.episodes": "engine/episodes.py",
+    "shipgym.interchange": "interchange.py",
 }
 BACK_GROUND = {"agents": "#f6efe4", "identification": "#e9f1ea", "shipgym": "#e8eef6"}
 

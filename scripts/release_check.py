@@ -61,20 +61,13 @@ from agents.deployment.nmea import library, readings, sentences
 assert library("serial").VERSION
 assert readings(sentences("HEHDT,180.0,T").strip())[0].quantity == "heading"
 """
-FRAME = """
+LOGS = """
 from shipgym import Trial, interchange
 trial = Trial([0.0, 1.0, 2.0], {"psi": [0.0, 0.1, 0.2]})
-for there, back in FORMS:
-    assert back(there(trial)).sha256 == trial.sha256
-"""
-XARRAY = FRAME.replace("FORMS", "[(interchange.to_xarray, interchange.from_xarray)]")
-LOGS = (
-    FRAME.replace("FORMS", "[(interchange.to_frame, interchange.from_frame)]")
-    + """
+assert interchange.from_frame(interchange.to_frame(trial)).sha256 == trial.sha256
 interchange.to_frame(trial).to_parquet("trial.parquet")
 assert (Trial.from_csv("trial.parquet")["psi"] == trial["psi"]).all()
 """
-)
 MINARI = """
 import os
 os.environ["MINARI_DATASETS_PATH"] = os.getcwd()
@@ -138,7 +131,6 @@ TRIED: dict[str, tuple[str | tuple[str, ...], ...]] = {
     "fmu": (("export", "mariner", "--fmu", "mariner.fmu"),),
     "nmea": (NMEA,),
     "logs": (LOGS,),
-    "xarray": (XARRAY,),
     "minari": (MINARI,),
     "rl": (("train", *LEARN, "--out", "run"),),
     "tune": (("tune", *LEARN, "--trials", "1", "--out", "study"),),
