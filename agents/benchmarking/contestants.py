@@ -41,7 +41,7 @@ from agents.controllers.registry import (
     controller_kinds,
     register_controller,
 )
-from agents.engines.job import working_folder
+from agents.jobs import working_folder
 from agents.policies.one_for_all import ONE_FOR_ALL, OneForAll
 from agents.policies.sb3_zip import read_sb3
 from agents.rollouts.rollout import check_fits

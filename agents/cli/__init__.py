@@ -191,7 +191,7 @@ def autopilot_command(
     the report then says why.
     """
     from agents.cli.terminal import progress_bars
-    from agents.engines.jobs import JobEngine
+    from agents.jobs import JobEngine
     from agents.verification.chain import DESIGNS, build_autopilot
 
     designs = (

@@ -56,7 +56,7 @@ def answered(command: Callable[..., None]) -> Callable[..., None]:
     @functools.wraps(command)
     def wrapped(*args: Any, **kwargs: Any) -> None:
         from agents.cli.terminal import printing
-        from agents.engines.jobs import WorkerDiedError
+        from agents.jobs import JobError
         from shipgym.errors import InputError, ManoeuvreError, UnstableModelError
 
         try:
@@ -65,7 +65,7 @@ def answered(command: Callable[..., None]) -> Callable[..., None]:
             sys.stdout.flush()
         except InputError as error:
             fail(str(error), WRONG_INPUT)
-        except (ManoeuvreError, UnstableModelError, WorkerDiedError) as error:
+        except (ManoeuvreError, UnstableModelError, JobError) as error:
             fail(str(error), FAILED)
         except KeyboardInterrupt:
             fail("interrupted, nothing was written", INTERRUPTED)

@@ -232,7 +232,7 @@ def tune_command(
     is killed, the same command continues with the trials that are not done.
     """
     from agents.cli.terminal import progress_bars
-    from agents.engines.jobs import JobEngine
+    from agents.jobs import JobEngine
     from agents.training.plan import Given, make_plan
     from agents.training.tuning import evaluated_evenly, tune
     from shipgym.files import named_values
@@ -241,7 +241,6 @@ def tune_command(
     own = fixed | ({} if total_steps is None else {"total_steps": total_steps})
     options = named_values(environment_options or (), "--option", EXAMPLE)
     where = JobEngine(engine, workers, address)
-    where.check()
     given = Given(
         algorithm,
         env,

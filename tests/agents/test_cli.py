@@ -24,7 +24,7 @@ from agents.cli import app, doctor, identification, reproduction, training, warm
 from agents.cli.command import answered, told_failure
 from agents.cli.warm import _jobs, _names
 from agents.controllers.designs import CLASSICAL
-from agents.engines.jobs import JobEngine, WorkerDiedError
+from agents.jobs import JobEngine, JobError
 from agents.training.plan import Given
 from agents.training.run_folder import CHECKPOINT
 from shipgym import InputError, ManoeuvreError, UnstableModelError, load_model
@@ -725,7 +725,7 @@ def test_a_training_that_is_interrupted_says_whether_it_can_go_on(
         (InputError("length: -1 found"), 2, "length: -1 found"),
         (ManoeuvreError("never turned", None), 1, "never turned"),
         (UnstableModelError("lost", 1.0, {}), 1, "lost"),
-        (WorkerDiedError("a worker died"), 1, "a worker died"),
+        (JobError("a worker was killed"), 1, "a worker was killed"),
         (KeyboardInterrupt(), 130, "interrupted, nothing was written"),
         (OSError(errno.ENOENT, "No such file", "a.toml"), 2, "a.toml: No such file"),
     ],

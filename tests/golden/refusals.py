@@ -26,9 +26,6 @@ from agents.deployment.c99 import autopilot_source, checked_name
 from agents.deployment.route import Route
 from agents.deployment.steering import Helm, Limits
 from agents.deployment.translator import c_name, literal
-from agents.engines.job import check_outcome, died_too_often
-from agents.engines.jobs import check_engine, run_jobs
-from agents.engines.serialisation import pack, serialised, shortened, unpack
 from agents.policies import shield
 from agents.policies.network import Network
 from agents.policies.onnx_export import onnx_model
@@ -611,7 +608,7 @@ def of_deployment() -> Iterator[str]:
 
 
 def of_rollouts() -> Iterator[str]:
-    """What rollouts, suites, jobs and Monte Carlo refuse."""
+    """What rollouts, suites and Monte Carlo refuse."""
     pid, task = PID.from_model(MARINER), Task.of("CourseKeeping", episode_steps=5)
     answers: list[Callable[[Any], Any]] = [
         lambda seen: "x",
@@ -678,33 +675,6 @@ def of_rollouts() -> Iterator[str]:
         f"of: {suite_of('mariner-calm')} {suite_of('mariner')}"
         f" {find_task('roll-limit').name}"
     )
-    yield from refused(
-        "jobs",
-        lambda: check_engine("dask", 1, None),
-        lambda: check_engine("local", 0, None),
-        lambda: check_engine("local", 1, "a:1"),
-        lambda: check_engine("local", None, None),
-        lambda: run_jobs(str, [{}], retries=-1),
-        lambda: serialised([1], "jobs[0]"),
-        lambda: pack({1: 2}),
-        lambda: pack({1}),
-        lambda: pack(np.array([None])),
-        lambda: unpack({"__array__": ["<O8", [1], ""]}),
-        lambda: check_outcome({"wrong": "it is"}, "job 3"),
-        lambda: check_outcome({"failed": "it has", "traceback": ""}, "job 4"),
-    )
-    yield (
-        f"{died_too_often('{}', 2)} {shortened('x' * 200)[-9:]}"
-        f" {shortened('x' * 201)[-9:]}"
-    )
-    packed = pack(
-        {
-            "a": (1, np.float32(0.5), None, np.nan),
-            "b": np.array([[1.5, 2.0]]),
-            "c": [np.inf, True],
-        }
-    )
-    yield f"{packed} {unpack(packed)}"
     model = load_model("mariner-tls-svm")
     yield from refused(
         "draws",
