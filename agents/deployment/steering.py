@@ -1,12 +1,10 @@
 """`shipgym steer`: an autopilot on NMEA 0183, which hands over when it cannot trust what it is told."""
 
 import asyncio
-import gc
 from collections.abc import Callable, Iterable
 from contextlib import closing, suppress
 from dataclasses import dataclass, field, replace
 from math import ceil, cos, inf, radians, sin
-from time import perf_counter
 from typing import Any
 
 from agents.controllers.los_autopilot import Guided
@@ -15,7 +13,6 @@ from agents.deployment.autopilot import Autopilot
 from agents.deployment.c99 import render
 from agents.deployment.nmea import TABLES, Link, Reading, readings, sentences
 from agents.deployment.route import Route
-from agents.deployment.scheduling import short_slice
 from shipgym import InputError
 from shipgym.checks import check_number
 from shipgym.tasks.guidance import wrapped
@@ -23,7 +20,6 @@ from shipgym.trials.units import KNOT
 
 STANDBY, STEERING, MANUAL = "standby", "steering", "manual"
 LONGEST_TICK = 1.0  # s, between two looks at the sensors
-EARLY_S = 1e-3  # before a step it sleeps no more: who sleeps wakes late
 RETRY_S, CONNECT_S = 1.0, 5.0  # between two attempts to connect, and the longest of one
 ANGLES = ("heading", "course", "leg", "to_steer", "rudder", "waypoint_bearing")
 PLACES = ("latitude", "longitude")
@@ -384,20 +380,10 @@ async def steer(
     parts = ceil(helm.pilot.dt / LONGEST_TICK - 1e-9)
     missing, retry_at = await _missing(link, address, first=True), loop.time() + RETRY_S
     tick, begin, number, status = helm.pilot.dt / parts, loop.time() * speed_up, 0, ""
-    # so that no collection of garbage looks through all that was imported, which takes
-    # long
-    gc.freeze()
-    with (
-        closing(link),
-        short_slice(),
-        suppress(asyncio.CancelledError),
-    ):  # an interruption ends it
+    with closing(link), suppress(asyncio.CancelledError):  # an interruption ends it
         while number * tick < duration:
             due = begin + number * tick
-            await asyncio.sleep(max(0.0, due / speed_up - EARLY_S - loop.time()))
-            ready = perf_counter() + due / speed_up - loop.time()
-            while perf_counter() < ready:
-                pass
+            await asyncio.sleep(max(0.0, due / speed_up - loop.time()))
             now = loop.time() * speed_up
             late = helm.state == STEERING and now - due > helm.limits.late_s * speed_up
             fault = f"a step came {now - due:.1f} s late" if late else None
