@@ -1,12 +1,11 @@
 """Build the wheel, install it in clean environments and try what it is for: README's lines, and each extra.
 
-    python scripts/release_check.py                        the core and every extra,
-    each in two environments:
-                                                           the lowest declared versions,
-                                                           and the newest
-    python scripts/release_check.py core report            only these python
-    scripts/release_check.py --newest core          only the newest versions; --lowest
-    likewise
+    python scripts/release_check.py                 the core and every extra
+    python scripts/release_check.py core report     only these
+    python scripts/release_check.py --newest core   only the newest versions
+
+Each is tried in two environments: the lowest declared versions (`--lowest`), and the
+newest (`--newest`).
 
 Needs the network. torch is taken in the version of `constraints.txt`: other builds
 bring gigabytes. Exits with 1 if something does not build, install or run.
