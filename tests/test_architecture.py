@@ -117,6 +117,21 @@ def test_no_function_is_longer_than_sixty_lines():
     assert not long
 
 
+def test_every_script_is_the_way_to_something_that_is_published():
+    """A page, the Makefile, a ship file or a test names it, or another script imports it."""
+    pages = [*PAGES, ROOT / "CONTRIBUTING.md", ROOT / "Makefile", ROOT / "mkdocs.yml"]
+    pages += [*(ROOT / "tests").rglob("*.py"), *(ROOT / "examples").rglob("*.toml")]
+    text = "".join(path.read_text(encoding="utf-8") for path in pages)
+    scripts = sorted((ROOT / "scripts").glob("*.py"))
+    code = "".join(path.read_text(encoding="utf-8") for path in scripts)
+    orphaned = [
+        path.name
+        for path in scripts
+        if f"scripts/{path.name}" not in text and f"from {path.stem} import" not in code
+    ]
+    assert orphaned == []
+
+
 def test_identification_has_few_files_at_its_top():
     assert len(list((ROOT / "identification").glob("*.py"))) <= 10
 
