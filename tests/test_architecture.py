@@ -1,6 +1,5 @@
 """The order of the house: what `docs/architecture.md` says and draws is what the code does."""
 
-import ast
 import re
 import tomllib
 import xml.etree.ElementTree as ElementTree
@@ -17,7 +16,6 @@ PAGES = [
     ROOT / "CHANGELOG.md",
     *sorted((ROOT / "docs").rglob("*.md")),
 ]
-LONGEST = 60  # lines of a function
 
 
 @pytest.fixture(scope="module")
@@ -104,17 +102,6 @@ def test_the_picture_of_a_step_names_functions_that_the_parts_have():
             assert hasattr(perfect, one), one
         if giver == "the sea":
             assert hasattr(open_sea, one), one
-
-
-def test_no_function_is_longer_than_sixty_lines():
-    long = [
-        f"{path.relative_to(ROOT)}:{node.lineno} {node.name}"
-        for path in draw_architecture.modules().values()
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
-        if isinstance(node, ast.FunctionDef)
-        and node.end_lineno - node.lineno >= LONGEST
-    ]
-    assert not long
 
 
 def test_every_script_is_the_way_to_something_that_is_published():
