@@ -89,10 +89,10 @@ def autopilot_command(
             progress=on_progress,
             where=JobEngine(engine, workers, address),
         )
-    _print_result(result, out / "report.html", draws)
+    print_autopilot(result, out / "report.html", draws)
 
 
-def _print_result(result: AutopilotResult, report: Path, draws: int) -> None:
+def print_autopilot(result: AutopilotResult, report: Path, draws: int) -> None:
     """Print the result of the chain; fail for an unstable model, and if every design is refused."""
     from agents.cli.terminal import answer, say, warn
     from identification.validation.warnings import model_warnings

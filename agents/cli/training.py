@@ -288,10 +288,10 @@ def tune_command(
             "interrupted; the same command continues with the trials that are not done",
             INTERRUPTED,
         )
-    _print_tuning(tuning, out)
+    print_tuning(tuning, out)
 
 
-def _print_tuning(tuning: Tuning, out: Path) -> None:
+def print_tuning(tuning: Tuning, out: Path) -> None:
     """Print trials and where the best settings are."""
     from agents.cli.tables import plain_table
     from agents.cli.terminal import answer, console, say

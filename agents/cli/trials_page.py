@@ -45,7 +45,7 @@ def _section(
     for manoeuvre in family:
         for index in trials.indices[manoeuvre]:
             by_manoeuvre = [trials.indices[other].get(index) for other in family]
-            rows[_readable(index)] = by_manoeuvre
+            rows[readable_index(index)] = by_manoeuvre
     return {
         "name": name,
         "title": FAMILIES[name].title,
@@ -96,7 +96,7 @@ def _manoeuvre_figures(
     return figures
 
 
-def _readable(name: str) -> str:
+def readable_index(name: str) -> str:
     """The name of an index as words with its unit."""
     units = {"_deg_s": "deg/s", "_deg": "deg", "_lengths": "ship lengths", "_s": "s"}
     for ending, unit in units.items():

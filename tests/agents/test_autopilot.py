@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from agents import LQ, LineOfSight, sail
-from agents.cli.terminal import ranking_table
+from agents.cli.tables import ranking_table
 from agents.jobs import JobEngine
 from agents.verification.chain import build_autopilot, verify
 from agents.verification.index_uncertainty import (
