@@ -209,7 +209,7 @@ class Helm:
         if (self.route is not None) != bool(turns) or {*turns} - {*Route.GIVES}:
             raise InputError(
                 f"route: autopilot '{name}' {'with' if self.route else 'without'} a"
-                " route found, expected 'wheel-over' or 'preview-mpc' of shipgym"
+                " route found, expected 'wheel-over' or 'mpc' of shipgym"
                 " autopilot with a route, or another without"
             )
         if unknown := set(self.needed) - TABLES["believed"].keys():

@@ -890,7 +890,7 @@ def test_autopilots_are_asked_for_as_told(demo, tmp_path, monkeypatch):
         "agents": (),
         "standards": False,
         "progress": None,
-        "designs": ("pid", "lq", "lq-scheduled", "turn-rate", "wheel-over"),
+        "designs": ("pid", "lq", "turn-rate", "wheel-over"),
         "where": JobEngine(),
     }
     assert usual[1] == expected
