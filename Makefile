@@ -22,7 +22,7 @@ export PYTHONDONTWRITEBYTECODE =
 .PHONY: demo test lint format type bench soak fuzz release-check ecosystem evidence docs site-test clean
 
 demo: $(VENV)/demo-installed
-	$(BIN)/shipgym autopilot examples/mariner/ship.toml --agent mariner-calm-ppo --out report
+	$(BIN)/shipgym autopilot examples/mariner/ship.toml --out report
 
 # Many loops and few steps of each: plain Python takes a tenth of the time that compiling them would. Tests that
 # are marked as `compiled` in files so marked take many steps, or state facts about compiled code.
@@ -66,9 +66,9 @@ ecosystem: $(VENV)/ecosystem-installed
 evidence: $(VENV)/dev-installed
 	$(BIN)/python scripts/reproduce.py all --markdown docs/reproduction.md --images docs/images || test $$? = 1  # 1: aims missed, as the page says
 	test ! -d $(DATA) || $(BIN)/python scripts/predict_real_ships.py --data $(DATA)
-	$(BIN)/shipgym benchmark --suite shipgym-v1 --controllers wheel-over,tuned-wheel-over,preview-mpc,ppo --out build/suite --no-page
+	$(BIN)/shipgym benchmark --suite shipgym-v1 --controllers wheel-over,tuned-wheel-over,mpc,ppo --out build/suite --no-page
 	$(BIN)/python scripts/best_known.py --suite shipgym-v1 build/suite --search tuned-best,ppo
-	$(BIN)/shipgym benchmark --suite shipgym-v2 --controllers tuned-ilos,wheel-over,tuned-wheel-over,preview-mpc,ppo --out build/suite-v2 --no-page
+	$(BIN)/shipgym benchmark --suite shipgym-v2 --controllers tuned-ilos,wheel-over,tuned-wheel-over,mpc,ppo --out build/suite-v2 --no-page
 	$(BIN)/python scripts/train_pretrained.py --table build/suite-v2
 	$(BIN)/python scripts/transfer.py --data $(DATA)
 	$(BIN)/python scripts/certainty.py

@@ -166,7 +166,7 @@ def measure_exports() -> None:
     mariner = load_model("mariner")
     exported = {
         "lq": autopilot_source(LQ.from_model(mariner), "lq"),
-        "ppo": autopilot_source(load_agent("mariner-calm-ppo"), "ppo"),
+        "ppo": autopilot_source(load_agent("sharp-turns-ppo-s0"), "ppo"),
         "ship": ship_source(mariner, "ship"),
     }
     for name, source in exported.items():

@@ -48,13 +48,6 @@ env = gymnasium.make("shipgym/CourseKeeping-v0", render_mode="rgb_array")
 env.reset(seed=0)
 assert env.render().shape == (600, 600, 3)
 """
-MPC = """
-import numpy, shipgym
-from agents import MPC
-mpc = MPC.from_model(shipgym.load_model("mariner"))
-action, _ = mpc.predict(numpy.full(len(mpc.observation_names), 0.1, numpy.float32))
-assert abs(action).max() > 0.0
-"""
 NMEA = """
 from agents.deployment.nmea import library, readings, sentences
 assert library("serial").VERSION
@@ -118,11 +111,10 @@ TRIED: dict[str, tuple[str | tuple[str, ...], ...]] = {
     "report": (("trials", "mariner", "--draws", "0", "--out", "trials.html"),),
     "benchmark": ((*BENCHMARK, "results"),),
     "render": (PICTURE,),
-    "mpc": (MPC,),
     "onnx": (
         (
             "export",
-            str(ROOT / "agents/pretrained/mariner-calm-ppo.json"),
+            str(ROOT / "agents/pretrained/sharp-turns-ppo-s0.json"),
             "--onnx",
             "agent.onnx",
         ),

@@ -46,9 +46,8 @@ def autopilot_command(
         Option(
             metavar="NAMES",
             help=(
-                "Autopilots to design; default:"
-                " pid,lq,lq-scheduled,turn-rate,wheel-over. "
-                "Others: preview-mpc, lqg."
+                "Autopilots to design; default: pid,lq,turn-rate,wheel-over."
+                " Others: lqg, mpc."
             ),
         ),
     ] = None,

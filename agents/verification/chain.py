@@ -46,7 +46,7 @@ if TYPE_CHECKING:
 
 
 FILES = ("report.html", "metrics.json", "model.json")  # beside those of the autopilots
-DESIGNS = ("pid", "lq", "lq-scheduled", "turn-rate", "wheel-over")
+DESIGNS = ("pid", "lq", "turn-rate", "wheel-over")
 LARGEST_SEED = 2**32
 
 
@@ -286,8 +286,8 @@ def _check_fits(guest: Agent, model: ShipModel, where: str) -> None:
     if more := [name for name in guest.observation_names if name not in names]:
         raise InputError(
             f"{where}: it observes {quoted(more)}, which course keeping does not show;"
-            " expected an agent for course keeping, such as mariner-calm-ppo; for"
-            " paths there is shipgym benchmark"
+            " expected an agent for course keeping; for paths there is shipgym"
+            " benchmark"
         )
     check_fits(guest, task, model, where)
 

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from agents.controllers.controller import Controller
-from agents.controllers.filtered_pid import FilteredPID
+from agents.controllers.lqg import LQG
 from agents.controllers.turn_rate import TurnRate
 from agents.deployment.helm import Helm
 from agents.deployment.nmea import NmeaReading
@@ -170,9 +170,7 @@ def _sea(model: ShipModel, pilot: Controller) -> dict[str, float]:
         found = {
             f"heading_{sea}": float(np.sqrt(np.mean(e**2))) for sea, e in errors.items()
         }
-        pilots = [
-            FilteredPID.from_model(model, wave_period=one) for one in (period, None)
-        ]
+        pilots = [LQG.from_model(model, wave_period=one) for one in (period, None)]
     except InputError:
         return {}
     travel = [

@@ -18,7 +18,6 @@ import numpy as np
 from rich.console import Console
 
 from agents import load_agent, load_results
-from agents.agent_file import read_agent
 from agents.benchmarking.contestants import Contestant
 from agents.benchmarking.results import gathered
 from agents.benchmarking.run import checked_part, job_of, run_job
@@ -34,7 +33,6 @@ from agents.job_results import (
     result_to_json,
 )
 from agents.jobs import JobEngine, run_jobs
-from agents.policies.one_for_all import OneForAll
 from agents.policies.sb3_zip import read_sb3
 from agents.suites.suite import DEFAULT_SUITE, BenchmarkTask, load_suite, parse_suite
 from agents.training.plan import Plan, training_options
@@ -44,7 +42,6 @@ from fuzzing.reading import CORPUS, Kind
 from shipgym import Episode, ShipFile, ShipModel, Trial
 from shipgym.envs.episode_file import to_file
 from shipgym.files import LARGEST_TOML, read_bytes
-from shipgym.ships import load_model
 from shipgym.trials.guesses import guess_trial
 
 SHOWN = Console(file=io.StringIO(), width=120)
@@ -240,16 +237,6 @@ def read_zip(path: Path) -> Any:
     return agent.policy(task.task, task.ship)
 
 
-def read_policy(path: Path) -> Any:
-    """A policy; one for all ships as it is made for one."""
-    agent = read_agent(path)
-    return (
-        agent.for_ship(load_model("container-abc-lssvr"))
-        if isinstance(agent, OneForAll)
-        else agent
-    )
-
-
 def read_bridge(path: Path) -> Helm:
     """A helm that was told the bytes of a line, and steers by what it understood."""
     helm = Helm(pid(), 0.5, Limits(silence_s=1e9))
@@ -289,7 +276,7 @@ KINDS = (
     Kind("log", lambda path: [guess_trial(path).trial], use_ship, slow=4),
     Kind("model", ShipModel.load, use_model, slow=2),
     Kind("controller", load_agent, use_agent),
-    Kind("policy", read_policy, use_agent, main="agent.json", slow=4),
+    Kind("policy", load_agent, use_agent, main="agent.json", slow=4),
     Kind("sb3", read_zip, use_agent, slow=10),
     Kind("episode", Episode.load, use_episode),
     Kind("results", load_results, use_results, main="results.json", slow=8),

@@ -27,7 +27,6 @@ def test_the_folder_holds_report_model_metrics_and_all_autopilots(chain):
     folder, _, _ = chain
     found = sorted(path.name for path in folder.iterdir())
     assert found == [
-        "lq-scheduled.json",
         "lq.json",
         "metrics.json",
         "model.json",
@@ -57,7 +56,7 @@ def test_metrics_tell_probabilities_margins_and_ranking(chain):
     )
     assert metrics["imo"]["advance"]["probability"] == 1.0
     assert metrics["imo"]["tactical_diameter"]["probability"] == 0.0
-    assert sorted(metrics["ranking"]) == ["lq", "lq-scheduled", "pid", "turn-rate"]
+    assert sorted(metrics["ranking"]) == ["lq", "pid", "turn-rate"]
     costs = [metrics["controllers"][name]["cost_mean"] for name in metrics["ranking"]]
     assert costs == sorted(costs)
     for name in metrics["ranking"]:
@@ -173,12 +172,12 @@ def test_a_cluster_that_does_not_answer_is_no_fault_of_the_model(demo, tmp_path)
 
 def test_an_unknown_guest_is_refused_with_the_nearest_name(tmp_path):
     expected = (
-        "agent: 'mariner-clam-ppo' found, expected a file, or one of .*Did you mean"
-        " 'mariner-calm-ppo'"
+        "agent: 'sharp-turn-ppo-s0' found, expected a file, or one of .*Did you mean"
+        " 'sharp-turns-ppo-s0'"
     )
     with pytest.raises(InputError, match=expected):
         build_autopilot(
-            "examples/mariner/ship.toml", tmp_path / "out", agents=["mariner-clam-ppo"]
+            "examples/mariner/ship.toml", tmp_path / "out", agents=["sharp-turn-ppo-s0"]
         )
     assert list(tmp_path.iterdir()) == []
 

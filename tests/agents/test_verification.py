@@ -312,7 +312,7 @@ def test_by_default_two_hundred_models_are_drawn_from_the_first_seed_on(
     result = chain.build_autopilot("ship.toml", tmp_path / "out", agents=["guest"])
     model, draws, seed, _, where, guests, designs = asked["verify"]
     assert (model, draws, seed, guests) == ("model", 200, 0, ["made of guest"])
-    assert designs == ("pid", "lq", "lq-scheduled", "turn-rate", "wheel-over")
+    assert designs == ("pid", "lq", "turn-rate", "wheel-over")
     assert where is chain.HERE
     assert (result.verification, asked["standards"]) == ("found", 0)
     assert (tmp_path / "out" / "report.html").exists()
