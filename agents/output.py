@@ -166,10 +166,13 @@ def _lock_path(folder: Path) -> Path:
 def process_description() -> str:
     """Describe this process, with its command, for a lock."""
     longest = 200  # characters of the command
-    command = shlex.join([Path(sys.argv[0]).name, *sys.argv[1:]])[:longest]
-    since = datetime.now().astimezone().isoformat(" ", "seconds")
+    program = Path(sys.argv[0]).name
+    command = shlex.join([program, *sys.argv[1:]])
+    now = datetime.now().astimezone()
+    since = now.isoformat(" ", "seconds")
     host = socket.gethostname()
-    return f"{PROCESS} {os.getpid()} on {host} since {since} ({command})"
+    pid = os.getpid()
+    return f"{PROCESS} {pid} on {host} since {since} ({command[:longest]})"
 
 
 def holder(lock: Path) -> str:
