@@ -1,8 +1,7 @@
 """Learning curves of PPO from scratch by the shipped settings, with seeds, against classical autopilots.
 
-    python scripts/learning_curves.py          about a minute of processor for each of
-    six runs, the picture python scripts/learning_curves.py --draw   the picture alone,
-    from build/learning_curves.json
+    python scripts/learning_curves.py          six runs of about a minute, and the picture
+    python scripts/learning_curves.py --draw   the picture, from build/learning_curves.json
 
 The picture is docs/images/learning_curves.png. Costs are means of a hundred episodes
 held out.

@@ -6,13 +6,12 @@ Tasks are those of `shipgym-v2`: contestants know the identified model and are
 evaluated, in the same 100 episodes, on the ship behind her trials. Each is made twice,
 alike but for what is known:
 
-    wheel-over     designed on the model, or on the ship tuned          the classical
-    controller that cost least on the model, its settings by direct search there,
-                   or, with the same budget, on the ship
+    wheel-over     designed on the model, or on the ship
+    tuned          the classical controller that cost least on the model, its settings
+                   by direct search there, or, with the same budget, on the ship
     ppo            the five agents of `agents/pretrained`, learned over models drawn
-    from the covariance and
-                   added to `tuned`; or three learned on the ship, with the same
-                   settings, and added to that tuned on her
+                   from the covariance and added to `tuned`; or three learned on the
+                   ship, with the same settings, and added to that tuned on her
 
 What one costs on the ship over what its twin costs that knew her is the loss by the
 model's error. How large that error is stands beside it: turning circles at 35 deg and

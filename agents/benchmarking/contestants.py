@@ -7,8 +7,7 @@ A contestant is named on the command line as
     search found for each task of the suite tuned-best                 of these the one
     that costs least in each task best-known                 the lowest cost that
     anything reached in each episode, kept with the suite ppo                        the
-    pretrained agents of `agents/pretrained` one-for-all                the pretrained
-    agent for all ships, made for each task's runs/agent.json            a file of an
+    pretrained agents of `agents/pretrained` runs/agent.json            a file of an
     agent or controller runs/model.zip             an agent as stable-baselines3 saves
     it runs/{task}-ppo-*.json     one for each task; several that match are training
     runs of one contestant a.json+b.json              training runs, one by one
@@ -33,7 +32,7 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
-from agents.agent_file import find_agent, read_agent
+from agents.agent_file import load_agent
 from agents.controllers.controller import Controller, Policy, model_hash
 from agents.controllers.designs import CLASSICAL, design, tuned
 from agents.controllers.registry import (
@@ -41,8 +40,7 @@ from agents.controllers.registry import (
     controller_kinds,
     register_controller,
 )
-from agents.engines.job import working_folder
-from agents.policies.one_for_all import ONE_FOR_ALL, OneForAll
+from agents.jobs import working_folder
 from agents.policies.sb3_zip import read_sb3
 from agents.rollouts.rollout import check_fits
 from agents.suites.suite import BenchmarkTask
@@ -255,7 +253,7 @@ def _check_object(source: Any, name: str) -> None:
 def _known() -> tuple[str, ...]:
     """Names of contestants."""
     searched = (TUNED + kind for kind in ("best", *CLASSICAL))
-    return (*controller_kinds(), *LEARNED, ONE_FOR_ALL, BEST_KNOWN, *searched)
+    return (*controller_kinds(), *LEARNED, BEST_KNOWN, *searched)
 
 
 def _check_text(text: str) -> None:
@@ -324,8 +322,6 @@ def _files(text: str, task: BenchmarkTask) -> list[Path]:
     name = task.handed_out.name
     if text in LEARNED:
         return pretrained(name, text)
-    if text == ONE_FOR_ALL:
-        return [find_agent(text)]
     if names_code(text):
         source = getattr(sys.modules.get(text.rpartition(":")[0]), "__file__", None)
         return [Path(source)] if source else []
@@ -367,16 +363,11 @@ def _made(source: Any, task: BenchmarkTask, suite: str) -> list[Policy]:
 
 
 def _loaded(path: Path) -> Any:
-    """A policy, or, of a zip and of an agent for all ships, a function that makes it for a task."""
+    """A policy, or, of a zip, a function that makes it for a task."""
     if path.suffix == ".zip":
         zipped = read_sb3(path)
         return lambda task: zipped.policy(task.task, task.ship)
-    agent = read_agent(path)
-    return (
-        (lambda task: agent.for_ship(task.ship, task.task))
-        if isinstance(agent, OneForAll)
-        else agent
-    )
+    return load_agent(path)
 
 
 def _policy(source: Any, task: BenchmarkTask) -> Policy:

@@ -15,10 +15,8 @@ from shipgym.files import LARGEST_TENSORS, atomic_path, read_bytes
 Columns = dict[str, NDArray[Any]]
 
 KEYS = ("contestant", "task", "run", "seed")
-#: Figures that are yes or no, and numbers of events: so they are in the file; missing
-#: ones are null.
+#: Figures that are yes or no, and are so in the file; missing ones are null.
 FLAGS = ("left_corridor", "grounded", "success", "terminated", "failed")
-COUNTS = ("interventions",)
 MOST_NUMBERS = 5_000_000  # of a table; characters of a column of texts
 
 
@@ -122,5 +120,5 @@ def _array(arrow: Any, name: str, values: NDArray[Any]) -> Any:
     if name in KEYS:
         return arrow.array(values.tolist() if values.dtype.kind == "U" else values)
     missing = np.isnan(values)
-    kind = np.bool_ if name in FLAGS else np.int64 if name in COUNTS else np.float64
+    kind = np.bool_ if name in FLAGS else np.float64
     return arrow.array(np.where(missing, 0.0, values).astype(kind), mask=missing)

@@ -31,11 +31,7 @@ WORST = 3  # episodes of each contestant in each task that may be replayed
 METRICS: dict[str, tuple[str, str]] = shipped_toml("agents.benchmarking", "words.toml")[
     "metrics"
 ]
-RARE = (
-    "extrapolating",
-    "shielded",
-    "interventions",
-)  # shown only where not 0 throughout
+RARE = ("extrapolating",)  # shown only where not 0 throughout
 
 
 def write_page(

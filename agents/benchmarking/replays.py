@@ -9,7 +9,7 @@ import numpy as np
 
 from agents.benchmarking.contestants import Contestant, contestants, remade
 from agents.benchmarking.results import BenchmarkResult
-from agents.engines.jobs import run_jobs
+from agents.jobs import JobEngine, run_jobs
 from agents.rollouts.episodes import recorded
 from agents.suites.suite import BenchmarkTask, load_suite
 from identification.progress import Progress
@@ -86,7 +86,7 @@ def rerun(
             }
         )
     told = progress and partial(progress, "episodes run again")
-    done = run_jobs(rerun_job, jobs, workers=workers, progress=told)
+    done = run_jobs(rerun_job, jobs, JobEngine(workers=workers), told)
     found |= {
         (job["contestant"], job["task"]): one
         for job, one in zip(jobs, done, strict=True)

@@ -38,7 +38,7 @@ from shipgym.files import make_folder, read_json, write_json
 FORMAT, KIND = 2, "shipgym-benchmark"
 RESULTS, EPISODES, PARTS = "results.json", "episodes.parquet", "parts"
 FIELDS = ("format", "kind", *SHAPE)
-PACKAGES = ("shipgym", "numpy", "numba", "scipy", "control", "osqp")
+PACKAGES = ("shipgym", "numpy", "numba", "scipy", "control")
 REMEDY = "run `shipgym benchmark` again"
 
 

@@ -3,6 +3,7 @@
 import shutil
 from collections.abc import Mapping, Sequence
 from contextlib import nullcontext
+from dataclasses import replace
 from functools import partial
 from itertools import product
 from pathlib import Path
@@ -19,7 +20,7 @@ from agents.benchmarking.contestants import (
     policy_hash,
 )
 from agents.benchmarking.results import PARTS, BenchmarkResult, check_new, gathered
-from agents.engines.jobs import check_engine, run_jobs
+from agents.jobs import JobEngine, run_jobs
 from agents.output import in_use
 from agents.rollouts.metrics import evaluate
 from agents.suites.reference import best_costs
@@ -86,7 +87,7 @@ def benchmark(
     check_number(
         check_whole(episodes, "episodes", at_least=1), "episodes", at_most=N_EPISODES
     )
-    check_engine(engine, workers, address)
+    where = JobEngine(engine, workers, address)
     for one in who:
         check_agents(one, chosen)
     folder = None if out is None else check_new(Path(out), resume, suite)
@@ -100,11 +101,8 @@ def benchmark(
         found = run_jobs(
             run_job,
             jobs,
-            engine=engine,
-            workers=workers,
-            address=address,
-            keep=folder and folder / PARTS,
-            progress=progress and partial(progress, "tasks done"),
+            replace(where, keep=folder and folder / PARTS),
+            progress and partial(progress, "tasks done"),
         )
         pairs = zip(jobs, found, strict=True)
         done = {

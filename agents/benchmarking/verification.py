@@ -12,7 +12,7 @@ from agents.benchmarking.results import REMEDY, BenchmarkResult, load_results, v
 from agents.benchmarking.run import job_of, run_job
 from agents.benchmarking.submission import KIND, read_submission
 from agents.controllers.designs import CLASSICAL
-from agents.engines.jobs import run_jobs
+from agents.jobs import JobEngine, run_jobs
 from agents.suites.suite import load_suite, suite_hash
 from shipgym.arrays import finite
 from shipgym.checks import check_number, check_whole
@@ -93,7 +93,7 @@ def verify(
         except InputError as error:
             size = result.figures(name, task).size
             checks[name, task] = Check(name, task, size, np.inf, False, 0.0, str(error))
-    found = run_jobs(run_job, list(jobs.values()), workers=workers)
+    found = run_jobs(run_job, list(jobs.values()), JobEngine(workers=workers))
     for (name, task), again in zip(jobs, found, strict=True):
         checks[name, task] = _compared(result, name, task, again, tolerance)
     return list(checks.values())

@@ -13,7 +13,6 @@ from agents.cli.command import (
     WRONG_INPUT,
     Address,
     EngineName,
-    answered,
     fail,
 )
 
@@ -86,7 +85,6 @@ AllowCode = Annotated[
 ]
 
 
-@answered
 def benchmark_command(
     controllers: Controllers = None,
     out: Out = None,

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from rich.text import Text
 
-from agents.cli.terminal import between, number, plain_table
+from agents.cli.tables import between, number, plain_table
 from shipgym.pages.numbers import counted
 
 if TYPE_CHECKING:

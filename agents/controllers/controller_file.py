@@ -44,8 +44,8 @@ FIELDS = (
     "margins",
     "design",
 )
-#: Kinds that `agents.policies.policy_file` reads.
-POLICIES = ("learned", "shielded", "one-for-all")
+#: The kind of file that `agents.policies.policy_file` reads.
+LEARNED = "learned"
 
 
 def read_controller(content: Mapping[str, Any], where: str) -> Controller:
@@ -53,8 +53,8 @@ def read_controller(content: Mapping[str, Any], where: str) -> Controller:
     check_format(content, FORMAT, where)
     if "kind" in content:
         kinds = controller_kinds()
-        kind = check_choice(content["kind"], (*kinds, *POLICIES), f"{where}: kind")
-        if kind in POLICIES:
+        kind = check_choice(content["kind"], (*kinds, LEARNED), f"{where}: kind")
+        if kind == LEARNED:
             raise InputError(
                 f"{where}: kind: '{kind}' found, expected a classical one:"
                 f" {quoted(kinds)}"

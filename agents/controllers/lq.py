@@ -2,10 +2,7 @@
 
 Source: Norrbin 1972, On the added resistance due to steering on a straight course (the
 cost); van Amerongen 1982, Adaptive steering of ships, chapter 3; Anderson & Moore 1990,
-Optimal Control, chapters 2 and 3 (cross terms); Chu, Fan, Lin & Wang 2004,
-Structure-preserving algorithms for periodic discrete-time algebraic Riccati equations,
-International Journal of Control 77 (doubling: many designs at once, as adaptive
-autopilots make them while they sail).
+Optimal Control, chapters 2 and 3 (cross terms).
 """
 
 from collections.abc import Mapping
@@ -29,9 +26,6 @@ from shipgym.arrays import Floats
 from shipgym.checks import check_number
 from shipgym.tasks.steering import RUDDER_WEIGHT
 from shipgym.tasks.task import control_interval
-
-DOUBLINGS = 40  # each doubles the horizon
-ACCURACY = 1e-13
 
 
 @dataclass(frozen=True, eq=False)
@@ -183,56 +177,3 @@ def _outputs(
     C, D = A[:, rows].copy(), B[:, rows]
     C[:, 2, RUDDER] -= 1.0
     return weights[:, None] * C, (weights * D)[:, :, None]
-
-
-def lq_rows(
-    A: Floats,
-    B: Floats,
-    dt: float,
-    rate_weight: float,
-    integral_time: float,
-    rudder_weight: float = RUDDER_WEIGHT,
-) -> Floats:
-    """The same for many ships at once, as designs made while sailing: rows of order = row x, shape (n, 5).
-
-    `A`, `B`: sampled ships, shape (n, 5, 5) and (n, 5); `dt`: control interval, s. NaN
-    where no stabilising one was found. Source: Anderson & Moore 1990, chapter 3 (cross
-    terms).
-    """
-    C, D = _outputs(A, B, dt, rate_weight, integral_time, rudder_weight)
-    column = B[:, :, None]
-    Ct, Dt, row = C.transpose(0, 2, 1), D.transpose(0, 2, 1), B[:, None, :]
-    R, S = Dt @ D, Dt @ C
-    plain = A - column @ (S / R)  # with commands that take the cross term away
-    X = riccati(plain, column @ (row / R), Ct @ C - S.transpose(0, 2, 1) @ (S / R))
-    gain: Floats = (row @ X @ A + S) / (R + row @ X @ column)
-    return -gain[:, 0]
-
-
-def riccati(A: Floats, G: Floats, H: Floats) -> Floats:
-    """Stabilising solutions X of X = A'X (I + G X)^-1 A + H, by doubling; all three are overwritten.
-
-    `G`, `H`: symmetric, not negative, as `A` of shape (n, m, m). Returns X, NaN where
-    it did not converge.
-    """
-    eye = np.eye(A.shape[-1])
-    converged = np.zeros(len(A), dtype=np.bool_)
-    with np.errstate(over="ignore", invalid="ignore"):
-        for _ in range(DOUBLINGS):
-            going = ~converged & np.isfinite(H).all(axis=(1, 2))
-            if not going.any():
-                break
-            a, g, h = A[going], G[going], H[going]
-            left = np.linalg.solve(eye + g @ h, np.concatenate([a, g], axis=2))
-            wa, wg = left[:, :, : len(eye)], left[:, :, len(eye) :]
-            at = a.transpose(0, 2, 1)
-            more = at @ h @ wa
-            A[going], G[going], H[going] = (
-                a @ wa,
-                g + a @ wg @ at,
-                h + 0.5 * (more + more.transpose(0, 2, 1)),
-            )
-            size = np.abs(H[going]).max(axis=(1, 2))
-            converged[going] = np.abs(more).max(axis=(1, 2)) < ACCURACY * size
-    H[~converged] = np.nan
-    return H

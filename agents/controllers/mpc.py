@@ -1,230 +1,381 @@
-"""Linear model predictive control: LQ that knows how far and how fast the rudder goes.
+"""MPC of the course: wheel-over with its course varied as a search on the design model finds best.
 
-With the regulator's cost of what is left after the horizon, and commands written as
-LQ's plus a correction v, the cost of a plan is that of LQ plus the sum of (R + B'PB)
-v[k]^2: the best plan is the one nearest to LQ's that keeps to the limits. Where LQ's
-own does, it is LQ's, and nothing has to be solved.
+Each ship length she is simulated from where she is observed, by wheel-over with courses
+added to its own: straight between knots, drawn, and drawn again about the best
+(cross-entropy method). The cheapest is steered until the next search, which begins with
+its rest. Wheel-over itself is among them, so by the model no plan is worse. The current
+is estimated: of it each observation shows the part across her way over ground.
 
-Sources: Rawlings, Mayne & Diehl 2017, Model Predictive Control, 1.3 and 2.5 (terminal
-cost); Rossiter, Kouvaritakis & Rice 1998, A numerically robust state-space approach to
-stable-predictive control strategies, Automatica 34 (corrections of a stabilising
-feedback); Stellato et al. 2020, OSQP, Mathematical Programming Computation 12.
+Sources: Rubinstein & Kroese 2004, The Cross-Entropy Method; Bertsekas 2019,
+Reinforcement Learning and Optimal Control, 2.4 (rollout: a base policy improved by
+looking ahead); Williams, Aldrich & Theodorou 2017, Model predictive path integral
+control, Journal of Guidance, Control, and Dynamics 40 (sampling on the model).
 """
 
-from collections.abc import Mapping
-from dataclasses import dataclass
-from functools import cached_property
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 
-from agents.controllers.controller import Controller, Range
-from agents.controllers.linear_loop import RUDDER, SIGNALS, check_stable, sample_ship
-from agents.controllers.lq import LQ, Weights, without_yaw_memory
-from agents.controllers.memory import Flags, Floats, deviations
-from shipgym import ShipModel
+from agents.controllers.controller import Policy, Range
+from agents.controllers.lq import LQ
+from agents.controllers.memory import Floats
+from agents.controllers.wheel_over import WheelOver
+from shipgym import InputError, ShipModel
 from shipgym.checks import check_number
-from shipgym.extras import library
-from shipgym.tasks.steering import RATE_WEIGHT, RUDDER_WEIGHT
+from shipgym.envs.engine import Engine
+from shipgym.tasks.guidance import wrapped
+from shipgym.tasks.steering import HEADING_SCALE
+from shipgym.tasks.task import (
+    STEPS_PER_LENGTH,
+    Task,
+    course_keeping_task,
+    path_following_task,
+)
 
-ACCURACY = 1e-4  # of the solver, rad
-MOST_ITERATIONS = 20_000
-# of a horizon: 20 ship lengths with any control interval that environments take
-MOST_STEPS = 640
-# of the solver (its rho), fixed so that an answer depends on the question alone
-STEP_SIZE = 2.0
-
-
-class Plan(NamedTuple):
-    """Plans over the horizon, deviations from straight running: the numbers that are limited."""
-
-    #: commands, then changes of the rudder in an interval, of LQ's own plan, per state,
-    #: shape (2 * horizon, 5)
-    by_state: Floats
-    by_correction: (
-        Floats  # the same per correction of LQ's commands, shape (2 * horizon, horizon)
-    )
+KNOTS, KNOT_STEPS = (
+    6,
+    int(STEPS_PER_LENGTH),
+)  # of a plan, and control intervals from one to the next
+COARSE = 2  # control intervals in a step of the search
+CANDIDATES, ELITES, ROUNDS = 16, 4, 2
+_HALF = np.random.default_rng(0).standard_normal((ROUNDS, CANDIDATES // 2, KNOTS))
+DRAWS = np.concatenate(
+    [_HALF, -_HALF], axis=1
+)  # always the same, each with its mirror image
+LEAST_DEVIATION = np.radians(0.5)  # of a knot
+STREAM_GAIN = 0.5  # share of the current seen anew in each interval that is taken over
+DEEP, FAR = 1e6, 1e9  # m: of water that is not shallow; of a turn that lies behind
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class MPC(Controller):
-    """Plans the rudder over a horizon within its limit and rate; needs the extra `mpc` (OSQP).
-
-    Attributes
-    ----------
-    transition : array of shape (5, 5)
-    effect : array of shape (5,)
-        The sampled ship, x[k + 1] = transition x[k] + effect order[k]
-        (`agents.controllers.linear_loop`).
-    """
+class MPC(WheelOver):
+    """Wheel-over whose course is improved by sampling on the design model, its `ship`."""
 
     kind: ClassVar[str] = "mpc"
-    feedback: ClassVar[Mapping[str, tuple[str, float]]] = LQ.feedback
-    arrays: ClassVar[Mapping[str, tuple[str | int, ...]]] = {
-        "transition": (len(SIGNALS), len(SIGNALS)),
-        "effect": (len(SIGNALS),),
-    }
+    has_ship: ClassVar[bool] = True
+    remembers: ClassVar[int] = (
+        3 + KNOTS
+    )  # intervals since the last search, current, plan
     ranges: ClassVar[Mapping[str, Range]] = {
-        **Controller.ranges,
-        "horizon_steps": Range(2, MOST_STEPS),
-        "rudder_rate_rad_s": Range(1e-6, 1e3),
+        **WheelOver.ranges,
+        "corridor": Range(1e-6, FAR),
+        "horizon_steps": Range(1, 1000),
+        **dict.fromkeys(("deviation", "acceptance", "water_depth"), Range(0.0, FAR)),
+        **dict.fromkeys(
+            ("rudder", "rudder_rate", "rudder_travel", "roll"), Range(0.0, FAR)
+        ),
     }
 
-    transition: Floats
-    effect: Floats
+    reads: ClassVar[tuple[str, ...]] = (*WheelOver.reads, "yaw_rate", "rudder")
+
+    ship: ShipModel
 
     def __post_init__(self) -> None:
-        steps = self.design["horizon_steps"]
-        check_number(
-            steps,
-            "horizon_steps",
-            at_most=MOST_STEPS,
-            hint="a shorter horizon or longer interval",
-        )
-        stays, moves = self.transition[RUDDER, RUDDER], self.effect[RUDDER]
-        check_number(
-            stays,
-            "arrays.transition: share of the rudder that stays",
-            at_least=0.0,
-            at_most=1.0,
-        )
-        check_number(
-            moves,
-            "arrays.effect: share of an order that is followed",
-            at_least=1e-6,
-            at_most=1.0,
-        )
-        check_stable(
-            self.transition + np.outer(self.effect, self.row), "arrays.transition"
-        )
+        if not isinstance(self.autopilot, LQ):
+            raise InputError(
+                f"autopilot: {type(self.autopilot).__name__} found, expected LQ"
+            )
 
     @classmethod
     def from_model(
         cls,
         model: ShipModel,
         *,
-        dt: float | None = None,
-        integral_lengths: float = 20.0,
-        horizon_lengths: float = 2.0,
-        rudder_weight: float = RUDDER_WEIGHT,
-        rate_weight_s2: float | None = None,
+        autopilot: Policy | None = None,
+        task: Task | None = None,
+        horizon_lengths: float = 6.0,
+        deviation_deg: float = 3.0,
+        **settings: Any,
     ) -> Self:
-        """Design on a model, about straight running.
-
-        Raises InputError if OSQP is not installed, the model has no straight course, or
-        an argument is out of its range.
+        """Lead LQ along the paths of a task.
 
         Parameters
         ----------
-        model, dt, integral_lengths, rudder_weight
-            As in `LQ.from_model`.
+        model : ShipModel
+            The design model, which is simulated in the current observed.
+        autopilot : LQ, optional
+            By default `LQ.from_model(model)`.
+        task : Task, optional
+            Also its weights are used; by default the environment's own.
         horizon_lengths : float
-            How far it plans within the limits, in times to travel one ship length;
-            beyond, LQ's cost without limits is taken.
-        rate_weight_s2 : float, optional
-            Weight of the rudder rate, s^2; by default the environment's own. LQ's is
-            higher (`linear_loop.rate_weight`), because LQ's model has no slow gear.
+            How far it looks ahead, in times to travel one ship length.
+        deviation_deg : float
+            Standard deviation of the courses that are tried first.
+        **settings
+            Those of `WheelOver.from_model`, with its errors.
         """
-        library("osqp", "mpc", "MPC needs it")
-        check_number(horizon_lengths, "horizon_lengths", above=0.0, at_most=20.0)
-        weight = (
-            RATE_WEIGHT * model.travel_time**2
-            if rate_weight_s2 is None
-            else rate_weight_s2
+        check_number(horizon_lengths, "horizon_lengths", above=0.0, at_most=40.0)
+        check_number(deviation_deg, "deviation_deg", above=0.0, at_most=60.0)
+        asked, length = task or path_following_task(), model.particulars["length"]
+        guide = super().from_model(model, autopilot=autopilot, task=asked, **settings)
+        steps = (
+            horizon_lengths
+            * length
+            / model.particulars["speed"]
+            / (COARSE * guide.design["dt"])
         )
-        weights = Weights.of(model, dt, integral_lengths, rudder_weight, weight)
-        interval, time = weights.dt, model.travel_time
-        reduced = without_yaw_memory(model, interval)
-        limits = {
-            "horizon_steps": float(max(2, round(horizon_lengths * time / interval))),
-            "rudder_rate_rad_s": model.steering.rate,
+        costs = {
+            "corridor": asked.corridor * length,
+            "horizon_steps": float(max(1, round(steps))),
+            "deviation": float(np.radians(deviation_deg)),
+            "acceptance": length * float(getattr(asked.settings, "acceptance", 0.0)),
+            "water_depth": min(asked.water_depth, DEEP),
+            "rudder": asked.rudder_weight / HEADING_SCALE**2,
+            "rudder_rate": asked.rudder_rate_weight / HEADING_SCALE**2,
+            "rudder_travel": (
+                getattr(asked.settings, "rudder_travel_weight", 0.0) / HEADING_SCALE
+            ),
+            "roll": asked.roll_weight / float(np.radians(asked.roll_scale_deg)) ** 2,
         }
-        gains, design = weights.gains(reduced, time), weights.design | limits
-        ship = {"transition": reduced.A, "effect": reduced.B[:, 0]}
-        return cls.designed(model, sample_ship(model, interval), gains, design, **ship)
+        return replace(guide, design={**guide.design, **costs})
 
-    def steer(
-        self, seen: dict[str, Floats], memory: Floats, begins: Flags
+    def to_dict(self) -> dict[str, Any]:
+        """What the file holds, the design model too."""
+        return {**super().to_dict(), "ship": self.ship.to_dict()}
+
+    def course(
+        self, seen: Mapping[str, Floats], memory: Floats
     ) -> tuple[Floats, Floats]:
-        """LQ's command where its plan keeps to the limits, else the first of the nearest plan that does."""
-        change = self.design["rudder_rate_rad_s"] * self.design["dt"]
-        low, high = (
-            -self.rudder_limit - self.neutral_rudder,
-            self.rudder_limit - self.neutral_rudder,
+        """See `Guided.course`: that of wheel-over and what the plan adds."""
+        count, plan = memory[..., 0], np.atleast_2d(memory[..., 3:]).copy()
+        stream, due = self._stream(seen, memory[..., 1:3]), np.flatnonzero(count == 0.0)
+        if len(due):
+            rows = {name: np.atleast_1d(values)[due] for name, values in seen.items()}
+            rest = np.concatenate([plan[due, 1:], np.zeros((len(due), 1))], axis=1)
+            plan[due] = self._planned(rows, np.atleast_2d(stream)[due].T, rest)
+        plan = plan.reshape(memory[..., 3:].shape)
+        wanted, _ = super().course(seen, memory)
+        step = ((count + 1.0) % KNOT_STEPS)[..., None]
+        return wanted + _added(plan, count / KNOT_STEPS), np.concatenate(
+            [step, stream, plan], axis=-1
         )
-        state = deviations(seen, self.neutral_rudder, self.neutral_sway)
-        rudder = state[:, RUDDER] = np.clip(state[:, RUDDER], low, high)
-        orders: Floats = np.einsum("ij,j->i", state, self.row)
-        steps = int(self.design["horizon_steps"])
-        lowest, highest = (
-            np.repeat((low, -change), steps),
-            np.repeat((high, change), steps),
+
+    def _stream(self, seen: Mapping[str, Floats], known: Floats) -> Floats:
+        """Current ahead and to starboard, m/s, shape (n, 2): the known one turns with her and is bettered."""
+        way = self.over_ground(seen)
+        ahead, aside = _turned(
+            known[..., 0], known[..., 1], seen["yaw_rate"] * self.design["dt"]
         )
-        planned = np.einsum("ij,kj->ik", state, self.plan.by_state)
-        stays, moves = self.transition[RUDDER, RUDDER], self.effect[RUDDER]
-        for ship in np.flatnonzero(
-            np.any((planned < lowest) | (planned > highest), axis=1)
-        ):
-            self._solver.update(l=lowest - planned[ship], u=highest - planned[ship])
-            order = (
-                orders[ship] + self._solver.solve(raise_error=False).x[0]
-            )  # the smallest correction
-            least, most = (
-                (rudder[ship] * (1.0 - stays) + way) / moves
-                for way in (-change, change)
+        _, wrong = _turned(seen["surge"] + ahead, seen["sway"] + aside, way)
+        wrong = STREAM_GAIN * wrong
+        return np.stack(
+            [ahead + wrong * np.sin(way), aside - wrong * np.cos(way)], axis=-1
+        )
+
+    def _planned(
+        self, seen: Mapping[str, Floats], stream: Floats, best: Floats
+    ) -> Floats:
+        """Plans bettered by the cross-entropy method, rad, shape (n, knots); the first knot stays."""
+        rows, mean = np.arange(len(best)), best
+        deviation, least = (
+            np.full(best.shape, self.design["deviation"]),
+            np.full(len(best), np.inf),
+        )
+        for drawn in DRAWS:
+            plans = mean[:, None] + deviation[:, None] * drawn
+            plans[:, 0], plans[:, CANDIDATES // 2], plans[:, :, 0] = (
+                best,
+                0.0,
+                best[:, :1],
             )
-            orders[ship] = min(max(order, least, low), most, high)  # to the last bit
-        return self.neutral_rudder + orders, memory
+            costs = self._costs(seen, stream, plans)
+            order = np.argsort(costs, axis=1, kind="stable")
+            found, first = costs[rows, order[:, 0]], plans[rows, order[:, 0]]
+            best, least = (
+                np.where((found < least)[:, None], first, best),
+                np.minimum(found, least),
+            )
+            elites = np.take_along_axis(plans, order[:, :ELITES, None], axis=1)
+            mean, deviation = (
+                elites.mean(axis=1),
+                np.maximum(elites.std(axis=1), LEAST_DEVIATION),
+            )
+        return best
 
-    @cached_property
-    def plan(self) -> Plan:
-        """How commands and rudder follow from the state and from corrections of LQ's commands."""
-        steps, row = int(self.design["horizon_steps"]), self.row
-        closed = self.transition + np.outer(self.effect, row)
-        limited = np.stack(
-            [row, closed[RUDDER] - np.eye(len(SIGNALS))[RUDDER]]
-        )  # command, rudder's change
-        by_state = np.empty((2, steps, len(SIGNALS)))
-        answer = np.empty((2, steps))  # to a correction of 1 at the first step
-        power = np.eye(len(SIGNALS))
-        answer[:, 0] = 1.0, self.effect[RUDDER]
-        for k in range(steps):
-            by_state[:, k] = limited @ power
-            if k + 1 < steps:
-                answer[:, k + 1] = limited @ power @ self.effect
-            power = closed @ power
-        later = np.subtract.outer(np.arange(steps), np.arange(steps))
-        by_correction = np.where(later >= 0, answer[:, np.maximum(later, 0)], 0.0)
-        return Plan(
-            by_state.reshape(2 * steps, -1), by_correction.reshape(2 * steps, steps)
+    def _costs(
+        self, seen: Mapping[str, Floats], stream: Floats, plans: Floats
+    ) -> Floats:
+        """Costs of plans on the design model, as the task has them, shape (n, candidates)."""
+        each, plan, of = plans.shape[1], plans.reshape(-1, KNOTS), self.design
+        lanes = {name: np.repeat(values, each) for name, values in seen.items()}
+        turns = [lanes[name] for name in self.turns_ahead]
+        ship = _Simulated(
+            self, lanes, self.heading(lanes, turns), np.repeat(stream, each, axis=1)
         )
-
-    @cached_property
-    def _solver(self) -> Any:
-        """OSQP with the corrections as unknowns; only its bounds change."""
-        from scipy import sparse
-
-        matrix = sparse.csc_matrix(self.plan.by_correction)
-        rows, steps = matrix.shape
-        solver = library("osqp", "mpc", "MPC needs it").OSQP()
-        solver.setup(
-            sparse.identity(steps, format="csc"),
-            np.zeros(steps),
-            matrix,
-            -np.ones(rows),
-            np.ones(rows),
-            verbose=False,
-            eps_abs=ACCURACY,
-            eps_rel=ACCURACY,
-            max_iter=MOST_ITERATIONS,
-            rho=STEP_SIZE,
-            adaptive_rho=False,
-            warm_starting=False,
+        path = Ahead(turns, self.gains["path_radius"], of["acceptance"])
+        place, cost, full = (
+            path.fix(ship.x, ship.y),
+            np.zeros(len(plan)),
+            ship.speed * ship.dt,
         )
-        return solver
+        for step in range(int(of["horizon_steps"])):
+            course = place.course + self.course_along(place.cross, place.turns)
+            before, rudder = place.way, ship.rudder
+            ship.steer(course + _added(plan, step * COARSE / KNOT_STEPS))
+            place, moved = path.fix(ship.x, ship.y), np.abs(ship.rudder - rudder)
+            cost += (place.cross / of["corridor"]) ** 2 - np.clip(
+                (place.way - before) / full, -1.0, 1.0
+            )
+            cost += of["rudder"] * ship.rudder**2 + of["rudder_travel"] / COARSE * moved
+            cost += (
+                of["rudder_rate"]
+                * (moved * self.ship.particulars["length"] / full) ** 2
+            )
+            if of["roll"] > 0.0:
+                cost += of["roll"] * ship.engine.read("phi") ** 2
+        return np.where(np.isfinite(cost), cost, np.inf).reshape(plans.shape[:2])
 
-    def __getstate__(self) -> dict[str, Any]:
-        """Everything but the solver, which another process sets up again."""
-        return {
-            name: value for name, value in self.__dict__.items() if name != "_solver"
+
+@lru_cache(maxsize=8)
+def _engine(ship: ShipModel, n: int, dt: float, depth: float) -> Engine:
+    """Design models side by side, in calm water."""
+    shallow = {"water_depth": depth} if depth < DEEP else {}
+    limits = {
+        "max_heading_error_deg": 180.0,
+        "max_envelope_distance": FAR,
+        "episode_steps": 10**6,
+    }
+    return Engine(ship, n, course_keeping_task(dt=dt, **limits, **shallow))
+
+
+def _added(plan: Floats, at: Any) -> Floats:
+    """Course that plans add at a number of knots from their beginning: straight between knots."""
+    shares = np.maximum(1.0 - np.abs(np.asarray(at)[..., None] - np.arange(KNOTS)), 0.0)
+    return np.asarray((plan * shares).sum(axis=-1))
+
+
+def _turned(ahead: Any, aside: Any, angle: Any) -> tuple[Any, Any]:
+    """A vector in axes turned to starboard by an angle."""
+    cosine, sine = np.cos(angle), np.sin(angle)
+    return ahead * cosine + aside * sine, aside * cosine - ahead * sine
+
+
+class _Simulated:
+    """Design models from where ships are observed, steered by LQ to courses over ground."""
+
+    def __init__(
+        self, guide: MPC, seen: Mapping[str, Floats], psi: Floats, stream: Floats
+    ) -> None:
+        self.guide, self.dt, self.time = guide, COARSE * guide.design["dt"], 0.0
+        self.speed = guide.ship.particulars["speed"]
+        self.engine = _engine(
+            guide.ship, len(psi), self.dt, guide.design["water_depth"]
+        )
+        self.engine.reset(np.zeros(len(psi), dtype=np.int64))
+        begin = {
+            "x": 0.0 * psi,
+            "y": seen["cross_track"],
+            "psi": psi,
+            "u": seen["surge"],
+            "v": seen["sway"],
         }
+        for name, values in {
+            **begin,
+            "r": seen["yaw_rate"],
+            "delta": seen["rudder"],
+        }.items():
+            self.engine.write(name, values)
+        self.north, self.east = _turned(stream[0], stream[1], -psi)
+        self.read()
+
+    def read(self) -> None:
+        """Where the ships are, drifted by the current."""
+        names = ("x", "y", "psi", "u", "v", "r", "delta")
+        x, y, self.psi, self.u, self.v, self.r, self.rudder = (
+            self.engine.read(name) for name in names
+        )
+        self.x, self.y = x + self.north * self.time, y + self.east * self.time
+
+    def steer(self, course: Floats) -> None:
+        """One step towards a course over ground."""
+        guide, u, v, (ahead, aside) = (
+            self.guide,
+            self.u,
+            self.v,
+            _turned(self.north, self.east, self.psi),
+        )
+        gains = guide.autopilot.gains  # type: ignore[attr-defined]
+        drift = np.arctan2(u * aside - v * ahead, u * (u + ahead) + v * (v + aside))
+        error = wrapped(course - guide.gains["crab_share"] * drift - self.psi)
+        order = guide.neutral_rudder + gains["rudder"] * (
+            self.rudder - guide.neutral_rudder
+        )
+        order += gains["heading_error"] * error + gains["yaw_rate"] * self.r
+        order += gains["sway"] * (v - guide.neutral_sway)
+        self.engine.command[0] = np.clip(order / guide.ship.steering.limit, -1.0, 1.0)
+        self.engine.advance()
+        self.time += self.dt
+        self.read()
+
+
+class Place(NamedTuple):
+    """Where ships are on their path."""
+
+    way: Floats  # m, along it
+    cross: Floats  # m, to starboard of it
+    course: Floats  # rad, its course there
+    turns: list[Floats]  # distance and angle of each turn to come, m and rad
+
+
+class Ahead:
+    """The path from beside each ship on, its course there 0: legs with corners, or with arcs of a radius, m.
+
+    `turns`: distance and angle of each, m and rad; `acceptance`: m before a corner
+    where the next leg begins.
+    """
+
+    def __init__(
+        self, turns: Sequence[Floats], radius: float, acceptance: float
+    ) -> None:
+        self.turns = list(zip(turns[::2], turns[1::2], strict=True))
+        self.radius, self.acceptance = radius, acceptance
+        self.passed = [np.zeros(len(turns[0]), dtype=np.bool_) for _ in self.turns]
+
+    def fix(self, x: Floats, y: Floats) -> Place:
+        """Where ships have come since the last fix; x and y along and beside where they began, m."""
+        radius, arcs = self.radius, self.radius > 0.0
+        way, cross, course, left = x, y, np.zeros_like(x), []
+        behind, leg, reached = course, course, np.ones(len(x), dtype=np.bool_)
+        for k, (distance, turn) in enumerate(self.turns):
+            side, angle, past = (
+                np.where(turn < 0.0, -1.0, 1.0),
+                np.abs(turn),
+                x - distance,
+            )
+            swept = (
+                np.arctan2(past, np.maximum(radius - side * y, 0.1 * radius))
+                if arcs
+                else 0.0 * x
+            )
+            over = (past > 0.0) & (swept >= angle) if arcs else past >= -self.acceptance
+            self.passed[k] = gone = self.passed[k] | (reached & over & (turn != 0.0))
+            bent = np.where(reached & ~gone & (past > 0.0) & (angle > 0.0), swept, 0.0)
+            way = np.where(bent > 0.0, behind + distance + radius * bent, way)
+            cross = np.where(
+                bent > 0.0, side * (radius - np.hypot(past, radius - side * y)), cross
+            )
+            course = np.where(bent > 0.0, leg + side * bent, course)
+            left += [
+                np.where(gone, FAR, np.maximum(-past, 0.0) if arcs else -past),
+                np.where(gone, 0.0, side * (angle - bent)),
+            ]
+            north, east = (
+                past - radius * np.sin(angle),
+                y - side * radius * (1.0 - np.cos(angle)),
+            )
+            along, beside = _turned(north, east, turn)
+            behind, leg = (
+                behind + distance + radius * angle,
+                np.where(gone, leg + turn, leg),
+            )
+            x, y, reached = (
+                np.where(gone, along, x),
+                np.where(gone, beside, y),
+                reached & gone,
+            )
+            way = np.where(gone, behind + (x if arcs else np.maximum(x, 0.0)), way)
+            cross, course = np.where(gone, y, cross), np.where(gone, leg, course)
+        return Place(way, cross, course, left)

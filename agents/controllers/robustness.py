@@ -59,8 +59,7 @@ def margin_uncertainty(
     Parameters
     ----------
     controller : Controller
-        A linear one; of a scheduled or adaptive one the design at service speed, of MPC
-        without limits.
+        A linear one.
     models : sequence of ShipModel
         For example `model.sample(100, seed)`, drawn from the estimated covariance.
     """

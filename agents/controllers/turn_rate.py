@@ -9,7 +9,7 @@ Source: Fossen 2011, Handbook of Marine Craft Hydrodynamics and Motion Control, 
 a function of the rate of turn).
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar, Self
 
@@ -18,7 +18,6 @@ import numpy as np
 from agents.controllers.controller import NUMBERS, Controller, Range
 from agents.controllers.linear_loop import Compensator, sample_ship
 from agents.controllers.memory import Flags, Floats, heading_error, records
-from agents.controllers.scheduled_lq import rising
 from shipgym import InputError, ShipModel
 from shipgym.checks import check_number
 from shipgym.ships.linear import linearise, nomoto_of, steady_turn_rudder
@@ -81,7 +80,7 @@ class TurnRate(Controller):
     rudders: Floats
 
     def __post_init__(self) -> None:
-        rising(self.rates.tolist(), "rates", above=None)
+        rising(self.rates.tolist(), "rates")
 
     @classmethod
     def from_model(
@@ -199,3 +198,14 @@ def steady_turns(model: ShipModel, neutral: float) -> tuple[Floats, Floats]:
     raise InputError(
         f"model {model.name!r}: no steady turn found, expected one to either side"
     )
+
+
+def rising(values: Sequence[float], name: str) -> Floats:
+    """Numbers in rising order as an array; InputError names them if they are not."""
+    listed = [check_number(one, f"{name}[{i}]") for i, one in enumerate(values)]
+    if len(listed) < 2 or np.any(np.diff(listed) <= 0.0):
+        raise InputError(
+            f"{name}: {list(values)} found, expected at least two in rising order, SI"
+            " units"
+        )
+    return np.array(listed)

@@ -11,7 +11,6 @@ from jinja2 import Environment, FunctionLoader, StrictUndefined
 
 import shipgym
 from agents.controllers.controller import Controller
-from agents.controllers.filtered_pid import notch_band
 from agents.controllers.los_autopilot import Guided
 from agents.controllers.wheel_over import STEEPEST
 from agents.deployment.autopilot import VARIABLES, Autopilot, bounds
@@ -28,12 +27,7 @@ from shipgym.tasks.steering import INTEGRAL_ZONE
 from shipgym.trials.units import UNITS
 
 LONGEST_NAME = 31  # characters, so that what is made of it stays within the 63 of C99
-LAWS = (
-    "lq-scheduled",
-    "lqg",
-    "turn-rate",
-    "pid-filtered",
-)  # with a law of their own in the template
+LAWS = ("lqg", "turn-rate")  # with a law of their own in the template
 GUIDES = ("los", "ilos", "alos", "wheel-over")
 SINGLE = "{:.9e}f".format  # a number in single precision as C writes it
 Variables = dict[str, tuple[str, str, float]]  #: unit, meaning and first value
@@ -193,11 +187,6 @@ def autopilot_source(agent: Any, name: str | None = None) -> Source:
     outputs = {
         one: (*about, 0.0) for one, about in VARIABLES["autopilot_output"].items()
     }
-    wave = (
-        pilot.design.get("wave_frequency", 0.0)
-        if isinstance(pilot, Controller)
-        else 0.0
-    )
     return _written(
         "autopilot",
         f"Autopilot '{agent.name}' for model '{agent.model_name}'",
@@ -216,7 +205,6 @@ def autopilot_source(agent: Any, name: str | None = None) -> Source:
         orders=ORDERS,
         steepest=STEEPEST,
         memory=getattr(pilot, "memory_size", 0),
-        band=notch_band(wave * bridge.dt),
     )
 
 

@@ -34,9 +34,7 @@ def onnx_model(policy: Any) -> Any:
     if not isinstance(policy, LearnedPolicy):
         raise InputError(
             f"policy: {type(policy).__name__} found, expected a learned policy: a"
-            " shield or a classical controller has a memory and rules that are not a"
-            " network; of a shielded one export its policy, and keep the shield"
-            " around it"
+            " classical controller is not a network; export it with --c or --fmu"
         )
     onnx = library("onnx", "onnx", "the export needs it")
     helper, real = onnx.helper, onnx.TensorProto.FLOAT

@@ -66,7 +66,6 @@ def metrics(run: Rollout) -> dict[str, Floats]:
         charged as if it had lost control then; success is on a path whether its end was
         reached, else whether control was kept.
     """
-    shielded = run.shielded & run.sailing
     kept = (~(run.terminated | run.failed)).astype(np.float64)
     own = (
         path_following(run)
@@ -81,8 +80,6 @@ def metrics(run: Rollout) -> dict[str, Floats]:
         **own,
         "fuel": fuel_per_distance(run),
         "extrapolating": mean(run, run.infos["extrapolating"]),
-        "shielded": ratio(total(shielded), run.steps),
-        "interventions": total(shielded[1:] & ~shielded[:-1]) + total(shielded[:1]),
         "terminated": lost.astype(np.float64),
         "failed": run.failed.astype(np.float64),
         "duration_s": run.steps * run.dt,

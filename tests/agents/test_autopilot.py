@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 from agents import LQ, LineOfSight, sail
-from agents.cli.terminal import ranking_table
-from agents.engines.jobs import JobEngine
+from agents.cli.tables import ranking_table
+from agents.jobs import JobEngine
 from agents.verification.chain import build_autopilot, verify
 from agents.verification.index_uncertainty import (
     nominal_runs,
@@ -27,7 +27,6 @@ def test_the_folder_holds_report_model_metrics_and_all_autopilots(chain):
     folder, _, _ = chain
     found = sorted(path.name for path in folder.iterdir())
     assert found == [
-        "lq-scheduled.json",
         "lq.json",
         "metrics.json",
         "model.json",
@@ -57,7 +56,7 @@ def test_metrics_tell_probabilities_margins_and_ranking(chain):
     )
     assert metrics["imo"]["advance"]["probability"] == 1.0
     assert metrics["imo"]["tactical_diameter"]["probability"] == 0.0
-    assert sorted(metrics["ranking"]) == ["lq", "lq-scheduled", "pid", "turn-rate"]
+    assert sorted(metrics["ranking"]) == ["lq", "pid", "turn-rate"]
     costs = [metrics["controllers"][name]["cost_mean"] for name in metrics["ranking"]]
     assert costs == sorted(costs)
     for name in metrics["ranking"]:
@@ -165,7 +164,7 @@ def test_a_guest_of_another_environment_or_ship_is_wrong_input(
 def test_a_cluster_that_does_not_answer_is_no_fault_of_the_model(demo, tmp_path):
     where = JobEngine(engine="ray", address="127.0.0.1:1")
     with pytest.raises(
-        InputError, match=r"^address: no ray cluster answers|not installed"
+        InputError, match=r"^address: expected a Ray cluster|not installed"
     ):
         build_autopilot(demo, tmp_path / "out", draws=4, where=where)
     assert list(tmp_path.iterdir()) == []
@@ -173,12 +172,12 @@ def test_a_cluster_that_does_not_answer_is_no_fault_of_the_model(demo, tmp_path)
 
 def test_an_unknown_guest_is_refused_with_the_nearest_name(tmp_path):
     expected = (
-        "agent: 'mariner-clam-ppo' found, expected a file, or one of .*Did you mean"
-        " 'mariner-calm-ppo'"
+        "agent: 'sharp-turn-ppo-s0' found, expected a file, or one of .*Did you mean"
+        " 'sharp-turns-ppo-s0'"
     )
     with pytest.raises(InputError, match=expected):
         build_autopilot(
-            "examples/mariner/ship.toml", tmp_path / "out", agents=["mariner-clam-ppo"]
+            "examples/mariner/ship.toml", tmp_path / "out", agents=["sharp-turn-ppo-s0"]
         )
     assert list(tmp_path.iterdir()) == []
 

@@ -165,22 +165,22 @@ def test_an_agent_is_found_by_its_file_its_folder_or_its_name(tmp_path, monkeypa
     monkeypatch.chdir(tmp_path)
     DESIGNS["pid"].save(tmp_path / "agent.json")
     (tmp_path / "run").mkdir()
-    for name in ("run/agent.json", "pid", "mariner-calm-ppo"):
+    for name in ("run/agent.json", "pid", "sharp-turns-ppo-s0"):
         (tmp_path / name).write_bytes((tmp_path / "agent.json").read_bytes())
-    for name in ("agent.json", "run", "pid", "mariner-calm-ppo"):
+    for name in ("agent.json", "run", "pid", "sharp-turns-ppo-s0"):
         assert load_agent(name).gains == DESIGNS["pid"].gains
     assert find_agent("no.json") == Path("no.json")
-    (tmp_path / "mariner-calm-ppo").unlink()
-    assert find_agent("mariner-calm-ppo") == PRETRAINED / "mariner-calm-ppo.json"
+    (tmp_path / "sharp-turns-ppo-s0").unlink()
+    assert find_agent("sharp-turns-ppo-s0") == PRETRAINED / "sharp-turns-ppo-s0.json"
     known = list_pretrained()
     assert known == sorted(known)
     assert len(known) == len(list(PRETRAINED.glob("*.json")))
     with pytest.raises(InputError) as error:
-        load_agent("mariner-clam-ppo")
+        load_agent("sharp-turn-ppo-s0")
     assert (
         str(error.value)
-        == f"agent: 'mariner-clam-ppo' found, expected a file, or one of {len(known)}"
-        f" pretrained agents, such as '{known[0]}'. Did you mean 'mariner-calm-ppo'?"
+        == f"agent: 'sharp-turn-ppo-s0' found, expected a file, or one of {len(known)}"
+        f" pretrained agents, such as '{known[0]}'. Did you mean 'sharp-turns-ppo-s0'?"
     )
 
 
@@ -278,31 +278,6 @@ def test_what_a_kind_needs_of_its_design_is_checked_when_it_is_read(path, tmp_pa
             "arrays.output: 1 entries found, expected a list of 2",
         ),
         (
-            "mpc",
-            lambda arrays: arrays["effect"].__setitem__(3, 0.0),
-            "share of an order .* 0 found, .* >= 1e-06 and <= 1$",
-        ),
-        (
-            "mpc",
-            lambda arrays: arrays["transition"][3].__setitem__(3, -0.01),
-            "stays: -0.01 found, .* >= 0 and",
-        ),
-        (
-            "mpc",
-            lambda arrays: arrays["transition"][3].__setitem__(3, 1.01),
-            "stays: 1.01 found, .* <= 1$",
-        ),
-        (
-            "mpc",
-            lambda arrays: arrays["effect"].__setitem__(3, 1.01),
-            "followed: 1.01 found",
-        ),
-        (
-            "mpc",
-            lambda arrays: arrays["transition"][0].__setitem__(0, 9.0),
-            "a sampled pole of size",
-        ),
-        (
             "lqg",
             lambda arrays: arrays["transition"].clear(),
             r"transition: .* of shape \(states, states\)",
@@ -318,34 +293,9 @@ def test_what_a_kind_needs_of_its_design_is_checked_when_it_is_read(path, tmp_pa
             r"arrays.input: 4 states found, expected one of \(3, 5\)",
         ),
         (
-            "lq-scheduled",
-            lambda arrays: arrays["speeds"].clear(),
-            r"speeds: .* of shape \(speeds\)",
-        ),
-        (
             "turn-rate",
             lambda arrays: arrays["rates"].sort(reverse=True),
             "rates: .* in rising order",
-        ),
-        (
-            "lq-scheduled",
-            lambda arrays: arrays["speeds"].sort(reverse=True),
-            "speeds: .* in rising order",
-        ),
-        (
-            "lq-scheduled",
-            lambda arrays: arrays["neutral"][0].pop(),
-            "expected a list of 2 numbers",
-        ),
-        (
-            "lq-adaptive",
-            lambda arrays: arrays["prior"][1].__setitem__(2, 0.0),
-            "the yaw acceleration per rudder",
-        ),
-        (
-            "lq-adaptive",
-            lambda arrays: arrays["prior"][1].__setitem__(2, 1e30),
-            "of magnitude 1e\\+09 at most",
         ),
     ],
 )

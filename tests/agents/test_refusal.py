@@ -78,13 +78,7 @@ def test_designs_that_lose_control_are_not_written(chain, tmp_path, monkeypatch)
     result = chain[1]
     monkeypatch.setattr(refusal, "MOST_LOST", -1.0)
     found, why = links._decided(result.verification, result.identification)
-    assert set(found.refused) == {
-        "pid",
-        "lq",
-        "lq-scheduled",
-        "turn-rate",
-        "wheel-over",
-    }
+    assert set(found.refused) == {"pid", "lq", "turn-rate", "wheel-over"}
     refused = replace(result, verification=found, refusal=why)
     (tmp_path / "report").mkdir()
     links._write(refused, tmp_path / "report")

@@ -8,7 +8,7 @@ from unittest.mock import Mock
 import numpy as np
 import pytest
 
-from agents import LQ, Shielded, WheelOver, benchmark, load_results
+from agents import LQ, WheelOver, benchmark, load_results
 from agents.benchmarking import results, run, submission
 from agents.benchmarking.contestants import Contestant
 from agents.benchmarking.submission import read_submission, submit
@@ -80,12 +80,6 @@ def test_contestants_are_handed_the_model_only():
     )
     with pytest.raises(InputError, match=said):
         cheat.policies(task, "small")
-    rescue = LQ.from_model(task.sailed[0])
-    hidden = Contestant(
-        "cheat", lambda handed: Shielded(LQ.from_model(handed.ship), rescue, 1.0)
-    )
-    with pytest.raises(InputError, match=said):
-        hidden.policies(task, "small")
 
 
 def test_a_policy_that_is_its_own_part_is_still_searched_for_the_ship():

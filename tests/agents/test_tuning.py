@@ -12,8 +12,8 @@ import pytest
 from typer.testing import CliRunner
 
 from agents.cli import app
-from agents.cli.training import _print_tuning
-from agents.engines.jobs import JobEngine
+from agents.cli.training import print_tuning
+from agents.jobs import JobEngine
 from agents.training import tuning
 from agents.training.plan import Given, make_plan
 from agents.training.settings import ALGORITHMS, load_settings
@@ -197,7 +197,7 @@ def test_trials_are_told_the_best_first(tmp_path, capsys):
         ),
         Trial(3, varied, {}, None, (), "diverged"),
     )
-    _print_tuning(Tuning(trials, trials[2]), tmp_path)
+    print_tuning(Tuning(trials, trials[2]), tmp_path)
     assert same_text("tune", capsys.readouterr().out)
 
 
@@ -465,7 +465,8 @@ def test_the_command_asks_for_what_it_was_told_and_shows_trials_best_first(
                 plan.configuration()["seed"],
             )
         )
-        asked.append((out, trials_asked, fixed, where.workers, progress))
+        asked.append((out, trials_asked, fixed, where.workers))
+        progress(1, trials_asked, None)
         assert (
             plan.threads == 1
         )  # of each of the trials that are done beside one another
@@ -488,7 +489,7 @@ def test_the_command_asks_for_what_it_was_told_and_shows_trials_best_first(
     told = json.loads(CliRunner().invoke(app, [*words, "--json"]).stdout)
     assert asked == [
         (0.9, 10_000, 0),
-        (tmp_path, 20, ("gamma",), 1, None),
+        (tmp_path, 20, ("gamma",), 1),
     ]  # ten evaluations on the way
     assert [trial["cost"] for trial in told["trials"]] == [5.0, None, 4.25]
     assert (told["best"], told["settings"]) == (2, str(tmp_path / "best.toml"))
@@ -505,7 +506,7 @@ def test_the_command_asks_for_what_it_was_told_and_shows_trials_best_first(
     lines = CliRunner().invoke(app, words).stdout.splitlines()
     assert asked[2:] == [
         (0.9, 50, 7),
-        (tmp_path, 3, ("gamma", "evaluate_every"), 2, None),
+        (tmp_path, 3, ("gamma", "evaluate_every"), 2),
     ]
     assert [line.split() for line in lines if line.strip()[:1].isdigit()] == [
         ["2", "4.250", "finished", "learning_rate", "0.000312,", "batch_size", "64"],

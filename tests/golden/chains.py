@@ -74,8 +74,6 @@ def record_demo(_: str) -> dict[str, Floats]:
         words = [
             "autopilot",
             str(SHIP_FILE),
-            "--agent",
-            "mariner-calm-ppo",
             "--out",
             str(out),
         ]

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from agents import LQ, PID, LearnedPolicy, Shielded
+from agents import LQ, PID, LearnedPolicy
 from agents.agent_file import load_agent
 from agents.controllers import designs, registry, robustness, turn_rate
 from agents.controllers.checker import check_controller
@@ -23,13 +23,10 @@ from agents.controllers.controller import Controller
 from agents.controllers.controller_file import read_controller
 from agents.controllers.linear_loop import check_stable
 from agents.deployment.c99 import autopilot_source, checked_name
+from agents.deployment.helm import Helm
 from agents.deployment.route import Route
-from agents.deployment.steering import Helm, Limits
+from agents.deployment.sensors import Limits
 from agents.deployment.translator import c_name, literal
-from agents.engines.job import check_outcome, died_too_often
-from agents.engines.jobs import check_engine, run_jobs
-from agents.engines.serialisation import pack, serialised, shortened, unpack
-from agents.policies import shield
 from agents.policies.network import Network
 from agents.policies.onnx_export import onnx_model
 from agents.policies.policy_extraction import actor_network, task_showing
@@ -49,8 +46,6 @@ from agents.suites.suite import (
 from agents.verification.monte_carlo import monte_carlo
 from shipgym import InputError, load_model
 from shipgym.sea.conditions import Current, Weather
-from shipgym.ships.conversions import nomoto2_ship
-from shipgym.ships.linear import nomoto
 from shipgym.tasks.task import Task, course_keeping_task, path_following_task
 from tests.agents.policies import MARINER, random_network, random_policy
 from tests.golden.controllers import SETTINGS
@@ -90,25 +85,11 @@ def of_controllers() -> Iterator[str]:
             {"damping": 0.0},
             {"frequency": 9.0},
         ],
-        "pid-filtered": [
-            {"reference_share": 0.0},
-            {"reference_share": np.inf},
-            {"tracking_lengths": -1.0},
-            {"largest_turn_rate_deg_s": 0.0},
-            {"wave_period": 2.0},
-            {"wave_period": 2.01},
-        ],
         "lq": [
             {"rudder_weight": 0.0},
             {"rate_weight_s2": 0.0},
             {"integral_lengths": 0.0},
             {"dt": -1.0},
-        ],
-        "lq-scheduled": [
-            {"speeds": [0.05, 5.0]},
-            {"speeds": [5.0]},
-            {"speeds": [5.0, 5.0]},
-            {"speeds": [0.0, 5.0]},
         ],
         "lqg": [
             {"noise": 0.0},
@@ -121,17 +102,6 @@ def of_controllers() -> Iterator[str]:
             {"rate_deg_min": 0.0},
             {"rate_deg_min": 900.0},
         ],
-        "mpc": [
-            {"horizon_lengths": 0.0},
-            {"horizon_lengths": 20.0},
-            {"horizon_lengths": 20.1},
-        ],
-        "lq-adaptive": [
-            {"forgetting_lengths": 0.0},
-            {"redesign_lengths": 0.0},
-            {"noise": -0.1},
-            {"noise": 0.0},
-        ],
         "los": [
             {"lookahead_lengths": 0.0},
             {"integral_lengths": 0.0},
@@ -143,7 +113,7 @@ def of_controllers() -> Iterator[str]:
             {"crab_share": -0.1},
             {"reach_lengths": 0.0, "radius_lengths": 1.0},
         ],
-        "preview-mpc": [
+        "mpc": [
             {"horizon_lengths": 40.1},
             {"deviation_deg": 60.0},
             {"deviation_deg": 60.1},
@@ -153,15 +123,8 @@ def of_controllers() -> Iterator[str]:
     small = {
         "pid": ("dt", "integral_lengths", "frequency", "damping"),
         "lq": ("rudder_weight", "rate_weight_s2", "integral_lengths"),
-        "pid-filtered": (
-            "reference_share",
-            "tracking_lengths",
-            "largest_turn_rate_deg_s",
-        ),
         "lqg": ("noise", "disturbance_deg"),
         "turn-rate": ("dt", "frequency", "rate_deg_min"),
-        "mpc": ("horizon_lengths",),
-        "lq-adaptive": ("forgetting_lengths", "redesign_lengths", "noise"),
         "los": ("lookahead_lengths", "integral_lengths"),
         "wheel-over": (
             "lookahead_lengths",
@@ -169,7 +132,7 @@ def of_controllers() -> Iterator[str]:
             "reach_lengths",
             "crab_share",
         ),
-        "preview-mpc": ("horizon_lengths", "deviation_deg"),
+        "mpc": ("horizon_lengths", "deviation_deg"),
     }
     for kind, names_ in small.items():
         tried[kind] += [{name: 0.05} for name in names_]
@@ -183,9 +146,6 @@ def of_controllers() -> Iterator[str]:
                 f"{kind} {shown}",
                 lambda kind=kind, one=one: made[kind].from_model(MARINER, **one),
             )
-    yield from refused(
-        "adaptive", lambda: made["lq-adaptive"].from_model(_without_sway())
-    )
     yield from refused("turns", lambda: turn_rate.steady_turns(_weak(), 0.0))
     yield from refused(
         "stable",
@@ -210,16 +170,11 @@ def _weak(share: float = 0.0) -> Any:
     return replace(MARINER, coefficients=changed)
 
 
-def _without_sway() -> Any:
-    """Nomoto's ship of second order."""
-    return nomoto2_ship(nomoto(MARINER), MARINER.particulars, MARINER.steering)
-
-
 def _files(made: dict[str, Any]) -> Iterator[str]:
     """Files of controllers with one field changed."""
     own = {
         kind: made[kind].from_model(MARINER, **SETTINGS[kind]).to_dict()
-        for kind in ("pid", "lqg", "mpc", "ilos")
+        for kind in ("pid", "lqg", "ilos")
     }
     changes: list[tuple[str, dict[str, Any]]] = [
         ("pid", {"format": 2}),
@@ -258,17 +213,6 @@ def _files(made: dict[str, Any]) -> Iterator[str]:
             },
         ),
         ("lqg", {"arrays": {**own["lqg"]["arrays"], "output": [[2e9] * 5] * 2}}),
-        ("mpc", {"design": {**own["mpc"]["design"], "horizon_steps": 641.0}}),
-        ("mpc", {"arrays": {**own["mpc"]["arrays"], "effect": [0.0] * 5}}),
-        (
-            "mpc",
-            {
-                "arrays": {
-                    **own["mpc"]["arrays"],
-                    "transition": (1.1 * np.eye(5)).tolist(),
-                }
-            },
-        ),
         ("ilos", {"autopilot": own["ilos"]}),
         ("ilos", {"autopilot": 3}),
         ("ilos", {"gains": {**own["ilos"]["gains"], "lookahead": 0.0}}),
@@ -286,7 +230,7 @@ def _controls() -> Iterator[str]:
         LQ.from_model(MARINER),
         registry.controller_class("ilos").from_model(MARINER),
     )  # type: ignore[attr-defined]
-    filtered = registry.controller_class("pid-filtered").from_model(MARINER)  # type: ignore[attr-defined]
+    filtered = registry.controller_class("lqg").from_model(MARINER)  # type: ignore[attr-defined]
     seen = np.zeros((2, 8))
     yield from refused(
         "predict",
@@ -294,7 +238,7 @@ def _controls() -> Iterator[str]:
         lambda: lq.predict(np.zeros((2, 2, 8))),
         lambda: ilos.predict(seen),
         lambda: filtered.predict(seen, np.zeros(3)),
-        lambda: filtered.predict(seen, np.zeros((2, 14)), [True] * 3),
+        lambda: filtered.predict(seen, np.zeros((2, 4)), [True] * 3),
         lambda: lq.check_fits(["heading_error_sin", "yaw_rate"], [1.0, 1.0]),
         lambda: lq.check_fits_model(load_model("tanker")),
         lambda: lq.check_fits(
@@ -373,7 +317,7 @@ def _controls() -> Iterator[str]:
 
 
 def of_policies() -> Iterator[str]:
-    """Fields, files, states and exports of learned policies and shields."""
+    """Fields, files, states and exports of learned policies."""
     base, n = LQ.from_model(MARINER), random_network
     weight, bias = np.ones((2, 3), np.float32), np.ones(2, np.float32)
     fields: list[dict[str, Any]] = [
@@ -419,32 +363,6 @@ def of_policies() -> Iterator[str]:
         lambda: path_policy().check_fits_model(MARINER),
         lambda: policy.check_fits(["a"], [1.0]),
     )
-    limits: list[dict[str, float]] = [
-        {"envelope_out": 0.99},
-        {"envelope_back": 1.5},
-        {"envelope_back": 1.49},
-        {"runaway_deg": 181.0},
-        {"runaway_deg": 180.0},
-        {"back_deg": 10.0},
-        {"back_deg": 0.0},
-        {"back_deg": 0.05},
-        {"out_lengths": 0.05},
-        {"turn_lengths": 0.05},
-        {"runaway_deg": 5.05},
-        {"out_lengths": -0.1},
-        {"calm_lengths": 0.0},
-        {"turn_lengths": -1.0},
-    ]
-    for one in limits:
-        yield from refused(f"limits {one}", lambda one=one: shield.Limits(**one))
-    yield from refused(
-        "shield",
-        lambda: Shielded(policy, policy, 1.0),
-        lambda: Shielded(policy, base, 0.0),
-        lambda: Shielded(policy, base, 0.05),  # type: ignore[arg-type]
-        lambda: Shielded.from_model(load_model("tanker"), policy),
-        lambda: Shielded(SimpleNamespace(), base, 1.0).file_fields(),  # type: ignore[arg-type]
-    )
     weather = Weather(current=Current(0.7))
     options = {
         "a": MARINER,
@@ -455,7 +373,6 @@ def of_policies() -> Iterator[str]:
     yield f"as JSON: {as_json(options)}"
     shown = ["a"], ["cross_track"], ["cross_track", "next_turn_angle"]
     yield f"tasks: {[task_showing(some) for some in shown]}"
-    yield f"shield: {Shielded(policy, base, 1.0).name}, {policy.name}"
     yield from _written(policy, base)
     yield from _exported()
 
@@ -467,24 +384,16 @@ def _written(policy: Any, base: Any) -> Iterator[str]:
         for one in (
             policy,
             random_policy(base=base, frame_stack=2),
-            Shielded.from_model(load_model("mariner-tls-svm"), policy),
         ):
             one.save(path)
             again = load_agent(path)
             seen = np.linspace(-0.5, 0.5, 8)
             yield f"read: {again.name} {again.predict(seen)[0]} {one.predict(seen)[0]}"
-        one_for_all = load_agent("one-for-all", load_model("tanker"))
-        one_for_all.save(path)
-        yield f"read: {load_agent(path).name} {one_for_all.training['outside']}"
         yield from refused(
             "file",
             lambda: policy.save(Path(folder) / "agent.txt"),
-            lambda: load_agent("one-for-all"),
             lambda: load_agent(Path(folder) / "none.json"),
         )
-    yield from refused(
-        "ship", lambda: load_agent("one-for-all", load_model("kvlcc2-l7"))
-    )
 
 
 def _exported() -> Iterator[str]:
@@ -601,7 +510,7 @@ def of_deployment() -> Iterator[str]:
         yield from refused(f"name {name!r}", lambda name=name: checked_name(name))
     numbers = [literal(x) for x in (1, True, -2.5, np.inf, -np.inf, np.nan, 1e-9)]
     yield f"{checked_name('ship-1 b')} {c_name('while')} {c_name('x')} {numbers}"
-    preview = registry.controller_class("preview-mpc").from_model(MARINER)  # type: ignore[attr-defined]
+    preview = registry.controller_class("mpc").from_model(MARINER)  # type: ignore[attr-defined]
     yield from refused(
         "C",
         lambda: c_name("\u00e4"),
@@ -611,7 +520,7 @@ def of_deployment() -> Iterator[str]:
 
 
 def of_rollouts() -> Iterator[str]:
-    """What rollouts, suites, jobs and Monte Carlo refuse."""
+    """What rollouts, suites and Monte Carlo refuse."""
     pid, task = PID.from_model(MARINER), Task.of("CourseKeeping", episode_steps=5)
     answers: list[Callable[[Any], Any]] = [
         lambda seen: "x",
@@ -678,33 +587,6 @@ def of_rollouts() -> Iterator[str]:
         f"of: {suite_of('mariner-calm')} {suite_of('mariner')}"
         f" {find_task('roll-limit').name}"
     )
-    yield from refused(
-        "jobs",
-        lambda: check_engine("dask", 1, None),
-        lambda: check_engine("local", 0, None),
-        lambda: check_engine("local", 1, "a:1"),
-        lambda: check_engine("local", None, None),
-        lambda: run_jobs(str, [{}], retries=-1),
-        lambda: serialised([1], "jobs[0]"),
-        lambda: pack({1: 2}),
-        lambda: pack({1}),
-        lambda: pack(np.array([None])),
-        lambda: unpack({"__array__": ["<O8", [1], ""]}),
-        lambda: check_outcome({"wrong": "it is"}, "job 3"),
-        lambda: check_outcome({"failed": "it has", "traceback": ""}, "job 4"),
-    )
-    yield (
-        f"{died_too_often('{}', 2)} {shortened('x' * 200)[-9:]}"
-        f" {shortened('x' * 201)[-9:]}"
-    )
-    packed = pack(
-        {
-            "a": (1, np.float32(0.5), None, np.nan),
-            "b": np.array([[1.5, 2.0]]),
-            "c": [np.inf, True],
-        }
-    )
-    yield f"{packed} {unpack(packed)}"
     model = load_model("mariner-tls-svm")
     yield from refused(
         "draws",

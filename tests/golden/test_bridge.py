@@ -1,4 +1,4 @@
-"""What stands on a bridge orders, shows and sends what was recorded; exported C is the recorded one."""
+"""What stands on a bridge orders, shows and sends what was recorded."""
 
 import pytest
 
@@ -15,7 +15,7 @@ def test_what_is_ordered_and_measured_is_golden(case):
 
 @pytest.mark.parametrize("name", policies.TEXTS)
 def test_what_is_exported_and_sent_is_golden(name):
-    """C and sentences of NMEA 0183 are what they were when this was recorded."""
+    """Sentences of NMEA 0183 are what they were when this was recorded."""
     assert same_text(f"bridge/{name.replace(' ', '-')}", policies.texts(name))
 
 

@@ -6,8 +6,6 @@ from tests.golden import controllers, refusals
 from tests.golden.record import beyond_tolerance
 from tests.golden.texts import same_text
 
-pytest.importorskip("osqp", reason="extra mpc is not installed")
-
 
 @pytest.mark.parametrize("case", controllers.cases())
 def test_designs_and_commands_are_the_golden_ones(case):

@@ -1,4 +1,4 @@
-"""Learned policies and shields command what was recorded."""
+"""Learned policies command what was recorded."""
 
 import pytest
 
@@ -9,7 +9,7 @@ from tests.golden.texts import same_text
 
 @pytest.mark.parametrize("case", policies.cases())
 def test_what_learned_policies_command_is_golden(case):
-    """Networks, shields and what is made for a ship command what they did when this was recorded."""
+    """Networks command what they did when this was recorded."""
     assert beyond_tolerance("policies", case) == []
 
 
