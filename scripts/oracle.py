@@ -38,8 +38,9 @@ from shipgym.envs.randomisation import Randomisation
 from shipgym.errors import InputError
 from shipgym.ships import ShipModel
 from shipgym.tasks.guidance import wrapped
+from shipgym.tasks.scales import observation_scales
 from shipgym.tasks.steering import INTEGRAL_ZONE
-from shipgym.tasks.task import Task, observation_scales
+from shipgym.tasks.task import Task
 
 Floats = NDArray[np.float64]
 Rudder = NDArray[np.float32]

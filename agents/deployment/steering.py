@@ -9,7 +9,7 @@ from math import ceil, cos, inf, radians, sin
 from time import perf_counter
 from typing import Any
 
-from agents.controllers.los_autopilot import Guided
+from agents.controllers.guided import Guided
 from agents.controllers.turn_rate import TurnRate
 from agents.deployment.autopilot import Autopilot
 from agents.deployment.c99 import render
@@ -202,15 +202,15 @@ class Helm:
         self.silent, self.counts = ["sensors"], {"sentences": 0, "damaged": 0}
 
     def _check(self, agent: Any) -> None:
-        name, turns = (
-            getattr(agent, "name", type(agent).__name__),
-            getattr(agent, "turns_ahead", ()),
-        )
+        name = getattr(agent, "name", type(agent).__name__)
+        sees_turns = isinstance(agent, Guided) and {*Route.GIVES} <= {
+            *self.pilot.inputs
+        }
         if self.rate is not None and not isinstance(agent, TurnRate):
             raise InputError(
                 f"rate of turn: autopilot '{name}' found, expected 'turn-rate'"
             )
-        if (self.route is not None) != bool(turns) or {*turns} - {*Route.GIVES}:
+        if (self.route is not None) != sees_turns:
             raise InputError(
                 f"route: autopilot '{name}' {'with' if self.route else 'without'} a"
                 " route found, expected 'wheel-over' or 'mpc' of shipgym"

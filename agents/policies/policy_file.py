@@ -29,7 +29,7 @@ from shipgym.checks import (
     placed,
     quoted,
 )
-from shipgym.tasks.task import OBSERVATION_NAMES
+from shipgym.tasks.scales import OBSERVATION_NAMES
 
 #: Fields that older files lack, and what they mean there.
 LATER: Mapping[str, Any] = {"action_repeat": 1, "rate_limit": NO_LIMIT}

@@ -10,8 +10,9 @@ from fmpy import validation
 from agents import LQ, TurnRate, WheelOver
 from agents.deployment import fmu
 from agents.deployment.autopilot import Autopilot
-from agents.deployment.c99 import autopilot_source, ship_source
+from agents.deployment.autopilot_c99 import autopilot_source
 from agents.deployment.fmu import write_fmu
+from agents.deployment.ship_c99 import ship_source
 from shipgym.errors import InputError
 from shipgym.sea.conditions import Current, Weather, Wind
 from shipgym.tasks.task import Task

@@ -133,7 +133,7 @@ NAMES = list(POLICIES["plain"].observation_names)
     ("field", "value", "message"),
     [
         ("format", 2, "format 2 found, this version of shipgym reads format 1"),
-        ("kind", "learnt", "kind: 'learnt' found.*Did you mean 'learned'"),
+        ("kind", "learnt", "kind: .*'learnt'.*Did you mean 'learned'"),
         ("network", None, "field 'network' is missing"),
         ("weight", {}, "unknown key 'weight'. Did you mean 'weights'"),
         ("weights", {"sha": "1"}, "weights: unknown key 'sha'"),
@@ -175,18 +175,18 @@ NAMES = list(POLICIES["plain"].observation_names)
         (
             "observation_names",
             [*NAMES[:2], NAMES[3], NAMES[2], *NAMES[4:]],
-            "observation 2 is 'sway'",
+            "observation 2: expected 'yaw_rate', got 'sway'",
         ),
         (
             "observation_names",
             NAMES[:7],
-            "7 observations found, expected 8; .* heading_error_integral",
+            "expected 8 observations, got 7; .* heading_error_integral",
         ),
         ("observation_names", [*NAMES, "sway"], "a name twice"),
         (
             "observation_scales",
             [1.0],
-            "observation_scales: 1 found, expected 8 numbers",
+            "observation_scales: expected 8 numbers, got 1",
         ),
         (
             "observation_scales",
@@ -283,7 +283,7 @@ def test_a_policy_of_another_ship_is_refused_with_the_difference(tmp_path):
         POLICIES[name].save(tmp_path / "agent.json")
         with pytest.raises(
             InputError,
-            match=r"model 'mariner': the scale of 'yaw_rate' is 0\.0248.* 0\.0479",
+            match=r"model 'mariner': scale of 'yaw_rate': expected 0\.0479.* got 0\.0248",
         ):
             load_agent(tmp_path / "agent.json", mariner(service_speed=4.0))
 

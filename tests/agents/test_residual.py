@@ -351,7 +351,7 @@ def test_what_was_learned_beside_a_base_is_flown_from_its_file_as_in_training(
         (lambda: ResidualVecEnv(ships(COURSE), BASES["ilos-lqg"][1]), "cross_track"),
         (
             lambda: ResidualVecEnv(ships(COURSE), LQ.from_model(load_model("kvlcc2"))),
-            "base: the scale of",
+            "base: scale of",
         ),
         (
             lambda: ResidualVecEnv(

@@ -553,7 +553,7 @@ def test_what_no_sentence_tells_is_refused():
     with pytest.raises(
         InputError, match=r"roll, roll_rate.*which no sentence of NMEA 0183 tells it"
     ):
-        Helm(load_agent("container-roll-path-ppo"), None, Limits())
+        Helm(load_agent("roll-limit-ppo-s0"), None, Limits())
 
 
 def free_port():

@@ -13,14 +13,14 @@ import numpy as np
 
 from agents import LQ, PID
 from agents.controllers.registry import controller_class
-from agents.deployment.autopilot import Autopilot, bounds
+from agents.deployment.autopilot import Autopilot, observation_bounds
 from agents.deployment.nmea import Reading, readings, sentences
 from agents.deployment.route import Route
 from agents.deployment.simulated import SimulatedShip
 from agents.deployment.steering import Helm, Limits, Sensors
 from agents.policies.policy import LearnedPolicy, order_numbers, toward
 from shipgym import load_model
-from shipgym.tasks.task import Task, path_following_task
+from shipgym.tasks.task import Task
 from tests.agents.policies import MARINER, random_network, random_policy
 from tests.golden.controllers import SHIPS, flattened, series
 from tests.golden.store import Floats, numbers_in, vector
@@ -102,17 +102,11 @@ def of_policy(policy: Any) -> dict[str, Floats]:
 def record_functions() -> dict[str, Floats]:
     """Functions of policies at numbers worth a look."""
     single = np.array([[0.7, -1.3], [0.2, 0.4]], np.float32)
-    policy = random_policy(rate_limit=0.3)
-    broken = np.array(
-        [[0.0, 0.7, np.nan], [2.0, np.nan, 0.1], [1.0, -0.4, 0.9]], np.float32
-    )
-    inputs = series(policy.observation_names, 2)[1].astype(np.float32)
     return {
         "toward": vector(
             toward(single, np.array([[0.1, -0.2], [0.25, -0.9]], np.float32), 0.17)
         ),
         "orders": vector(order_numbers([[-0.93], [0.11], [0.49], [1.0]])),
-        "decided": vector(policy._decided(inputs, broken)),
     }
 
 
@@ -132,9 +126,6 @@ ABOARD: dict[str, Callable[[], Any]] = {
     },
     "wheel-over": lambda: controller_class("wheel-over").from_model(
         MARINER, task=Task.of("PathFollowing-v1")
-    ),  # type: ignore[attr-defined]
-    "old wheel-over": lambda: controller_class("wheel-over").from_model(
-        MARINER, task=path_following_task()
     ),  # type: ignore[attr-defined]
     "learned": random_policy,
     "residual": POLICIES["residual"],
@@ -167,8 +158,6 @@ def of_autopilots() -> dict[str, Floats]:
                 "rate_of_turn": 0.004 * (k > 15),
                 "cross_track": 90.0 - 7.0 * k,
                 "course": 0.35 + 0.2 * np.sin(0.3 * k),
-                "turn_distance": 700.0 - 20.0 * k,
-                "turn_angle": 0.7,
                 "next_turn_distance": 500.0 - 20.0 * k,
                 "next_turn_angle": -0.6,
                 "second_turn_distance": 1300.0 - 20.0 * k,
@@ -177,7 +166,9 @@ def of_autopilots() -> dict[str, Floats]:
             orders.append(pilot.step({one: given[one] for one in pilot.inputs}))
         inside = [pilot.dt, pilot.limit, pilot.integral, pilot.last_command]
         found |= {f"{name} orders": vector(orders), f"{name} inside": vector(inside)}
-    return found | {f"bounds {name}": vector(pair) for name, pair in bounds().items()}
+    return found | {
+        f"bounds {name}": vector(pair) for name, pair in observation_bounds().items()
+    }
 
 
 def track(radius: float = 610.0) -> Route:

@@ -21,13 +21,9 @@ from shipgym.sea.open_sea import Sea
 from shipgym.ships import Envelope
 from shipgym.tasks.contract import Interval, Random
 from shipgym.tasks.definition import read_definition
+from shipgym.tasks.scales import rounded_interval
 from shipgym.tasks.steering import ROLL_SCALE
-from shipgym.tasks.task import (
-    RUDDER_ORDERS,
-    Task,
-    course_keeping_task,
-    rounded_interval,
-)
+from shipgym.tasks.task import RUDDER_ORDERS, Task, course_keeping_task
 from shipgym.trials.sensors import SEA_TRIAL
 
 pytestmark = pytest.mark.interpreted
