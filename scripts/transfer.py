@@ -99,7 +99,7 @@ class Contestant:
 
 def contestants(task: BenchmarkTask, out: Path, runs: int) -> Iterator[Contestant]:
     """All of one task, each made on the model and on the ship."""
-    model, ship = task.handed_out, replace(task.handed_out, model=task.behind)
+    model, ship = task.design_task, replace(task.design_task, model=task.true_ship)
     pairs: dict[str, tuple[Sequence[Policy], Sequence[Policy]]] = {
         "wheel-over": ([design("wheel-over", model)], [design("wheel-over", ship)])
     }

@@ -3,6 +3,7 @@
 import hashlib
 import sys
 from collections.abc import Callable
+from importlib import import_module
 from inspect import (
     CO_ASYNC_GENERATOR,
     CO_COROUTINE,
@@ -70,6 +71,16 @@ def load_file(path: Path, expected: str = "a Python file") -> ModuleType:
         why = f"{type(error).__name__}: {error}{''.join(within)}"
         raise InputError(f"{place}: cannot be executed: {why}") from error
     return module
+
+
+def import_named(module: str) -> ModuleType:
+    """Import a module that a user names; one in the working folder is found too."""
+    path = list(sys.path)
+    sys.path.insert(0, str(Path.cwd()))
+    try:
+        return import_module(module)
+    finally:
+        sys.path[:] = path
 
 
 def check_function(value: Any, count: int, where: str, what: str) -> None:

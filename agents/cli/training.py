@@ -21,7 +21,7 @@ EXAMPLE = "gamma=0.98"
 Algorithm = Annotated[str, Argument(metavar="ALGORITHM", help="ppo, sac, td3 or tqc.")]
 Environment = Annotated[
     str | None,
-    Option(help="course-keeping (default), path-following-v1, or an environment id."),
+    Option(help="course-keeping (default), path-following, or an environment id."),
 ]
 Model = Annotated[
     str | None,

@@ -78,11 +78,12 @@ def warm_command(
 
 def _names(wanted: list[str] | None, everything: bool) -> list[str]:
     """Environments and models that are asked for."""
-    from shipgym.envs.registration import TASKS, env_id, environments
+    from shipgym.envs.registration import ENVIRONMENTS, env_id
     from shipgym.ships import list_models
+    from shipgym.tasks.definition import TASKS
 
     if everything:
-        return [*environments(), *list_models()]
+        return [*ENVIRONMENTS, *list_models()]
     return wanted or [*map(env_id, TASKS), "mariner"]
 
 
@@ -93,13 +94,13 @@ def _jobs(
     import shipgym
     from shipgym.engine.loops import LOOPS, ship_loop
     from shipgym.envs.environment import DEFAULT_TASK
-    from shipgym.envs.registration import env_id, environments
+    from shipgym.envs.registration import ENVIRONMENTS, env_id
     from shipgym.errors import InputError
     from shipgym.python_files import load_file
 
     path, expected = Path(name), "the Python file of a task or a ship"
     task = path.suffix == ".py" and not hasattr(load_file(path, expected), "SHIP")
-    if task or name in environments():
+    if task or name in ENVIRONMENTS:
         given: dict[str, Any] = {"model": ship} if ship else {}
         given |= {"task": name} if task else {}
         for water, sea in SEAS.items():
@@ -121,7 +122,4 @@ def _jobs(
 def _make(env_id: str, options: dict[str, Any]) -> None:
     import gymnasium
 
-    with warnings.catch_warnings(
-        action="ignore", category=DeprecationWarning
-    ):  # of older ids
-        gymnasium.make(env_id, **options).close()
+    gymnasium.make(env_id, **options).close()

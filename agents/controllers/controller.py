@@ -121,10 +121,8 @@ class Controller:
     kind: ClassVar[str] = ""
     #: For each gain the signal it acts on and the sign with which it does.
     feedback: ClassVar[Mapping[str, tuple[str, float]]] = {}
-    #: What it observes, also in other tasks, and names of its gains where not those of
-    #: `feedback`.
+    #: What it observes, and names of its gains where not those of `feedback`.
     observes: ClassVar[tuple[str, ...]] = OBSERVATION_NAMES
-    alternatives: ClassVar[tuple[tuple[str, ...], ...]] = ()
     gain_names: ClassVar[tuple[str, ...]] = ()
     #: What it reads of the ship beside her heading, where that does not follow from
     #: `feedback`.

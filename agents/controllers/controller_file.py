@@ -74,9 +74,7 @@ def read_controller(content: Mapping[str, Any], where: str) -> Controller:
             f"{where}: observation_names: {shown(names)} found, expected a list of"
             " names"
         )
-    observes = next(
-        (some for some in design.alternatives if list(some) == names), design.observes
-    )
+    observes = design.observes
     check_names([str(name) for name in names], observes, f"{where}: observation_names")
     known = design.gain_names or tuple(design.feedback)
     gains = {name: design.ranges.get(name, NUMBERS) for name in known}

@@ -10,7 +10,7 @@ from agents.agent_file import load_agent
 from agents.controllers.controller import Controller, model_hash
 from agents.controllers.registry import BUILT_IN, controller_class
 from agents.suites.reference import load_tuned
-from agents.suites.suite import BenchmarkTask, suite_of
+from agents.suites.suite import BenchmarkTask
 from shipgym import InputError, ShipModel
 
 #: In an order in which those come first that others build on; the suites know no rate
@@ -109,8 +109,8 @@ def design_base(name: str, task: BenchmarkTask) -> Controller | None:
     if name == "none":
         return None
     if name == "tuned":
-        if suite := suite_of(task.name):
-            return tuned("base", task, suite)
+        if task.suite:
+            return tuned("base", task, task.suite)
         raise InputError(
             "base: 'tuned' found without a task of the suite, expected --task, or"
             " another base"

@@ -86,10 +86,6 @@ class Guided(Controller):
         own = autopilot is None or autopilot is like
         like.check_fits_model(model)
         scales = {quantity.name: quantity.scale for quantity in task.observed(model)}
-        names = next(
-            (some for some in cls.alternatives if scales.keys() >= {*some}),
-            cls.observes,
-        )
         return cls(
             gains={
                 **gains,
@@ -98,8 +94,8 @@ class Guided(Controller):
             neutral_rudder=like.neutral_rudder,
             neutral_sway=like.neutral_sway,
             margins=like.margins if own else Margins(np.inf, np.inf, np.inf, np.inf),
-            observation_scales=tuple(scales[name] for name in names),
-            observation_names=names,
+            observation_scales=tuple(scales[name] for name in cls.observes),
+            observation_names=cls.observes,
             model_name=like.model_name,
             model_sha256=like.model_sha256,
             design={"dt": dt, **design},

@@ -50,18 +50,10 @@ class WheelOver(Guided):
     observes: ClassVar[tuple[str, ...]] = (
         *Guided.observes,
         *COURSE_ERROR,
-        "turn_distance",
-        "turn_angle",
-    )
-    alternatives: ClassVar[tuple[tuple[str, ...], ...]] = (
-        (
-            *Guided.observes,
-            *COURSE_ERROR,
-            "next_turn_distance",
-            "next_turn_angle",
-            "second_turn_distance",
-            "second_turn_angle",
-        ),
+        "next_turn_distance",
+        "next_turn_angle",
+        "second_turn_distance",
+        "second_turn_angle",
     )
     reads: ClassVar[tuple[str, ...]] = ("cross_track", "course", "sway", "surge")
     gain_names: ClassVar[tuple[str, ...]] = (
@@ -146,7 +138,7 @@ class WheelOver(Guided):
     @property
     def turns_ahead(self) -> tuple[str, ...]:
         """See `Guided.turns_ahead`."""
-        return self.observation_names[len(WheelOver.observes) - 2 :]
+        return self.observation_names[-4:]
 
     def course(
         self, seen: Mapping[str, Floats], memory: Floats

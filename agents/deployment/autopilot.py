@@ -14,7 +14,7 @@ from agents.controllers.wheel_over import COURSE_ERROR
 from shipgym import InputError
 from shipgym.engine.records import field_types
 from shipgym.files import read_toml
-from shipgym.tasks import path_following, path_following_v0
+from shipgym.tasks import path_following
 from shipgym.tasks.contract import Seen
 from shipgym.tasks.guidance import wrapped
 from shipgym.tasks.steering import Extras, Helm
@@ -51,7 +51,7 @@ def _reads(agent: Any) -> set[str]:
 @cache
 def bounds() -> dict[str, tuple[float, float]]:
     """Bounds of observations by name, in multiples of their scale."""
-    records = Helm, Extras, path_following_v0.Observation, path_following.Observation
+    records = Helm, Extras, path_following.Observation
     notes = [
         note for record in records for note in field_types(record, notes=True).items()
     ]

@@ -158,8 +158,7 @@ def _environment(ships: Any) -> dict[str, Any]:
 
 def task_showing(names: Sequence[str]) -> str:
     """The task of the package that shows these quantities."""
-    path = "PathFollowing-v1" if "next_turn_angle" in names else "PathFollowing"
-    return path if "cross_track" in names else "CourseKeeping"
+    return "PathFollowing" if "cross_track" in names else "CourseKeeping"
 
 
 def _network(agent: Any) -> Network:

@@ -11,11 +11,10 @@ from numpy.typing import NDArray
 from agents.controllers.controller import FORMAT, check_names
 from agents.controllers.controller_file import read_controller, read_model, read_scales
 from agents.policies.network import Layer, Network
-from agents.policies.policy import NO_LIMIT, LearnedPolicy
+from agents.policies.policy import LearnedPolicy
 from agents.policies.weights_file import (
     REMEDY,
     Tensors,
-    present_names,
     read_weights,
     weights_path,
 )
@@ -31,8 +30,6 @@ from shipgym.checks import (
 )
 from shipgym.tasks.task import OBSERVATION_NAMES
 
-#: Fields that older files lack, and what they mean there.
-LATER: Mapping[str, Any] = {"action_repeat": 1, "rate_limit": NO_LIMIT}
 FIELDS = (
     "format",
     "kind",
@@ -58,15 +55,14 @@ def read_policy(content: Mapping[str, Any], path: Path) -> LearnedPolicy:
     Raises InputError naming the file and the field at fault.
     """
     where = str(path)
-    current = {**LATER, **present_names(content)}
-    check_format(current, FORMAT, where)
-    check_keys(current, FIELDS, where, FIELDS)
+    check_format(content, FORMAT, where)
+    check_keys(content, FIELDS, where, FIELDS)
 
-    table = check_table(current["weights"], f"{where}: weights", ("sha256",))
+    table = check_table(content["weights"], f"{where}: weights", ("sha256",))
     sha256 = check_text(table.get("sha256"), f"{where}: weights.sha256")
     tensors = read_weights(weights_path(path), sha256, path)
     with placed(where):
-        agent = _learned(current, tensors)
+        agent = _learned(content, tensors)
     if tensors:
         raise InputError(
             f"{weights_path(path)}: unknown {quoted(tensors)} found with the weights;"
@@ -85,7 +81,13 @@ def _learned(content: Mapping[str, Any], tensors: Tensors) -> LearnedPolicy:
         observation_scales=read_scales(content["observation_scales"], names),
         **{
             name: content[name]
-            for name in ("action", "frame_stack", "authority", *LATER)
+            for name in (
+                "action",
+                "frame_stack",
+                "authority",
+                "action_repeat",
+                "rate_limit",
+            )
         },
         base=(
             None

@@ -274,7 +274,7 @@ def test_each_construct_of_python_is_the_same_in_c(tmp_path):
 
 def over_wheel_over():
     """A policy with weights at random that adds to what wheel-over commands."""
-    task = Task.of("PathFollowing-v1")
+    task = Task.of("PathFollowing")
     shown, base = task.observed(MARINER), WheelOver.from_model(MARINER, task=task)
     names, scales = zip(*((one.name, one.scale) for one in shown), strict=True)
     network = random_network(len(names) + 1, 16, 1)
@@ -294,7 +294,7 @@ CONTROLLERS = {
     "ilos": IntegralLineOfSight.from_model(MARINER),
     "alos": AdaptiveLineOfSight.from_model(MARINER, autopilot=PID.from_model(MARINER)),
     "turn_rate": TurnRate.from_model(MARINER),
-    "wheel_over": WheelOver.from_model(MARINER, task=Task.of("PathFollowing-v1")),
+    "wheel_over": WheelOver.from_model(MARINER, task=Task.of("PathFollowing")),
     "wheel_over_legs": WheelOver.from_model(
         MARINER, autopilot=TurnRate.from_model(MARINER), task=path_following_task()
     ),

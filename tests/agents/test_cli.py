@@ -431,7 +431,7 @@ def test_warm_takes_what_is_named_or_all_there_is():
     everything = _names(None, True)
     assert {
         "shipgym/CourseKeeping-v0",
-        "shipgym/PathFollowingRoll-v1",
+        "shipgym/PathFollowingRoll-v0",
         "mariner",
         "kvlcc2-mmg",
     } <= set(everything)
@@ -440,7 +440,7 @@ def test_warm_takes_what_is_named_or_all_there_is():
     assert _names(None, False) == [
         "shipgym/CourseKeeping-v0",
         "shipgym/PathFollowing-v0",
-        "shipgym/PathFollowing-v1",
+        "shipgym/PathFollowing-v0",
         "mariner",
     ]
     assert [what for what, _ in _jobs("shipgym/CourseKeeping-v0")] == [
@@ -1268,7 +1268,7 @@ def test_a_training_is_asked_for_as_told(tmp_path, monkeypatch):
         "--out",
         tmp_path,
         "--env",
-        "path-following-v1",
+        "path-following",
         "--model",
         "tanker",
     ]
@@ -1299,7 +1299,7 @@ def test_a_training_is_asked_for_as_told(tmp_path, monkeypatch):
     own = {"gamma": 0.9, "total_steps": 5000, "base": "none"}
     given = Given(
         "sac",
-        "path-following-v1",
+        "path-following",
         "tanker",
         "rough",
         None,

@@ -91,7 +91,7 @@ def test_with_the_task_s_own_lookahead_plain_line_of_sight_is_the_autopilot_itse
 def test_it_is_a_controller_and_a_file(law, pilot, tmp_path):
     guided = law.from_model(MARINER, autopilot=pilot.from_model(MARINER))
     check_controller(guided, MARINER, path_following_task(noise=1.0), n_steps=20)
-    check_controller(guided, MARINER, Task.of("PathFollowing-v1"), n_steps=5)
+    check_controller(guided, MARINER, Task.of("PathFollowing"), n_steps=5)
     guided.save(tmp_path / "guided.json")
     again = load_agent(tmp_path / "guided.json", MARINER)
     assert type(again) is law

@@ -111,7 +111,7 @@ REFUSED = {
         "16 observations within .* expected the task's 8",
     ),
     "other task": (
-        lambda: {"env": ships("shipgym/PathFollowing-v1")},
+        lambda: {"env": ships("shipgym/PathFollowing-v0")},
         "15 observations within",
     ),
     "other action": (

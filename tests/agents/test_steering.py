@@ -413,7 +413,7 @@ def test_a_rate_of_turn_is_steered_or_limits_the_way_to_a_heading(
     )
 
 
-WHEEL_OVER = WheelOver.from_model(MARINER, task=Task.of("PathFollowing-v1"))
+WHEEL_OVER = WheelOver.from_model(MARINER, task=Task.of("PathFollowing"))
 ROUTE = "latitude,longitude\n54.0,7.5\n54.02,7.5\n54.03,7.52\n"
 
 

@@ -20,7 +20,7 @@ from agents.deployment.simulated import SimulatedShip
 from agents.deployment.steering import Helm, Limits, Sensors
 from agents.policies.policy import LearnedPolicy, order_numbers, toward
 from shipgym import load_model
-from shipgym.tasks.task import Task, path_following_task
+from shipgym.tasks.task import Task
 from tests.agents.policies import MARINER, random_network, random_policy
 from tests.golden.controllers import SHIPS, flattened, series
 from tests.golden.store import Floats, numbers_in, vector
@@ -48,8 +48,8 @@ POLICIES: dict[str, Callable[[], Any]] = {
 
 
 def path_policy(**more: Any) -> LearnedPolicy:
-    """One that adds to wheel-over on paths of version 1."""
-    task = Task.of("PathFollowing-v1")
+    """One that adds to wheel-over on paths."""
+    task = Task.of("PathFollowing")
     shown = task.observed(MARINER)
     base = controller_class("wheel-over").from_model(MARINER, task=task)  # type: ignore[attr-defined]
     return LearnedPolicy(
@@ -57,7 +57,7 @@ def path_policy(**more: Any) -> LearnedPolicy:
         tuple(one.name for one in shown),
         tuple(one.scale for one in shown),
         base=base,
-        env_id="shipgym/PathFollowing-v1",
+        env_id="shipgym/PathFollowing-v0",
         model_name="mariner",
         **more,
     )
@@ -131,10 +131,7 @@ ABOARD: dict[str, Callable[[], Any]] = {
         )
     },
     "wheel-over": lambda: controller_class("wheel-over").from_model(
-        MARINER, task=Task.of("PathFollowing-v1")
-    ),  # type: ignore[attr-defined]
-    "old wheel-over": lambda: controller_class("wheel-over").from_model(
-        MARINER, task=path_following_task()
+        MARINER, task=Task.of("PathFollowing")
     ),  # type: ignore[attr-defined]
     "learned": random_policy,
     "residual": POLICIES["residual"],
@@ -167,8 +164,6 @@ def of_autopilots() -> dict[str, Floats]:
                 "rate_of_turn": 0.004 * (k > 15),
                 "cross_track": 90.0 - 7.0 * k,
                 "course": 0.35 + 0.2 * np.sin(0.3 * k),
-                "turn_distance": 700.0 - 20.0 * k,
-                "turn_angle": 0.7,
                 "next_turn_distance": 500.0 - 20.0 * k,
                 "next_turn_angle": -0.6,
                 "second_turn_distance": 1300.0 - 20.0 * k,
@@ -291,7 +286,7 @@ def of_helm() -> dict[str, Floats]:
 def of_helm_on_a_route() -> dict[str, Floats]:
     """A ship in a current and wind, steered along a route by what her instruments show."""
     guide = controller_class("wheel-over").from_model(
-        MARINER, task=Task.of("PathFollowing-v1")
+        MARINER, task=Task.of("PathFollowing")
     )  # type: ignore[attr-defined]
     places = np.array([[54.0, 7.5], [54.012, 7.5], [54.02, 7.53], [54.03, 7.53]])
     helm = Helm(

@@ -40,7 +40,6 @@ from agents.suites.suite import (
     find_task,
     load_suite,
     parse_suite,
-    suite_of,
 )
 from agents.verification.monte_carlo import monte_carlo
 from shipgym import InputError, load_model
@@ -72,10 +71,7 @@ def of_controllers() -> Iterator[str]:
         ranges = ", ".join(
             f"{name} {tuple(limits)}" for name, limits in one.ranges.items()
         )
-        yield (
-            f"{kind}: observes {one.observes}, {one.alternatives}, gains"
-            f" {one.gain_names}, {ranges}"
-        )
+        yield (f"{kind}: observes {one.observes}, gains {one.gain_names}, {ranges}")
     tried: dict[str, list[dict[str, Any]]] = {
         "pid": [
             {"dt": 0.0},
@@ -253,8 +249,8 @@ def _controls() -> Iterator[str]:
         lambda: replace(ilos, autopilot=random_policy()).loop(),
     )
     task, path = (
-        load_suite("shipgym-v1").task("mariner-calm"),
-        load_suite("shipgym-v1").task("container-path"),
+        BenchmarkTask("mariner-calm", "course-keeping", "mariner"),
+        load_suite().task("sharp-turns").design_task,
     )
     yield from refused(
         "design",
@@ -370,7 +366,7 @@ def of_policies() -> Iterator[str]:
         3: Path("x"),
     }
     yield f"as JSON: {as_json(options)}"
-    shown = ["a"], ["cross_track"], ["cross_track", "next_turn_angle"]
+    shown = ["a"], ["cross_track"]
     yield f"tasks: {[task_showing(some) for some in shown]}"
     yield from _written(policy, base)
     yield from _exported()
@@ -466,7 +462,7 @@ def of_deployment() -> Iterator[str]:
     pid, wheel = (
         PID.from_model(MARINER),
         registry.controller_class("wheel-over").from_model(
-            MARINER, task=Task.of("PathFollowing-v1")
+            MARINER, task=Task.of("PathFollowing")
         ),
     )  # type: ignore[attr-defined]
     rate = registry.controller_class("turn-rate").from_model(MARINER)  # type: ignore[attr-defined]
@@ -578,14 +574,11 @@ def of_rollouts() -> Iterator[str]:
         )
     yield from refused(
         "suite",
-        lambda: load_suite("shipgym-v3"),
-        lambda: find_task("mariner-clam"),
+        lambda: load_suite("shipgym-v2"),
+        lambda: find_task("sharp-turn"),
         lambda: load_suite().task("x"),
     )
-    yield (
-        f"of: {suite_of('mariner-calm')} {suite_of('mariner')}"
-        f" {find_task('roll-limit').name}"
-    )
+    yield f"of: {find_task('roll-limit').name}"
     model = load_model("mariner-tls-svm")
     yield from refused(
         "draws",
