@@ -2,8 +2,8 @@
 
 import hashlib
 import sys
-from collections.abc import Callable
-from importlib import import_module
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from inspect import (
     CO_ASYNC_GENERATOR,
     CO_COROUTINE,
@@ -73,14 +73,15 @@ def load_file(path: Path, expected: str = "a Python file") -> ModuleType:
     return module
 
 
-def import_named(module: str) -> ModuleType:
-    """Import a module that a user names; one in the working folder is found too."""
-    path = list(sys.path)
+@contextmanager
+def working_folder() -> Iterator[None]:
+    """Find modules of the working folder, which a user has named, within the block."""
+    before = list(sys.path)
     sys.path.insert(0, str(Path.cwd()))
     try:
-        return import_module(module)
+        yield
     finally:
-        sys.path[:] = path
+        sys.path[:] = before
 
 
 def check_function(value: Any, count: int, where: str, what: str) -> None:

@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, fields, replace
 from functools import cached_property
+from pathlib import Path
 from typing import Any, NamedTuple, Self
 
 import numpy as np
@@ -146,6 +147,15 @@ class BenchmarkTask:
         ship, task, randomisation = self.evaluation
         steered = ship if model is None else model
         return Engine(steered, num_envs, task, randomisation, threads=threads)
+
+    @property
+    def files(self) -> list[Path]:
+        """Files of the user's own that it names: tasks, models, rewards, sensors."""
+        options = [*self.options.values(), *self.far.values()]
+        named = [self.environment, self.model, self.true_ship, *options]
+        endings = (".py", ".json")
+        texts = [one for one in named if isinstance(one, str) and one.endswith(endings)]
+        return [Path(text) for text in texts if Path(text).is_file()]
 
     def to_dict(self) -> dict[str, Any]:
         """Return what `from_dict` reads, ready for JSON."""

@@ -1,5 +1,6 @@
 """Environments as users name them: by a short name, by an id, or by the file of a task."""
 
+from importlib import import_module
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -7,7 +8,7 @@ import gymnasium
 
 from shipgym import InputError
 from shipgym.checks import did_you_mean, quoted
-from shipgym.python_files import import_named
+from shipgym.python_files import working_folder
 
 #: Tasks of the shipped environments by their short names.
 SHORT_NAMES = {"course-keeping": "CourseKeeping", "path-following": "PathFollowing"}
@@ -75,7 +76,8 @@ def read_environment(
 
 def _import(module: str, text: str, where: str) -> None:
     try:
-        import_named(module)
+        with working_folder():
+            import_module(module)
     except Exception as error:  # whatever the module does
         raise InputError(
             f"{where}: expected module:id, got '{text}', which cannot be imported"
