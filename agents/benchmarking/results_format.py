@@ -1,4 +1,4 @@
-"""What stands where in `results.json`, format 2, and that it is checked when read."""
+"""Fields of `results.json`, checked when it is read."""
 
 from collections.abc import Mapping
 from types import NoneType
@@ -6,75 +6,97 @@ from typing import Any
 
 from shipgym.checks import ANY_KEY, Shape, check_choice, check_shape, check_whole
 
+FORMAT, KIND = 1, "shipgym-benchmark"
+
 TEXT, COUNT, NUMBER = (str,), (int,), (int, float)
-PERHAPS = (int, float, NoneType)
-INTERVAL: Shape = {"value": PERHAPS, "low": PERHAPS, "high": PERHAPS}
-TASK: dict[str, Shape] = dict.fromkeys(
-    ("environment", "model", "model_sha256", "why", "on", "ship"), TEXT
-)
-CONTESTANT: Shape = {  # files: SHA-256 by path; refused: why, by task
-    "source": (str, NoneType),
-    "files": {ANY_KEY: TEXT},
-    "runs": COUNT,
-    "refused": {ANY_KEY: TEXT},
+TEXT_OR_NULL, NUMBER_OR_NULL = (str, NoneType), (int, float, NoneType)
+INTERVAL: Shape = {
+    "value": NUMBER_OR_NULL,
+    "low": NUMBER_OR_NULL,
+    "high": NUMBER_OR_NULL,
 }
-FOUND: Shape = {
-    "cost": {"value": NUMBER, "low": PERHAPS, "high": PERHAPS},
+TASK: Shape = {
+    "environment": TEXT,
+    "model": TEXT,
+    "model_sha256": TEXT,
+    "why": TEXT,
+    "on": TEXT,
+    "ship": TEXT,
+}
+CONTROLLER: Shape = {
+    "source": TEXT_OR_NULL,
+    "files": {ANY_KEY: TEXT},  # SHA-256 by path
+    "runs": COUNT,
+    "refused": {ANY_KEY: TEXT},  # why, by task
+}
+CELL: Shape = {
+    "cost": {"value": NUMBER, "low": NUMBER_OR_NULL, "high": NUMBER_OR_NULL},
     "cost_iqm": INTERVAL,
     "score": INTERVAL,
-    "relative_cost": PERHAPS,
+    "relative_cost": NUMBER_OR_NULL,
     "runs": COUNT,
     "lost": COUNT,
     "failed": COUNT,
     "failure": TEXT,
-    "policy_sha256": [(str, NoneType)],
-    "microseconds_per_action": PERHAPS,
-    "metrics": {ANY_KEY: {"mean": PERHAPS, "median": PERHAPS, "p95": PERHAPS}},
+    "policy_sha256": [TEXT_OR_NULL],
+    "microseconds_per_action": NUMBER_OR_NULL,
+    "metrics": {
+        ANY_KEY: {
+            "mean": NUMBER_OR_NULL,
+            "median": NUMBER_OR_NULL,
+            "p95": NUMBER_OR_NULL,
+        }
+    },
 }
-ENTRY: dict[str, Shape] = {
+TOTAL: dict[str, Shape] = {
     "score": INTERVAL,
-    "relative_cost": PERHAPS,
+    "relative_cost": NUMBER_OR_NULL,
     "tasks": COUNT,
     "lost": COUNT,
     "failed": COUNT,
 }
-RANKED: Shape = {
-    "name": TEXT,
-    **ENTRY,
-    "elsewhere": {ANY_KEY: ENTRY},
-}  # the last by set of episodes
-SHAPE: dict[str, Shape] = {
-    "versions": {ANY_KEY: TEXT},  # and the processor: bit for bit on equal ones only
-    "suite": {"name": TEXT, "sha256": TEXT, "tasks": {ANY_KEY: TASK}},
+#: The total is that of the episodes on the ship, `elsewhere` has those of other sets.
+RANKED: Shape = {"name": TEXT, **TOTAL, "elsewhere": {ANY_KEY: TOTAL}}
+
+SUMMARY: dict[str, Shape] = {
+    "versions": {ANY_KEY: TEXT},  # and the processor
+    "suite": {
+        "name": TEXT,
+        "sha256": TEXT,
+        "file": TEXT,  # of a suite of the user's own
+        "complete": (bool,),  # all tasks of the suite were run
+        "tasks": {ANY_KEY: TASK},
+    },
     "seeds": {"first": COUNT, "count": COUNT},
-    "contestants": {ANY_KEY: CONTESTANT},
-    "tasks": {ANY_KEY: {ANY_KEY: FOUND}},  # by task and contestant
-    "reference": {
-        ANY_KEY: {"zero": NUMBER, "best": NUMBER}
-    },  # costs that are scores of 0 and 1, by task
+    "controllers": {ANY_KEY: CONTROLLER},
+    "tasks": {ANY_KEY: {ANY_KEY: CELL}},  # by task and controller
+    # costs whose scores are 0 and 1, by task
+    "reference": {ANY_KEY: {"zero": NUMBER, "best": NUMBER}},
     "ranking": [RANKED],  # best first
-    "improvement": {
-        ANY_KEY: {ANY_KEY: INTERVAL}
-    },  # probability that one costs less than another
+    # probability that the first costs less than the second
+    "improvement": {ANY_KEY: {ANY_KEY: INTERVAL}},
     "profile": {"thresholds": [NUMBER], "shares": {ANY_KEY: [NUMBER]}},
-    "episodes": {"file": TEXT, "rows": COUNT, "sha256": (str, NoneType)},
+    "episodes": {"file": TEXT, "rows": COUNT, "sha256": TEXT_OR_NULL},
 }
+FIELDS = ("format", "kind", *SUMMARY)
 
 
 def check_summary(content: Mapping[str, Any], where: str) -> None:
-    """Refuse a summary with another value somewhere, or one that names whom or what it does not know.
+    """Refuse a wrong value, or a controller or task that is named but not described.
 
-    Raises InputError that begins with `where`, the file, and names the place.
+    Raises InputError that begins with `where`, the file, and names the field.
     """
-    for name, shape in SHAPE.items():
+    for name, shape in SUMMARY.items():
         check_shape(content[name], shape, f"{where}: {name}")
     check_whole(content["seeds"]["count"], f"{where}: seeds.count", at_least=1)
-    known, tasks = content["contestants"], content["suite"]["tasks"]
-    names = [entry["name"] for entry in content["ranking"]]
-    for name in [*names, *content["improvement"], *content["profile"]["shares"]]:
-        check_choice(name, known, f"{where}: name of a contestant")
-    for name in [*content["tasks"], *content["reference"]]:
-        check_choice(name, tasks, f"{where}: name of a task")
-    for task, found in content["tasks"].items():
-        for name in found:
-            check_choice(name, names, f"{where}: tasks.{task}: name of a contestant")
+
+    controllers = content["controllers"]
+    ranked = [one["name"] for one in content["ranking"]]
+    shares = content["profile"]["shares"]
+    for name in [*ranked, *content["improvement"], *shares]:
+        check_choice(name, controllers, f"{where}: name of a controller")
+    for task in [*content["tasks"], *content["reference"]]:
+        check_choice(task, content["suite"]["tasks"], f"{where}: name of a task")
+    for task, cells in content["tasks"].items():
+        for name in cells:
+            check_choice(name, ranked, f"{where}: tasks.{task}: name of a controller")

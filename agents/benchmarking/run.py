@@ -3,6 +3,7 @@
 import shutil
 from collections.abc import Mapping, Sequence
 from contextlib import nullcontext
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -10,7 +11,7 @@ from typing import Any
 from agents.benchmarking.cells import Cell, job_of, run_cell, run_job
 from agents.benchmarking.entries import Entry, check_agents, read_entries
 from agents.benchmarking.results import PARTS, BenchmarkResult, check_new, collect
-from agents.engines.jobs import JobEngine
+from agents.jobs import JobEngine, run_jobs
 from agents.output import in_use
 from agents.suites.suite import DEFAULT_SUITE, N_EPISODES, BenchmarkTask, load_suite
 from identification.progress import Progress
@@ -67,15 +68,15 @@ def benchmark(
     selected = read.select(tasks)
     check_whole(episodes, "episodes", at_least=1)
     check_number(episodes, "episodes", at_most=N_EPISODES)
-    jobs = JobEngine(engine, workers, address)
-    jobs.check()
+    where = JobEngine(engine, workers, address)
     for entry in entries:
         check_agents(entry, selected)
     folder = None if out is None else check_new(Path(out), resume, read.name)
+    if folder is not None:
+        where = replace(where, keep=folder / PARTS)
 
     with nullcontext() if folder is None else in_use(folder):
-        done = progress and partial(progress, "tasks done")
-        cells = _run_cells(entries, selected, episodes, jobs, folder, done)
+        cells = _run_cells(entries, selected, episodes, where, progress)
         if not any(cell.runs for cell in cells.values()):
             if folder is not None and not resume:
                 shutil.rmtree(folder / PARTS, ignore_errors=True)
@@ -88,28 +89,21 @@ def _run_cells(
     entries: Sequence[Entry],
     tasks: Sequence[BenchmarkTask],
     n_episodes: int,
-    engine: JobEngine,
-    folder: Path | None,
-    progress: Any,
+    where: JobEngine,
+    progress: Progress | None,
 ) -> dict[tuple[str, str], Cell]:
     """Run every entry in every task; cells by the names of both."""
     texts = [entry for entry in entries if entry.is_text]
     objects = [entry for entry in entries if not entry.is_text]
     pairs = [(entry, task) for entry in texts for task in tasks]
-    contents = run_jobs(
-        run_job,
-        [job_of(entry, task, n_episodes) for entry, task in pairs],
-        engine=engine.engine,
-        workers=engine.workers,
-        address=engine.address,
-        keep=folder and folder / PARTS,
-        progress=progress,
-    )
+    jobs = [job_of(entry, task, n_episodes) for entry, task in pairs]
+    tell = progress and partial(progress, "tasks done")
+    contents = run_jobs(run_job, jobs, where, tell)
 
     cells: dict[tuple[str, str], Cell] = {}
     for (entry, task), content in zip(pairs, contents, strict=True):
-        where = f"part of '{entry.name}' on '{task.name}'"
-        cells[entry.name, task.name] = Cell.from_dict(content, n_episodes, where)
+        part = f"part of '{entry.name}' on '{task.name}'"
+        cells[entry.name, task.name] = Cell.from_dict(content, n_episodes, part)
     for entry in objects:
         for task in tasks:
             cells[entry.name, task.name] = run_cell(entry, task, n_episodes)

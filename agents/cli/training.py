@@ -10,7 +10,15 @@ from typing import TYPE_CHECKING, Annotated
 
 from typer import Argument, Option
 
-from agents.cli.command import INTERRUPTED, Address, EngineName, Workers, answered, fail
+from agents.cli.command import (
+    INTERRUPTED,
+    Address,
+    AllowCode,
+    EngineName,
+    Workers,
+    answered,
+    fail,
+)
 
 if TYPE_CHECKING:
     from agents.training.plan import Given
@@ -21,7 +29,12 @@ EXAMPLE = "gamma=0.98"
 Algorithm = Annotated[str, Argument(metavar="ALGORITHM", help="ppo, sac, td3 or tqc.")]
 Environment = Annotated[
     str | None,
-    Option(help="course-keeping (default), path-following, or an environment id."),
+    Option(
+        help=(
+            "course-keeping (default), path-following, an environment id, module:id, or"
+            " the file of your own task."
+        )
+    ),
 ]
 Model = Annotated[
     str | None,
@@ -30,6 +43,9 @@ Model = Annotated[
 Sea = Annotated[str | None, Option(help="calm (default), slight, moderate or rough.")]
 TaskName = Annotated[
     str | None, Option(help="A benchmark task, instead of --env, --model and --sea.")
+]
+SuiteName = Annotated[
+    str, Option(help="Suite of the task: a name, or the TOML file of your own.")
 ]
 EnvironmentOptions = Annotated[
     list[str] | None,
@@ -77,6 +93,8 @@ def train_command(
     model: Model = None,
     sea: Sea = None,
     task: TaskName = None,
+    suite: SuiteName = "shipgym-v1",
+    allow_code: AllowCode = None,
     environment_options: EnvironmentOptions = None,
     total_steps: TotalSteps = None,
     settings: Settings = None,
@@ -122,6 +140,8 @@ def train_command(
         seed,
         randomise,
         threads,
+        suite,
+        allow_code or (),
     )
     _print_result(_train(given, out, resume, max_seconds), out)
 
@@ -211,6 +231,8 @@ def tune_command(
     model: Model = None,
     sea: Sea = None,
     task: TaskName = None,
+    suite: SuiteName = "shipgym-v1",
+    allow_code: AllowCode = None,
     environment_options: EnvironmentOptions = None,
     trials: Annotated[
         int, Option(min=1, help="Trials in all, with those already done.")
@@ -253,6 +275,8 @@ def tune_command(
         seed,
         randomise,
         threads=1,
+        suite=suite,
+        allow_code=allow_code or (),
     )
     plan = make_plan(given)
     if "evaluate_every" not in fixed:
