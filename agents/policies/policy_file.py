@@ -73,8 +73,9 @@ def read_policy(content: Mapping[str, Any], path: Path) -> LearnedPolicy:
 
 def _learned(content: Mapping[str, Any], tensors: Tensors) -> LearnedPolicy:
     """A learned policy; its weights are taken out of `tensors`."""
-    names = _names(content["observation_names"])
     place = check_table(content["environment"], "environment", ("id", "options"))
+    options = check_table(place.get("options"), "environment.options")
+    names = _names(content["observation_names"], own_task="task" in options)
     return LearnedPolicy(
         network=_network(content["network"], tensors),
         observation_names=names,
@@ -95,7 +96,7 @@ def _learned(content: Mapping[str, Any], tensors: Tensors) -> LearnedPolicy:
             else read_controller(check_table(content["base"], "base"), "base")
         ),
         env_id=check_text(place.get("id"), "environment.id"),
-        env_options=dict(check_table(place.get("options"), "environment.options")),
+        env_options=dict(options),
         **read_model(content["model"]),
         training=dict(check_table(content["training"], "training")),
     )
@@ -136,13 +137,14 @@ def _tensor(tensors: Tensors, name: str, shape: tuple[int, ...]) -> NDArray[np.f
     return array
 
 
-def _names(value: Any) -> tuple[str, ...]:
-    """Names of observations, the first those that every environment shows."""
+def _names(value: Any, own_task: bool) -> tuple[str, ...]:
+    """Names of observations; unless of a user's own task, the first are always the same."""
     where = "observation_names"
     if not isinstance(value, list):
         raise InputError(f"{where}: {value!r} found, expected a list of names")
     names = tuple(check_text(name, f"{where}[{i}]") for i, name in enumerate(value))
-    check_names(names[: len(OBSERVATION_NAMES)], OBSERVATION_NAMES, where)
+    if not own_task:
+        check_names(names[: len(OBSERVATION_NAMES)], OBSERVATION_NAMES, where)
     if len(set(names)) < len(names):
         raise InputError(
             f"{where}: a name twice in {quoted(names)}, expected each once"
