@@ -11,7 +11,7 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
-from agents.agent_file import read_agent
+from agents.agent_file import load_agent
 from agents.controllers.controller import Controller, Policy
 from agents.controllers.designs import CLASSICAL, design, tuned
 from agents.controllers.registry import (
@@ -110,7 +110,7 @@ def make_policy(source: Source, task: BenchmarkTask) -> Policy:
 def load_source(path: Path) -> Source:
     """Read a policy; of a zip, a function that makes one for a task."""
     if path.suffix != ".zip":
-        return read_agent(path)
+        return load_agent(path)
     agent = read_sb3(path)
     return lambda task: agent.policy(task.task, task.ship)
 

@@ -4,8 +4,8 @@ import json
 from dataclasses import fields
 
 import pytest
-
 from agents.benchmarking.contestants import pretrained
+
 from agents.suites.suite import ENVIRONMENTS, load_suite
 from agents.training.plan import (
     EVALUATION_SEED,
