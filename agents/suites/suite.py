@@ -125,7 +125,7 @@ def _shipped(name: str) -> Suite:
 
 def _shipped_file(name: str) -> Path:
     known = list_suites()
-    check_choice(name, known, "suite", "the path of a TOML file")
+    check_choice(name, known, "suite", " or the path of a TOML file")
     return FOLDER / f"{name}.toml"
 
 
@@ -248,7 +248,8 @@ class _Reader:
             name: self.absolute(one) for name, one in check_table(value, where).items()
         }
         if isinstance(options.get("sea"), Mapping):
-            options["sea"] = Weather.from_dict(options["sea"], f"{where}.sea")
+            with placed(f"{where}.sea"):
+                options["sea"] = Weather.from_dict(options["sea"], f"{where}.sea")
         return options
 
     def absolute(self, value: Any) -> Any:
