@@ -13,7 +13,6 @@ from agents.cli.command import (
     Address,
     AllowCode,
     EngineName,
-    answered,
     fail,
 )
 
@@ -60,7 +59,6 @@ Page = Annotated[
 ]
 
 
-@answered
 def benchmark_command(
     controllers: Controllers = None,
     out: Out = None,

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from rich.text import Text
 
-from agents.cli.terminal import between, number, plain_table
+from agents.cli.tables import between, number, plain_table
 from shipgym.pages.numbers import counted
 
 if TYPE_CHECKING:

@@ -22,9 +22,10 @@ from agents.benchmarking.contestants import Contestant
 from agents.benchmarking.results import gathered
 from agents.benchmarking.run import checked_part, job_of, run_job
 from agents.cli.benchmark_tables import costs_table, ranking_table
+from agents.deployment.helm import Helm
 from agents.deployment.nmea import Line
 from agents.deployment.route import Route
-from agents.deployment.steering import Helm, Limits
+from agents.deployment.sensors import Limits
 from agents.job_results import (
     KeptResults,
     job_to_json,

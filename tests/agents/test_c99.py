@@ -411,7 +411,8 @@ def test_what_is_no_closed_law_is_refused():
     ):
         autopilot_source(MPC.from_model(MARINER))
     with pytest.raises(
-        InputError, match=r"commands rudder-shaft .*expected rudder alone"
+        InputError,
+        match=r"expected one that commands the rudder .* got one that commands rudder-shaft",
     ):
         autopilot_source(random_policy(action="rudder-shaft"))
 
@@ -524,7 +525,7 @@ def test_the_command_writes_c_and_says_what_it_cannot(tmp_path):
         ("nothing to write: give --c FOLDER", "mariner"),
         ("Did you mean 'mariner'", "marinr", "--c", tmp_path / "no"),
         (
-            "--depth found, which are for --c and --fmu",
+            "--depth: expected with --c or --fmu",
             "mariner",
             "--onnx",
             tmp_path / "no",
@@ -556,7 +557,7 @@ def test_the_command_writes_c_and_says_what_it_cannot(tmp_path):
             tmp_path / "no.zip",
         ),
         (
-            "--fmi: 2.0 found, which is for --fmu alone",
+            "--fmi: expected with --fmu, got 2.0",
             "mariner",
             "--c",
             tmp_path / "no",
@@ -564,7 +565,7 @@ def test_the_command_writes_c_and_says_what_it_cannot(tmp_path):
             "2.0",
         ),
         (
-            "--depth: 9 found, but",
+            "--depth: expected none for an autopilot, got 9",
             tmp_path / "pid.json",
             "--c",
             tmp_path / "no",

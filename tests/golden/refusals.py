@@ -23,8 +23,9 @@ from agents.controllers.controller import Controller
 from agents.controllers.controller_file import read_controller
 from agents.controllers.linear_loop import check_stable
 from agents.deployment.c99 import autopilot_source, checked_name
+from agents.deployment.helm import Helm
 from agents.deployment.route import Route
-from agents.deployment.steering import Helm, Limits
+from agents.deployment.sensors import Limits
 from agents.deployment.translator import c_name, literal
 from agents.policies.network import Network
 from agents.policies.onnx_export import onnx_model
