@@ -4,8 +4,7 @@
 # make fuzz      a million mutated files of every kind that is read
 # make soak      long runs with extreme actions, kills at random moments, wrong command lines
 # make release-check  the wheel in clean environments, without extras and with each, lowest and newest versions
-# make ecosystem skrl, TorchRL, Tianshou, PufferLib and CleanRL's wrappers on our environments, shipmmg; for every night
-# make mutate    small faults put into MODULES, by default all: do the tests beside them notice?
+# make ecosystem skrl, TorchRL, Tianshou and CleanRL's wrappers on our environments; for every night
 # make evidence  what the pages of docs/ claim, run again
 # make docs      the site, and whether its links, pictures and pages work in a browser
 # make site-test the latter alone
@@ -20,7 +19,7 @@ DATA ?= ../shared/data
 # Bytecode is kept (an empty value means unset): the many processes of the tests compile the same files but once.
 export PYTHONDONTWRITEBYTECODE =
 
-.PHONY: demo test lint format type bench soak fuzz release-check ecosystem mutate evidence docs site-test clean
+.PHONY: demo test lint format type bench soak fuzz release-check ecosystem evidence docs site-test clean
 
 demo: $(VENV)/demo-installed
 	$(BIN)/shipgym autopilot examples/mariner/ship.toml --out report
@@ -64,9 +63,6 @@ fuzz: $(VENV)/dev-installed
 ecosystem: $(VENV)/ecosystem-installed
 	OMP_NUM_THREADS=1 $(VENV)/ecosystem/bin/python scripts/ecosystem.py
 
-mutate: $(VENV)/dev-installed
-	SHIPGYM_CACHE=$(CURDIR)/$(VENV)/mutated OMP_NUM_THREADS=1 $(BIN)/python scripts/mutate.py $(MODULES)
-
 evidence: $(VENV)/dev-installed
 	$(BIN)/python scripts/reproduce.py all --markdown docs/reproduction.md --images docs/images || test $$? = 1  # 1: aims missed, as the page says
 	test ! -d $(DATA) || $(BIN)/python scripts/predict_real_ships.py --data $(DATA)
@@ -80,7 +76,6 @@ evidence: $(VENV)/dev-installed
 	$(BIN)/python scripts/bridge_logs.py
 	$(BIN)/python scripts/standards.py
 	$(BIN)/python scripts/run_notebooks.py
-	$(BIN)/python scripts/gallery.py
 	$(BIN)/python scripts/tutorial.py
 
 docs: $(VENV)/dev-installed
@@ -111,12 +106,6 @@ $(VENV)/dev-installed: pyproject.toml constraints.txt | $(VENV)/bin/python
 $(VENV)/ecosystem-installed: pyproject.toml constraints.txt | $(VENV)/bin/python
 	$(PYTHON) -m venv $(VENV)/ecosystem
 	$(VENV)/ecosystem/bin/python -m pip install --quiet -c constraints.txt -e ".[rl]" skrl torchrl tianshou
-	# PufferLib's games need downloads from elsewhere; without them its setup misses a name, which the folder gives
-	$(VENV)/ecosystem/bin/python -m pip install --quiet wheel gym==0.23 pettingzoo==1.24.1 shimmy psutil
-	NO_OCEAN=1 NO_TRAIN=1 PYTHONPATH=$(CURDIR)/scripts/pufferlib_setup $(VENV)/ecosystem/bin/python -m pip install --quiet \
-		--no-deps --no-build-isolation pufferlib==3.0.0
-	$(VENV)/ecosystem/bin/python -m pip install --quiet matplotlib
-	$(VENV)/ecosystem/bin/python -m pip install --quiet --no-deps shipmmg
 	touch $@
 
 clean:

@@ -146,7 +146,7 @@ def tune(
     """
     check_choice(kind, CLASSICAL, "controller")
     seeds = FIRST_SEED + np.arange(episodes)
-    engine = task.handed_out.engine(episodes)
+    engine = task.design_task.engine(episodes)
 
     def cost(asked: Mapping[str, float]) -> float:
         try:

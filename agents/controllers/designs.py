@@ -10,7 +10,7 @@ from agents.agent_file import load_agent
 from agents.controllers.controller import Controller, model_hash
 from agents.controllers.registry import BUILT_IN, controller_class
 from agents.suites.reference import load_tuned
-from agents.suites.suite import BenchmarkTask, suite_of
+from agents.suites.suite import BenchmarkTask
 from shipgym import InputError, ShipModel
 
 #: Those first that others build on; the suites know no rate of turn to steer.
@@ -123,13 +123,12 @@ def design_base(name: str, task: BenchmarkTask) -> Controller | None:
     if name == "none":
         return None
     if name == "tuned":
-        suite = suite_of(task.name)
-        if suite is None:
+        if not task.suite:
             raise InputError(
                 "base: expected a task of a suite for 'tuned', got none; give --task, or"
                 " another base"
             )
-        return tuned("base", task, suite)
+        return tuned("base", task, task.suite)
     if name.endswith(".json"):
         agent = load_agent(name, task.ship)
         if not isinstance(agent, Controller):

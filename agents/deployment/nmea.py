@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from functools import cache
 from math import copysign, radians
@@ -15,36 +15,33 @@ from shipgym import InputError, extras
 from shipgym.files import read_toml
 from shipgym.trials.units import UNITS
 
-LONGEST_LINE = 512  # bytes; 82 are the standard's
-BAUD = 4800  # of the standard
 TABLES = read_toml(Path(__file__).with_name("sentences.toml"), "table of sentences")
-TO_SI = {**UNITS["length"], **UNITS["angle"], **UNITS["angular rate"], **UNITS["speed"]}
-#: Signs of the cross-track error by the side to steer to, and of a latitude or
-#: longitude.
-SIDES = {"L": 1.0, "R": -1.0, "N": 1.0, "S": -1.0, "E": 1.0, "W": -1.0}
-EXPECTED = "expected tcp:HOST:PORT, udp:HOST:PORT, serial:DEVICE or serial:DEVICE@BAUD"
+#: Quantities by name: largest magnitude that is believed, and how two instruments are
+#: compared.
+QUANTITIES: dict[str, dict[str, Any]] = TABLES["quantities"]
 
 
-class Reading(NamedTuple):
+class NmeaReading(NamedTuple):
     """One number that an instrument sent."""
 
-    quantity: str
+    quantity: str  # a key of `QUANTITIES`
     value: float  # SI units and radians
     talker: str  # who sent it: HE, GP, ...
 
 
 @cache
 def library(name: str = "pynmea2") -> ModuleType:
-    """pynmea2, taught what it does not know, or pyserial; InputError where it is not installed."""
-    found: ModuleType = extras.library(name, "nmea")
+    """pynmea2, with the sentences that it lacks, or pyserial; InputError if it is not installed."""
+    module: ModuleType = extras.library(name, "nmea")
     if name == "pynmea2":
-        for one in TABLES["fields"].keys() - found.TalkerSentence.sentence_types.keys():
-            type(one, (found.TalkerSentence,), {"fields": ()})
-    return found
+        base = module.TalkerSentence
+        for kind in TABLES["fields"].keys() - base.sentence_types.keys():
+            type(kind, (base,), {"fields": ()})
+    return module
 
 
-def readings(line: str) -> list[Reading] | None:
-    """What a sentence tells; None for one that is damaged, nothing for one of another kind or not valid.
+def readings(line: str) -> list[NmeaReading] | None:
+    """Numbers of a sentence: none of one of another kind or that is not valid, None if it is damaged.
 
     A sentence without a checksum counts as damaged, as one with a wrong one.
     """
@@ -53,76 +50,93 @@ def readings(line: str) -> list[Reading] | None:
         sentence = nmea.parse(line, check=True)
         if not isinstance(sentence, nmea.TalkerSentence):
             return []
-        return list(
-            _told(
-                sentence.data,
-                TABLES["fields"].get(sentence.sentence_type, {}),
-                sentence.talker,
-            )
-        )
+        kinds = TABLES["fields"].get(sentence.sentence_type, {})
+        found = []
+        for quantity, field in kinds.items():
+            value = _value(sentence.data, field)
+            if value is not None and abs(value) <= QUANTITIES[quantity]["largest"]:
+                found.append(NmeaReading(quantity, value, sentence.talker))
+        return found
     except nmea.SentenceTypeError:
         return []
     except (ValueError, IndexError, KeyError):
         return None
 
 
-def _told(fields: list[str], kinds: dict[str, Any], talker: str) -> Iterator[Reading]:
-    for quantity, one in kinds.items():
-        if (
-            all(fields[int(k)] == text for k, text in one["needs"].items())
-            and fields[one["at"]]
-        ):
-            value = float(fields[one["at"]])
-            minutes = one["unit"] == "deg min"  # as 5430.5, 54 degrees and 30.5 minutes
-            value = (
-                radians(value // 100.0 + value % 100.0 / 60.0)
-                if minutes
-                else value * TO_SI[one["unit"]]
-            )
-            value = (
-                copysign(value, SIDES[fields[one["side"]]]) if "side" in one else value
-            )
-            if abs(value) <= TABLES["believed"][quantity]:
-                yield Reading(quantity, value, talker)
+def _value(texts: list[str], field: Mapping[str, Any]) -> float | None:
+    """Number of a field in SI units, None if it is empty or other fields say that it is not valid."""
+    for position, text in field["needs"].items():
+        if texts[int(position)] != text:
+            return None
+    if not texts[field["at"]]:
+        return None
+
+    value = float(texts[field["at"]])
+    if field["unit"] == "deg min":  # as 5430.5: 54 degrees and 30.5 minutes
+        degrees, minutes = divmod(value, 100.0)
+        value = radians(degrees + minutes / 60.0)
+    else:
+        value *= _si_factors()[field["unit"]]
+    if "side" in field:
+        # the side to steer to for the cross-track error, else of latitude or longitude
+        signs = {"L": 1.0, "R": -1.0, "N": 1.0, "S": -1.0, "E": 1.0, "W": -1.0}
+        value = copysign(value, signs[texts[field["side"]]])
+    return value
+
+
+@cache
+def _si_factors() -> dict[str, float]:
+    quantities = ("length", "angle", "angular rate", "speed")
+    return {unit: factor for one in quantities for unit, factor in UNITS[one].items()}
 
 
 def sentences(text: str) -> str:
     """Lines such as HEHDT,90,T as sentences, with their checksums."""
     checksum = library().NMEASentence.checksum
-    return "".join(f"${line}*{checksum(line):02X}\r\n" for line in text.splitlines())
+    lines = [f"${line}*{checksum(line):02X}\r\n" for line in text.splitlines()]
+    return "".join(lines)
 
 
 class Line(asyncio.Protocol, asyncio.DatagramProtocol):
-    """One end of a connection: `received` is told each line; it stands among `ends` while it is open."""
+    """One end of a connection; it is a member of `ends` while it is open.
+
+    `received` is called with each line.
+    """
+
+    longest = 512  # bytes of a line; the standard allows 82
 
     def __init__(self, received: Callable[[str], None], ends: set[Line]) -> None:
-        self.received, self.ends, self.rest = received, ends, b""
+        self.received = received
+        self.ends = ends
+        self.rest = b""  # of a line that has not ended
         self.transport: Any = None
-        self.peer: Any = None  # who was heard last, over UDP
+        self.peer: Any = None  # from whom the last datagram came
 
     def connection_made(self, transport: Any) -> None:
-        """A stream, or a socket of datagrams, is open."""
+        """Register an open stream or socket of datagrams."""
         self.transport = self.transport or transport
         self.ends.add(self)
 
     def connection_lost(self, error: Exception | None) -> None:
-        """It is closed."""
+        """Forget a closed connection."""
         self.ends.discard(self)
 
     def data_received(self, data: bytes) -> None:
-        """Bytes of a stream, in any portions."""
+        """Take bytes of a stream, in any portions."""
         *lines, self.rest = (self.rest + data).split(b"\n")
-        self.rest = self.rest if len(self.rest) <= LONGEST_LINE else b""
-        for line in filter(bytes.strip, lines):
-            self.received(line[:LONGEST_LINE].decode("ascii", "replace").strip())
+        if len(self.rest) > self.longest:
+            self.rest = b""
+        for line in lines:
+            if line.strip():
+                self.received(line[: self.longest].decode("ascii", "replace").strip())
 
     def datagram_received(self, data: bytes, address: Any) -> None:
-        """One datagram, of whole lines."""
+        """Take one datagram, of whole lines."""
         self.peer = address
         self.data_received(data + b"\n")
 
     def send(self, data: bytes) -> None:
-        """Send bytes; a datagram to whoever was heard last, or to where the socket is connected."""
+        """Send bytes; a datagram to the last peer, or to where the socket is connected."""
         if not hasattr(self.transport, "sendto"):
             self.transport.write(data)
         elif self.peer or self.transport.get_extra_info("peername"):
@@ -133,47 +147,69 @@ class Link:
     """A connection by its address: tcp:HOST:PORT, udp:HOST:PORT, serial:DEVICE or serial:DEVICE@BAUD."""
 
     def __init__(self, received: Callable[[str], None]) -> None:
+        self.received = received
         self.ends: set[Line] = set()  # what is connected
-        self.others: list[Any] = []  # a server, what reads a serial line
-        self.line: Callable[[], Line] = lambda: Line(received, self.ends)
+        self.others: list[Any] = []  # a server, a reader of a serial line
+
+    def line(self) -> Line:
+        """A new end of the connection."""
+        return Line(self.received, self.ends)
 
     async def open(self, address: str, serve: bool = False) -> None:
-        """Connect, or, as instruments do, wait to be connected to over TCP, and send first over UDP.
+        """Connect; or with `serve` wait for connections over TCP, and send first over UDP.
 
         Raises InputError for an address of another form, or one that cannot be opened.
         """
         kind, _, rest = address.partition(":")
-        (host, _, port), loop = rest.rpartition(":"), asyncio.get_running_loop()
+        kinds = {"tcp": self._open_tcp, "udp": self._open_udp}
         try:
             if kind == "serial" and rest:
-                await self._open_serial(*rest.partition("@")[::2])
-            elif kind == "udp":
-                where = "remote_addr" if serve else "local_addr"
-                await loop.create_datagram_endpoint(
-                    self.line, **{where: (host, int(port))}
-                )  # type: ignore[arg-type]
-            elif kind == "tcp" and serve:
-                self.others.append(await loop.create_server(self.line, host, int(port)))
-            elif kind == "tcp":
-                await loop.create_connection(self.line, host, int(port))
+                await self._open_serial(rest)
             else:
-                raise ValueError
-        except (ValueError, OverflowError):
-            raise InputError(f"address: '{address[:80]}' found, {EXPECTED}") from None
-        except OSError as error:
+                host, _, port = rest.rpartition(":")
+                await kinds[kind](host, int(port), serve)
+        except InputError:
+            raise
+        except (KeyError, ValueError, OverflowError):
             raise InputError(
-                f"{address}: cannot be opened ({error.strerror or error})"
-            ) from error
+                "address: expected tcp:HOST:PORT, udp:HOST:PORT, serial:DEVICE or"
+                f" serial:DEVICE@BAUD, got '{address[:80]}'"
+            ) from None
+        except OSError as error:
+            reason = error.strerror or error
+            raise InputError(f"{address}: cannot be opened ({reason})") from error
 
-    async def _open_serial(self, device: str, baud: str) -> None:
-        serial, line = library("serial"), self.line()
-        port = serial.Serial(
-            device, int(baud or BAUD), timeout=0, write_timeout=0, exclusive=True
+    async def _open_tcp(self, host: str, port: int, serve: bool) -> None:
+        loop = asyncio.get_running_loop()
+        if serve:
+            self.others.append(await loop.create_server(self.line, host, port))
+        else:
+            await loop.create_connection(self.line, host, port)
+
+    async def _open_udp(self, host: str, port: int, serve: bool) -> None:
+        loop = asyncio.get_running_loop()
+        place = (host, port)
+        if serve:
+            await loop.create_datagram_endpoint(self.line, remote_addr=place)
+        else:
+            await loop.create_datagram_endpoint(self.line, local_addr=place)
+
+    async def _open_serial(self, rest: str) -> None:
+        """Open a serial line, which is written to at once, and read when there is something."""
+        device, _, baud = rest.partition("@")
+        standard_baud = 4800
+        port = library("serial").Serial(
+            device,
+            int(baud or standard_baud),
+            timeout=0,
+            write_timeout=0,
+            exclusive=True,
         )
-        line.transport = port  # written to at once, read when there is something
-        self.others.append(
-            (await asyncio.get_running_loop().connect_read_pipe(lambda: line, port))[0]
-        )
+        line = self.line()
+        line.transport = port
+        loop = asyncio.get_running_loop()
+        reader, _ = await loop.connect_read_pipe(lambda: line, port)
+        self.others.append(reader)
 
     def send(self, text: str) -> None:
         """Send sentences to all that are connected."""

@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from agents.engines.jobs import HERE, JobEngine
+from agents.jobs import HERE, JobEngine, run_jobs
 from agents.output import in_use, present
 from agents.training.plan import Plan, check_same
 from agents.training.settings import (
@@ -131,9 +131,8 @@ def tune(
                 {"configuration": run | {"settings": one}, "limits": bounds}
                 for _, one in proposed
             ]
-            results = replace(where, keep=folder / KEPT).run(
-                training or train_trial, jobs, tell
-            )
+            kept = replace(where, keep=folder / KEPT)
+            results = run_jobs(training or train_trial, jobs, kept, tell)
             for (parameters, settings), result in zip(proposed, results, strict=True):
                 found.append(_trial(len(found), parameters, settings, result))
             _record(study, found, plan, fixed)

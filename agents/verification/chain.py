@@ -14,9 +14,8 @@ import numpy as np
 from agents.agent_file import load_agent
 from agents.controllers.controller import Controller
 from agents.controllers.registry import controller_class, controller_kinds
-from agents.engines.jobs import HERE, JobEngine
-from agents.engines.ray_engine import EngineError
 from agents.identifying import identification_settings, trials_of
+from agents.jobs import HERE, EngineError, JobEngine
 from agents.output import whole_folder
 from agents.rollouts.course_keeping import sail, step_response
 from agents.rollouts.rollout import check_fits
@@ -81,7 +80,6 @@ def build_autopilot(
     results are the same. Raises InputError for anything wrong with the files or
     arguments; nothing is written then.
     """
-    where.check()
     check_number(draws, "draws", at_least=2)
     check_number(seed, "seed", at_least=0, at_most=LARGEST_SEED)
     for kind in designs:

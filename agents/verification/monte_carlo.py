@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from agents.controllers.controller import Controller
 from agents.controllers.controller_file import read_controller
-from agents.engines.jobs import HERE, JobEngine
+from agents.jobs import HERE, JobEngine, run_jobs
 from agents.rollouts.course_keeping import Episodes, sail
 from agents.verification import index_uncertainty
 from agents.verification.index_uncertainty import ManoeuvreUncertainty
@@ -64,8 +64,8 @@ def monte_carlo(
     drawn = model.sample(draws, seed)
     tell = progress or (lambda done: None)
     jobs = draw_jobs(controllers, model, drawn, seed)
-    found = where.run(
-        do_draws, jobs, lambda done, _: tell(min(done * DRAWS_A_JOB, draws))
+    found = run_jobs(
+        do_draws, jobs, where, lambda done, _: tell(min(done * DRAWS_A_JOB, draws))
     )
     sailed = index_uncertainty.uncertainty_of(
         model, nominal, [part["sailed"] for part in found]

@@ -16,10 +16,11 @@ import numpy as np
 from agents.controllers.controller import Controller
 from agents.controllers.lqg import LQG
 from agents.controllers.turn_rate import TurnRate
-from agents.deployment.nmea import Reading
+from agents.deployment.helm import Helm
+from agents.deployment.nmea import NmeaReading
 from agents.deployment.route import Route
+from agents.deployment.sensors import Limits
 from agents.deployment.simulated import MINUTE, START, SimulatedShip
-from agents.deployment.steering import Helm, Limits
 from agents.verification.tracks import Track, track_task
 from shipgym.arrays import Floats
 from shipgym.errors import InputError
@@ -86,7 +87,7 @@ def run(
         known = ship.measured()
         for name, value in known.items():
             if name not in lost or now < LOST_S:
-                helm.sensors.take(Reading(name, value, "II"), now)
+                helm.sensors.take(NmeaReading(name, value, "II"), now)
         helm.watch(dt, now)
         helm.steer(now)
         if helm.alarm:
@@ -95,7 +96,7 @@ def run(
         rows.append(
             (now, off, known["yaw_rate"], *np.degrees([known["rudder"], helm.order]))
         )
-        given.append(helm.given(now))
+        given.append(helm.inputs(now))
         warnings.append(helm.warnings)
         ship.order = helm.order
         for _ in range(PER_INTERVAL):

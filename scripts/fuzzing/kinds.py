@@ -22,11 +22,17 @@ from agents.benchmarking.contestants import Contestant
 from agents.benchmarking.results import gathered
 from agents.benchmarking.run import checked_part, job_of, run_job
 from agents.cli.benchmark_tables import costs_table, ranking_table
+from agents.deployment.helm import Helm
 from agents.deployment.nmea import Line
 from agents.deployment.route import Route
-from agents.deployment.steering import Helm, Limits
-from agents.engines.jobs import run_jobs
-from agents.engines.serialisation import KeptResults, pack, serialised, unpack
+from agents.deployment.sensors import Limits
+from agents.job_results import (
+    KeptResults,
+    job_to_json,
+    result_from_json,
+    result_to_json,
+)
+from agents.jobs import JobEngine, run_jobs
 from agents.policies.sb3_zip import read_sb3
 from agents.suites.suite import DEFAULT_SUITE, BenchmarkTask, load_suite, parse_suite
 from agents.training.plan import Plan, training_options
@@ -133,14 +139,14 @@ def squared(job: dict[str, Any]) -> dict[str, Any]:
 
 def keep_results(folder: Path) -> None:
     """Results of jobs, as a benchmark or a study that goes on finds them."""
-    run_jobs(squared, JOBS[:1], keep=folder)
+    run_jobs(squared, JOBS[:1], JobEngine(keep=folder))
 
 
 def read_kept(path: Path) -> Any:
     """Jobs of which some are done."""
-    folder, text = path.parent, serialised(JOBS[0], "job")
+    folder, text = path.parent, job_to_json(JOBS[0], "job")
     kept = KeptResults(folder, squared).load(text)
-    return None if kept is None else run_jobs(squared, JOBS[:1], keep=folder)
+    return None if kept is None else run_jobs(squared, JOBS[:1], JobEngine(keep=folder))
 
 
 @cache
@@ -192,7 +198,7 @@ def read_study(path: Path) -> Any:
 def part_job() -> tuple[Contestant, BenchmarkTask, str]:
     """A contestant, a task, and the job of both."""
     one, task = Contestant("pid", "pid"), load_suite().task("mariner-calm")
-    return one, task, serialised(job_of(one, task, DEFAULT_SUITE, 3), "job")
+    return one, task, job_to_json(job_of(one, task, DEFAULT_SUITE, 3), "job")
 
 
 def keep_part(folder: Path) -> None:
@@ -205,7 +211,7 @@ def keep_part(folder: Path) -> None:
         "policy_sha256": None,
     }
     KeptResults(folder, run_job).save(
-        part_job()[2], {"value": pack({"refused": "", "runs": [run, run]})}
+        part_job()[2], result_to_json({"refused": "", "runs": [run, run]})
     )
 
 
@@ -215,7 +221,7 @@ def read_part(path: Path) -> Any:
     kept = KeptResults(path.parent, run_job).load(text)
     if kept is None:
         return None
-    part = checked_part(unpack(kept["value"]), json.loads(text))
+    part = checked_part(result_from_json(kept), json.loads(text))
     return gathered(DEFAULT_SUITE, [task], [one], {(one.name, task.name): part}, 3)
 
 

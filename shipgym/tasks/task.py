@@ -341,4 +341,4 @@ def course_keeping_task(**options: Any) -> Task:
 
 def path_following_task(**options: Any) -> Task:
     """The task of path following by keywords (`Task.of`)."""
-    return Task.of("PathFollowing-v1", **options)
+    return Task.of("PathFollowing", **options)

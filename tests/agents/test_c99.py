@@ -271,7 +271,7 @@ def test_an_autopilot_orders_what_the_controller_commands_in_the_environment(age
 @pytest.mark.parametrize("kind", [WheelOver, MPC, IntegralLineOfSight])
 def test_guidance_orders_what_it_commands_along_a_path(kind):
     """Its inputs are those of a bridge: the direction of the path, and the course over ground."""
-    env = gym.make("shipgym/PathFollowing-v1", model="mariner", max_turn_deg=60.0)
+    env = gym.make("shipgym/PathFollowing-v0", model="mariner", max_turn_deg=60.0)
     agent = kind.from_model(MARINER, task=env.unwrapped.task)
     seen, _ = env.reset(seed=3)
     names, scales = env.unwrapped.observation_names, env.unwrapped.observation_scales

@@ -75,7 +75,7 @@ BY_A_BRIDGE = {
     "second_turn_distance": 2000.0,
     "second_turn_angle": -0.4,
 }
-ALONG_ARCS = Task.of("PathFollowing-v1", dt=2 * DT)
+ALONG_ARCS = Task.of("PathFollowing", dt=2 * DT)
 PILOTS = {
     "lq": LQ.from_model(MARINER, dt=2 * DT),
     "turn_rate": TurnRate.from_model(MARINER, dt=2 * DT),

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from agents import LQ, PID, sail
-from agents.engines.jobs import JobEngine
+from agents.jobs import JobEngine
 from agents.verification import index_uncertainty
 from agents.verification.index_uncertainty import (
     nominal_runs,
@@ -99,7 +99,7 @@ def test_wrong_arguments(ship, pilots):
     with pytest.raises(InputError, match="draws: 1 found"):
         monte_carlo(pilots, ship, 1)
     with pytest.raises(InputError, match="Did you mean 'local'"):
-        JobEngine("lokal").check()
+        JobEngine("lokal")
 
 
 def test_draws_that_run_away_in_any_manoeuvre_count_once_and_have_no_paths(

@@ -249,7 +249,7 @@ def test_another_environment_is_refused_with_the_difference():
         match=r"shape \(30, 8\) found, expected \(13,\) .* 'turn_angle' is the last",
     ):
         path_policy().predict(SEEN)
-    second = Task.of("PathFollowing-v1", corridor=0.5).observed(MARINER)
+    second = Task.of("PathFollowing", corridor=0.5).observed(MARINER)
     with pytest.raises(
         InputError, match=r"with in shipgym/PathFollowing-v0: observation 11 is 'next_"
     ):

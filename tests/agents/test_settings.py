@@ -4,8 +4,8 @@ import json
 from dataclasses import fields
 
 import pytest
-
 from agents.benchmarking.contestants import pretrained
+
 from agents.suites.suite import ENVIRONMENTS, load_suite
 from agents.training.plan import (
     EVALUATION_SEED,
@@ -27,7 +27,6 @@ from agents.training.settings import (
     changed,
     load_settings,
     make_settings,
-    present_names,
     read_settings_file,
 )
 from shipgym import InputError
@@ -272,13 +271,8 @@ def test_settings_of_the_command_line_and_of_files(tmp_path):
             InputError, match=r"expected name=value, such as --set gamma=0\.98"
         ):
             named_values([wrong], "--set", "gamma=0.98")
-    assert present_names({"history": 2, "hold": 3, "gamma": 1}) == {
-        "frame_stack": 2,
-        "action_repeat": 3,
-        "gamma": 1,
-    }
     path = tmp_path / "mine.toml"
-    path.write_text("hold = 3\ngamma = 1\n")
+    path.write_text("action_repeat = 3\ngamma = 1\n")
     assert read_settings_file(path, "ppo") == {"action_repeat": 3, "gamma": 1.0}
     path.write_text("gamma = \n")
     with pytest.raises(InputError, match=r"mine\.toml: not valid TOML"):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from agents import LQ, PID, WheelOver
-from agents.deployment.steering import Limits
+from agents.deployment.sensors import Limits
 from agents.verification import standards as module
 from agents.verification.standards import (
     REQUIREMENTS,

@@ -13,7 +13,7 @@ from typer.testing import CliRunner
 
 from agents.cli import app
 from agents.cli.training import _print_tuning
-from agents.engines.jobs import JobEngine
+from agents.jobs import JobEngine
 from agents.training import tuning
 from agents.training.plan import Given, make_plan
 from agents.training.settings import ALGORITHMS, load_settings

@@ -8,7 +8,6 @@ import pytest
 
 import shipgym
 from agents import PID
-from agents.engines.jobs import JobEngine
 from agents.verification import chain, page
 from agents.verification.page import headline, verification_view
 from agents.verification.result import pilot_metrics, track_metrics
@@ -240,15 +239,12 @@ def test_a_stage_is_told_at_its_beginning_and_end_and_its_parts_in_between():
     [
         ({"seed": -1}, "seed: -1 found, expected"),
         ({"seed": 2**32 + 1}, "seed: 4.*found, expected"),
-        ({"where": "lokal"}, "Did you mean 'local'"),
         ({"plotly": False}, "plotly is missing"),
     ],
 )
 def test_what_is_wrong_is_said_before_a_file_is_read(
     given, message, tmp_path, monkeypatch
 ):
-    if "where" in given:
-        given = {"where": JobEngine(given["where"])}
     if given.pop("plotly", True) is False:
 
         def missing():

@@ -3,7 +3,7 @@
 Each kind is designed twice: as it is for one ship, and with settings that are not the
 defaults for another. The series of observations is no voyage: smooth, of all sizes from
 small motions to those beyond the limits, with jumps of the course, and different for
-each ship. Guidance is also shown paths of both versions.
+each ship. Guidance is also shown paths of two tasks.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from agents.controllers.robustness import margin_uncertainty
 from shipgym import ShipModel, load_model
 from shipgym.ships.conversions import nomoto2_ship
 from shipgym.ships.linear import nomoto
-from shipgym.tasks.task import Task
+from shipgym.tasks.task import Task, path_following_task
 from tests.golden.store import Floats, numbers_in, vector
 
 STEPS, SHIPS = 48, 3
@@ -49,7 +49,8 @@ LINEAR = {
     "rate_weight_s2": 17.0,
 }
 PATHS: dict[str, Callable[[], Task]] = {
-    "v1": lambda: Task.of("PathFollowing-v1", rudder_travel_weight=0.03),
+    "narrow": lambda: path_following_task(noise=0.7, lookahead=2.3, corridor=0.8),
+    "travel": lambda: path_following_task(rudder_travel_weight=0.03),
 }
 SETTINGS: dict[str, dict[str, Any]] = {
     "pid": {"dt": 1.3, "frequency": 0.043, "damping": 0.77, "integral_lengths": 13.0},
@@ -106,7 +107,7 @@ def record(case: str) -> dict[str, Floats]:
 
 
 def of_guide(kind: str, settings: dict[str, Any]) -> dict[str, Floats]:
-    """A guidance law over LQ, with settings over PID if it leads any, on paths of both versions."""
+    """A guidance law over LQ, with settings over PID if it leads any, on the paths of two tasks."""
     model, found = load_model("mariner"), {}
     for name, path in PATHS.items():
         more: dict[str, Any] = {"task": path(), **settings}

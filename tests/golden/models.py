@@ -5,7 +5,7 @@ from __future__ import annotations
 import copy
 import json
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import replace
 from functools import cache, partial
 from pathlib import Path
@@ -13,7 +13,6 @@ from typing import Any
 
 import numpy as np
 
-from shipgym import interchange
 from shipgym.engine.motion import Motion, Ship
 from shipgym.engine.stages import Sums
 from shipgym.manoeuvres import towing_tank
@@ -1322,121 +1321,6 @@ def own_equations() -> Answers:
     }
 
 
-def exchanged() -> Answers:
-    """Parameter sets of MSS and shipmmg, frames and datasets."""
-    t = np.array([0.0, 0.5, 1.7])
-    trial = Trial(
-        t,
-        {"u": [6.0, 6.1, 6.2], "r": [0.01, 0.02, 0.0]},
-        name="one",
-        kind="zigzag",
-        derived=["u"],
-        repaired={"u": 2},
-        notes=["told"],
-        length=7.0,
-    )
-    mss, boxed, package = (
-        interchange.to_mss(model("mariner")),
-        interchange.to_mss(model("container")),
-        catalogue.kvlcc2(form="shipmmg"),
-    )
-    mmg_parameters = interchange.to_shipmmg(package, 1019.0)
-    basic = {
-        **mmg_parameters["basic_params"],
-        "I_zG": 1.3 * mmg_parameters["basic_params"]["I_zG"],
-    }
-
-    def ship(one: ShipModel) -> Any:
-        return [
-            one.name,
-            one.structure,
-            one.coefficients,
-            one.particulars,
-            one.steering,
-            one.service_shaft_speed,
-            one.provenance,
-        ]
-
-    def without(given: Mapping[str, Any], *names: str, **more: Any) -> dict[str, Any]:
-        return {
-            name: value for name, value in given.items() if name not in names
-        } | more
-
-    frame, dataset = interchange.to_frame(trial), interchange.to_xarray(trial)
-    return {
-        "mss": mss,
-        "container": boxed,
-        "no mss": lambda: interchange.to_mss(model("tanker")),
-        "from mss": lambda: ship(interchange.from_mss(mss, "back", 1000.0)),
-        "from container": lambda: ship(interchange.from_mss(boxed, "back")),
-        "changed": (
-            lambda: ship(
-                interchange.from_mss({**boxed, "Xvv": -0.005, "delta_max": 12.0})
-            ).__getitem__(2)
-        ),
-        "length": lambda: interchange.from_mss({**boxed, "L": 170.0}),
-        "missing": lambda: interchange.from_mss(without(mss, "Xu")),
-        "unknown": lambda: interchange.from_mss({**mss, "Zw": 1.0}),
-        "text": lambda: interchange.from_mss({**mss, "Xu": "a"}),
-        "no gear": lambda: ship(interchange.from_mss(without(mss, "delta_max")))[4],
-        "shipmmg": mmg_parameters,
-        "nomoto": lambda: interchange.to_shipmmg(model("mariner")),
-        "published": lambda: interchange.to_shipmmg(model("kvlcc2")),
-        "from shipmmg": lambda: ship(
-            interchange.from_shipmmg(
-                {**mmg_parameters, "basic_params": basic},
-                7.7,
-                shaft_speed=1.6,
-                density=1019.0,
-                steering=GEAR,
-                name="back",
-            )
-        ),
-        "usual": lambda: ship(interchange.from_shipmmg(mmg_parameters, 7.7)),
-        "kt": lambda: ship(
-            interchange.from_shipmmg(
-                {"kt_params": {"K": 0.07, "T": 31.0}}, 7.7, length=151.0, steering=GEAR
-            )
-        ),
-        "kt length": lambda: interchange.from_shipmmg(
-            {"kt_params": {"K": 0.07, "T": 31.0}}, 7.7
-        ),
-        "no table": lambda: interchange.from_shipmmg({}, 7.7),
-        "a field": lambda: interchange.from_shipmmg({"kt_params": {"K": 0.07}}, 7.7),
-        "a text": lambda: interchange.from_shipmmg(
-            {"kt_params": {"K": "a", "T": 1.0}}, 7.7
-        ),
-        "frame": [
-            frame.index.to_numpy(),
-            frame.to_numpy(),
-            list(frame.columns),
-            str(frame.index.name),
-            frame.attrs["shipgym"],
-        ],
-        "back": lambda: interchange.from_frame(frame),
-        "other frame": lambda: interchange.from_frame(
-            frame.rename_axis("t").pipe(lambda f: f.__class__({"u": [1.0]}))
-        ),
-        "dataset": [
-            dataset["u"].to_numpy(),
-            dataset["t"].attrs,
-            dataset["r"].attrs,
-            list(dataset["u"].dims),
-            dataset.attrs["shipgym"],
-        ],
-        "from dataset": lambda: interchange.from_xarray(dataset),
-        "other dataset": lambda: interchange.from_xarray(dataset.drop_attrs()),
-        "episode": lambda: interchange.from_frame(without_facts(frame)),
-    }
-
-
-def without_facts(frame: Any) -> Any:
-    """A frame that tells of neither a trial nor an episode."""
-    other = frame.copy()
-    other.attrs["shipgym"] = "{}"
-    return other
-
-
 QUESTIONS = Questions(
     {
         "reference ships": reference_ships,
@@ -1451,6 +1335,5 @@ QUESTIONS = Questions(
         "kernels": kernels,
         "checked": checked,
         "own equations": own_equations,
-        "exchanged": exchanged,
     }
 )

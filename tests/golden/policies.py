@@ -14,10 +14,11 @@ import numpy as np
 from agents import LQ, PID
 from agents.controllers.registry import controller_class
 from agents.deployment.autopilot import Autopilot, observation_bounds
-from agents.deployment.nmea import Reading, readings, sentences
+from agents.deployment.helm import Helm
+from agents.deployment.nmea import NmeaReading, readings, sentences
 from agents.deployment.route import Route
+from agents.deployment.sensors import HelmSensors, Limits
 from agents.deployment.simulated import SimulatedShip
-from agents.deployment.steering import Helm, Limits, Sensors
 from agents.policies.policy import LearnedPolicy, order_numbers, toward
 from shipgym import load_model
 from shipgym.tasks.task import Task
@@ -48,8 +49,8 @@ POLICIES: dict[str, Callable[[], Any]] = {
 
 
 def path_policy(**more: Any) -> LearnedPolicy:
-    """One that adds to wheel-over on paths of version 1."""
-    task = Task.of("PathFollowing-v1")
+    """One that adds to wheel-over on paths."""
+    task = Task.of("PathFollowing")
     shown = task.observed(MARINER)
     base = controller_class("wheel-over").from_model(MARINER, task=task)  # type: ignore[attr-defined]
     return LearnedPolicy(
@@ -57,7 +58,7 @@ def path_policy(**more: Any) -> LearnedPolicy:
         tuple(one.name for one in shown),
         tuple(one.scale for one in shown),
         base=base,
-        env_id="shipgym/PathFollowing-v1",
+        env_id="shipgym/PathFollowing-v0",
         model_name="mariner",
         **more,
     )
@@ -125,7 +126,7 @@ ABOARD: dict[str, Callable[[], Any]] = {
         )
     },
     "wheel-over": lambda: controller_class("wheel-over").from_model(
-        MARINER, task=Task.of("PathFollowing-v1")
+        MARINER, task=Task.of("PathFollowing")
     ),  # type: ignore[attr-defined]
     "learned": random_policy,
     "residual": POLICIES["residual"],
@@ -232,9 +233,9 @@ def of_helm() -> dict[str, Floats]:
             ]
         )
     }
-    sensors = Sensors(limits)
+    sensors = HelmSensors(limits)
     for one in (("course", 0.7), ("speed", 6.1), ("heading", 0.4)):
-        sensors.take(Reading(*one, "GP"), 1.0)
+        sensors.take(NmeaReading(*one, "GP"), 1.0)
     found["over ground"] = vector(
         list(sensors.numbers(["surge", "sway", "heading"], 2.0).values())
     )
@@ -263,7 +264,7 @@ def of_helm() -> dict[str, Floats]:
             }
             for quantity, value in told.items():
                 if not (quantity == "yaw_rate" and k > 33):
-                    helm.sensors.take(Reading(quantity, value, "II"), now)
+                    helm.sensors.take(NmeaReading(quantity, value, "II"), now)
             helm.watch(1.0, now)
             helm.steer(now)
             rows.append(
@@ -282,7 +283,7 @@ def of_helm() -> dict[str, Floats]:
 def of_helm_on_a_route() -> dict[str, Floats]:
     """A ship in a current and wind, steered along a route by what her instruments show."""
     guide = controller_class("wheel-over").from_model(
-        MARINER, task=Task.of("PathFollowing-v1")
+        MARINER, task=Task.of("PathFollowing")
     )  # type: ignore[attr-defined]
     places = np.array([[54.0, 7.5], [54.012, 7.5], [54.02, 7.53], [54.03, 7.53]])
     helm = Helm(
@@ -298,7 +299,7 @@ def of_helm_on_a_route() -> dict[str, Floats]:
     )
     for k in range(420):
         for name, value in ship.measured().items():
-            helm.sensors.take(Reading(name, value, "II"), 1.0 * k)
+            helm.sensors.take(NmeaReading(name, value, "II"), 1.0 * k)
         helm.watch(1.0, 1.0 * k)
         helm.steer(1.0 * k)
         ship.order = helm.order
@@ -311,7 +312,7 @@ def of_helm_on_a_route() -> dict[str, Floats]:
         "track": vector(rows),
         "said": vector(said),
         "seconds": vector(
-            helm._seconds_to_turn(
+            helm.seconds_to_turn(
                 {
                     "next_turn_distance": 900.0,
                     "next_turn_angle": 0.3,
@@ -368,9 +369,9 @@ def said_by_helm() -> list[str]:
                 "course": 0.61,
             }
             for quantity, value in told.items():
-                helm.sensors.take(Reading(quantity, value, "II"), now)
+                helm.sensors.take(NmeaReading(quantity, value, "II"), now)
             if kind == "lq":
-                helm.sensors.take(Reading("heading", 0.8, "GP"), now)
+                helm.sensors.take(NmeaReading("heading", 0.8, "GP"), now)
             helm.watch(1.0, now)
             helm.steer(now)
             said += [helm.status, helm.sentences()]

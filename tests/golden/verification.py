@@ -16,7 +16,7 @@ from unittest.mock import patch
 import numpy as np
 
 from agents import LQ, PID, WheelOver
-from agents.engines.jobs import HERE
+from agents.jobs import HERE
 from agents.verification import chain
 from agents.verification import standards as asked
 from agents.verification.chain import verify
