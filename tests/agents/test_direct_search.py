@@ -147,13 +147,10 @@ def test_policies_are_not_added_to_slow_controllers_unless_asked_for(
 ) -> None:
     path = tmp_path / "tuned.json"
     monkeypatch.setattr("agents.suites.reference.suite_file", lambda suite, what: path)
-    monkeypatch.setattr(
-        "agents.controllers.designs.suite_of", lambda name: "shipgym-v1"
-    )
     costs = {"mpc": 1.0, "lq": 3.0, "pid": 4.0}
     found = {kind: {"settings": {}, "cost": cost} for kind, cost in costs.items()}
     write_json({"tasks": {"calm": found}}, path)
-    base = design_base("tuned", CALM)
+    base = design_base("tuned", replace(CALM, suite="shipgym-v1"))
     assert getattr(base, "kind", None) == "lq"
     del found["lq"], found["pid"]
     write_json({"tasks": {"calm": found}}, path)
@@ -163,13 +160,12 @@ def test_policies_are_not_added_to_slow_controllers_unless_asked_for(
 
 def test_the_suite_s_settings_make_sane_controllers_for_every_task() -> None:
     suite, found = load_suite(), load_tuned("shipgym-v1")
-    assert set(found) == {task.name for task in suite.tasks}
-    for task in suite.tasks:
+    tasks = [task.design_task for task in suite.tasks if task.on == "ship"]
+    assert set(found) == {task.name for task in tasks}
+    for task in tasks:
         for kind in ("base", "best"):
             assert is_sane(tuned(kind, task, suite.name))
-        assert set(found[task.name]) == set(tunable(task)) - {
-            "mpc"
-        }  # not searched: slow
+        assert set(found[task.name]) == {"lq", "ilos", "wheel-over"}
         assert all(
             one["cost"] <= one["start_cost"] for one in found[task.name].values()
         )

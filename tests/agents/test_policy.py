@@ -241,21 +241,20 @@ def test_another_environment_is_refused_with_the_difference():
         sail(random_policy(), load_model("kvlcc2"))
     with pytest.raises(
         InputError,
-        match=r"8 observations found, expected 13; .*: cross_track, course_error",
+        match=r"8 observations found, expected 15; .*: cross_track, course_error",
     ):
         sail(path_policy(), MARINER)
     with pytest.raises(
         InputError,
-        match=r"shape \(30, 8\) found, expected \(13,\) .* 'turn_angle' is the last",
+        match=r"shape \(30, 8\) found, expected \(15,\) .* 'second_turn_angle' is the last",
     ):
         path_policy().predict(SEEN)
-    second = Task.of("PathFollowing", corridor=0.5).observed(MARINER)
-    with pytest.raises(
-        InputError, match=r"with in shipgym/PathFollowing-v0: observation 11 is 'next_"
-    ):
-        path_policy().check_fits(
-            [one.name for one in second], [one.scale for one in second]
-        )
+    shown = Task.of("PathFollowing", corridor=0.5).observed(MARINER)
+    names = [one.name for one in shown]
+    names[11], names[13] = names[13], names[11]
+    said = r"with in shipgym/PathFollowing-v0: observation 11 is 'second_turn_distance"
+    with pytest.raises(InputError, match=said):
+        path_policy().check_fits(names, [one.scale for one in shown])
     wider = path_following_task().observed(MARINER)
     with pytest.raises(
         InputError, match=r"scale of 'cross_track' is 160.9.*learned with 80.4"
