@@ -52,8 +52,8 @@ FIELDS = (
 
 def read_controller(content: Mapping[str, Any], where: str) -> Controller:
     """Controller from what `Controller.to_dict` returned; InputError names the field at fault."""
+    check_keys(content, content, where, ("format", "kind"))
     check_format(content, FORMAT, where)
-    check_keys(content, content, where, ("kind",))
     known_kinds = controller_kinds()
     kind = check_choice(content["kind"], (*known_kinds, LEARNED), f"{where}: kind")
     if kind == LEARNED:

@@ -12,6 +12,7 @@ from agents.controllers.registry import BUILT_IN, controller_class
 from agents.suites.reference import load_tuned
 from agents.suites.suite import BenchmarkTask
 from shipgym import InputError, ShipModel
+from shipgym.checks import quoted
 
 #: Those first that others build on; the suites know no rate of turn to steer.
 CLASSICAL = tuple(kind for kind in BUILT_IN if kind != "turn-rate")
@@ -90,10 +91,15 @@ def tuned(kind: str, task: BenchmarkTask, suite: str) -> Controller:
             if name not in without[kind]
         }
         kind = min(costs, key=costs.__getitem__, default=kind)
+    if not found:
+        raise InputError(
+            f"controller: expected a task of suite '{suite}' with tuned controllers, got"
+            f" '{task.name}'"
+        )
     if kind not in found:
         raise InputError(
             f"controller: expected one that was tuned for task '{task.name}' of suite"
-            f" '{suite}', {', '.join(found) or 'of which there are none'}, got '{kind}'"
+            f" '{suite}', {quoted(found)}, got '{kind}'"
         )
     return design(kind, task, found[kind]["settings"])
 

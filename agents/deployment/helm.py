@@ -83,7 +83,7 @@ class Helm:
 
     def _check(self, agent: Any) -> None:
         name = getattr(agent, "name", type(agent).__name__)
-        turns = {*TURNS} & {*self.pilot.inputs}
+        turns = {*TURNS} & {*self.pilot.inputs} if self.follows_path else set()
         if self.rate is not None and not isinstance(agent, TurnRate):
             raise InputError(
                 f"rate of turn: expected autopilot 'turn-rate', got '{name}'"

@@ -234,7 +234,7 @@ def test_what_is_run_again_costs_the_same(result):
 
 def test_a_changed_result_is_reported_beyond_a_billionth(result):
     episodes = [EpisodeId("pid", "calm", 0, FIRST + k) for k in range(2)]
-    for change, different in ((1.0 + 0.9e-9, ()), (1.0 + 1.1e-9, tuple(episodes))):
+    for change, different in ((1.0 + 1e-10, ()), (1.0 + 1e-8, tuple(episodes))):
         columns = {**result.episodes, "cost": result.episodes["cost"] * change}
         assert rerun(replace(result, episodes=columns), episodes).different == different
 

@@ -365,7 +365,7 @@ def test_the_command_writes_c_and_says_what_it_cannot(tmp_path):
         ("nothing to write: give --c FOLDER", "mariner"),
         ("Did you mean 'mariner'", "marinr", "--c", tmp_path / "no"),
         (
-            "--depth found, which are for --c and --fmu",
+            "--depth: expected with --c or --fmu",
             "mariner",
             "--onnx",
             tmp_path / "no",
@@ -397,7 +397,7 @@ def test_the_command_writes_c_and_says_what_it_cannot(tmp_path):
             tmp_path / "no.zip",
         ),
         (
-            "--fmi: 2.0 found, which is for --fmu alone",
+            "--fmi: expected with --fmu, got 2.0",
             "mariner",
             "--c",
             tmp_path / "no",
@@ -405,7 +405,7 @@ def test_the_command_writes_c_and_says_what_it_cannot(tmp_path):
             "2.0",
         ),
         (
-            "--depth: 9 found, but",
+            "--depth: expected none for an autopilot, got 9",
             tmp_path / "pid.json",
             "--c",
             tmp_path / "no",

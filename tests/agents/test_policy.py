@@ -246,7 +246,7 @@ def test_another_environment_is_refused_with_the_difference():
         sail(path_policy(), MARINER)
     with pytest.raises(
         InputError,
-        match=r"shape \(30, 8\) found, expected \(13,\) .* 'turn_angle' is the last",
+        match=r"expected shape \(15,\) .* 'second_turn_angle' is the last",
     ):
         path_policy().predict(SEEN)
     second = Task.of("PathFollowing", corridor=0.5).observed(MARINER)

@@ -15,7 +15,7 @@ from agents.controllers import registry
 from agents.controllers.controller import Controller
 from agents.controllers.designs import design_base
 from agents.controllers.law import Nothing, linear_law
-from agents.suites.suite import load_suite
+from agents.suites.suite import find_task
 from shipgym import load_model
 from shipgym.errors import InputError
 from tests.agents.policies import random_policy
@@ -97,20 +97,23 @@ def test_a_controller_of_ones_own_is_one_file(mine, tmp_path, monkeypatch):
     again = load_agent(tmp_path / "pd.json", ship)
     assert type(again) is my_controllers.PD
     assert again.gains == controller.gains
-    task = load_suite("shipgym-v1").task("mariner-calm")
+    task = find_task("sharp-turns")
     assert isinstance(design_base("my-pd", task), my_controllers.PD)
     results = [
         benchmark(
-            "my-pd,lq,file=pd.json", tasks=["mariner-calm"], episodes=2, workers=workers
+            "my-pd,lq,file=pd.json",
+            tasks=["sharp-turns-on-model"],
+            episodes=2,
+            workers=workers,
         )
         for workers in (1, 2)
     ]
     for result in results:
-        costs = result.figures("my-pd", "mariner-calm")
+        costs = result.figures("my-pd", "sharp-turns-on-model")
         np.testing.assert_array_equal(
-            costs, results[0].figures("my-pd", "mariner-calm")
+            costs, results[0].figures("my-pd", "sharp-turns-on-model")
         )
-        assert (costs > result.figures("lq", "mariner-calm")).all()
+        assert (costs > result.figures("lq", "sharp-turns-on-model")).all()
 
 
 def test_the_command_line_finds_a_class_by_its_module(mine, tmp_path):
@@ -119,7 +122,7 @@ def test_the_command_line_finds_a_class_by_its_module(mine, tmp_path):
         "--controllers",
         "my_controllers:PD",
         "--tasks",
-        "mariner-calm",
+        "sharp-turns-on-model",
         "--episodes",
         "2",
     ]
@@ -183,7 +186,7 @@ def test_a_kind_is_a_name_and_no_other_controller_s(monkeypatch):
 
 
 def test_a_base_is_a_classical_controller_of_a_file_or_none(tmp_path):
-    task = load_suite("shipgym-v1").task("mariner-calm")
+    task = find_task("sharp-turns")
     made = LQ.from_model(task.ship, integral_lengths=33.0)
     made.save(tmp_path / "mine.json")
     base = design_base(str(tmp_path / "mine.json"), task)

@@ -27,7 +27,8 @@ SHIPS, STEPS, HISTORY, AUTHORITY = 3, 11, 3, 0.4
 
 
 def ships(env, n=SHIPS, seed=7):
-    return ShipVecEnv(env, n, seed=seed, noise=1.0, sea="rough", episode_steps=5)
+    options = {"model": "mariner", "noise": 1.0, "sea": "rough", "episode_steps": 5}
+    return ShipVecEnv(env, n, seed=seed, **options)
 
 
 def by_hand(env, base, seed, outputs):
