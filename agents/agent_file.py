@@ -1,4 +1,4 @@
-"""Agents by their files, whatever their kind, and pretrained ones by name."""
+"""Load agents by their files, whatever their kind, and pretrained ones by name."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ def list_pretrained() -> list[str]:
 
 
 def find_agent(name: str | Path) -> Path:
-    """The file of an agent: as given, in the folder of a run, or of the pretrained agent of that name.
+    """File of an agent: as given, in the folder of a run, or of the pretrained agent of that name.
 
     Raises InputError if it is neither, with the nearest pretrained name.
     """
@@ -75,7 +75,7 @@ def find_agent(name: str | Path) -> Path:
     known = list_pretrained()
     if str(name) not in known:
         raise InputError(
-            f"agent: '{name}' found, expected a file, or one of {len(known)} pretrained"
-            f" agents, such as '{known[0]}'.{did_you_mean(str(name), known)}"
+            f"agent: expected a file, or one of {len(known)} pretrained agents, such as"
+            f" '{known[0]}', got '{name}'.{did_you_mean(str(name), known)}"
         )
     return PRETRAINED / f"{name}.json"

@@ -37,6 +37,7 @@ from agents.job_results import (
 from shipgym.checks import check_choice, check_whole
 from shipgym.errors import InputError
 from shipgym.extras import library
+from shipgym.python_files import working_folder
 
 __all__ = ["HERE", "EngineError", "JobEngine", "JobError", "run_jobs"]
 
@@ -152,17 +153,6 @@ def run_jobs(
             kept.save(outcome.job, outcome.result)
         report()
     return [result_from_json(results[text]) for text in texts]
-
-
-@contextmanager
-def working_folder() -> Iterator[None]:
-    """Let modules of the working folder be imported while the block lasts."""
-    before = list(sys.path)
-    sys.path.insert(0, str(Path.cwd()))
-    try:
-        yield
-    finally:
-        sys.path[:] = before
 
 
 def _check_outcome(outcome: JobOutcome, name: str) -> None:

@@ -22,8 +22,10 @@ from typing import Any, ClassVar
 import numpy as np
 
 from agents import LQ, load_agent
-from agents.deployment.c99 import Source, autopilot_source, ship_source
+from agents.deployment.autopilot_c99 import autopilot_source
+from agents.deployment.c99 import Source
 from agents.deployment.fmu import write_fmu
+from agents.deployment.ship_c99 import ship_source
 from agents.deployment.simulated import SimulatedShip, simulate_ship
 from agents.deployment.steering import steer
 from shipgym.ships import load_model

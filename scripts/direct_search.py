@@ -22,7 +22,7 @@ from scipy.optimize import minimize
 from agents.controllers.controller import Controller
 from agents.controllers.designs import CLASSICAL, INNER, design, no_path
 from agents.controllers.los_autopilot import CRITICAL
-from agents.controllers.wheel_over import own_lead, own_turn
+from agents.controllers.wheel_over import own_lead
 from agents.rollouts.rollout import episode_costs
 from agents.suites.suite import BenchmarkTask
 from shipgym.checks import check_choice, check_whole
@@ -146,7 +146,7 @@ def tune(
     """
     check_choice(kind, CLASSICAL, "controller")
     seeds = FIRST_SEED + np.arange(episodes)
-    engine = task.handed_out.engine(episodes)
+    engine = task.design_task.engine(episodes)
 
     def cost(asked: Mapping[str, float]) -> float:
         try:
@@ -200,19 +200,7 @@ def search_spaces(kind: str, task: BenchmarkTask) -> list[list[Setting]]:
         lookahead = task.task.lookahead
         own = [Setting("lookahead_lengths", lookahead)]
         if kind in ("wheel-over", "mpc"):
-            if hasattr(
-                task.task.settings, "turn_radius"
-            ):  # the path has arcs of its own
-                own.append(
-                    Setting("reach_lengths", own_lead(task.ship, None), 0.3, 3.0)
-                )
-            else:
-                radius, reach = own_turn(task.ship)
-                own += [
-                    Setting("reach_lengths", reach),
-                    Setting("radius_lengths", radius),
-                ]
-                own.append(Setting("turn_lookahead_lengths", lookahead))
+            own.append(Setting("reach_lengths", own_lead(task.ship, None), 0.3, 3.0))
             own.append(Setting("crab_share", 1.0, 0.3, 1.5))
             own += [Setting("deviation_deg", 3.0)] * (kind == "mpc")
         elif kind != "los":

@@ -21,7 +21,7 @@ import numpy as np
 
 import shipgym
 
-ID, OPTIONS = "shipgym/PathFollowing-v1", {"model": "mariner", "episode_steps": 30}
+ID, OPTIONS = "shipgym/PathFollowing-v0", {"model": "mariner", "episode_steps": 30}
 STEPS = 70  # two episodes end within
 
 

@@ -28,7 +28,7 @@ SEEDS = (0, 1, 2)
 #: Classical autopilots by id.
 CLASSICAL = {
     "shipgym/CourseKeeping-v0": ("lq",),
-    "shipgym/PathFollowing-v1": ("ilos", "wheel-over"),
+    "shipgym/PathFollowing-v0": ("ilos", "wheel-over"),
 }
 SETTINGS = {"base": "none", "total_steps": 1_000_000, "evaluate_every": 32_768}
 

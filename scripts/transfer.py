@@ -27,13 +27,13 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+from agents.benchmarking.contestants import pretrained
 from build_models import COMPARED_DEG, errors
 from direct_search import tune
 from numpy.typing import NDArray
 
 import shipgym
 from agents.agent_file import load_agent
-from agents.benchmarking.contestants import pretrained
 from agents.benchmarking.statistics import Draws, Interval, interval
 from agents.controllers.controller import Controller, Policy
 from agents.controllers.designs import NO_BASES, design, tuned
@@ -99,7 +99,7 @@ class Contestant:
 
 def contestants(task: BenchmarkTask, out: Path, runs: int) -> Iterator[Contestant]:
     """All of one task, each made on the model and on the ship."""
-    model, ship = task.handed_out, replace(task.handed_out, model=task.behind)
+    model, ship = task.design_task, replace(task.design_task, model=task.true_ship)
     pairs: dict[str, tuple[Sequence[Policy], Sequence[Policy]]] = {
         "wheel-over": ([design("wheel-over", model)], [design("wheel-over", ship)])
     }

@@ -2,7 +2,8 @@
 
 import hashlib
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from inspect import (
     CO_ASYNC_GENERATOR,
     CO_COROUTINE,
@@ -70,6 +71,17 @@ def load_file(path: Path, expected: str = "a Python file") -> ModuleType:
         why = f"{type(error).__name__}: {error}{''.join(within)}"
         raise InputError(f"{place}: cannot be executed: {why}") from error
     return module
+
+
+@contextmanager
+def working_folder() -> Iterator[None]:
+    """Find modules of the working folder, which a user has named, within the block."""
+    before = list(sys.path)
+    sys.path.insert(0, str(Path.cwd()))
+    try:
+        yield
+    finally:
+        sys.path[:] = before
 
 
 def check_function(value: Any, count: int, where: str, what: str) -> None:

@@ -122,7 +122,7 @@ COMMANDS: dict[str, tuple[Callable[..., None], str]] = {
     ),
     "train": (
         train_command,
-        "sac --env path-following-v1 --model my_ship/model.json --out run/",
+        "sac --env path-following --model my_ship/model.json --out run/",
     ),
     "tune": (tune_command, "sac --trials 40 --workers 2 --out study/"),
     "benchmark": (

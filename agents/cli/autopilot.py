@@ -46,8 +46,8 @@ def autopilot_command(
         Option(
             metavar="NAMES",
             help=(
-                "Autopilots to design; default: pid,lq,turn-rate,wheel-over."
-                " Others: lqg, mpc."
+                "Autopilots to design; default: pid,lq,turn-rate,wheel-over. "
+                "Others: lqg, mpc."
             ),
         ),
     ] = None,

@@ -32,6 +32,13 @@ Address = Annotated[
         metavar="HOST:PORT", help="Ray cluster; default: start Ray on this computer."
     ),
 ]
+AllowCode = Annotated[
+    list[str] | None,
+    Option(
+        metavar="CODE",
+        help="Python file or module that your suite may name; repeatable.",
+    ),
+]
 Out = Annotated[Path, Option(metavar="FOLDER", help="Folder for the results.")]
 #: The options of `identify`; see `IdentifyCommand`.
 IdentifyOptions = Annotated[dict[str, Any], Option(parser=dict, hidden=True)]

@@ -103,7 +103,8 @@ def _write(
 def _source(what: str, name: str | None, depth: float) -> Source:
     """C99 of the controller, policy or model of a file or a name."""
     from agents.agent_file import list_pretrained, load_agent
-    from agents.deployment.c99 import autopilot_source, ship_source
+    from agents.deployment.autopilot_c99 import autopilot_source
+    from agents.deployment.ship_c99 import ship_source
     from shipgym.errors import InputError
     from shipgym.files import read_json
     from shipgym.ships import load_model

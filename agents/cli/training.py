@@ -10,7 +10,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from typer import Argument, Option
 
-from agents.cli.command import INTERRUPTED, Address, EngineName, Workers, fail
+from agents.cli.command import (
+    INTERRUPTED,
+    Address,
+    AllowCode,
+    EngineName,
+    Workers,
+    fail,
+)
 
 if TYPE_CHECKING:
     from agents.training.plan import Given, Plan
@@ -20,7 +27,12 @@ if TYPE_CHECKING:
 Algorithm = Annotated[str, Argument(metavar="ALGORITHM", help="ppo, sac, td3 or tqc.")]
 Environment = Annotated[
     str | None,
-    Option(help="course-keeping (default), path-following-v1, or an environment id."),
+    Option(
+        help=(
+            "course-keeping (default), path-following, an environment id, module:id, or"
+            " the file of your own task."
+        )
+    ),
 ]
 Model = Annotated[
     str | None,
@@ -29,6 +41,9 @@ Model = Annotated[
 Sea = Annotated[str | None, Option(help="calm (default), slight, moderate or rough.")]
 TaskName = Annotated[
     str | None, Option(help="A benchmark task, instead of --env, --model and --sea.")
+]
+SuiteName = Annotated[
+    str, Option(help="Suite of the task: a name, or the TOML file of your own.")
 ]
 EnvironmentOptions = Annotated[
     list[str] | None,
@@ -75,6 +90,8 @@ def train_command(
     model: Model = None,
     sea: Sea = None,
     task: TaskName = None,
+    suite: SuiteName = "shipgym-v1",
+    allow_code: AllowCode = None,
     environment_options: EnvironmentOptions = None,
     total_steps: TotalSteps = None,
     settings: Settings = None,
@@ -121,6 +138,8 @@ def train_command(
         seed=seed,
         randomise=randomise,
         threads=threads,
+        suite=suite,
+        allow_code=allow_code or (),
     )
     _print_result(_train(given, out, resume, max_seconds), out)
 
@@ -226,6 +245,8 @@ def tune_command(
     model: Model = None,
     sea: Sea = None,
     task: TaskName = None,
+    suite: SuiteName = "shipgym-v1",
+    allow_code: AllowCode = None,
     environment_options: EnvironmentOptions = None,
     trials: Annotated[
         int, Option(min=1, help="Trials in all, with those already done.")
@@ -267,6 +288,8 @@ def tune_command(
         seed=seed,
         randomise=randomise,
         threads=1,
+        suite=suite,
+        allow_code=allow_code or (),
     )
     where = JobEngine(engine, workers, address)
     plan = make_plan(given)

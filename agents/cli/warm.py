@@ -70,11 +70,12 @@ def warm_command(
 
 def warm_names(wanted: list[str] | None, everything: bool) -> list[str]:
     """Environments and models to compile; by default both tasks and the Mariner."""
-    from shipgym.envs.registration import TASKS, env_id, environments
+    from shipgym.envs.registration import ENVIRONMENTS, env_id
     from shipgym.ships import list_models
+    from shipgym.tasks.definition import TASKS
 
     if everything:
-        return [*environments(), *list_models()]
+        return [*ENVIRONMENTS, *list_models()]
     return wanted or [*map(env_id, TASKS), "mariner"]
 
 
@@ -86,7 +87,7 @@ def warm_jobs(name: str, ship: str | None = None) -> dict[str, Callable[[], Any]
     import shipgym
     from shipgym.engine.loops import LOOPS, ship_loop
     from shipgym.envs.environment import DEFAULT_TASK
-    from shipgym.envs.registration import env_id, environments
+    from shipgym.envs.registration import ENVIRONMENTS, env_id
     from shipgym.errors import InputError
     from shipgym.python_files import load_file
 
@@ -94,7 +95,7 @@ def warm_jobs(name: str, ship: str | None = None) -> dict[str, Callable[[], Any]
     if Path(name).suffix == ".py":
         content = load_file(Path(name), "the Python file of a task or a ship")
         is_task = not hasattr(content, "SHIP")
-    if is_task or name in environments():
+    if is_task or name in ENVIRONMENTS:
         options: dict[str, Any] = {"model": ship} if ship else {}
         environment = name
         if is_task:
@@ -121,5 +122,4 @@ def warm_jobs(name: str, ship: str | None = None) -> dict[str, Callable[[], Any]
 def _make(environment: str, options: dict[str, Any]) -> None:
     import gymnasium
 
-    with warnings.catch_warnings(action="ignore", category=DeprecationWarning):
-        gymnasium.make(environment, **options).close()
+    gymnasium.make(environment, **options).close()

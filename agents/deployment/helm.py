@@ -4,7 +4,7 @@ from dataclasses import replace
 from math import inf, radians
 from typing import Any
 
-from agents.controllers.los_autopilot import Guided
+from agents.controllers.guided import TURNS, Guided
 from agents.controllers.turn_rate import TurnRate
 from agents.deployment.autopilot import Autopilot
 from agents.deployment.c99 import render
@@ -84,7 +84,7 @@ class Helm:
 
     def _check(self, agent: Any) -> None:
         name = getattr(agent, "name", type(agent).__name__)
-        turns = set(getattr(agent, "turns_ahead", ()))
+        turns = {*TURNS} & {*self.pilot.inputs} if self.follows_path else set()
         if self.rate is not None and not isinstance(agent, TurnRate):
             raise InputError(
                 f"rate of turn: expected autopilot 'turn-rate', got '{name}'"

@@ -115,9 +115,8 @@ def _nodes(policy: LearnedPolicy, helper: Any) -> tuple[list[Any], dict[str, Any
 
 
 def _metadata(policy: LearnedPolicy) -> dict[str, str]:
-    """What its file says of it, and two names that older readers know."""
+    """What its file says of it."""
     content, _ = policy.file_fields()
     left_out = ("format", "kind", "network", "training")
     values = {name: one for name, one in content.items() if name not in left_out}
-    values |= {"history": policy.frame_stack, "hold": policy.action_repeat}
     return {name: json.dumps(value) for name, value in values.items()}

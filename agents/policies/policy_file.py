@@ -11,11 +11,10 @@ from numpy.typing import NDArray
 from agents.controllers.controller import FORMAT, check_names
 from agents.controllers.controller_file import read_controller, read_model, read_scales
 from agents.policies.network import Layer, Network
-from agents.policies.policy import NO_LIMIT, LearnedPolicy
+from agents.policies.policy import LearnedPolicy
 from agents.policies.weights_file import (
     REMEDY,
     Tensors,
-    present_names,
     read_weights,
     weights_path,
 )
@@ -29,10 +28,8 @@ from shipgym.checks import (
     placed,
     quoted,
 )
-from shipgym.tasks.task import OBSERVATION_NAMES
+from shipgym.tasks.scales import OBSERVATION_NAMES
 
-#: Fields that older files lack, and what they mean there.
-LATER: Mapping[str, Any] = {"action_repeat": 1, "rate_limit": NO_LIMIT}
 FIELDS = (
     "format",
     "kind",
@@ -58,15 +55,14 @@ def read_policy(content: Mapping[str, Any], path: Path) -> LearnedPolicy:
     Raises InputError naming the file and the field at fault.
     """
     where = str(path)
-    current = {**LATER, **present_names(content)}
-    check_format(current, FORMAT, where)
-    check_keys(current, FIELDS, where, FIELDS)
+    check_format(content, FORMAT, where)
+    check_keys(content, FIELDS, where, FIELDS)
 
-    table = check_table(current["weights"], f"{where}: weights", ("sha256",))
+    table = check_table(content["weights"], f"{where}: weights", ("sha256",))
     sha256 = check_text(table.get("sha256"), f"{where}: weights.sha256")
     tensors = read_weights(weights_path(path), sha256, path)
     with placed(where):
-        agent = _learned(current, tensors)
+        agent = _learned(content, tensors)
     if tensors:
         raise InputError(
             f"{weights_path(path)}: unknown {quoted(tensors)} found with the weights;"
@@ -77,15 +73,22 @@ def read_policy(content: Mapping[str, Any], path: Path) -> LearnedPolicy:
 
 def _learned(content: Mapping[str, Any], tensors: Tensors) -> LearnedPolicy:
     """A learned policy; its weights are taken out of `tensors`."""
-    names = _names(content["observation_names"])
     place = check_table(content["environment"], "environment", ("id", "options"))
+    options = check_table(place.get("options"), "environment.options")
+    names = _names(content["observation_names"], own_task="task" in options)
     return LearnedPolicy(
         network=_network(content["network"], tensors),
         observation_names=names,
         observation_scales=read_scales(content["observation_scales"], names),
         **{
             name: content[name]
-            for name in ("action", "frame_stack", "authority", *LATER)
+            for name in (
+                "action",
+                "frame_stack",
+                "authority",
+                "action_repeat",
+                "rate_limit",
+            )
         },
         base=(
             None
@@ -93,7 +96,7 @@ def _learned(content: Mapping[str, Any], tensors: Tensors) -> LearnedPolicy:
             else read_controller(check_table(content["base"], "base"), "base")
         ),
         env_id=check_text(place.get("id"), "environment.id"),
-        env_options=dict(check_table(place.get("options"), "environment.options")),
+        env_options=dict(options),
         **read_model(content["model"]),
         training=dict(check_table(content["training"], "training")),
     )
@@ -134,13 +137,14 @@ def _tensor(tensors: Tensors, name: str, shape: tuple[int, ...]) -> NDArray[np.f
     return array
 
 
-def _names(value: Any) -> tuple[str, ...]:
-    """Names of observations, the first those that every environment shows."""
+def _names(value: Any, own_task: bool) -> tuple[str, ...]:
+    """Names of observations; unless of a user's own task, the first are always the same."""
     where = "observation_names"
     if not isinstance(value, list):
         raise InputError(f"{where}: {value!r} found, expected a list of names")
     names = tuple(check_text(name, f"{where}[{i}]") for i, name in enumerate(value))
-    check_names(names[: len(OBSERVATION_NAMES)], OBSERVATION_NAMES, where)
+    if not own_task:
+        check_names(names[: len(OBSERVATION_NAMES)], OBSERVATION_NAMES, where)
     if len(set(names)) < len(names):
         raise InputError(
             f"{where}: a name twice in {quoted(names)}, expected each once"

@@ -12,8 +12,8 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 from agents.controllers.registry import controller_kinds
-from agents.policies.weights_file import as_json, present_names
-from agents.suites.suite import ENVIRONMENTS, suite_of
+from agents.policies.weights_file import as_json
+from agents.suites.environments import SHORT_NAMES
 from shipgym.checks import (
     check_choice,
     check_keys,
@@ -241,6 +241,7 @@ def load_settings(
     task: str = "",
     given: Mapping[str, Any] | None = None,
     action: str = "rudder",
+    suite: str = "",
 ) -> Settings:
     """The tuned settings of an algorithm, with those given by name replaced.
 
@@ -251,10 +252,13 @@ def load_settings(
     Parameters
     ----------
     algorithm : {"ppo", "sac", "td3", "tqc"}
-    environment : {"course-keeping", "path-following", "path-following-v1"}
+    environment : str
+        "course-keeping", "path-following", or the path of a task's file.
     task : str
         Name of a suite's task; one without settings of its own has those of its
         environment.
+    suite : str
+        Its suite (`BenchmarkTask.suite`).
     given : mapping of str to Any, optional
         Settings by name that go before the tuned ones.
     action : {"rudder", "rudder-discrete", "rudder-shaft"}
@@ -262,18 +266,16 @@ def load_settings(
         policy learns from scratch.
     """
     check_choice(algorithm, ALGORITHMS, "algorithm")
-    check_choice(environment, ENVIRONMENTS, "environment")
+    if not environment.endswith(".py"):
+        check_choice(environment, SHORT_NAMES, "environment")
     check_choice(action, ACTIONS, "action")
     content = hyperparameters(algorithm)
     chosen = dict(content["defaults"])
     if action == "rudder" and (given or {}).get("base") != "none":
-        followed = environment.removesuffix("-v1")
-        for table, name in (
-            ("residual", followed),
-            ("suites", suite_of(task)),
-            ("tasks", task),
-        ):
-            chosen |= content.get(table, {}).get(name, {})
+        chosen |= content["residual"].get(environment, {})
+        if suite in content["suites"]:
+            chosen |= content["suites"][suite]
+            chosen |= content.get("tasks", {}).get(task, {})
     return make_settings(algorithm, chosen | dict(given or {}))
 
 
@@ -307,15 +309,9 @@ def read_settings_file(path: Path, algorithm: str) -> dict[str, Any]:
     )
 
 
-#: What settings mean that older runs do not have.
-LATER = {
-    one.name: one.default for one in fields(Settings) if one.default is not MISSING
-}
-
-
 def _settings(value: Any, kind: type[Settings], where: str) -> dict[str, Any]:
     """A table that names settings only; whole numbers stand for decimal ones."""
-    table = present_names(check_table(value, where))
+    table = check_table(value, where)
     types = {one.name: one.type for one in fields(kind)}
     check_keys(table, tuple(types), where)
     return {

@@ -58,7 +58,7 @@ def track_task(model: ShipModel) -> Task:
     waypoints = np.vstack([np.zeros(2), np.cumsum(legs, axis=0)])
     current = Current(CURRENT * model.particulars["speed"], towards_deg=90.0)
     return Task.of(
-        "PathFollowing-v1",
+        "PathFollowing",
         waypoints=waypoints,
         sea=Weather(current=current),
         episode_steps=STEPS,

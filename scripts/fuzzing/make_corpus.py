@@ -27,7 +27,7 @@ from agents.training import training
 from agents.training.plan import Given, make_plan
 from agents.training.training import train
 from shipgym import Episode, Particulars, ShipFile, ShipModel
-from shipgym.tasks.task import OBSERVATION_NAMES, observation_scales
+from shipgym.tasks.scales import OBSERVATION_NAMES, observation_scales
 from shipgym.trials.nmea import checksum
 
 CORPUS = Path(__file__).parents[2] / "tests" / "corpus"

@@ -154,7 +154,7 @@ def test_a_guest_of_another_environment_or_ship_is_wrong_input(
     said = (
         "cross_track.*for paths there is"
         if made_for == "paths"
-        else "the scale of '.*' is"
+        else "scale of '.*': expected"
     )
     with pytest.raises(InputError, match=f"agent '.*guest.json': .*{said}"):
         build_autopilot(demo, tmp_path / "out", draws=4, agents=[path])
@@ -172,7 +172,7 @@ def test_a_cluster_that_does_not_answer_is_no_fault_of_the_model(demo, tmp_path)
 
 def test_an_unknown_guest_is_refused_with_the_nearest_name(tmp_path):
     expected = (
-        "agent: 'sharp-turn-ppo-s0' found, expected a file, or one of .*Did you mean"
+        "agent: expected a file, or one of .*'sharp-turn-ppo-s0'. Did you mean"
         " 'sharp-turns-ppo-s0'"
     )
     with pytest.raises(InputError, match=expected):

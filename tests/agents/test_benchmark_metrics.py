@@ -264,7 +264,11 @@ def test_figures_of_steering_and_of_paths_by_hand():
     """Two episodes of 4 and 2 intervals of 3 s; what is recorded later or at the beginning does not count."""
     sailing = np.array([[1, 1], [1, 1], [1, 0], [1, 0]], dtype=np.bool_)
     run = SimpleNamespace(
-        sailing=sailing, steps=sailing.sum(axis=0).astype(float), dt=3.0
+        sailing=sailing,
+        steps=sailing.sum(axis=0).astype(float),
+        dt=3.0,
+        seeds=SEEDS[:2],
+        task=PATH.task,
     )
     run.states = {"delta": np.radians([[0, 0], [2, 1], [-2, 1], [1, 9], [1, 0]])}
     run.infos = {

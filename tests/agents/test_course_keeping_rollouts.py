@@ -195,7 +195,7 @@ def test_a_controller_that_gives_no_command_is_named(answer, message):
 @pytest.mark.parametrize(
     ("call", "message"),
     [
-        (lambda: sail(PILOT, mariner(4.0)), "model 'mariner': the scale of 'yaw_rate'"),
+        (lambda: sail(PILOT, mariner(4.0)), "model 'mariner': scale of 'yaw_rate'"),
         (lambda: sail(PILOT, []), "models: none found"),
         (
             lambda: sail(PILOT, fleet(3), seeds=[1, 2]),

@@ -19,7 +19,7 @@ from tests.agents.steering import sentence
 
 PID_MARINER, LQ_MARINER = PID.from_model(MARINER), LQ.from_model(MARINER)
 TURN_RATE = TurnRate.from_model(MARINER)
-WHEEL_OVER = WheelOver.from_model(MARINER, task=Task.of("PathFollowing-v1"))
+WHEEL_OVER = WheelOver.from_model(MARINER, task=Task.of("PathFollowing"))
 
 
 def helm(agent=PID_MARINER, **limits):
@@ -225,7 +225,7 @@ def test_what_no_sentence_tells_is_refused():
     with pytest.raises(
         InputError, match=r"what sentences of NMEA 0183 have, got .*roll, roll_rate"
     ):
-        Helm(load_agent("container-roll-path-ppo"), None, Limits())
+        Helm(load_agent("roll-limit-ppo-s0"), None, Limits())
 
 
 def test_limits_are_those_of_the_page():

@@ -87,11 +87,7 @@ def test_the_metadata_say_what_it_observes(tmp_path):
         0.6,
         "lq",
     )
-    assert (found["history"], found["hold"], found["action_repeat"]) == (
-        2,
-        1,
-        1,
-    )  # older names too
+    assert found["action_repeat"] == 1
     assert not found.keys() & {"training", "network", "format", "kind"}
 
 

@@ -27,7 +27,7 @@ from tests.agents.policies import MARINER
 from tests.agents.steering import free_port, no_waiting
 
 PID_MARINER, LQ_MARINER = PID.from_model(MARINER), LQ.from_model(MARINER)
-WHEEL_OVER = WheelOver.from_model(MARINER, task=Task.of("PathFollowing-v1"))
+WHEEL_OVER = WheelOver.from_model(MARINER, task=Task.of("PathFollowing"))
 ROUTE = "latitude,longitude\n54.0,7.5\n54.02,7.5\n54.03,7.52\n"
 
 

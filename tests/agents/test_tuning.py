@@ -326,14 +326,13 @@ def test_one_that_was_stopped_early_is_the_best_only_where_none_has_finished(tmp
     assert _best([diverged, *stopped]) is stopped[1]
     assert _best([diverged, *stopped, finished]) is finished
     on_task = make_plan(
-        Given("ppo", task="mariner-calm", seed=4, settings={"base": "none"})
+        Given("ppo", task="sharp-turns", seed=4, settings={"base": "none"})
     )
     _write_best(tmp_path, on_task, [diverged, *stopped])
     lines = (tmp_path / "best.toml").read_text().splitlines()
     assert (
-        lines[0]
-        == "# Trial 2 of 3: no trial has finished, seed 4, ppo on mariner-calm with"
-        " mariner."
+        lines[0] == "# Trial 2 of 3: no trial has finished, seed 4, ppo on sharp-turns"
+        " with mariner-tls-svm."
     )
 
 
@@ -431,7 +430,7 @@ def test_trials_are_trainings_that_stop_when_they_fall_behind():
     ("arguments", "message"),
     [
         (["pppo"], "Did you mean 'ppo'"),
-        (["ppo", "--task", "mariner-clam"], "Did you mean 'mariner-calm'"),
+        (["ppo", "--task", "sharp-trns"], "Did you mean 'sharp-turns'"),
         (["ppo", "--set", "gama=0.9"], "Did you mean 'gamma'"),
         (["ppo", "--engine", "rays"], "Did you mean 'ray'"),
         (["ppo", "--address", "h:1"], "it is for engine 'ray'"),

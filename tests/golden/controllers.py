@@ -3,7 +3,7 @@
 Each kind is designed twice: as it is for one ship, and with settings that are not the
 defaults for another. The series of observations is no voyage: smooth, of all sizes from
 small motions to those beyond the limits, with jumps of the course, and different for
-each ship. Guidance is also shown paths of both versions.
+each ship. Guidance is also shown paths of two tasks.
 """
 
 from __future__ import annotations
@@ -15,9 +15,10 @@ from typing import Any
 import numpy as np
 
 from agents import LQ, PID
-from agents.controllers import linear_loop, lqg, turn_rate, wheel_over
+from agents.controllers import guided, kalman, linear_loop, turn_rate, wheel_over
 from agents.controllers.controller_file import read_controller
-from agents.controllers.memory import gathered, on_course
+from agents.controllers.law import Turns, gathered
+from agents.controllers.memory import from_columns, on_course
 from agents.controllers.registry import controller_class
 from agents.controllers.robustness import margin_uncertainty
 from shipgym import ShipModel, load_model
@@ -48,8 +49,8 @@ LINEAR = {
     "rate_weight_s2": 17.0,
 }
 PATHS: dict[str, Callable[[], Task]] = {
-    "v0": lambda: path_following_task(noise=0.7, lookahead=2.3, corridor=0.8),
-    "v1": lambda: Task.of("PathFollowing-v1", rudder_travel_weight=0.03),
+    "narrow": lambda: path_following_task(noise=0.7, lookahead=2.3, corridor=0.8),
+    "travel": lambda: path_following_task(rudder_travel_weight=0.03),
 }
 SETTINGS: dict[str, dict[str, Any]] = {
     "pid": {"dt": 1.3, "frequency": 0.043, "damping": 0.77, "integral_lengths": 13.0},
@@ -67,15 +68,12 @@ SETTINGS: dict[str, dict[str, Any]] = {
     "alos": {"integral_lengths": 9.0},
     "wheel-over": {
         "lookahead_lengths": 1.7,
-        "turn_lookahead_lengths": 2.9,
-        "radius_lengths": 3.1,
         "reach_lengths": 1.3,
         "crab_share": 0.7,
     },
     "mpc": {
         "horizon_lengths": 2.3,
         "deviation_deg": 4.0,
-        "radius_lengths": 2.7,
         "reach_lengths": 1.1,
     },
 }
@@ -109,7 +107,7 @@ def record(case: str) -> dict[str, Floats]:
 
 
 def of_guide(kind: str, settings: dict[str, Any]) -> dict[str, Floats]:
-    """A guidance law over LQ, with settings over PID if it leads any, on paths of both versions."""
+    """A guidance law over LQ, with settings over PID if it leads any, on the paths of two tasks."""
     model, found = load_model("mariner"), {}
     for name, path in PATHS.items():
         more: dict[str, Any] = {"task": path(), **settings}
@@ -144,24 +142,20 @@ def of_controller(made: Any) -> dict[str, Floats]:
             action, alone = again.predict(seen[2], alone)
             own.append(action)
     orders, _ = orders_of(made, shown[:12])
-    found |= {"commands": vector(actions), "alone": vector(own), "orders": orders}
-    return found | {
-        f"memory {k}": vector(one) for k, one in enumerate(flattened(state))
-    }
+    return found | {"commands": vector(actions), "alone": vector(own), "orders": orders}
 
 
 def orders_of(made: Any, shown: Floats) -> tuple[Floats, Any]:
     """Orders before they are limited, rad, of what is no guidance."""
     if hasattr(made, "autopilot"):
         return vector(0.0), None
-    memory, orders = np.zeros((SHIPS, made.memory_size)), []
+    nothing = np.zeros((made.memory_size, SHIPS))
+    memory, orders = from_columns(made.memory_record, iter(nothing)), []
     for step, rows in enumerate(shown):
-        seen = dict(
-            zip(made.observation_names, (rows * made.observation_scales).T, strict=True)
-        )
+        seen = made.signals(rows)
         if made.kind == "turn-rate" and step % 3 == 0:
-            seen["rate_of_turn"] = np.array([0.0, 0.004, -0.007])
-        order, memory = made.steer(seen, memory, np.full(SHIPS, step == 0))
+            seen = seen._replace(rate_of_turn=np.array([0.0, 0.004, -0.007]))
+        order, memory = made.steer(seen, memory)
         orders.append(order)
     return vector(orders), memory
 
@@ -271,25 +265,21 @@ def record_second_order() -> dict[str, Floats]:
 def record_functions() -> dict[str, Floats]:
     """Functions that designs are made of, at numbers that no design has."""
     model, dt = load_model("mariner"), 1.3
-    A, B = linear_loop.sampled_ships(
-        np.array([[[-0.02, -3.1, 0.9], [-0.001, -0.05, 0.003]]] * 2), 0.0, dt
+    A, B = linear_loop.sampled(
+        np.array([[-0.02, -3.1, 0.9], [-0.001, -0.05, 0.003]]), 0.0, dt
     )
     ship = linear_loop.sample_ship(model, dt, first_order=True)
-    slow = linear_loop.sample_ship(model, dt, speed=5.1)
-    motion, drive = lqg.wave_model(9.3, 0.013, dt)
-    gain, deviations = lqg.kalman_gain(
+    motion, drive = kalman.wave_model(9.3, 0.013, dt)
+    gain, deviations = kalman.kalman_gain(
         0.9 * motion, 2.0 * drive, np.eye(2)[:1], np.array([[1e-4]])
     )
     reach = on_course(
         np.zeros((2, 9)), np.array([0.3, -2.0]), np.array([1.7, -0.9]), 7.0
     )
     return {
-        "sampled": np.concatenate([vector(A[0]), vector(B[0])]),
+        "sampled": np.concatenate([vector(A), vector(B)]),
         "first order": np.concatenate(
             [vector(ship.A), vector(ship.B), vector(astuple(ship.about))]
-        ),
-        "slow": np.concatenate(
-            [vector(slow.A), vector(slow.B), vector(astuple(slow.about))]
         ),
         "wave motion": vector(motion),
         "wave drive": vector(drive),
@@ -299,28 +289,27 @@ def record_functions() -> dict[str, Floats]:
         "gathered": gathered(
             np.array([0.1, 5.0, -5.0, 2.0]),
             np.array([0.05, 0.09, -0.02, 0.4]),
-            np.array([False, False, False, False]),
+            np.ones(4),
             3.0,
             5.1,
         ),
-        "begun": gathered(0.4, 0.07, True, 3.0, 5.1).reshape(-1),
-        "bend": wheel_over.bend(
+        "begun": vector(gathered(0.4, 0.07, 0.0, 3.0, 5.1)),
+        "bend": guided.bend(
             700.0,
-            [
+            Turns(
                 np.array([100.0, 600.0, 650.0]),
                 np.array([0.7, -0.4, 0.0]),
                 np.array([500.0, 690.0, 900.0]),
                 np.array([-0.3, 0.9, 0.2]),
-            ],
+            ),
             400.0,
         ),
-        "own turn": vector(wheel_over.own_turn(model, 0.5)),
         "own lead": vector(
             [
                 wheel_over.own_lead(model, one)
                 for one in (None, LQ.from_model(model, **LINEAR))
             ]
         ),
-        "steady turns": vector(turn_rate.steady_turns(model, 0.01)),
+        "steady turns": vector([*turn_rate.steady_turns(model, 0.01)]),
         "rate weight": vector([linear_loop.rate_weight(model), model.travel_time]),
     }

@@ -13,7 +13,7 @@ import numpy as np
 
 from agents import LQ, PID
 from agents.controllers.registry import controller_class
-from agents.deployment.autopilot import Autopilot, bounds
+from agents.deployment.autopilot import Autopilot, observation_bounds
 from agents.deployment.helm import Helm
 from agents.deployment.nmea import NmeaReading, readings, sentences
 from agents.deployment.route import Route
@@ -21,7 +21,7 @@ from agents.deployment.sensors import HelmSensors, Limits
 from agents.deployment.simulated import SimulatedShip
 from agents.policies.policy import LearnedPolicy, order_numbers, toward
 from shipgym import load_model
-from shipgym.tasks.task import Task, path_following_task
+from shipgym.tasks.task import Task
 from tests.agents.policies import MARINER, random_network, random_policy
 from tests.golden.controllers import SHIPS, flattened, series
 from tests.golden.store import Floats, numbers_in, vector
@@ -49,8 +49,8 @@ POLICIES: dict[str, Callable[[], Any]] = {
 
 
 def path_policy(**more: Any) -> LearnedPolicy:
-    """One that adds to wheel-over on paths of version 1."""
-    task = Task.of("PathFollowing-v1")
+    """One that adds to wheel-over on paths."""
+    task = Task.of("PathFollowing")
     shown = task.observed(MARINER)
     base = controller_class("wheel-over").from_model(MARINER, task=task)  # type: ignore[attr-defined]
     return LearnedPolicy(
@@ -58,7 +58,7 @@ def path_policy(**more: Any) -> LearnedPolicy:
         tuple(one.name for one in shown),
         tuple(one.scale for one in shown),
         base=base,
-        env_id="shipgym/PathFollowing-v1",
+        env_id="shipgym/PathFollowing-v0",
         model_name="mariner",
         **more,
     )
@@ -103,17 +103,11 @@ def of_policy(policy: Any) -> dict[str, Floats]:
 def record_functions() -> dict[str, Floats]:
     """Functions of policies at numbers worth a look."""
     single = np.array([[0.7, -1.3], [0.2, 0.4]], np.float32)
-    policy = random_policy(rate_limit=0.3)
-    broken = np.array(
-        [[0.0, 0.7, np.nan], [2.0, np.nan, 0.1], [1.0, -0.4, 0.9]], np.float32
-    )
-    inputs = series(policy.observation_names, 2)[1].astype(np.float32)
     return {
         "toward": vector(
             toward(single, np.array([[0.1, -0.2], [0.25, -0.9]], np.float32), 0.17)
         ),
         "orders": vector(order_numbers([[-0.93], [0.11], [0.49], [1.0]])),
-        "decided": vector(policy._decided(inputs, broken)),
     }
 
 
@@ -132,10 +126,7 @@ ABOARD: dict[str, Callable[[], Any]] = {
         )
     },
     "wheel-over": lambda: controller_class("wheel-over").from_model(
-        MARINER, task=Task.of("PathFollowing-v1")
-    ),  # type: ignore[attr-defined]
-    "old wheel-over": lambda: controller_class("wheel-over").from_model(
-        MARINER, task=path_following_task()
+        MARINER, task=Task.of("PathFollowing")
     ),  # type: ignore[attr-defined]
     "learned": random_policy,
     "residual": POLICIES["residual"],
@@ -168,8 +159,6 @@ def of_autopilots() -> dict[str, Floats]:
                 "rate_of_turn": 0.004 * (k > 15),
                 "cross_track": 90.0 - 7.0 * k,
                 "course": 0.35 + 0.2 * np.sin(0.3 * k),
-                "turn_distance": 700.0 - 20.0 * k,
-                "turn_angle": 0.7,
                 "next_turn_distance": 500.0 - 20.0 * k,
                 "next_turn_angle": -0.6,
                 "second_turn_distance": 1300.0 - 20.0 * k,
@@ -178,7 +167,9 @@ def of_autopilots() -> dict[str, Floats]:
             orders.append(pilot.step({one: given[one] for one in pilot.inputs}))
         inside = [pilot.dt, pilot.limit, pilot.integral, pilot.last_command]
         found |= {f"{name} orders": vector(orders), f"{name} inside": vector(inside)}
-    return found | {f"bounds {name}": vector(pair) for name, pair in bounds().items()}
+    return found | {
+        f"bounds {name}": vector(pair) for name, pair in observation_bounds().items()
+    }
 
 
 def track(radius: float = 610.0) -> Route:
@@ -290,7 +281,7 @@ def of_helm() -> dict[str, Floats]:
 def of_helm_on_a_route() -> dict[str, Floats]:
     """A ship in a current and wind, steered along a route by what her instruments show."""
     guide = controller_class("wheel-over").from_model(
-        MARINER, task=Task.of("PathFollowing-v1")
+        MARINER, task=Task.of("PathFollowing")
     )  # type: ignore[attr-defined]
     places = np.array([[54.0, 7.5], [54.012, 7.5], [54.02, 7.53], [54.03, 7.53]])
     helm = Helm(

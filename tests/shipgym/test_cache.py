@@ -353,7 +353,7 @@ def test_who_waits_at_a_terminal_sees_one_line(tmp_path, monkeypatch, capsys):
     assert capsys.readouterr().err == ""
 
 
-@pytest.mark.parametrize("task", ["PathFollowing", "PathFollowing-v1"])
+@pytest.mark.parametrize("task", ["CourseKeeping", "PathFollowing"])
 def test_loops_over_ships_are_vectorised(task, monkeypatch):
     monkeypatch.setattr(
         compiling, "usable_folder", lambda: None

@@ -773,5 +773,5 @@ def test_loops_of_two_tasks_share_the_step_of_a_ship_but_not_that_of_another_shi
         return loop.inner(made.parts["sail_lanes"])
 
     mariner = sailing("CourseKeeping", "mariner-tls-svm")
-    assert sailing("PathFollowing-v1", "mariner-tls-svm") is mariner
+    assert sailing("PathFollowing", "mariner-tls-svm") is mariner
     assert sailing("CourseKeeping", "kvlcc2-mmg") is not mariner

@@ -22,13 +22,9 @@ from shipgym.envs.randomisation import Randomisation
 from shipgym.ships import Envelope
 from shipgym.tasks import course_keeping
 from shipgym.tasks.contract import Interval, Random, Readings
+from shipgym.tasks.scales import OBSERVATION_NAMES, control_interval, observation_scales
 from shipgym.tasks.steering import Weights, extras, helm, integrated, steering_reward
-from shipgym.tasks.task import (
-    OBSERVATION_NAMES,
-    control_interval,
-    course_keeping_task,
-    observation_scales,
-)
+from shipgym.tasks.task import course_keeping_task
 
 ID = "shipgym/CourseKeeping-v0"
 

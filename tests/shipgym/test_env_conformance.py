@@ -14,14 +14,14 @@ from stable_baselines3.common.vec_env import SubprocVecEnv
 
 import shipgym
 from shipgym import InputError
-from shipgym.envs.registration import environments
+from shipgym.envs.registration import ENVIRONMENTS
 from shipgym.sea import Current, Weather, Wind
 from shipgym.ships import ShipModel
 
 pytestmark = pytest.mark.interpreted
 
 COURSE, PATH = "shipgym/CourseKeeping-v0", "shipgym/PathFollowing-v0"
-IDS = list(environments())
+IDS = list(ENVIRONMENTS)
 SEA = Weather(current=Current(0.5), wind=Wind(9.0))
 BY_KEYWORD = [
     (
@@ -64,9 +64,6 @@ NAMES = [
 def test_every_id_and_variant_conforms_without_a_warning(check, name, options):
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        warnings.filterwarnings(
-            "ignore", ".*is out of date.*upgrading to version `v1`", DeprecationWarning
-        )
         env = gymnasium.make(name, **options)
         check(env.unwrapped)
     assert env.spec.id == name
@@ -330,18 +327,15 @@ def test_reset_says_what_is_wrong():
 @pytest.mark.parametrize("name", IDS)
 def test_every_id_conforms_as_a_vector(name):
     options = {"episode_steps": 6, "disable_env_checker": True}
-    with warnings.catch_warnings(
-        action="ignore", category=DeprecationWarning
-    ):  # of ids that are out of date
-        shipgym.check_vector_env(
-            lambda: gymnasium.make_vec(name, 3, episode_steps=6),
-            lambda: gymnasium.make(name, **options),
-            20,
-        )
+    shipgym.check_vector_env(
+        lambda: gymnasium.make_vec(name, 3, episode_steps=6),
+        lambda: gymnasium.make(name, **options),
+        20,
+    )
 
 
 def test_every_id_makes_both():
-    for name in environments():
+    for name in ENVIRONMENTS:
         many, one = gymnasium.make_vec(name, num_envs=2), gymnasium.make(name)
         assert many.single_observation_space == one.observation_space
         assert many.single_action_space == one.action_space

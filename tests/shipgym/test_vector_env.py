@@ -30,7 +30,7 @@ def vector(name, num_envs=3, **options):
 
 
 @pytest.mark.parametrize("mode", MODES)
-@pytest.mark.parametrize("name", [COURSE, PATH, "shipgym/PathFollowing-v1"])
+@pytest.mark.parametrize("name", [COURSE, PATH])
 def test_conformance_and_rows_that_are_single_environments(name, mode):
     check_vector_env(
         lambda: vector(name, 3, autoreset_mode=mode, **SHORT),
