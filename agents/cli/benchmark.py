@@ -9,10 +9,10 @@ from typer import Option
 
 from agents.cli.command import (
     INTERRUPTED,
-    WRONG_INPUT,
     Address,
     AllowCode,
     EngineName,
+    Out,
     fail,
 )
 
@@ -28,13 +28,6 @@ Controllers = Annotated[
             " ...), tuned-pid, pretrained agents (ppo, sac), files of agents,"
             " module:function, name=...; default: all classical ones."
         )
-    ),
-]
-Out = Annotated[
-    Path | None,
-    Option(
-        metavar="FOLDER",
-        help="Folder for results.json, episodes.parquet and index.html.",
     ),
 ]
 Suite = Annotated[
@@ -60,8 +53,8 @@ Page = Annotated[
 
 
 def benchmark_command(
+    out: Out,
     controllers: Controllers = None,
-    out: Out = None,
     suite: Suite = "shipgym-v1",
     tasks: Tasks = None,
     workers: Workers = None,
@@ -77,11 +70,6 @@ def benchmark_command(
     from agents.cli.terminal import progress_bars
     from agents.controllers.designs import CLASSICAL
 
-    if out is None:
-        fail(
-            "--out: expected a folder for the results, got none: --out results/",
-            WRONG_INPUT,
-        )
     try:
         with progress_bars() as progress:
             result = benchmark(

@@ -832,6 +832,17 @@ def test_a_folder_takes_the_results_of_one_suite_only(copy, tmp_path):
 
 # --- the command
 
+INTERRUPTED_PILOT = """
+from agents import PID
+
+INTERRUPTED = True
+
+def pilot(task):
+    if INTERRUPTED:
+        raise KeyboardInterrupt
+    return PID.from_model(task.ship)
+"""
+
 
 def test_the_command_ranks_and_writes(suite, tmp_path):
     out = tmp_path / "r"
@@ -846,6 +857,25 @@ def test_the_command_ranks_and_writes(suite, tmp_path):
     again = shipgym(*words, "--resume", "--json")
     assert json.loads(again.stdout)["ranking"][0]["name"] == "pid"
     assert not (out / "index.html").exists()  # it would be of the results before
+
+
+def test_the_command_goes_on_where_it_was_interrupted(suite, tmp_path, monkeypatch):
+    module = tmp_path / "interrupted_pilot.py"
+    monkeypatch.chdir(tmp_path)
+    words = ["--controllers", "lq,mine=interrupted_pilot:pilot", "--suite", suite]
+    words += ["--tasks", "calm", "--episodes", 2, "--workers", 1, "--out", "r"]
+    module.write_text(INTERRUPTED_PILOT)
+    answer = shipgym(*words)
+    assert answer.exit_code == 130
+    assert "what was done is kept in r: continue with --resume" in answer.stderr
+
+    monkeypatch.setitem(sys.modules, "plotly", None)
+    sys.modules["interrupted_pilot"].INTERRUPTED = False
+    answer = shipgym(*words, "--resume")
+    assert answer.exit_code == 0
+    assert "warning: there is no index.html: plotly" in answer.stderr
+    assert "warning: 2 of 100 episodes: for a quick look" in answer.stderr
+    assert set(load_results("r").ranking) == {"lq", "mine"}
 
 
 def test_bad_input_is_one_message_and_nothing_is_written(suite, tmp_path):
@@ -870,5 +900,5 @@ def test_bad_input_is_one_message_and_nothing_is_written(suite, tmp_path):
         answer = shipgym(*words, "--out", out)
         assert (answer.exit_code, answer.stdout) == (2, "")
         assert said in answer.stderr
-    assert "--out: expected a folder" in shipgym("--controllers", "pid").stderr
+    assert "Missing option '--out'" in shipgym("--controllers", "pid").stderr
     assert not out.exists()

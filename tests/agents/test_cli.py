@@ -20,7 +20,6 @@ from typer.testing import CliRunner
 
 from agents.cli import app, main, reproduction
 from agents.cli.command import Commands, report_os_error, shared_options
-from agents.controllers.designs import CLASSICAL
 from agents.jobs import JobEngine, JobError
 from agents.training.run_folder import CHECKPOINT
 from shipgym import InputError, ManoeuvreError, UnstableModelError, load_model
@@ -680,129 +679,6 @@ def test_an_autopilot_that_cannot_be_trusted_fails_with_the_reason(
     answer = shipgym("autopilot", demo, "--out", tmp_path)
     assert answer.exit_code == (1 if fields else 0)
     assert answer.stderr.startswith(message)
-
-
-@pytest.fixture
-def benchmarked(monkeypatch):
-    """What the command asks for of benchmarks that are not run, and their result."""
-    summary = {
-        "contestants": dict.fromkeys(("pid", "lq", "mine")),
-        "seeds": {"count": 100},
-    }
-    found = SimpleNamespace(
-        summary=summary, failures=[], asked=[], submitted=[], ends=None
-    )
-
-    def benchmark(*given, **more):
-        found.asked.append((*given[:5], more["episodes"], more["resume"]))
-        if found.ends is not None:
-            raise found.ends
-        given[3].mkdir(exist_ok=True)
-        return found
-
-    def write_page(result, path, **_):
-        raise InputError("plotly is not installed")
-
-    monkeypatch.setattr("agents.benchmarking.run.benchmark", benchmark)
-    monkeypatch.setattr("agents.benchmarking.page.write_page", write_page)
-    monkeypatch.setattr(
-        "agents.benchmarking.submission.submit",
-        lambda _, *what: found.submitted.append(what),
-    )
-    for table in ("ranking_table", "costs_table"):
-        monkeypatch.setattr(
-            f"agents.cli.benchmark_tables.{table}", lambda result: "a table"
-        )
-    return found
-
-
-def test_a_benchmark_is_run_as_told_and_the_last_contestant_submitted(
-    benchmarked, tmp_path
-):
-    out, mine = tmp_path / "out", tmp_path / "mine.json"
-    answer = shipgym("benchmark", "--out", out, "--submit", mine)
-    assert answer.exit_code == 0, answer.stderr
-    assert answer.stderr == "warning: there is no index.html: plotly is not installed\n"
-    assert answer.stdout.splitlines() == [
-        "a table",
-        "",
-        "a table",
-        "",
-        f"written: {out}",
-    ]
-    assert benchmarked.submitted == [("mine", mine)]
-    benchmarked.failures.append("lq lost control")
-    benchmarked.summary["seeds"]["count"] = 99
-    words = [
-        "--controllers",
-        "pid,mine",
-        "--tasks",
-        "a,b",
-        "--workers",
-        3,
-        "--episodes",
-        99,
-        "--resume",
-    ]
-    answer = shipgym("benchmark", "--out", out, *words, "--no-page")
-    assert answer.stderr.splitlines() == [
-        "warning: lq lost control",
-        "warning: 99 of 100 episodes: for a quick look, not for a ranking",
-    ]
-    assert len(benchmarked.submitted) == 1
-    assert benchmarked.asked == [
-        (CLASSICAL, "shipgym-v1", None, out, None, 100, False),
-        ("pid,mine", "shipgym-v1", ["a", "b"], out, 3, 99, True),
-    ]
-    absent = shipgym(
-        "benchmark", "--out", out, "--submit", tmp_path / "absent" / "mine.json"
-    )
-    assert (absent.exit_code, len(benchmarked.asked)) == (
-        2,
-        2,
-    )  # before anything is run
-    benchmarked.ends = KeyboardInterrupt()
-    answer = shipgym("benchmark", "--out", out)
-    assert answer.exit_code == 130
-    assert (
-        answer.stderr
-        == f"error: interrupted; what was done is kept in {out}: continue with"
-        " --resume\n"
-    )
-
-
-def test_results_are_verified_as_told(monkeypatch, tmp_path):
-    asked = []
-
-    def verify(path, **given):
-        asked.append((path, given))
-        return []
-
-    monkeypatch.setattr("agents.benchmarking.verification.verify", verify)
-    assert shipgym("benchmark", "--verify", tmp_path, "--json").stdout.split() == [
-        "{",
-        '"checks":',
-        "[]",
-        "}",
-    ]
-    given = (
-        "--sample",
-        3,
-        "--tolerance",
-        0.1,
-        "--workers",
-        2,
-        "--allow-code",
-        "mine:make",
-    )
-    assert shipgym("benchmark", "--verify", tmp_path, *given).exit_code == 0
-    assert asked == [
-        (tmp_path, {"sample": 8, "tolerance": None, "workers": None, "allow_code": []}),
-        (
-            tmp_path,
-            {"sample": 3, "tolerance": 0.1, "workers": 2, "allow_code": ["mine:make"]},
-        ),
-    ]
 
 
 @pytest.mark.parametrize(

@@ -223,12 +223,12 @@ def result():
         "suite": {"name": "shipgym-v1"},
         "ranking": [entry("lq"), entry("pid", 7)],
         "tasks": {"calm": {"lq": of_lq, "pid": of_pid}, "rough": {"lq": slower}},
-        "contestants": {"lq": {"runs": 1}, "pid": {"runs": 3}},
+        "controllers": {"lq": {"runs": 1}, "pid": {"runs": 3}},
     }
     return SimpleNamespace(summary=summary, tasks=tuple(summary["tasks"]))
 
 
-def test_contestants_are_shown_with_the_mean_of_their_times():
+def test_controllers_are_shown_with_the_mean_of_their_times():
     first, second = cells(benchmark_tables.ranking_table(result()), 2)
     assert first == "lq 0.512 0.400 to 0.600 1.500 2 1 1 0 4.00"
     assert second == "pid 0.512 0.400 to 0.600 1.500 2 3 1 7 -"
@@ -239,23 +239,3 @@ def test_costs_are_shown_by_task_the_lowest_first():
     assert first == "calm pid 1.00 - - 3 -"
     assert second == "lq 2.00 1.50 to 2.50 - 3 98 %"
     assert third == "rough lq 2.00 1.50 to 2.50 - 3 98 %"
-
-
-def test_what_was_run_again_is_the_same_close_or_differs():
-    about = {
-        "contestant": "lq",
-        "task": "calm",
-        "episodes": 5,
-        "difference": 1.5e-9,
-        "note": "",
-    }
-    checks = [
-        SimpleNamespace(exact=exact, passed=passed, **about)
-        for exact, passed in ((True, True), (False, True), (False, False))
-    ]
-    rows = cells(benchmark_tables.verification_table(checks), 3)
-    assert [row.split(maxsplit=3)[3] for row in rows] == [
-        "none the same",
-        "1.5e-09 close",
-        "1.5e-09 differs",
-    ]
