@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from shipgym.checks import quoted
 from shipgym.errors import InputError
 from shipgym.extras import library
-from shipgym.files import LARGEST_TENSORS, atomic_path, read_bytes
+from shipgym.drafts import atomic_path
+from shipgym.files import LARGEST_TENSORS, read_bytes
 
 Columns = dict[str, NDArray[Any]]
 

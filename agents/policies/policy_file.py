@@ -34,7 +34,7 @@ from shipgym.checks import (
     placed,
     quoted,
 )
-from shipgym.ships.model_file import read_envelope
+from shipgym.ships.envelope import Envelope
 from shipgym.tasks.task import OBSERVATION_NAMES
 
 #: What older files of a kind lack, and what it means.
@@ -154,7 +154,11 @@ def _shielded(content: Mapping[str, Any], tensors: Tensors, prefix: str) -> Shie
         policy=policy,
         fallback=_controller(content, "fallback"),
         dt=check_number(content["dt"], "dt", above=0.0),
-        envelope=read_envelope(content["envelope"], "envelope"),
+        envelope=(
+            None
+            if content["envelope"] is None
+            else Envelope.from_dict(content["envelope"], "envelope")
+        ),
         limits=Limits(
             **{name: check_number(limits.get(name), f"limits.{name}") for name in known}
         ),

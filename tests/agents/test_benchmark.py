@@ -110,13 +110,13 @@ def test_the_table_is_tidy(folder):
     [
         (
             ("pdi", "mariner-calm"),
-            "contestant: 'pdi' found, expected one of 'pid', 'lq'",
+            "contestant: expected one of 'pid', 'lq'",
         ),
         (
             ("pid", "mariner-clam"),
-            "task: 'mariner-clam' found, expected one of 'mariner-calm'",
+            "task: expected one of 'mariner-calm'",
         ),
-        (("pid", "mariner-calm", "cots"), "figure: 'cots' found"),
+        (("pid", "mariner-calm", "cots"), "figure: expected"),
     ],
 )
 def test_figures_of_nobody_are_refused(folder, asked, said):
@@ -553,7 +553,7 @@ def test_agents_in_the_box_are_found_by_task_and_algorithm():
 def test_wrong_task_and_suite():
     with pytest.raises(InputError, match="Did you mean 'mariner-calm'"):
         benchmark("pid", tasks=["mariner-clam"])
-    with pytest.raises(InputError, match="suite: 'shipgym-v9' found"):
+    with pytest.raises(InputError, match="suite: expected"):
         benchmark("pid", suite="shipgym-v9")
 
 
@@ -566,9 +566,9 @@ def test_what_the_results_say_is_true(folder):
 @pytest.mark.parametrize(
     ("asked", "said"),
     [
-        ({"sample": 0}, "sample: 0 found"),
-        ({"tolerance": -1e-9}, "tolerance: -1e-09 found"),
-        ({"tolerance": np.nan}, "tolerance: nan found"),
+        ({"sample": 0}, "sample: expected"),
+        ({"tolerance": -1e-9}, "tolerance: expected"),
+        ({"tolerance": np.nan}, "tolerance: expected"),
     ],
 )
 def test_a_sample_of_nothing_and_a_tolerance_below_zero_are_refused(
@@ -871,7 +871,7 @@ def test_an_episode_run_again_costs_the_same_to_a_billionth():
         (
             "results.json",
             lambda data: data.replace(b'"format": 2', b'"format": 9'),
-            "format 9 found",
+            "expected format 2",
         ),
         (
             "results.json",
@@ -952,31 +952,31 @@ def test_rows_of_nobody_in_the_summary_are_refused(copy):
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        (lambda one: one["seeds"].update(count=0), "r.json: seeds.count: 0 found"),
-        (lambda one: one["seeds"].update(count="4"), "r.json: seeds.count: '4' "),
+        (lambda one: one["seeds"].update(count=0), "r.json: seeds.count: expected"),
+        (lambda one: one["seeds"].update(count="4"), "r.json: seeds.count: expected"),
         (
             lambda one: one["ranking"][0].update(name="los"),
-            "r.json: name of a contestant: 'los' found",
+            "r.json: name of a contestant: expected",
         ),
         (
             lambda one: one["improvement"].update(los={}),
-            "r.json: name of a contestant: 'los' found",
+            "r.json: name of a contestant: expected",
         ),
         (
             lambda one: one["profile"]["shares"].update(los=[]),
-            "r.json: name of a contestant: 'los' found",
+            "r.json: name of a contestant: expected",
         ),
         (
             lambda one: one["tasks"].update(rough={}),
-            "r.json: name of a task: 'rough' found",
+            "r.json: name of a task: expected",
         ),
         (
             lambda one: one["reference"].update(rough={"zero": 1, "best": 0}),
-            "r.json: name of a task: 'rough' found",
+            "r.json: name of a task: expected",
         ),
         (
             lambda one: one["ranking"].pop(0),
-            "r.json: tasks.mariner-calm: name of a contestant: 'lq' found",
+            "r.json: tasks.mariner-calm: name of a contestant: expected",
         ),
         (
             lambda one: one["tasks"]["mariner-calm"]["lq"].pop("runs"),
@@ -1095,7 +1095,7 @@ def test_tasks_are_chosen_by_name_each_once():
 
 @pytest.mark.parametrize("episodes", [0, 101, 2.5])
 def test_as_many_episodes_are_run_as_are_scored_at_most(episodes):
-    with pytest.raises(InputError, match=f"episodes: {episodes} found"):
+    with pytest.raises(InputError, match="episodes: expected"):
         benchmark("pid", tasks=TASKS, episodes=episodes)
 
 
@@ -1253,7 +1253,7 @@ def test_bad_input_is_told_in_one_line_and_nothing_is_written(tmp_path):
         (["--controllers", "pid"], "--out"),
         (
             ["--controllers", "pid", "--out", out, "--engine", "rai"],
-            "engine: 'rai' found",
+            "engine: expected",
         ),
         (["--verify", out], "there is no such file of benchmark results"),
         (
@@ -1264,7 +1264,7 @@ def test_bad_input_is_told_in_one_line_and_nothing_is_written(tmp_path):
             ["--submit", tmp_path / "s.json", "--episodes", 9, "--out", out],
             "--episodes: found together with",
         ),
-        (["--tasks", "mariner-calm,", "--out", out], "task: '' found, expected one of"),
+        (["--tasks", "mariner-calm,", "--out", out], "task: expected one of"),
         (
             ["--controllers", f"pid,{cut}", "--tasks", "mariner-calm", "--out", out],
             "may be cut short",

@@ -120,7 +120,7 @@ def kernel_ship():
     weights = dict(
         zip(structure.coefficient_names, 1e-3 * random.normal(size=9), strict=True)
     )
-    return replace(box, coefficients=weights, covariance=None, own_table=structure)
+    return replace(box, coefficients=weights, covariance=None, dynamics=structure)
 
 
 @pytest.mark.parametrize("name", ["tanker", "kvlcc2-rm-svm", "kernel"])

@@ -239,11 +239,9 @@ def test_impossible_designs_are_refused():
         {"tracking_lengths": -1.0},
         {"wave_period": 1.0},
     ):
-        with pytest.raises(InputError, match=f"{next(iter(arguments))}: .* found"):
+        with pytest.raises(InputError, match=f"{next(iter(arguments))}: expected"):
             FilteredPID.from_model(MARINER, **arguments)
-    with pytest.raises(
-        InputError, match=r"wave_period: 0\.9 found, expected a number > 1;"
-    ):
+    with pytest.raises(InputError, match=r"wave_period: expected a number > 1 "):
         FilteredPID.from_model(MARINER, dt=0.5, wave_period=0.9)
 
 
@@ -256,5 +254,5 @@ def test_impossible_designs_are_refused():
     ],
 )
 def test_numbers_beyond_their_bounds_are_refused(name, value):
-    with pytest.raises(InputError, match=rf"{name}: .* found, expected"):
+    with pytest.raises(InputError, match=rf"{name}: expected"):
         FilteredPID.from_model(MARINER, **{name: value})

@@ -214,9 +214,7 @@ def test_a_policy_evaluation_of_stable_baselines3_takes_it_as_it_is():
 
 
 def test_an_impossible_design_is_refused():
-    with pytest.raises(
-        InputError, match="integral_lengths: -1 found, expected a number > 0"
-    ):
+    with pytest.raises(InputError, match="integral_lengths: expected a number > 0"):
         LQ.from_model(MARINER, integral_lengths=-1.0)
 
 
@@ -224,7 +222,7 @@ def test_an_impossible_design_is_refused():
     ("name", "value"), [("rudder_weight", 0.0), ("rate_weight_s2", 0.0), ("dt", 0.0)]
 )
 def test_numbers_beyond_their_bounds_are_refused(name, value):
-    with pytest.raises(InputError, match=rf"{name}: .* found, expected"):
+    with pytest.raises(InputError, match=rf"{name}: expected"):
         LQ.from_model(MARINER, **{name: value})
 
 

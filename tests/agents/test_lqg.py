@@ -189,10 +189,10 @@ def test_the_state_is_that_of_as_many_ships():
 def test_impossible_designs_are_refused():
     with pytest.raises(
         InputError,
-        match="wave_period: 1 found, expected a number > 2; two control intervals",
+        match=r"wave_period: expected a number > 2 .two control intervals",
     ):
         LQG.from_model(MARINER, wave_period=1.0)
-    with pytest.raises(InputError, match="noise: 0 found"):
+    with pytest.raises(InputError, match="noise: expected"):
         LQG.from_model(MARINER, noise=0.0)
 
 
@@ -201,7 +201,7 @@ def test_impossible_designs_are_refused():
     [("wave_heading_deg", 0.0), ("disturbance_deg", 0.0), ("rudder_weight", -1.0)],
 )
 def test_numbers_beyond_their_bounds_are_refused(name, value):
-    with pytest.raises(InputError, match=rf"{name}: .* found, expected"):
+    with pytest.raises(InputError, match=rf"{name}: expected"):
         LQG.from_model(MARINER, wave_period=9.0, **{name: value})
 
 

@@ -224,13 +224,13 @@ def test_a_policy_evaluation_of_stable_baselines3_takes_it_as_it_is():
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ({"integral_lengths": 0.0}, "integral_lengths: 0 found, expected a number > 0"),
+        ({"integral_lengths": 0.0}, "integral_lengths: expected a number > 0"),
         (
             {"frequency": 5.0},
             "PID on model 'mariner': the closed loop is unstable with these gains",
         ),
-        ({"damping": -1.0}, "damping: -1 found"),
-        ({"dt": "1"}, "dt: '1' .* found"),
+        ({"damping": -1.0}, "damping: expected"),
+        ({"dt": "1"}, "dt: expected"),
     ],
 )
 def test_impossible_designs_are_refused(arguments, message):
@@ -240,7 +240,7 @@ def test_impossible_designs_are_refused(arguments, message):
 
 @pytest.mark.parametrize(("name", "value"), [("frequency", 0.0), ("damping", -1.0)])
 def test_numbers_beyond_their_bounds_are_refused(name, value):
-    with pytest.raises(InputError, match=rf"{name}: .* found, expected"):
+    with pytest.raises(InputError, match=rf"{name}: expected"):
         PID.from_model(MARINER, **{name: value})
 
 

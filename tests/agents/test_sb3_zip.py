@@ -200,7 +200,7 @@ def test_what_is_no_such_zip_is_refused(tmp_path):
         path.write_bytes(content)
         with pytest.raises(InputError, match="not a zip of stable-baselines3"):
             read_sb3(path)
-    with pytest.raises(InputError, match=r"no_such\.zip' found, expected one of"):
+    with pytest.raises(InputError, match=r"expected one of"):
         contestants(str(tmp_path / "no_such.zip"))
 
 
@@ -283,8 +283,8 @@ def test_what_stands_between_the_layers_is_told_by_its_name(kwargs, found):
             {"policy_kwargs": {"extra": 1, "also": 2}},
             "policy_kwargs 'also', 'extra' found, expected 'MlpPol",
         ),
-        ({"policy_kwargs": 3}, "data: policy_kwargs: 3 found, expected a table"),
-        ({"policy_class": None}, "data: policy_class: None found, expected a table"),
+        ({"policy_kwargs": 3}, "data: policy_kwargs: expected a table"),
+        ({"policy_class": None}, "data: policy_class: expected a table"),
         (
             {"policy_class": {}},
             "policy of None found, expected 'MlpPolicy' of stable-baselines3",
@@ -353,7 +353,7 @@ def test_without_torch_the_extra_is_named(tmp_path, monkeypatch):
     (tmp_path / "model.zip").write_bytes(
         zipped(data="{}", **{"policy.pth": saved_tensors({})})
     )
-    with pytest.raises(InputError, match=r"model\.zip: data: policy_class: None found"):
+    with pytest.raises(InputError, match=r"model\.zip: data: policy_class: expected"):
         read_sb3(tmp_path / "model.zip")
     monkeypatch.setitem(sys.modules, "torch", None)
     with pytest.raises(

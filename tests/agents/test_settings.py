@@ -91,7 +91,7 @@ def test_settings_reach_to_their_bounds_and_no_further(
         tuple(allowed) if isinstance(allowed, list) else allowed
     )
     with pytest.raises(
-        InputError, match=rf"{name}: .* found, expected|top_quantiles_to_drop: 2 found"
+        InputError, match=rf"{name}: .*expected|top_quantiles_to_drop: 2 found"
     ):
         changed(usual, {name: beyond})
 
@@ -112,29 +112,29 @@ def test_settings_reach_to_their_bounds_and_no_further(
             {"ent_coef": "auto_-1"},
             "found, expected a number, 'auto' or such as 'auto_0.1'",
         ),
-        ({"ent_coef": "otto"}, "ent_coef: 'otto'"),
+        ({"ent_coef": "otto"}, "ent_coef: .*'otto'"),
         (
             {"target_entropy": "auto_1"},
-            "target_entropy: 'auto_1' .* found, expected a number .*; or 'auto'$",
+            "target_entropy: expected a number .*or 'auto'.",
         ),
         (
             {"target_entropy": "auto1"},
-            "target_entropy: 'auto1' .* found, expected a number .*; or 'auto'$",
+            "target_entropy: expected a number .*or 'auto'.",
         ),
         (
             {"ent_coef": "auto_0"},
             "found, expected a number, 'auto' or such as 'auto_0.1'",
         ),
-        ({"ent_coef": True}, "ent_coef: True found"),
+        ({"ent_coef": True}, "ent_coef: expected"),
         ({"schedule": "liner"}, "Did you mean 'linear'"),
-        ({"activation": "elu"}, "activation: 'elu' found, expected one of"),
+        ({"activation": "elu"}, "activation: expected one of"),
         (
             {"ships": 10, "buffer_size": 9},
             "buffer_size: 9 found, expected one for each of 10 ships",
         ),
-        ({"authority": 2.1, "base": "lq"}, "authority: 2.1 found"),
-        ({"authority": 0.0, "base": "lq"}, "authority: 0 found"),
-        ({"total_steps": 1.5}, "total_steps: 1.5"),
+        ({"authority": 2.1, "base": "lq"}, "authority: expected"),
+        ({"authority": 0.0, "base": "lq"}, "authority: expected"),
+        ({"total_steps": 1.5}, "total_steps: expected"),
     ],
 )
 def test_settings_that_cannot_be_meant_are_refused(given, message):
@@ -157,7 +157,7 @@ def test_a_base_is_a_kind_of_controller_or_a_file_of_one():
     settings = load_settings("ppo")
     assert changed(settings, {"base": "designs/mine.json"}).base == "designs/mine.json"
     for wrong in ("designs/mine.toml", "lqq", ""):
-        with pytest.raises(InputError, match=f"base: '{wrong}' found"):
+        with pytest.raises(InputError, match="base: expected"):
             changed(settings, {"base": wrong})
     with pytest.raises(
         InputError, match=r"authority: 0\.5 found without a base, expected 1, or a base"
@@ -169,8 +169,8 @@ def test_a_base_is_a_kind_of_controller_or_a_file_of_one():
 @pytest.mark.parametrize(
     ("asked", "message"),
     [
-        (("pqo",), "algorithm: 'pqo' found.* Did you mean 'ppo'"),
-        (("ppo", "harbour"), "environment: 'harbour' found"),
+        (("pqo",), "algorithm: expected.* Did you mean 'ppo'"),
+        (("ppo", "harbour"), "environment: expected"),
     ],
 )
 def test_settings_of_what_is_not_known_are_refused(asked, message):
@@ -284,7 +284,7 @@ def test_settings_of_the_command_line_and_of_files(tmp_path):
     with pytest.raises(InputError, match=r"mine\.toml: not valid TOML"):
         read_settings_file(path, "ppo")
     path.write_bytes(b"\xff\xfe")
-    with pytest.raises(InputError, match="the file is in UTF-16"):
+    with pytest.raises(InputError, match="in UTF-8, got UTF-16"):
         read_settings_file(path, "ppo")
 
 
@@ -444,18 +444,18 @@ def test_domain_randomisation_draws_ships_seas_and_speeds_and_leaves_what_was_as
     [
         (
             {"seed": 800},
-            "seed: 800 found, expected a whole number of at least 0 and at most 799",
+            "seed: expected an integer of at least 0 and at most 799",
         ),
-        ({"seed": -1}, "seed: -1 found"),
-        ({"threads": 0}, "threads: 0 found"),
+        ({"seed": -1}, "seed: expected"),
+        ({"threads": 0}, "threads: expected"),
         (
             {"settings": {"ships": 1001, "batch_size": 1001}},
-            "ships: 1001 found, .* at most 1000",
+            "ships: expected .* at most 1000",
         ),
-        ({"settings": {"ships": 0}}, "ships: 0 found"),
+        ({"settings": {"ships": 0}}, "ships: expected"),
         (
             {"settings": {"action_repeat": 601}},
-            "action_repeat: 601 found, .* at most 600, no longer than an",
+            "action_repeat: expected .* at most 600 .no longer than an",
         ),
         (
             {"options": {"action": "rudder-shaft"}},
@@ -499,7 +499,7 @@ def test_plans_that_cannot_be_are_refused(arguments, message):
 
 
 def test_an_unknown_algorithm_is_told_before_an_unknown_task():
-    with pytest.raises(InputError, match="algorithm: 'pqo' found"):
+    with pytest.raises(InputError, match="algorithm: expected"):
         make_plan(Given("pqo", task="mariner-clam"))
     with pytest.raises(InputError, match="which sac does not learn; take ppo"):
         make_plan(

@@ -267,14 +267,14 @@ def test_the_shaft_stays_with_the_policy():
 @pytest.mark.parametrize(
     ("limits", "message"),
     [
-        ({"envelope_out": 0.5}, "limits.envelope_out: 0.5 found"),
+        ({"envelope_out": 0.5}, "limits.envelope_out: expected"),
         (
             {"envelope_back": 1.5},
-            "limits.envelope_back: 1.5 found.*< 1.5; less than to take over",
+            "limits.envelope_back: expected.*< 1.5 .less than to take over",
         ),
-        ({"back_deg": 10.0}, "limits.back_deg: 10 found"),
-        ({"runaway_deg": 200.0}, "limits.runaway_deg: 200 found"),
-        ({"calm_lengths": -1.0}, "limits.calm_lengths: -1 found"),
+        ({"back_deg": 10.0}, "limits.back_deg: expected"),
+        ({"runaway_deg": 200.0}, "limits.runaway_deg: expected"),
+        ({"calm_lengths": -1.0}, "limits.calm_lengths: expected"),
     ],
 )
 def test_limits_that_do_not_fit_are_refused(limits, message):
@@ -329,7 +329,7 @@ def test_times_are_in_ship_lengths_and_one_interval_at_least():
     assert shield._intervals(2.0) == pytest.approx(2.0 * length_time / 0.5)
     assert shield._intervals(0.0) == shield._intervals(1e-6) == 1.0
     assert Shielded.from_model(MARINER, Always(0.0), dt=0.05).dt == 0.05
-    with pytest.raises(InputError, match="dt: 0 found, expected a number > 0"):
+    with pytest.raises(InputError, match="dt: expected a number > 0"):
         Shielded.from_model(MARINER, Always(0.0), dt=0.0)
 
 
@@ -355,9 +355,9 @@ def test_a_shield_waits_a_quarter_and_a_whole_ship_length():
         "back_deg": 10.0,
     }
     for name, value in wrong.items():
-        with pytest.raises(InputError, match=rf"limits\.{name}: {value:g} found"):
+        with pytest.raises(InputError, match=rf"limits\.{name}: expected"):
             Limits(**{name: value})
     for name in ("out_lengths", "calm_lengths"):
-        with pytest.raises(InputError, match=rf"limits\.{name}: -1 found"):
+        with pytest.raises(InputError, match=rf"limits\.{name}: expected"):
             Limits(**{name: -1.0})
         assert getattr(Limits(**{name: 0.0}), name) == 0.0

@@ -497,9 +497,9 @@ def test_turns_ahead_are_those_of_the_path_following_environment():
         ("latitude,longitude\n54,7\n", "1 waypoints found, expected at least 2"),
         (
             "latitude,longitude\n54,7\n95,7\n",
-            r"line 3 \(data row 2\), column 'latitude': 95 found",
+            r"line 3 \(data row 2\), column 'latitude': expected",
         ),
-        ("latitude,longitude\n54,7\n54,\n", "column 'longitude': nan found"),
+        ("latitude,longitude\n54,7\n54,\n", "column 'longitude': expected"),
         ("lat,lon\n54,7\n", "column 'latitude' not found"),
         (
             "latitude,longitude\n54,7\n54.001,7\n54.001,7.001\n",
@@ -534,7 +534,7 @@ def test_what_steers_no_route_and_no_rate_is_refused():
     ):
         Helm(LQ_MARINER, None, Limits(), rate=0.01)
     with pytest.raises(
-        InputError, match=r"rate of turn: 1 found, expected .* rad/s, to a heading"
+        InputError, match=r"rate of turn: expected .* .rad/s, to a heading"
     ):
         Helm(TURN_RATE, 0.5, Limits(), rate=1.0)
 
@@ -871,10 +871,10 @@ def test_by_default_a_ship_is_simulated_as_time_goes_until_she_is_stopped(monkey
     [
         (
             ["--drop", "HDT"],
-            "--drop: 'HDT' found, expected name=value, such as --drop HDT=60",
+            "--drop: expected name=value, such as --drop HDT=60",
         ),
-        (["--drop", "hdt='late'"], "--drop hdt: 'late' .*found, expected"),
-        (["--drop", "hdt=-1"], "--drop hdt: -1 found, expected a number >= 0"),
+        (["--drop", "hdt='late'"], "--drop hdt: expected"),
+        (["--drop", "hdt=-1"], "--drop hdt: expected a number >= 0"),
         (
             ["--drop", "XYZ=3"],
             "drop: unknown key 'XYZ'. Known keys: 'APB', 'BWC', 'HDT', 'RMC', 'ROT'",
@@ -1008,9 +1008,7 @@ def test_a_simulated_ship_keeps_time_and_runs_so_many_times_as_fast():
 
     with asyncio.Runner(loop_factory=no_waiting) as runner:
         runner.run(sails())
-        with pytest.raises(
-            InputError, match="speed_up: 0 found, expected a number > 0"
-        ):
+        with pytest.raises(InputError, match="speed_up: expected a number > 0"):
             runner.run(simulate_ship(ship, "udp:127.0.0.1:9", speed_up=0.0))
     assert ship.steps == 600
     assert steps[0] == pytest.approx(59.9 / 10.0)
@@ -1066,7 +1064,7 @@ def test_it_hands_over_when_a_step_comes_a_second_late_and_not_sooner(delay_s, a
 @pytest.mark.parametrize("name", ["speed_up", "heading", "rate"])
 def test_what_is_no_number_is_refused_before_anything_is_opened(name):
     given = {"heading": 0.1, "rate": 0.001} | {name: math.nan}
-    with pytest.raises(InputError, match=f"{name}: nan found"):
+    with pytest.raises(InputError, match=f"{name}: expected"):
         asyncio.run(steer(PID_MARINER, "usb:1", **given))
 
 

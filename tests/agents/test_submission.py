@@ -148,7 +148,7 @@ def test_a_submission_is_verified(tmp_path):
         ),
         ("costs", {task: [["1"]] for task in TASKS}, "costs"),
         ("kind", "shipgym-other", "kind 'shipgym-other' found"),
-        ("format", 2, "format 2 found, this version of shipgym reads format 1"),
+        ("format", 2, "expected format 1, which this version of shipgym reads, got 2"),
         (
             "contestant",
             {"name": "lq", "source": None, "files": {}},
@@ -190,7 +190,7 @@ def test_what_nobody_else_can_make_or_was_not_run_through_is_not_submitted(tmp_p
     )
     with pytest.raises(InputError, match=said):
         submit(fewer, "lq", tmp_path / "mine.json")
-    with pytest.raises(InputError, match="submit: 'lg' found, expected one of 'lq'"):
+    with pytest.raises(InputError, match="submit: expected one of 'lq'"):
         submit(fewer, "lg", tmp_path / "mine.json")
     assert not (tmp_path / "mine.json").exists()
 
@@ -206,7 +206,7 @@ def test_a_folder_of_another_suite_and_results_of_the_first_format_are_refused(
     file.write_text(json.dumps(json.loads(file.read_text()) | {"format": 1}))
     with pytest.raises(
         InputError,
-        match=r"results.json: format 1 found, this version of shipgym reads format 2",
+        match=r"results.json: expected format 2, which this version of shipgym reads, got 1",
     ):
         load_results(tmp_path / "out")
 

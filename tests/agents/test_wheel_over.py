@@ -129,7 +129,7 @@ def test_it_is_a_controller_and_a_file(tmp_path):
     guide.save(tmp_path / "guide.json")
     again = load_agent(tmp_path / "guide.json", MARINER)
     assert (again.kind, again.gains) == ("wheel-over", guide.gains)
-    with pytest.raises(InputError, match="crab_share: 3 found, expected"):
+    with pytest.raises(InputError, match="crab_share: expected"):
         WheelOver.from_model(MARINER, crab_share=3.0)
 
 
@@ -141,9 +141,7 @@ def test_a_length_that_is_no_length_is_refused_by_the_name_that_it_was_given_by(
         "radius_lengths",
         "reach_lengths",
     ):
-        with pytest.raises(
-            InputError, match=f"^{name}: 0 found, expected a number > 0"
-        ):
+        with pytest.raises(InputError, match=f"^{name}: expected a number > 0"):
             WheelOver.from_model(
                 MARINER, **{"radius_lengths": 3.0, "reach_lengths": 1.0} | {name: 0.0}
             )

@@ -92,7 +92,7 @@ def truth(reference: ShipModel) -> ShipModel:
         ]
     )
     coefficients = dict(zip(table.coefficient_names, values.tolist(), strict=True))
-    return ShipModel("truth", table.name, SHIP, GEAR, coefficients, own_table=table)
+    return ShipModel("truth", table.name, SHIP, GEAR, coefficients, dynamics=table)
 
 
 @pytest.fixture(scope="module")

@@ -168,7 +168,7 @@ def test_trials_can_be_asked_for_by_use(folder):
     ship = ShipFile.load(folder / "ship.toml")
     assert [trial.name for trial in ship.trials("fit")] == ["a.csv"]
     assert [trial.name for trial in ship.trials(use="validate")] == ["runs/b.csv"]
-    with pytest.raises(InputError, match=r"'fitting' found.*Did you mean 'fit'"):
+    with pytest.raises(InputError, match=r"expected.*Did you mean 'fit'"):
         ship.trials("fitting")
 
 
@@ -216,16 +216,16 @@ def test_repair_may_be_asked_for_the_whole_file_or_one_trial(folder):
         (
             "length = 7.0",
             "length = -7.0",
-            ": [ship] length: -7 found, expected a number > 0",
+            ": [ship] length: expected a number > 0",
         ),
-        ("length = 7.0", 'length = "7.0"', ": [ship] length: '7.0' (a text"),
-        ("length = 7.0", "length = nan", ": ship.length: nan found, expected a number"),
-        ("length = 7.0", "length = true", ": [ship] length: True found"),
+        ("length = 7.0", 'length = "7.0"', ": [ship] length: expected a number > 0"),
+        ("length = 7.0", "length = nan", ": ship.length: expected a number"),
+        ("length = 7.0", "length = true", ": [ship] length: expected"),
         ("length = 7.0", "", ": [ship] length: missing"),
         (
             "length = 7.0",
             f"length = 1{'0' * 400}",
-            "0 found, expected a whole number of at most 64 bits",
+            "expected an integer of at most 64 bits",
         ),
         ("beam =", "beem =", ": [ship]: unknown key 'beem'. Did you mean 'beam'?"),
         (
@@ -241,7 +241,7 @@ def test_repair_may_be_asked_for_the_whole_file_or_one_trial(folder):
         (
             "rudder_limit_deg = 35.0",
             "rudder_limit_deg = -3.0",
-            ": [steering] rudder_limit_deg: -3 found",
+            ": [steering] rudder_limit_deg: expected",
         ),
         ('unit = "deg/s"', 'unit = "degs"', ": [columns] r: unit 'degs' found"),
         ('unit = "deg/s"', 'unit = "knots"', "'knots' is a unit of speed"),
@@ -249,12 +249,12 @@ def test_repair_may_be_asked_for_the_whole_file_or_one_trial(folder):
         (
             'rudder_positive = "port"',
             'rudder_positive = "left"',
-            ": [conventions] rudder_positive: 'left' found",
+            ": [conventions] rudder_positive: expected",
         ),
         (
             'rudder_positive = "port"',
             "rudder_positive = 1",
-            ": [conventions] rudder_positive: 1 found",
+            ": [conventions] rudder_positive: expected",
         ),
         (
             'rudder_positive = "port"',
@@ -264,27 +264,27 @@ def test_repair_may_be_asked_for_the_whole_file_or_one_trial(folder):
         (
             'rudder_positive = "starboard"',
             'rudder_positive = "right"',
-            ": [[trials]] 2 rudder_positive: 'right'",
+            ": [[trials]] 2 rudder_positive: expected",
         ),
-        ('structure = "abkowitz"', "structure = 3", ": [identify] structure: 3 found"),
+        ('structure = "abkowitz"', "structure = 3", ": [identify] structure: expected"),
         ("structure =", "structur =", ": [identify]: unknown key 'structur'"),
         (
             'structure = "abkowitz"',
             'reference_model = "ship.py"',
             (
-                ": [identify].reference_model: 'ship.py' found, which is code: no file"
+                ": [identify].reference_model: expected data, got 'ship.py', which is code: no file"
                 " makes shipgym run another"
             ),
         ),
-        ('kind = "zigzag"', 'kind = "zig zag"', ": [[trials]] 1 kind: 'zig zag' found"),
-        ('use = "validate"', 'use = "valid"', ": [[trials]] 2 use: 'valid' found"),
+        ('kind = "zigzag"', 'kind = "zig zag"', ": [[trials]] 1 kind: expected"),
+        ('use = "validate"', 'use = "valid"', ": [[trials]] 2 use: expected"),
         (
             'use = "validate"',
             'used = "validate"',
             ": [[trials]] 2: unknown key 'used'. Did you mean 'use'?",
         ),
         ('file = "a.csv"', "", ": [[trials]] 1: no file found"),
-        ('file = "a.csv"', "file = 3", ": [[trials]] 1 file: 3 found"),
+        ('file = "a.csv"', "file = 3", ": [[trials]] 1 file: expected"),
         (
             'file = "runs/b.csv"',
             'file = "./a.csv"',
@@ -320,11 +320,11 @@ def test_a_ship_file_without_ship_or_trials_is_refused(folder):
 def test_a_missing_ship_file_a_folder_and_binary_content_are_refused(tmp_path):
     with pytest.raises(InputError, match="there is no such ship file"):
         ShipFile.load(tmp_path / "ship.toml")
-    with pytest.raises(InputError, match="this is a folder"):
+    with pytest.raises(InputError, match="got a folder"):
         ShipFile.load(tmp_path)
     (tmp_path / "ship.toml").write_bytes(b"[ship]\nname = \xff\x00")
     with pytest.raises(
-        InputError, match=r"line 2 holds byte 0xff, .* expected a ship file \(TOML\)"
+        InputError, match=r"line 2: expected a ship file .TOML. in UTF-8, got byte 0xff"
     ):
         ShipFile.load(tmp_path / "ship.toml")
 
@@ -450,9 +450,9 @@ def test_a_number_without_bound_above_may_be_infinite():
     ] == float("inf")
     for wrong in (float("inf"), 1.05, 0.0):
         with pytest.raises(
-            InputError, match=r"\[identify\] explained_variance: .* found"
+            InputError, match=r"\[identify\] explained_variance: expected"
         ):
             check_options({"explained_variance": wrong}, "[identify]")
     for wrong in (float("nan"), -0.1, -float("inf")):
-        with pytest.raises(InputError, match=r"\[identify\] C: .* found"):
+        with pytest.raises(InputError, match=r"\[identify\] C: expected"):
             check_options({"C": wrong}, "[identify]")

@@ -186,7 +186,7 @@ def test_sensors_of_ones_own_show_the_same_voyage_otherwise(tmp_path):
         InputError, match=r"sensors: .*my_sensors.py and noise or measurement found"
     ):
         gymnasium.make(COURSE, sensors=path, noise=1.0)
-    with pytest.raises(InputError, match="log_time_constant: 0 found"):
+    with pytest.raises(InputError, match="log_time_constant: expected"):
         gymnasium.make(COURSE, sensors=path, log_time_constant=0.0)
     path = written(
         tmp_path, "my_sensors.py", SENSORS.replace("log_time_constant", "rudder_weight")
@@ -271,14 +271,18 @@ WRONG = [
     (
         "return 2.0 + ",
         "return -2.0 - ",
-        "fairway.py: worst_cost: -52 found, expected a number >= 0",
+        "fairway.py: worst_cost: expected a number >= 0",
     ),
     (
         "] = 50.0",
         "] = [50.0]",
         r"Settings.over_speed_weight: \[50.0\] found, expected a number, or",
     ),
-    ('5.0, "rad/s"', "5.0, 3", "Observation.yaw_rate: unit: 3 found, expected a text"),
+    (
+        '5.0, "rad/s"',
+        "5.0, 3",
+        "Observation.yaw_rate: unit: expected a non-empty string",
+    ),
     ("max(motion.u", "mox(motion.u", "line 52, in step: NameError: name 'mox'"),
     ("Reward(-off * off, ", "Reward(", "line 54, in step: TypeError: .*'over_speed'"),
     (
@@ -316,7 +320,7 @@ WRONG = [
         "",
         r"line 48, in step: what it returns is \(State, Reward, true or false\), ",
     ),
-    ("fabs(off) > 1.0", "off", "in step: result 3 is a number, expected true or false"),
+    ("fabs(off) > 1.0", "off", "in step: result 3 is a number, expected a boolean"),
     (
         "motion.y, limit",
         "motion.y, (limit, 1.0)",
@@ -365,7 +369,7 @@ WRONG = [
     (
         "] = 50.0",
         "] = -50.0",
-        "Settings.over_speed_weight: default: -50 found, expected a number >= 0",
+        "Settings.over_speed_weight: default: expected a number >= 0",
     ),
     (
         "half_width: Annotated",
@@ -385,7 +389,7 @@ WRONG = [
     (
         "REPORTED = (",
         'NAME = ["a"]\nREPORTED = (',
-        r"NAME: \['a'\] found, expected a text",
+        r"NAME: expected a non-empty string",
     ),
     (
         "REPORTED = (",
@@ -724,9 +728,7 @@ def test_what_is_often_clipped_is_remarked(tmp_path):
 
 def test_ids_are_texts():
     for one in (None, 3, ""):
-        with pytest.raises(
-            InputError, match=r"env_id: .* found, expected a text that is not empty"
-        ):
+        with pytest.raises(InputError, match=r"env_id: expected a non-empty string"):
             register_task(one, "CourseKeeping")
 
 
@@ -753,7 +755,7 @@ def test_ids_are_taken_once(fairway, tmp_path):
         match="'harbour/Fairway' found, expected an id such as 'harbour/fairway-v0'",
     ):
         register_task("harbour/Fairway", tmp_path / "fairway.py", **SHIP)
-    with pytest.raises(InputError, match="render_mode: 'film' found"):
+    with pytest.raises(InputError, match="render_mode: expected"):
         register_task(
             "harbour/Film-v0", tmp_path / "fairway.py", render_mode="film", **SHIP
         )
@@ -984,15 +986,15 @@ def test_settings_are_given_by_keyword_the_others_are_their_defaults():
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"count": 0}, "count: 0 found, expected a whole number of at least 1"),
-        ({"count": 2.0}, "count: 2.0 found, expected a whole number of at least 1"),
-        ({"count": 101}, "count: 101 found, expected a number >= 1 and <= 100"),
-        ({"share": 0.0}, "share: 0 found, expected a number > 0 and <= 1"),
+        ({"count": 0}, "count: expected an integer of at least 1"),
+        ({"count": 2.0}, "count: expected an integer of at least 1"),
+        ({"count": 101}, "count: expected a number >= 1 and <= 100"),
+        ({"share": 0.0}, "share: expected a number > 0 and <= 1"),
         (
             {"lengths": (3.0, 0.0)},
-            "lengths: the largest: 0 found, expected a number > 0",
+            "lengths: the largest: expected a number > 0",
         ),
-        ({"lengths": (0.0, 3.0)}, "lengths: the least: 0 found, expected a number > 0"),
+        ({"lengths": (0.0, 3.0)}, "lengths: the least: expected a number > 0"),
         (
             {"lengths": (1.0,)},
             r"lengths: \(1.0,\) found, expected the least and the largest",
@@ -1001,7 +1003,7 @@ def test_settings_are_given_by_keyword_the_others_are_their_defaults():
         ({"lengths": 3.0}, "lengths: 3.0 found, expected the least and the largest"),
         (
             {"listed": [0.0, -1.5]},
-            "listed: number 1: -1.5 found, expected a number >= -1",
+            "listed: number 1: expected a number >= -1",
         ),
         ({"listed": 3.0}, "listed: 3.0 found, expected a list"),
         ({"listed": [[1.0]]}, r"listed: \[\[1.0\]\] found, expected a list"),
@@ -1069,29 +1071,24 @@ def test_a_task_without_events_and_plan_is_complete():
 
 def test_bounds_of_an_observation_are_finite_and_in_order(tmp_path):
     for bounds, wrong in {
-        "1.0, -1.0": "upper bound: -1 found, expected a number > 1",
-        "1.0, 1.0": "upper bound: 1 found, expected a number > 1",
-        "-float('inf'), 1.0": "lower bound: -inf found, expected a number",
-        "-1.0, float('nan')": "upper bound: nan found, expected a number > -1",
-        "'0', 1.0": (
-            "lower bound: '0' (a text; write the number without quotes) found, expected"
-            " a number"
-        ),
-        "-1.0, None": "upper bound: None found, expected a number > -1",
+        "1.0, -1.0": "upper bound: expected a number > 1",
+        "1.0, 1.0": "upper bound: expected a number > 1",
+        "-float('inf'), 1.0": "lower bound: expected a number",
+        "-1.0, float('nan')": "upper bound: expected a number > -1",
+        "'0', 1.0": ("lower bound: expected a number, got '0' a number"),
+        "-1.0, None": "upper bound: expected a number > -1",
         "-1.0, 1.0, option='rol'": (
-            "option: 'rol' found, expected one of '', 'roll', 'shaft', 'shaft speed'"
+            "option: expected one of '', 'roll', 'shaft', 'shaft speed'"
         ),
-        "-1.0, 1.0, scale=0.0": "scale: 0 found, expected a number > 0",
-        "-1.0, 1.0, scale=-2.0": "scale: -2 found, expected a number > 0",
-        "-1.0, 1.0, scale=float('nan')": "scale: nan found, expected a number > 0",
-        "-1.0, 1.0, scale='8'": (
-            "scale: '8' (a text; write the number without quotes) found"
-        ),
+        "-1.0, 1.0, scale=0.0": "scale: expected a number > 0",
+        "-1.0, 1.0, scale=-2.0": "scale: expected a number > 0",
+        "-1.0, 1.0, scale=float('nan')": "scale: expected a number > 0",
+        "-1.0, 1.0, scale='8'": ("scale: expected a number > 0, got '8'"),
         "-1.0, 1.0, scale=lambda ship: 1.0": (
             "scale: 1 arguments found, expected a function of ship and sett"
         ),
         "-1.0, 1.0, scale=lambda ship, _: 0.0": (
-            "scale for 'mariner-tls-svm': 0 found, expected a number > 0"
+            "scale for 'mariner-tls-svm': expected a number > 0"
         ),
         "-1.0, 1.0, scale=lambda ship, _: ship.w": (
             "AttributeError: 'Ship' object has no attribute 'w'"

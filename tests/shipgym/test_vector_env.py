@@ -135,17 +135,17 @@ def test_gymnasiums_vector_wrappers_work_on_it():
 
 def test_a_vector_environment_says_what_is_wrong(mariner):
     for options, message in (
-        ({"num_envs": 0}, "num_envs: 0 found"),
+        ({"num_envs": 0}, "num_envs: expected"),
         ({"sae": "calm"}, "Did you mean 'sea'"),
         ({"autoreset_mode": "later"}, "autoreset_mode: 'later' found"),
-        ({"threads": 0}, "threads: 0 found"),
+        ({"threads": 0}, "threads: expected"),
         (
             {"render_mode": "human"},
-            "render_mode: 'human' found, expected one of 'rgb_array', or None",
+            "render_mode: expected one of 'rgb_array', or None, got 'human'",
         ),
         ({"ensemble": ["container"]}, "ensemble: 'container' has other equations"),
         ({"model_uncertainty": "posterior"}, "'mariner' has no covariance"),
-        ({"speed_range": 0.5}, "speed_range: 0.5 found"),
+        ({"speed_range": 0.5}, "speed_range: expected"),
         ({"speed_range": (0.9, 0.5)}, "speed_range: the largest: 0.5"),
     ):
         with pytest.raises(InputError, match=message):
@@ -153,7 +153,7 @@ def test_a_vector_environment_says_what_is_wrong(mariner):
     env = vector(COURSE, 2)
     with pytest.raises(InputError, match="reset_mask"):
         env.reset(options={"reset_mask": np.zeros(3, dtype=np.bool_)})
-    with pytest.raises(InputError, match="seed: 3 found"):
+    with pytest.raises(InputError, match="seed: expected"):
         env.reset(seed=[1, 2, 3])
     discrete = vector(COURSE, 2, action="rudder-discrete")
     discrete.reset(seed=0)
@@ -239,7 +239,7 @@ def test_a_mask_that_says_nothing_is_refused(options, message):
 
 def test_an_unknown_mode_is_refused():
     for name, value in (("autoreset_mode", "Never"), ("render_mode", "human")):
-        with pytest.raises(InputError, match=f"{name}: '{value}' found, expected"):
+        with pytest.raises(InputError, match=f"{name}: expected"):
             gymnasium.make_vec(
                 "shipgym/CourseKeeping-v0", num_envs=2, model="mariner", **{name: value}
             )

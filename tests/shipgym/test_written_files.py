@@ -1,6 +1,7 @@
 """Files appear whole or not at all, wherever they are, and nothing is left of those that did not."""
 
 import errno
+import math
 import os
 import subprocess
 import sys
@@ -9,17 +10,15 @@ from pathlib import Path
 
 import pytest
 
-from shipgym import files
-from shipgym.errors import InputError
-from shipgym.files import (
+from shipgym.drafts import (
     abandoned_drafts,
+    atomic_path,
     draft_folder,
     draft_name,
-    make_folder,
     remove_drafts,
-    write_json,
-    write_text,
 )
+from shipgym.errors import InputError
+from shipgym.files import make_folder, read_json, write_json, write_text
 
 WEEK = 7 * 86400
 
@@ -137,24 +136,6 @@ def test_a_folder_is_removed_unless_it_was_renamed(tmp_path, dead):
     assert [path.name for path in tmp_path.iterdir()] == ["result"]
 
 
-def test_a_process_is_dead_where_the_system_knows_none_of_its_number(monkeypatch, dead):
-    host = files._host()
-    assert [
-        files._is_dead(host, str(number)) for number in (dead, os.getpid(), 10**30)
-    ] == [
-        True,
-        False,
-        True,
-    ]
-    assert not files._is_dead("00000000", str(dead))
-
-    def refused(*_):
-        raise PermissionError  # of another user's, which is alive
-
-    monkeypatch.setattr(os, "kill", refused)
-    assert files._is_dead(host, "1") is False
-
-
 def test_drafts_of_this_computer_and_of_others_count_as_abandoned_after_a_week(
     tmp_path,
 ):
@@ -167,3 +148,32 @@ def test_drafts_of_this_computer_and_of_others_count_as_abandoned_after_a_week(
             os.utime(path, (time.time() - age,) * 2)
         assert sorted(abandoned_drafts(tmp_path)) == expected
     assert abandoned_drafts(tmp_path / "none") == []
+
+
+def test_a_process_of_another_user_is_alive_and_a_number_beyond_all_is_dead(
+    tmp_path, monkeypatch
+):
+    beyond = draft(tmp_path / "a", 10**30)
+    other = draft(tmp_path / "b", 1)
+
+    def refused(*_):
+        raise PermissionError
+
+    monkeypatch.setattr(os, "kill", refused)
+    assert abandoned_drafts(tmp_path) == []
+    monkeypatch.undo()
+    assert beyond in abandoned_drafts(tmp_path)
+    assert other not in abandoned_drafts(tmp_path)
+
+
+def test_a_file_stays_as_it_was_where_writing_fails(tmp_path):
+    path = tmp_path / "a.json"
+    write_json({"a": 1.5, "b": [1, 2]}, path)
+    with pytest.raises(ValueError, match="not JSON compliant"):
+        write_json({"a": math.nan}, path)
+    with pytest.raises(ZeroDivisionError), atomic_path(path) as half:
+        half.write_text(str(1 / 0))
+    assert read_json(path, "table", "write it again") == {"a": 1.5, "b": [1, 2]}
+    assert [left.name for left in tmp_path.iterdir()] == ["a.json"]
+    write_text("ä\n", path)
+    assert path.read_bytes() == "ä\n".encode()
