@@ -5,7 +5,6 @@ import math
 import reprlib
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
 from numbers import Integral, Real
 from pathlib import Path
 from types import NoneType
@@ -58,33 +57,6 @@ def placed(where: str, separator: str = ": ") -> Iterator[None]:
         if str(error).startswith(where):
             raise
         raise InputError(f"{where}{separator}{error}") from None
-
-
-@dataclass(frozen=True)
-class Findings:
-    """Problems and remarks that a battery of checks found."""
-
-    name: str  # of what was checked
-    # what makes it unfit to be used, each with a remedy or its place
-    problems: tuple[str, ...]
-    remarks: tuple[str, ...] = ()  # what is unusual, and may be right
-
-    @property
-    def ok(self) -> bool:
-        """True where there are no problems."""
-        return not self.problems
-
-    @property
-    def verdict(self) -> str:
-        """Soundness in words."""
-        return "sound" if self.ok else f"{len(self.problems)} problem(s)"
-
-    def __str__(self) -> str:
-        """Verdict, then a line for each problem and remark."""
-        lines = [f"{self.name}: {self.verdict}"]
-        lines += [f"  problem: {problem}" for problem in self.problems]
-        lines += [f"  remark: {remark}" for remark in self.remarks]
-        return "\n".join(lines)
 
 
 def quoted(words: Iterable[str]) -> str:
@@ -225,10 +197,15 @@ def check_number(
         and (below is None or number < below)
         and (at_most is None or number <= at_most)
     )
-    if within:
-        return number
+    if not within:
+        bounds = {">": above, ">=": at_least, "<": below, "<=": at_most}
+        raise _no_such_number(value, where, bounds, hint)
+    return number
 
-    bounds = {">": above, ">=": at_least, "<": below, "<=": at_most}
+
+def _no_such_number(
+    value: Any, where: str, bounds: Mapping[str, float | None], hint: str
+) -> InputError:
     stated = [
         f"{sign} {bound:g}" for sign, bound in bounds.items() if bound is not None
     ]
@@ -237,8 +214,8 @@ def check_number(
         expected += f" ({hint})"
     if isinstance(value, bool) or not isinstance(value, Real):
         quotes = "write the number without quotes" if isinstance(value, str) else ""
-        raise unexpected(where, expected, value, quotes)
-    raise InputError(f"{where}: expected {expected}, got {number:g}")
+        return unexpected(where, expected, value, quotes)
+    return InputError(f"{where}: expected {expected}, got {_as_float(value):g}")
 
 
 def _as_float(value: Any) -> float:

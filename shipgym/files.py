@@ -133,15 +133,22 @@ def read_text(path: Path, what: str, largest: int, latin: bool = False) -> str:
     except UnicodeDecodeError as error:
         if latin and not re.search(rb"[\x80-\x9f\xfe\xff\0]", data):
             return data.decode("latin-1")
-        if data.startswith((b"\xff\xfe", b"\xfe\xff")):
-            place, found = str(path), "UTF-16"
-        else:
-            line = data.count(b"\n", 0, error.start) + 1
-            place = f"{path}: line {line}"
-            found = f"byte 0x{data[error.start]:02x} (binary content)"
-        raise InputError(
-            f"{place}: expected a {what} in UTF-8, got {found}; save it as text in UTF-8"
-        ) from None
+        raise _not_utf_8(path, what, data, error.start) from None
+
+
+def _not_utf_8(path: Path, what: str, data: bytes, start: int) -> InputError:
+    """The error for a file whose bytes are none of UTF-8 from `start` on."""
+    if data.startswith((b"\xff\xfe", b"\xfe\xff")):
+        place, found = str(path), "UTF-16"
+    else:
+        line = data.count(b"\n", 0, start) + 1
+        place, found = (
+            f"{path}: line {line}",
+            f"byte 0x{data[start]:02x} (binary content)",
+        )
+    return InputError(
+        f"{place}: expected a {what} in UTF-8, got {found}; save it as text in UTF-8"
+    )
 
 
 def read_json(path: Path, what: str, remedy: str) -> Mapping[str, Any]:

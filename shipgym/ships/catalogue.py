@@ -1,5 +1,7 @@
 """The shipped models by name: reference ships, identified models in `library/`, and grey boxes on them."""
 
+from __future__ import annotations
+
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -31,7 +33,7 @@ Form = Literal["published", "shipmmg"]
 
 
 def model_of(
-    ship: "ShipEquations", coefficients: Mapping[str, float] | None = None
+    ship: ShipEquations, coefficients: Mapping[str, float] | None = None
 ) -> ShipModel:
     """Make a model of a ship with equations of her own, some coefficients changed or none."""
     return ShipModel(
@@ -112,7 +114,7 @@ def list_models() -> list[str]:
     return [*REFERENCE_SHIPS, *identified, *REGISTERED_EQUATIONS]
 
 
-def register_ship_equations(ship: "ShipEquations | str | Path") -> "ShipEquations":
+def register_ship_equations(ship: ShipEquations | str | Path) -> ShipEquations:
     """Register a ship with equations of her own, so that `load_model` finds her by name.
 
     Given is the ship, or the Python file that defines her as `SHIP`, which is run. A
@@ -146,8 +148,7 @@ def load_model(name: str | Path) -> ShipModel:
     if path.suffix == ".py":
         return model_of(register_ship_equations(path))
     models = list_models()
-    is_file = isinstance(name, Path) or path.suffix == ".json" or _exists(path)
-    if name not in models and is_file:
+    if name not in models and (isinstance(name, Path) or _is_file(path)):
         return ShipModel.load(path)
     known = check_choice(name, models, "model (a name, or the path of a model file)")
     if known in REFERENCE_SHIPS:
@@ -157,9 +158,10 @@ def load_model(name: str | Path) -> ShipModel:
     return ShipModel.load(LIBRARY / f"{known}.json")
 
 
-def _exists(path: Path) -> bool:
+def _is_file(path: Path) -> bool:
+    """True for the path of a file that exists, or is meant as that of a model file."""
     try:
-        return path.exists()
+        return path.suffix == ".json" or path.exists()
     except OSError:  # a text too long for a path
         return False
 
@@ -194,10 +196,10 @@ def truth_of(model: str | Path | ShipModel) -> ShipModel:
 
 def grey_box(
     reference: str | ShipModel,
-    equations: "Mapping[str, str | tuple[Term, ...]] | None" = None,
+    equations: Mapping[str, str | tuple[Term, ...]] | None = None,
     shaft: bool | None = None,
     name: str = "grey-box",
-) -> "GreyBox":
+) -> GreyBox:
     """A reference ship plus a table of terms, as a structure of a given name.
 
     The reference is a shipped model's name, the path of a model file, or a model. The
@@ -219,16 +221,16 @@ def grey_box(
     return GreyBox(name, SOURCE, table, "service", "acceleration", bare, known)
 
 
-def fitted_box(ship: ShipModel) -> "GreyBox":
+def fitted_box(ship: ShipModel) -> GreyBox:
     """A grey box on a model of the very same ship, whose covariance and provenance it keeps."""
     reference = replace(ship, name=f"{ship.name}, {ship.structure}", envelope=None)
     return replace(grey_box(ship), reference=reference)
 
 
 def converted_model(
-    reference: "str | ShipModel | GreyBox",
-    particulars: "Particulars",
-    steering: "SteeringGear",
+    reference: str | ShipModel | GreyBox,
+    particulars: Particulars,
+    steering: SteeringGear,
     service_shaft_speed: float = 0.0,
     name: str | None = None,
 ) -> ShipModel:

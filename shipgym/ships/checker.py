@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 
 from shipgym.arrays import Floats
-from shipgym.checks import Findings
 from shipgym.errors import InputError, UnstableModelError
+from shipgym.findings import Findings
 from shipgym.ships.catalogue import load_model
 from shipgym.ships.equations import ShipEquations
 from shipgym.ships.manoeuvring_model import ship_of

@@ -126,11 +126,13 @@ def accelerations(
 
     # propeller: u_P = u ((1 - w_P) + tau ((v + x_P r)^2 + c_Pv v + c_Pr r))
     v_P = v + c.xp * r
-    u_P = u * ((1.0 - c.wp) + c.tau * (v_P * v_P + c.c_pv * v + c.c_pr * r))
+    straightened = v_P * v_P + c.c_pv * v + c.c_pr * r
+    u_P = u * ((1.0 - c.wp) + c.tau * straightened)
     # K_T = 0.527 - 0.455 J by (n D)^2, which a shaft at rest has too: J = u_P / nD
     nD = motion.n * DIAMETER * per_U
     K_T_nn = nD * (0.527 * nD - 0.455 * u_P)
-    T = (2.0 * DIAMETER**2 / (L * L)) * copysign(1.0, motion.n) * K_T_nn
+    disc = 2.0 * DIAMETER**2 / (L * L)
+    T = disc * copysign(1.0, motion.n) * K_T_nn
 
     F_N, sin_delta, cos_delta = rudder_force(motion.delta, v, r, u_P, K_T_nn, c)
 
@@ -182,45 +184,81 @@ def rudder_force(
     """Normal force F_N of the rudder, negative for one to starboard, and sine and cosine of its angle."""
     v_R = c.gamma * v + c.c_Rr * r + c.c_Rrrr * r * r * r + c.c_Rrrv * r * r * v
     # u_R = epsilon u_P sqrt(1 + 8 kappa K_T / (pi J^2))
-    u_R = copysign(c.epsilon, u_P) * sqrt(u_P * u_P + (8.0 * c.kappa / pi) * K_T_nn)
-    sine, cosine = small_sin_cos(delta)
+    jet = u_P * u_P + (8.0 * c.kappa / pi) * K_T_nn
+    u_R = copysign(c.epsilon, u_P) * sqrt(jet)
+
     # (u_R^2 + v_R^2) sin(delta + atan(v_R / u_R)), without the arc
-    across = sine * fabs(u_R) + cosine * v_R * copysign(1.0, u_R)
-    normal = sqrt(u_R * u_R + v_R * v_R) * across
+    sine, cosine = small_sin_cos(delta)
+    along = cosine * v_R * copysign(1.0, u_R)
+    across = sine * fabs(u_R) + along
+    U_R = sqrt(u_R * u_R + v_R * v_R)
+
+    # lift slope of a rudder of this aspect ratio
     slope = 6.13 * ASPECT_RATIO / (ASPECT_RATIO + 2.25)
-    return -slope * (RUDDER_AREA / (LENGTH * LENGTH)) * normal, sine, cosine
+    area = RUDDER_AREA / (LENGTH * LENGTH)
+    return -slope * area * (U_R * across), sine, cosine
 
 
 def sway_hull(at: State, c: Any) -> float:
     """Sway force of the hull: linear in sway, turn, roll and heel, and cubic in all but roll."""
     v, r, phi = at.v, at.r, at.phi
-    linear = c.Y_v * v + c.Y_r * r + c.Y_p * at.p + c.Y_f * phi
-    by_v = c.Y_vvv * v + c.Y_vvr * r + c.Y_vvf * phi
-    by_r = c.Y_rrr * r + c.Y_vrr * v + c.Y_rrf * phi
-    by_phi = c.Y_vff * v + c.Y_rff * r
-    force: float = linear + v * v * by_v + r * r * by_r + phi * phi * by_phi
+    vv, rr, ff = v * v, r * r, phi * phi
+    force: float = (
+        c.Y_v * v
+        + c.Y_r * r
+        + c.Y_p * at.p
+        + c.Y_f * phi
+        + c.Y_vvv * vv * v
+        + c.Y_vvr * vv * r
+        + c.Y_vvf * vv * phi
+        + c.Y_rrr * rr * r
+        + c.Y_vrr * rr * v
+        + c.Y_rrf * rr * phi
+        + c.Y_vff * ff * v
+        + c.Y_rff * ff * r
+    )
     return force
 
 
 def roll_hull(at: State, c: Any) -> float:
     """Roll moment of the hull, in the same terms."""
     v, r, phi = at.v, at.r, at.phi
-    linear = c.K_v * v + c.K_r * r + c.K_p * at.p + c.K_f * phi
-    by_v = c.K_vvv * v + c.K_vvr * r + c.K_vvf * phi
-    by_r = c.K_rrr * r + c.K_vrr * v + c.K_rrf * phi
-    by_phi = c.K_vff * v + c.K_rff * r
-    moment: float = linear + v * v * by_v + r * r * by_r + phi * phi * by_phi
+    vv, rr, ff = v * v, r * r, phi * phi
+    moment: float = (
+        c.K_v * v
+        + c.K_r * r
+        + c.K_p * at.p
+        + c.K_f * phi
+        + c.K_vvv * vv * v
+        + c.K_vvr * vv * r
+        + c.K_vvf * vv * phi
+        + c.K_rrr * rr * r
+        + c.K_vrr * rr * v
+        + c.K_rrf * rr * phi
+        + c.K_vff * ff * v
+        + c.K_rff * ff * r
+    )
     return moment
 
 
 def yaw_hull(at: State, c: Any) -> float:
     """Yaw moment of the hull, in the same terms."""
     v, r, phi = at.v, at.r, at.phi
-    linear = c.N_v * v + c.N_r * r + c.N_p * at.p + c.N_f * phi
-    by_v = c.N_vvv * v + c.N_vvr * r + c.N_vvf * phi
-    by_r = c.N_rrr * r + c.N_vrr * v + c.N_rrf * phi
-    by_phi = c.N_vff * v + c.N_rff * r
-    moment: float = linear + v * v * by_v + r * r * by_r + phi * phi * by_phi
+    vv, rr, ff = v * v, r * r, phi * phi
+    moment: float = (
+        c.N_v * v
+        + c.N_r * r
+        + c.N_p * at.p
+        + c.N_f * phi
+        + c.N_vvv * vv * v
+        + c.N_vvr * vv * r
+        + c.N_vvf * vv * phi
+        + c.N_rrr * rr * r
+        + c.N_vrr * rr * v
+        + c.N_rrf * rr * phi
+        + c.N_vff * ff * v
+        + c.N_rff * ff * r
+    )
     return moment
 
 

@@ -36,16 +36,18 @@ class Envelope:
         A channel that hardly moves is given a thousandth of the ellipsoid's mean width,
         so that the ellipsoid has a volume.
         """
-        channels = [np.asarray(channel, dtype=float) for channel in (u, v, r, delta)]
-        samples = np.stack(channels, axis=-1)
-        low, high = samples.min(axis=0), samples.max(axis=0)
+        samples = np.stack([u, v, r, delta], axis=-1).astype(float)
+        low = samples.min(axis=0)
+        high = samples.max(axis=0)
         width = np.maximum(high - low, 1e-6)
         centre, quadratic = smallest_ellipsoid((samples - low) / width)
 
         middle = low + centre * width
-        shape = np.linalg.qr(np.linalg.cholesky(quadratic).T / width).R
-        reach = np.linalg.norm((samples - middle) @ shape.T, axis=-1).max()
-        return cls(low, high, middle, shape / reach)
+        factor = np.linalg.cholesky(quadratic).T / width
+        shape = np.linalg.qr(factor).R
+        offsets = samples - middle
+        distances = np.linalg.norm(offsets @ shape.T, axis=-1)
+        return cls(low, high, middle, shape / distances.max())
 
     def distance(
         self, u: ArrayLike, v: ArrayLike, r: ArrayLike, delta: ArrayLike
@@ -73,11 +75,12 @@ class Envelope:
         table = check_table(content, where, ("channels", *shapes))
         names = table.get("channels")
         if names != list(CHANNELS):
-            raise unexpected(f"{where}.channels", str(list(CHANNELS)), names)
-        arrays = {
-            name: check_array(table.get(name), shape, f"{where}.{name}")
-            for name, shape in shapes.items()
-        }
+            expected = str(list(CHANNELS))
+            raise unexpected(f"{where}.channels", expected, names)
+        arrays = {}
+        for name, shape in shapes.items():
+            place = f"{where}.{name}"
+            arrays[name] = check_array(table.get(name), shape, place)
         return cls(**arrays)
 
 

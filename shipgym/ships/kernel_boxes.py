@@ -7,6 +7,8 @@ Sun & Shi 2019). With a linear reference fitted to the same trials it is a kerne
 of its own, a black box.
 """
 
+from __future__ import annotations
+
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cache
@@ -126,12 +128,13 @@ class Kernel:
 
 def kernel_inputs(channels: Mapping[str, Any], particulars: Particulars) -> Floats:
     """Inputs v / U, r L / U, rudder angle and U / U0 of samples, shape (n_samples, 4)."""
-    u, v, r, delta = (
-        np.asarray(channels[name], dtype=float) for name in ("u", "v", "r", "delta")
-    )
-    U0, L = particulars["speed"], particulars["length"]
-    U = np.maximum(np.hypot(u, v), SLOWEST * U0)
-    return np.stack([v / U, r * L / U, delta, U / U0], axis=-1)
+    arrays = [np.asarray(channels[name]) for name in ("u", "v", "r", "delta")]
+    u, v, r, delta = arrays
+    U0 = particulars["speed"]
+    slowest = SLOWEST * U0
+    U = np.maximum(np.hypot(u, v), slowest)
+    turn = r * particulars["length"] / U
+    return np.stack([v / U, turn, delta, U / U0], axis=-1)
 
 
 def gaussians(x: Floats, centres: Floats) -> Floats:
@@ -139,8 +142,10 @@ def gaussians(x: Floats, centres: Floats) -> Floats:
     # |x - c|^2 = |x|^2 - 2 x c + |c|^2
     own = (x**2).sum(axis=1)
     theirs = (centres**2).sum(axis=1)
-    squares = own[:, None] - 2.0 * x @ centres.T + theirs
-    return np.asarray(np.exp(-0.5 * np.maximum(squares, 0.0)))
+    product = x @ centres.T
+    squares = own[:, None] - 2.0 * product + theirs
+    within = np.maximum(squares, 0.0)
+    return np.asarray(np.exp(-0.5 * within))
 
 
 @dataclass(frozen=True)
@@ -266,25 +271,30 @@ N_CENTRES = 0  # place of their number
 def coordinates(motion: Motion, c: KernelCoefficients, ship: Ship) -> Point:
     """Coordinates of a ship among the centres, and half the square of her distance from the origin."""
     u, v = motion.u, motion.v
-    U = max(sqrt(u * u + v * v), SLOWEST * ship.speed)
+    slowest = SLOWEST * ship.speed
+    U = max(sqrt(u * u + v * v), slowest)
     per_U = 1.0 / U
+    turn_rate = motion.r * ship.length * per_U
     sway = c.per_v * (v * per_U - c.v)
-    turn = c.per_r * (motion.r * ship.length * per_U - c.r)
+    turn = c.per_r * (turn_rate - c.r)
     rudder = c.per_delta * (motion.delta - c.delta)
     speed = c.per_speed * (U / ship.speed - c.speed)
-    half = 0.5 * (sway * sway + turn * turn + rudder * rudder + speed * speed)
-    return Point(sway, turn, rudder, speed, half)
+    square = sway * sway + turn * turn + rudder * rudder + speed * speed
+    return Point(sway, turn, rudder, speed, half=0.5 * square)
 
 
 def add_centre(at: Point, sums: Sums, c: KernelCoefficients, number: int) -> Sums:
     """Add one centre: its weights by exp(-|x - centre|^2 / 2)."""
     row = ROW * number
     # -|x - centre|^2 / 2 = -|centre|^2 / 2 - |x|^2 / 2 + x centre
-    exponent = row_of(c.table, row + 4) - at.half
-    exponent = exponent + row_of(c.table, row) * at.a
-    exponent = exponent + row_of(c.table, row + 1) * at.b
-    exponent = exponent + row_of(c.table, row + 2) * at.c
-    exponent = exponent + row_of(c.table, row + 3) * at.d
+    exponent = (
+        row_of(c.table, row + 4)
+        - at.half
+        + row_of(c.table, row) * at.a
+        + row_of(c.table, row + 1) * at.b
+        + row_of(c.table, row + 2) * at.c
+        + row_of(c.table, row + 3) * at.d
+    )
     value = two_to(exponent)
     return Sums(
         u=sums.u + value * row_of(c.table, row + 5),

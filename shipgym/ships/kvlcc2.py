@@ -113,10 +113,12 @@ def accelerations(
     # wake: (1 - w_P) / (1 - w_P0) = 1 + (1 - exp(-C_1 |beta_P|)) (C_2 - 1)
     beta_P = beta - c.x_P * r_
     C_2 = c.C_2_starboard if beta_P >= 0.0 else c.C_2_port
-    straightened = (1.0 - exponential(-c.C_1 * fabs(beta_P))) * (C_2 - 1.0)
-    one_w_P = (1.0 - c.w_P0) * (1.0 + straightened)
+    straight = exponential(-c.C_1 * fabs(beta_P))
+    fuller = (1.0 - straight) * (C_2 - 1.0)
+    one_w_P = (1.0 - c.w_P0) * (1.0 + fuller)
 
-    return accelerations_in(motion, c, Flow(U, v * per_U, r_, beta, one_w_P))
+    flow = Flow(U, v * per_U, r_, beta, one_w_P)
+    return accelerations_in(motion, c, flow)
 
 
 def package_accelerations(
@@ -141,7 +143,7 @@ def accelerations_in(
 ) -> tuple[float, float, float, float, float]:
     """Accelerations in a flow: the forces by mass and added mass."""
     u, v, r = motion.u, motion.v, motion.r
-    L, d = c.L, c.d
+    L = c.L
     X_H, Y_H, N_H = hull_forces(c, flow)
 
     # propeller: T = n^2 D^4 K_T(J), J = inflow / tip
@@ -160,15 +162,18 @@ def accelerations_in(
     # (m + m_y) vdot + (m + m_x) u r + x_G m rdot = Y
     # (I_zG + x_G^2 m + J_z) rdot + x_G m (vdot + u r) = N
     m = c.volume
-    m_x = c.mx * 0.5 * L * L * d
-    m_y = c.my * 0.5 * L * L * d
-    I_z = m * (0.25 * L) ** 2 + c.xG * c.xG * m + c.Jz * 0.5 * L**4 * d
     xG_m = c.xG * m
-    surge = X_H + X_R + X_P + (m + m_y) * v * r + xG_m * r * r
-    sway = Y_H + Y_R - (m + m_x) * u * r
+    m_surge = m + c.mx * 0.5 * L * L * c.d
+    m_sway = m + c.my * 0.5 * L * L * c.d
+    J_z = c.Jz * 0.5 * L**4 * c.d
+    I_z = m * (0.25 * L) ** 2 + c.xG * c.xG * m + J_z
+    surge = X_H + X_R + X_P + m_sway * v * r + xG_m * r * r
+    sway = Y_H + Y_R - m_surge * u * r
     yaw = N_H + N_R - xG_m * u * r
-    udot = surge * (1.0 / (m + m_x))
-    vdot = (I_z * sway - xG_m * yaw) * (1.0 / ((m + m_y) * I_z - xG_m**2))
+
+    determinant = m_sway * I_z - xG_m**2
+    udot = surge * (1.0 / m_surge)
+    vdot = (I_z * sway - xG_m * yaw) * (1.0 / determinant)
     rdot = (yaw - xG_m * vdot) * (1.0 / I_z)
     return udot, vdot, rdot, 0.0, 0.0
 
@@ -214,10 +219,11 @@ def rudder_force(
 
     # u_R = epsilon inflow sqrt(eta (1 + kappa (sqrt(1 + 8 K_T / (pi J^2)) - 1))^2 + 1 - eta)
     eta = c.D_P / c.H_R
-    jet = sqrt(inflow * inflow + (8.0 / pi) * K_T_nn)
-    race = fabs(inflow) * (1.0 - c.kappa) + c.kappa * jet
-    mean = sqrt(eta * race * race + (1.0 - eta) * inflow * inflow)
-    u_R = copysign(c.epsilon, inflow) * mean
+    outside = inflow * inflow
+    jet = outside + (8.0 / pi) * K_T_nn
+    race = fabs(inflow) * (1.0 - c.kappa) + c.kappa * sqrt(jet)
+    mean = eta * race * race + (1.0 - eta) * outside
+    u_R = copysign(c.epsilon, inflow) * sqrt(mean)
 
     # U_R sin(alpha_R) = U_R sin(delta - atan2(v_R, u_R)), without the arc
     sine, cosine = small_sin_cos(motion.delta)

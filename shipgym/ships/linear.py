@@ -171,11 +171,17 @@ def _balance(
 
 def _units(model: ShipModel) -> dict[str, float]:
     """Unit of each state in the prime system; that of a shaft is its service speed."""
-    U0, L = model.particulars["speed"], model.particulars["length"]
-    units = dict.fromkeys(model.state_names, 1.0)
-    prime = {"u": U0, "v": U0, "r": U0 / L, "p": U0 / L, "q": (U0 / L) ** 2}
-    prime["n"] = model.service_shaft_speed or 1.0
-    return units | {name: unit for name, unit in prime.items() if name in units}
+    speed = model.particulars["speed"]
+    turn_rate = speed / model.particulars["length"]
+    prime = {
+        "u": speed,
+        "v": speed,
+        "r": turn_rate,
+        "p": turn_rate,
+        "q": turn_rate**2,
+        "n": model.service_shaft_speed or 1.0,
+    }
+    return {name: prime.get(name, 1.0) for name in model.state_names}
 
 
 def _prime_rates(model: ShipModel, state: dict[str, float]) -> dict[str, float]:
@@ -183,11 +189,10 @@ def _prime_rates(model: ShipModel, state: dict[str, float]) -> dict[str, float]:
     at = {"n": model.service_shaft_speed} | state
     channels = {name: np.array([value]) for name, value in at.items()}
     units = _units(model)
-    rates = model.accelerations(channels)
-    return {
-        name: float(rate[0]) * model.travel_time / units[name]
-        for name, rate in rates.items()
-    }
+    rates = {}
+    for name, (rate,) in model.accelerations(channels).items():
+        rates[name] = float(rate) * model.travel_time / units[name]
+    return rates
 
 
 def linearise(
@@ -206,18 +211,23 @@ def linearise(
     """
     sway = "q" if "q" in model.state_names else "v"
     roll: list[str] = [name for name in ("p", "phi") if name in model.state_names]
-    rates = [sway, "r", *roll]
-    jacobian = _jacobian(model, at, rates, side)
-    to, by = [sway, "r"], [sway, "r", "delta"]
+    jacobian = _jacobian(model, at, [sway, "r", *roll], side)
+    to = [sway, "r"]
+    by = [sway, "r", "delta"]
     steering = _block(jacobian, to, by)
     if roll:
         # roll is balanced, 0 = R_s s + R_p p, where s is (v, r, delta): p = -R_p^-1 R_s s
-        R_s, R_p = _block(jacobian, roll, by), _block(jacobian, roll, roll)
-        steering -= _block(jacobian, to, roll) @ np.linalg.solve(R_p, R_s)
+        R_s = _block(jacobian, roll, by)
+        R_p = _block(jacobian, roll, roll)
+        by_roll = _block(jacobian, to, roll)
+        steering -= by_roll @ np.linalg.solve(R_p, R_s)
 
-    units = np.array([_units(model)[name] for name in to])
-    accelerations = steering * units[:, None] / model.travel_time
-    return accelerations[:, :2] / units, accelerations[:, 2:]
+    all_units = _units(model)
+    units = np.array([all_units[name] for name in to])
+    rates = steering * units[:, None] / model.travel_time
+    A = rates[:, :2] / units
+    B = rates[:, 2:]
+    return A, B
 
 
 def _jacobian(
@@ -229,10 +239,12 @@ def _jacobian(
     """
     size = 1e-4  # prime system; the error of central differences is its square
     units = _units(model)
-    state = dict(zip(model.state_names, at.state(model).tolist(), strict=True))
+    values = at.state(model).tolist()
+    state = dict(zip(model.state_names, values, strict=True))
 
     def rates_off(name: str, step: float) -> dict[str, float]:
-        off = state | {name: state[name] + step * units[name]}
+        varied = state[name] + step * units[name]
+        off = state | {name: varied}
         found = _prime_rates(model, off)
         if "p" in found:
             found["phi"] = off["p"] / units["p"]
@@ -255,8 +267,10 @@ def _block(
     jacobian: dict[tuple[str, str], float], rates: list[str], by: list[str]
 ) -> Floats:
     """Entries of a Jacobian as a matrix, a row a rate."""
-    entries = [jacobian[rate, name] for rate in rates for name in by]
-    return np.array(entries).reshape(len(rates), len(by))
+    matrix = np.empty((len(rates), len(by)))
+    for row, rate in zip(matrix, rates, strict=True):
+        row[:] = [jacobian[rate, name] for name in by]
+    return matrix
 
 
 def steering_state_space(
@@ -276,20 +290,27 @@ def nomoto_of(A: Floats, B: Floats) -> Nomoto:
     Raises InputError if a steady rudder does not turn the ship.
     """
     determinant = float(np.linalg.det(A))
+    trace = float(np.trace(A))
+    # r / delta = (b_2 s + numerator) / (s^2 - trace s + determinant)
     numerator = float(A[1, 0] * B[0, 0] - A[0, 0] * B[1, 0])
     if numerator == 0.0 or determinant == 0.0:
         raise InputError(
             "nomoto: expected a ship with damping, whose rudder has a steady effect, got"
             " none"
         )
-    poles = np.linalg.eigvals(A)
     time_constants = [np.nan, np.nan]
+    poles = np.linalg.eigvals(A)
     if np.all(np.isreal(poles)):
         time_constants = (-1.0 / poles.real).tolist()
     T1, T2 = sorted(time_constants, key=abs, reverse=True)
     T3 = float(B[1, 0]) / numerator
-    T1_plus_T2 = -float(np.trace(A)) / determinant
-    return Nomoto(K=numerator / determinant, T1=T1, T2=T2, T3=T3, T=T1_plus_T2 - T3)
+    return Nomoto(
+        K=numerator / determinant,
+        T1=T1,
+        T2=T2,
+        T3=T3,
+        T=-trace / determinant - T3,
+    )
 
 
 def nomoto(model: ShipModel) -> Nomoto:
@@ -348,11 +369,13 @@ def straight_line_stability(model: ShipModel) -> StraightLineStability:
     so both tell the same. Raises InputError if the model has no straight course.
     """
     at = straight_running(model)
-    matrices = {name: linearise(model, at, side)[0] for name, side in SIDES.items()}
+    matrices = {}
     eigenvalues = {}
-    for name, A in matrices.items():
+    for name, side in SIDES.items():
+        A, _ = linearise(model, at, side)
         values: list[complex] = np.linalg.eigvals(A).tolist()
-        values.sort(key=lambda value: complex(value).real, reverse=True)
+        values.sort(key=lambda value: -complex(value).real)
+        matrices[name] = A
         eigenvalues[name] = tuple(values)
     return StraightLineStability(eigenvalues, _criterion(model, matrices))
 

@@ -1,5 +1,7 @@
 """The equations of motion of one ship with her numbers: what every simulation is made from."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -40,7 +42,7 @@ class ManoeuvringModel:
     envelope: Envelope | None = None
     provenance: dict[str, Any] | None = None
     # by default what is shipped or registered under the structure's name
-    dynamics: "Structure | ShipEquations" = None  # type: ignore[assignment]
+    dynamics: Structure | ShipEquations = None  # type: ignore[assignment]
     service_shaft_speed: float = 0.0
 
     def __post_init__(self) -> None:
@@ -48,8 +50,13 @@ class ManoeuvringModel:
         dynamics = self.dynamics or get_dynamics(self.structure)
         object.__setattr__(self, "dynamics", dynamics)
         names = self.dynamics.coefficient_names
-        ordered = _in_order(self.coefficients, names, self.name)
-        object.__setattr__(self, "coefficients", ordered)
+        if self.coefficients.keys() != set(names):
+            raise _other_coefficients(self.name, names, self.coefficients)
+        coefficients = {
+            name: check_number(self.coefficients[name], f"coefficients.{name}")
+            for name in names
+        }
+        object.__setattr__(self, "coefficients", coefficients)
         shaft = self.service_shaft_speed
         if self.dynamics.scales and "n" in self.command_names and not shaft > 0:
             raise InputError(
@@ -108,7 +115,8 @@ class ManoeuvringModel:
         Raises InputError for water that is too shallow, and for particulars that the
         structure cannot use.
         """
-        self.check_depth(water_depth)
+        if water_depth != np.inf:
+            self.check_depth(water_depth)
         values = tuple(self.coefficients.values())
         if values not in self._numbers:
             self._numbers.clear()
@@ -260,24 +268,15 @@ class ManoeuvringModel:
             )
 
 
-def _in_order(
-    coefficients: Mapping[str, float], names: tuple[str, ...], model: str
-) -> dict[str, float]:
-    """Coefficients in the order of their names; InputError if they are not these, or not finite."""
-    missing = [name for name in names if name not in coefficients]
-    unknown = [name for name in coefficients if name not in names]
-    if missing or unknown:
-        raise InputError(
-            f"coefficients of {model!r}: expected the {len(names)} of its structure;"
-            f" missing: {quoted(missing)}; unknown: {quoted(unknown)}"
-        )
-    ordered = {name: float(coefficients[name]) for name in names}
-    for name, value in ordered.items():
-        if not np.isfinite(value):
-            raise InputError(
-                f"coefficients of {model!r}: {name}: expected a number, got {value}"
-            )
-    return ordered
+def _other_coefficients(
+    model: str, names: tuple[str, ...], coefficients: Mapping[str, float]
+) -> InputError:
+    missing = quoted(name for name in names if name not in coefficients)
+    unknown = quoted(name for name in coefficients if name not in names)
+    return InputError(
+        f"coefficients of {model!r}: expected the {len(names)} of its structure;"
+        f" missing: {missing}; unknown: {unknown}"
+    )
 
 
 def _with_last_axis(argument: str, given: ArrayLike, names: tuple[str, ...]) -> Floats:

@@ -162,12 +162,18 @@ class Flow(NamedTuple):
 def power_law(x: float, power: float) -> float:
     """A speed by service speed to a power; its logarithm from the series of artanh at its eighth root."""
     least, most = 0.01, 4.0  # for which the series is good enough
-    root = sqrt(sqrt(sqrt(min(max(x, least), most))))
+    within = min(max(x, least), most)
+    root = sqrt(sqrt(sqrt(within)))
     z = (root - 1.0) / (root + 1.0)
     s = z * z
-    # 1 + s / 3 + s^2 / 5 + ... + s^7 / 15
-    rest = 1.0 / 9.0 + s * (1.0 / 11.0 + s * (1.0 / 13.0 + s / 15.0))
-    series = 1.0 + s * (1.0 / 3.0 + s * (1.0 / 5.0 + s * (1.0 / 7.0 + s * rest)))
+    # artanh(z) / z = 1 + s / 3 + s^2 / 5 + ... + s^7 / 15
+    series = 1.0 / 13.0 + s / 15.0
+    series = 1.0 / 11.0 + s * series
+    series = 1.0 / 9.0 + s * series
+    series = 1.0 / 7.0 + s * series
+    series = 1.0 / 5.0 + s * series
+    series = 1.0 / 3.0 + s * series
+    series = 1.0 + s * series
     return exponential(power * 16.0 * z * series)
 
 
@@ -189,15 +195,18 @@ def accelerations(
     # (m + m_y) vdot + (m + m_x) u r + x_G m rdot = Y
     # (I_zG + x_G^2 m + J_z) rdot + x_G m (vdot + u r) = N
     m = c.volume
-    m_x = c.mx * 0.5 * L * L * c.d
-    m_y = c.my * 0.5 * L * L * c.d
-    I_z = m * (c.gyradius * c.gyradius + c.xG * c.xG) + c.Jz * 0.5 * L**4 * c.d
     xG_m = c.xG * m
-    surge = X_H + X_R + X_P + (m + m_y) * v * r + xG_m * r * r
-    sway = Y_H + Y_R - (m + m_x) * u * r
+    m_surge = m + c.mx * 0.5 * L * L * c.d
+    m_sway = m + c.my * 0.5 * L * L * c.d
+    J_z = c.Jz * 0.5 * L**4 * c.d
+    I_z = m * (c.gyradius * c.gyradius + c.xG * c.xG) + J_z
+    surge = X_H + X_R + X_P + m_sway * v * r + xG_m * r * r
+    sway = Y_H + Y_R - m_surge * u * r
     yaw = N_H + N_R - xG_m * u * r
-    udot = surge * (1.0 / (m + m_x))
-    vdot = (I_z * sway - xG_m * yaw) * (1.0 / ((m + m_y) * I_z - xG_m**2))
+
+    determinant = m_sway * I_z - xG_m**2
+    udot = surge * (1.0 / m_surge)
+    vdot = (I_z * sway - xG_m * yaw) * (1.0 / determinant)
     rdot = (yaw - xG_m * vdot) * (1.0 / I_z)
     return udot, vdot, rdot, 0.0, 0.0
 
@@ -213,9 +222,10 @@ def flow_of(motion: Motion, c: Any, ship: Ship) -> Flow:
 
     # wake: (1 - w_P) / (1 - w_P0) = 1 + (1 - exp(-C_1 |beta_P|)) (C_2 - 1)
     beta_P = beta - c.x_P * r_
-    C_2 = c.C_2 + (c.C_2_side if beta_P >= 0.0 else -c.C_2_side)
-    straightened = (1.0 - exponential(-c.C_1 * fabs(beta_P))) * (C_2 - 1.0)
-    inflow = u * ((1.0 - c.w_P0) * (1.0 + straightened))
+    side = c.C_2_side if beta_P >= 0.0 else -c.C_2_side
+    straight = exponential(-c.C_1 * fabs(beta_P))
+    fuller = (1.0 - straight) * (c.C_2 + side - 1.0)
+    inflow = u * ((1.0 - c.w_P0) * (1.0 + fuller))
 
     # K_T(J) by tip^2, where J = inflow / tip
     tip = ship.speed * c.nD_U0 * (motion.n / ship.shaft)
@@ -262,22 +272,24 @@ def hull_forces(c: Any, flow: Flow, ship: Ship) -> tuple[float, float, float]:
 
 def rudder_force(motion: Motion, c: Any, flow: Flow) -> tuple[float, float, float]:
     """Normal force F_N of the rudder, and sine and cosine of its angle."""
-    inflow = flow.inflow
     # v_R = U gamma_R beta_R
     beta_R = flow.beta - c.l_R * flow.r_
-    gamma_R = c.gamma_R + (c.gamma_R_side if beta_R >= 0.0 else -c.gamma_R_side)
-    v_R = flow.U * gamma_R * beta_R
+    side = c.gamma_R_side if beta_R >= 0.0 else -c.gamma_R_side
+    v_R = flow.U * (c.gamma_R + side) * beta_R
 
     # u_R = epsilon inflow sqrt(eta (1 + kappa (sqrt(1 + 8 K_T / (pi J^2)) - 1))^2 + 1 - eta)
-    jet = sqrt(max(inflow * inflow + (8.0 / pi) * flow.K_T_nn, 0.0))
-    race = fabs(inflow) * (1.0 - c.kappa) + c.kappa * jet
-    mean = sqrt(c.eta * race * race + (1.0 - c.eta) * inflow * inflow)
-    u_R = copysign(c.epsilon, inflow) * mean
+    inflow = flow.inflow
+    outside = inflow * inflow
+    jet = outside + (8.0 / pi) * flow.K_T_nn
+    race = fabs(inflow) * (1.0 - c.kappa) + c.kappa * sqrt(max(jet, 0.0))
+    mean = c.eta * race * race + (1.0 - c.eta) * outside
+    u_R = copysign(c.epsilon, inflow) * sqrt(mean)
 
     # U_R sin(alpha_R), without the arc; the force grows faster than that sine by c_R
     sine, cosine = small_sin_cos(motion.delta + c.delta_0)
     across = sine * u_R - cosine * v_R
-    steeper = sqrt(u_R * u_R + v_R * v_R) + c.c_R * fabs(across)
+    U_R = sqrt(u_R * u_R + v_R * v_R)
+    steeper = U_R + c.c_R * fabs(across)
     return 0.5 * c.A_R * c.f_alpha * across * steeper, sine, cosine
 
 

@@ -22,6 +22,8 @@ Format 1 has these fields:
 * `sha256`: of coefficients and covariance (`numbers_hash`); may be absent.
 """
 
+from __future__ import annotations
+
 import hashlib
 import json
 from collections.abc import Callable, Mapping
@@ -38,7 +40,7 @@ from shipgym.checks import (
     check_number,
     check_table,
     check_text,
-    quoted,
+    placed,
     unexpected,
 )
 from shipgym.errors import InputError
@@ -99,9 +101,7 @@ def read_model(
             fields["particulars"], f"{where}: particulars"
         ),
         steering=SteeringGear.from_mapping(fields["steering"], f"{where}: steering"),
-        coefficients=_read_coefficients(
-            fields["coefficients"], names, f"{where}: coefficients"
-        ),
+        coefficients=check_table(fields["coefficients"], f"{where}: coefficients"),
         covariance=covariance,
         envelope=envelope,
         provenance=provenance,
@@ -131,7 +131,7 @@ def numbers_hash(model: ManoeuvringModel) -> str:
 
 def _read_dynamics(
     value: Any, where: str, make: Callable[..., ManoeuvringModel]
-) -> "Structure | ShipEquations":
+) -> Structure | ShipEquations:
     """Read a table of terms, or find the equations of a ship that has her own, by name."""
     table = check_table(
         value,
@@ -177,21 +177,8 @@ def _read_reference(
 ) -> Model:
     """Read the reference ship of a grey box."""
     place = f"{where}.reference"
-    return read_model(check_table(table.get("reference"), place), place, make)
-
-
-def _read_coefficients(
-    value: Any, names: tuple[str, ...], where: str
-) -> dict[str, float]:
-    table = check_table(value, where)
-    if len(table) != len(names):
-        missing = quoted(name for name in names if name not in table)
-        raise InputError(
-            f"{where}: expected {len(names)} for the structure, got {len(table)};"
-            f" missing: {missing}"
-        )
-    check_keys(table, names, where)
-    return {name: check_number(table[name], f"{where}.{name}") for name in names}
+    with placed(place):
+        return read_model(check_table(table.get("reference"), place), place, make)
 
 
 def _read_covariance(value: Any, n: int, where: str) -> Floats:

@@ -1,5 +1,7 @@
 """Orders to rudder and shaft: checked, and in the form that loops take."""
 
+from __future__ import annotations
+
 from typing import Protocol
 
 import numpy as np

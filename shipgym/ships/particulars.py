@@ -1,8 +1,11 @@
 """Particulars of a ship, and what can be estimated from them."""
 
+from __future__ import annotations
+
 import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, fields, replace
+from functools import partial
 from typing import Any, Self
 
 from shipgym.checks import check_table, check_text, placed, unexpected
@@ -186,7 +189,7 @@ class Particulars(Mapping[str, Any]):
             (self.require("yaw_gyradius") / self.length) ** 2 + self.xg_prime**2
         )
 
-    def completed(self) -> "Particulars":
+    def completed(self) -> Particulars:
         """Return particulars with mass, inertia and added masses estimated where absent, and marked so.
 
         Water density 1025 kg/m3, centre of gravity at midship, yaw gyradius L/4, mass
@@ -255,28 +258,24 @@ def _mass(ship: Particulars) -> float:
     return ship.require("block_coefficient") * _box_mass(ship)
 
 
-def _clarke(name: str) -> Callable[[Particulars], float]:
+def _clarke(name: str, ship: Particulars) -> float:
     """Estimate one added mass."""
     remedy = (
         "give beam, draught and block_coefficient (or mass) in [ship], or all of"
         f" {', '.join(ADDED_MASSES)} in [ship.added_mass]"
     )
-
-    def estimate(ship: Particulars) -> float:
-        _check_known(ship, name, remedy)
-        beam, draught = ship.require("beam"), ship.require("draught")
-        fullness = ship.require("block_coefficient")
-        value = clarke_added_masses(ship.length, beam, draught, fullness)[name]
-        if name in ("Y_vdot", "N_rdot") and value >= 0.0:
-            raise InputError(
-                f"particulars of {ship.name}: expected a {name} < 0, got {value:.3g} by"
-                f" regression for length/beam {ship.length / beam:.2f} and beam/draught"
-                f" {beam / draught:.2f}: the proportions are outside its range; check"
-                " them, or give [ship.added_mass]"
-            )
-        return value
-
-    return estimate
+    _check_known(ship, name, remedy)
+    beam, draught = ship.require("beam"), ship.require("draught")
+    fullness = ship.require("block_coefficient")
+    value = clarke_added_masses(ship.length, beam, draught, fullness)[name]
+    if name in ("Y_vdot", "N_rdot") and value >= 0.0:
+        raise InputError(
+            f"particulars of {ship.name}: expected a {name} < 0, got {value:.3g} by"
+            f" regression for length/beam {ship.length / beam:.2f} and beam/draught"
+            f" {beam / draught:.2f}: the proportions are outside its range; check them,"
+            " or give [ship.added_mass]"
+        )
+    return value
 
 
 def _check_known(ship: Particulars, name: str, remedy: str) -> None:
@@ -300,5 +299,8 @@ _ESTIMATES: Estimates = {  # in this order
     "block_coefficient": _block_coefficient,
     "mass": _mass,
     "X_udot": lambda ship: -0.05 * ship.mass_prime,
-    **{name: _clarke(name) for name in ("Y_vdot", "Y_rdot", "N_vdot", "N_rdot")},
+    "Y_vdot": partial(_clarke, "Y_vdot"),
+    "Y_rdot": partial(_clarke, "Y_rdot"),
+    "N_vdot": partial(_clarke, "N_vdot"),
+    "N_rdot": partial(_clarke, "N_rdot"),
 }

@@ -1,5 +1,7 @@
 """A ship as a manoeuvring model that is simulated, sampled from, saved and loaded."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -59,9 +61,9 @@ class ShipModel(ManoeuvringModel):
         dt: float,
         state: ArrayLike | None = None,
         water_depth: float = np.inf,
-        weather: "Weather | str | None" = None,
-        seed: "Seed" = 0,
-    ) -> "Trial":
+        weather: Weather | str | None = None,
+        seed: Seed = 0,
+    ) -> Trial:
         """Simulate with commands held over each step (classical Runge-Kutta).
 
         Raises UnstableModelError where the ship leaves every physical range; carries
@@ -121,7 +123,7 @@ class ShipModel(ManoeuvringModel):
 
     def _drawn_tables(
         self, n: int, rng: np.random.Generator
-    ) -> "list[Structure | ShipEquations]":
+    ) -> list[Structure | ShipEquations]:
         """Its table n times, with a fitted reference ship drawn each time."""
         from shipgym.ships.grey_boxes import GreyBox
 
@@ -158,6 +160,8 @@ def _root(covariance: Floats) -> Floats:
     """Square root of a covariance, by way of the correlations: 1e-5 and 1 are drawn equally well."""
     deviation = np.sqrt(np.diag(covariance))
     scale = np.where(deviation > 0.0, deviation, 1.0)
-    values, vectors = np.linalg.eigh(covariance / np.outer(scale, scale))
-    root: Floats = scale[:, None] * vectors * np.sqrt(np.clip(values, 0.0, None))
+    correlations = covariance / np.outer(scale, scale)
+    values, vectors = np.linalg.eigh(correlations)
+    lengths = np.sqrt(np.clip(values, 0.0, None))
+    root: Floats = scale[:, None] * vectors * lengths
     return root

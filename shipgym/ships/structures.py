@@ -1,5 +1,7 @@
 """The printed structures by name (`structures.toml`), ships with equations, and what users register."""
 
+from __future__ import annotations
+
 from collections.abc import Callable, Mapping, Sequence
 from functools import cache
 from importlib import import_module
@@ -34,7 +36,7 @@ USUAL = {"source": "own", "normalisation": "si", "quantity": "acceleration"}
 
 #: What users registered, by name.
 REGISTERED_STRUCTURES: dict[str, Structure] = {}
-REGISTERED_EQUATIONS: "dict[str, ShipEquations]" = {}
+REGISTERED_EQUATIONS: dict[str, ShipEquations] = {}
 
 Read = TypeVar("Read")
 
@@ -99,7 +101,7 @@ def list_equations() -> list[str]:
     return [*SHIPPED_EQUATIONS, *REGISTERED_EQUATIONS]
 
 
-def get_equations(name: str) -> "ShipEquations":
+def get_equations(name: str) -> ShipEquations:
     """Return a ship with equations of her own by name; InputError if there is none."""
     if name in REGISTERED_EQUATIONS:
         return REGISTERED_EQUATIONS[name]
@@ -108,7 +110,7 @@ def get_equations(name: str) -> "ShipEquations":
     return ship
 
 
-def get_dynamics(name: str) -> "Structure | ShipEquations":
+def get_dynamics(name: str) -> Structure | ShipEquations:
     """Return a structure, or the equations of a ship that has her own, by name; InputError if there is none."""
     if name in list_equations():
         return get_equations(name)

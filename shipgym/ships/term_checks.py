@@ -33,7 +33,17 @@ def check_structure(
         )
     for equation, terms in equations.items():
         _check_terms(terms, normalisation, f"{where}: equations.{equation}")
-    _check_roll_and_memory(equations, quantity, where)
+    symbols: set[str] = set()
+    for terms in equations.values():
+        for term in terms:
+            symbols.update(symbol for symbol, _ in term.powers)
+    if symbols.intersection(ROLL) and "p" not in equations:
+        raise InputError(
+            f"{where}: expected an equation of roll 'p' where terms have roll, got none;"
+            " give its terms, or leave roll out"
+        )
+    if "p" in equations or "q" in equations:
+        _check_roll_and_memory(equations, quantity, where)
     if quantity == "force":
         _check_forces(equations, normalisation, where)
 
@@ -60,21 +70,12 @@ def _check_terms(terms: tuple[Term, ...], normalisation: str, where: str) -> Non
 
 
 def _check_roll_and_memory(equations: Equations, quantity: str, where: str) -> None:
-    used = {
-        symbol for terms in equations.values() for t in terms for symbol, _ in t.powers
-    }
-    rolling = [symbol for symbol in ROLL if symbol in used]
-    if rolling and "p" not in equations:
-        raise InputError(
-            f"{where}: expected an equation of roll 'p' where a term has"
-            f" '{rolling[0]}', got none; give its terms, or leave roll out"
-        )
     if "q" in equations and ("r" not in equations or "p" in equations):
         raise InputError(
             f"{where}: expected the memory 'q' of yaw with an equation 'r' and without"
             f" one of roll 'p', got equations {quoted(equations)}"
         )
-    if ("p" in equations or "q" in equations) and quantity != "acceleration":
+    if quantity != "acceleration":
         raise InputError(
             f"{where}: expected accelerations in a table with roll 'p' or memory 'q',"
             " got forces"

@@ -184,8 +184,8 @@ WEIGHT = ("parameters", "policy", "actor.mu.weight")
             "agent.episodes[0]: a table of 2 found, expected a table of 3",
         ),
         (("episodes",), "rlt", "agent.episodes: 'rlt' found, expected list of 0"),
-        (("successes",), ["x"], "agent.successes[0]: expected"),
-        (("successes",), [float("inf")], "agent.successes[0]: expected"),
+        (("successes",), ["x"], "agent.successes[0]: 'x' found"),
+        (("successes",), [float("inf")], "agent.successes[0]: inf found"),
         (("ships",), [], "agent.ships: list of 0 found, expected list of 2"),
         (("ships", 0, "var"), "x", "agent.ships[0].var: 'x' found"),
         (

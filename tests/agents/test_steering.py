@@ -971,7 +971,7 @@ def test_limits_are_those_of_the_page():
     assert limits.between("speed") == pytest.approx(4.0 * 1852.0 / 3600.0)
     assert limits.between("latitude") == pytest.approx(100.0 / 6.371e6)
     assert limits.between("cross_track") == math.inf
-    with pytest.raises(InputError, match="late_s: 0"):
+    with pytest.raises(InputError, match="late_s: expected a number > 0"):
         Limits(late_s=0.0)
 
 

@@ -12,7 +12,6 @@ from shipgym import InputError
 from shipgym.arrays import integral
 from shipgym.checks import (
     ANY_KEY,
-    Findings,
     check_array,
     check_choice,
     check_fields,
@@ -32,6 +31,7 @@ from shipgym.checks import (
     shown,
     unexpected,
 )
+from shipgym.findings import Findings
 from shipgym.sea import Weather, Wind
 
 

@@ -262,7 +262,7 @@ def test_wrong_actions_of_rudder_and_shaft():
         ({"model": None}, "model: None found, expected a name"),
         ({"model": "marinr"}, "Did you mean 'mariner'"),
         ({"model_uncertainty": "prior"}, "model_uncertainty: expected"),
-        ({"model_uncertainty": "posterior"}, "'mariner' has no covariance"),
+        ({"model_uncertainty": "posterior"}, "model 'mariner': expected a covariance"),
         ({"ensemble": "tanker"}, "ensemble: 'tanker' found, expected a list"),
         ({"ensemble": ["tanker"]}, "ensemble: 'tanker' has other equations"),
         ({"speed_range": (0.9, 0.5)}, "speed_range: the largest: expected"),
@@ -295,9 +295,7 @@ def test_a_count_that_is_none(count):
 
 
 def test_a_ship_without_a_rudder_is_refused(monkeypatch):
-    monkeypatch.setattr(
-        "shipgym.ships.structures.STRUCTURES", dict(shipgym.ships.structures.STRUCTURES)
-    )
+    monkeypatch.setattr("shipgym.ships.structures.REGISTERED_STRUCTURES", {})
     shipgym.register_structure("drifting", {"v": "v, |v| v", "r": "v, r"})
     mariner = shipgym.load_model("mariner")
     drifting = ShipModel(

@@ -153,11 +153,11 @@ CASES = [
     (lambda fields: json.dumps(fields)[:5000], "broken JSON"),
     (
         broken(lambda f: f["coefficients"].pop("Y_v")),
-        r"expected 40 for the structure, got 39; missing: 'Y_v'",
+        r"expected the 40 of its structure; missing: 'Y_v'",
     ),
     (
         broken(lambda f: f["coefficients"].update(Y_w=f["coefficients"].pop("Y_v"))),
-        "unknown key 'Y_w'",
+        "missing: 'Y_v'; unknown: 'Y_w'",
     ),
     (
         broken(lambda f: f["coefficients"].update(Y_v="much")),

@@ -317,7 +317,7 @@ def test_a_table_is_registered_in_a_line_and_saved_with_its_models(
         ),
         (
             {"equations": {"r": "r, phi"}},
-            "expected an equation of roll 'p' where a term has 'phi'",
+            "expected an equation of roll 'p' where terms have roll",
         ),
         (
             {"equations": {"q": "r, delta"}},

@@ -197,7 +197,7 @@ def test_saying_what_the_weather_is_loads_no_scipy():
 def test_weather_is_refused_beyond_what_there_is(make, most):
     make(most)
     make(0.98 * most)
-    with pytest.raises(InputError, match=r"expected a number"):
+    with pytest.raises(InputError, match="expected"):
         make(1.02 * most)
 
 
