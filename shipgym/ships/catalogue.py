@@ -180,15 +180,17 @@ def truth_of(model: str | Path | ShipModel) -> ShipModel:
     'mariner'
     """
     given = model if isinstance(model, ShipModel) else load_model(model)
-    name = str((given.provenance or {}).get("truth"))
-    ship = REFERENCE_SHIPS[name]() if name in REFERENCE_SHIPS else None
-    if ship is None or ship.particulars.length != given.particulars.length:
-        raise InputError(
-            f"model {given.name!r}: provenance.truth: expected the reference ship of her"
-            f" size behind the trials, as 'mariner-tls-svm' names it, got {name!r};"
-            " evaluate on a ship that you name yourself"
-        )
-    return ship
+    provenance = given.provenance or {}
+    name = str(provenance.get("truth"))
+    if name in REFERENCE_SHIPS:
+        ship = REFERENCE_SHIPS[name]()
+        if ship.particulars.length == given.particulars.length:
+            return ship
+    raise InputError(
+        f"model {given.name!r}: provenance.truth: expected the reference ship of her"
+        f" size behind the trials, as 'mariner-tls-svm' names it, got {name!r};"
+        " evaluate on a ship that you name yourself"
+    )
 
 
 # ---- grey boxes ------------------------------------------------------------------------
@@ -214,8 +216,11 @@ def grey_box(
 
     ship = reference if isinstance(reference, ShipModel) else load_model(reference)
     table = {}
-    for equation, terms in (equations or dict.fromkeys("uvr", MEI)).items():
-        table[equation] = read_terms(terms) if isinstance(terms, str) else tuple(terms)
+    given = equations or dict.fromkeys("uvr", MEI)
+    for equation, terms in given.items():
+        if isinstance(terms, str):
+            terms = read_terms(terms)
+        table[equation] = tuple(terms)
     bare = replace(ship, covariance=None, envelope=None, provenance=None)
     known = "n" in ship.command_names if shaft is None else shaft
     return GreyBox(name, SOURCE, table, "service", "acceleration", bare, known)

@@ -146,14 +146,19 @@ def _asymmetry(model: ShipModel) -> float:
     ours = _accelerations(model, channels)
     image = _accelerations(model, mirrored) * sign
 
-    L, U0 = model.particulars["length"], model.particulars["speed"]
-    units = dict.fromkeys(rates, 1.0)  # but for what all have
-    units |= dict.fromkeys(ANGULAR, L)
-    units["q"] = L * L / U0
+    # units of the prime system, but for what all have
+    length = model.particulars["length"]
+    units = dict.fromkeys(rates, 1.0)
+    units |= dict.fromkeys(ANGULAR, length)
+    units["q"] = length * model.travel_time
     unit = [units[name] for name in rates]
-    difference = float(np.sqrt(np.mean(((ours - image) * unit) ** 2)))
-    size = float(np.sqrt(np.mean((ours * unit) ** 2)))
+    size = _root_mean_square(ours * unit)
+    difference = _root_mean_square((ours - image) * unit)
     return difference / (2.0 * size) if size > 0.0 else 0.0
+
+
+def _root_mean_square(values: Floats) -> float:
+    return float(np.sqrt(np.mean(values**2)))
 
 
 def _run(model: ShipModel, rudder: float, lengths: float) -> Trial:

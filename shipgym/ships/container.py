@@ -124,20 +124,12 @@ def accelerations(
     p = motion.p * L * per_U
     phi = motion.phi
 
-    # propeller: u_P = u ((1 - w_P) + tau ((v + x_P r)^2 + c_Pv v + c_Pr r))
-    v_P = v + c.xp * r
-    straightened = v_P * v_P + c.c_pv * v + c.c_pr * r
-    u_P = u * ((1.0 - c.wp) + c.tau * straightened)
-    # K_T = 0.527 - 0.455 J by (n D)^2, which a shaft at rest has too: J = u_P / nD
-    nD = motion.n * DIAMETER * per_U
-    K_T_nn = nD * (0.527 * nD - 0.455 * u_P)
-    disc = 2.0 * DIAMETER**2 / (L * L)
-    T = disc * copysign(1.0, motion.n) * K_T_nn
-
+    u_P, K_T_nn, T = propeller(motion.n * DIAMETER * per_U, u, v, r, c)
     F_N, sin_delta, cos_delta = rudder_force(motion.delta, v, r, u_P, K_T_nn, c)
 
     # W' GM'
-    W_GM = (WEIGHT / (0.5 * L * L) * GM / L) * per_U * per_U
+    weight = WEIGHT / (0.5 * L * L)
+    W_GM = (weight * GM / L) * per_U * per_U
 
     at = State(u, v, r, p, phi)
     X = (
@@ -157,7 +149,8 @@ def accelerations(
         + c.mx * c.lx * u * r
         - W_GM * phi
     )
-    N = yaw_hull(at, c) + (c.x_R + c.a_H * c.x_H) * F_N * cos_delta
+    x_HR = c.x_R + c.a_H * c.x_H
+    N = yaw_hull(at, c) + x_HR * F_N * cos_delta
 
     # [m + m_y      -m_y l_y    m_y alpha_y] [vdot]   [Y]
     # [-m_y l_y     I_x + J_x   0          ] [pdot] = [K]
@@ -169,13 +162,29 @@ def accelerations(
     e = c.Iz + c.Jz
     determinant = a * d * e - b * b * e - g * g * d
     udot = X * (1.0 / (c.m + c.mx))
-    vdot = (d * e * Y - b * e * K - g * d * N) * (1.0 / determinant)
+    coupled = d * e * Y - b * e * K - g * d * N
+    vdot = coupled * (1.0 / determinant)
     pdot = (K - b * vdot) * (1.0 / d)
     rdot = (N - g * vdot) * (1.0 / e)
 
     linear = U * U * (1.0 / L)
     angular = U * U * (1.0 / (L * L))
     return udot * linear, vdot * linear, rdot * angular, pdot * angular, 0.0
+
+
+def propeller(
+    nD: float, u: float, v: float, r: float, c: Any
+) -> tuple[float, float, float]:
+    """Inflow u_P of the propeller, its thrust coefficient by (n D)^2, and its thrust T."""
+    # u_P = u ((1 - w_P) + tau ((v + x_P r)^2 + c_Pv v + c_Pr r))
+    v_P = v + c.xp * r
+    straightened = v_P * v_P + c.c_pv * v + c.c_pr * r
+    u_P = u * ((1.0 - c.wp) + c.tau * straightened)
+    # K_T = 0.527 - 0.455 J, where J = u_P / nD: a shaft at rest has this product too
+    K_T_nn = nD * (0.527 * nD - 0.455 * u_P)
+    disc = 2.0 * DIAMETER**2 / (LENGTH * LENGTH)
+    T = disc * copysign(1.0, nD) * K_T_nn
+    return u_P, K_T_nn, T
 
 
 def rudder_force(

@@ -228,22 +228,24 @@ def si_matrices(
 
 def _checked(A: ArrayLike, B: ArrayLike) -> tuple[Floats, Floats]:
     """The matrices as arrays of shape (2, 2) and (2, 1)."""
-    a, b = np.asarray(A, dtype=float), np.asarray(B, dtype=float)
-    for name, matrix, shape in (("A", a, (2, 2)), ("B", b, (2, 1))):
-        if matrix.shape != shape or not np.all(np.isfinite(matrix)):
-            raise InputError(
-                f"{name}: expected finite numbers of shape {shape}, got"
-                f" {matrix.tolist()}"
-            )
-    return a, b
+    return _matrix("A", A, (2, 2)), _matrix("B", B, (2, 1))
+
+
+def _matrix(name: str, given: ArrayLike, shape: tuple[int, int]) -> Floats:
+    matrix = np.asarray(given, dtype=float)
+    if matrix.shape != shape or not np.all(np.isfinite(matrix)):
+        expected = f"finite numbers of shape {shape}"
+        raise unexpected(name, expected, matrix.tolist())
+    return matrix
 
 
 def _units(length: float, speed: float) -> tuple[Floats, Floats]:
     """Units of the entries of A and B in the prime system."""
     check_number(length, "length", above=0.0, hint="in m")
     check_number(speed, "speed", above=0.0, hint="in m/s")
-    state = np.array([speed, speed / length])  # of v and r
-    per_time = state[:, None] * (speed / length)
+    turn_rate = speed / length
+    state = np.array([speed, turn_rate])  # of v and r
+    per_time = turn_rate * state[:, None]
     return per_time / state, per_time
 
 

@@ -45,9 +45,9 @@ class Envelope:
         middle = low + centre * width
         factor = np.linalg.cholesky(quadratic).T / width
         shape = np.linalg.qr(factor).R
-        offsets = samples - middle
-        distances = np.linalg.norm(offsets @ shape.T, axis=-1)
-        return cls(low, high, middle, shape / distances.max())
+        offsets = (samples - middle) @ shape.T
+        reach = np.linalg.norm(offsets, axis=-1).max()
+        return cls(low, high, middle, shape / reach)
 
     def distance(
         self, u: ArrayLike, v: ArrayLike, r: ArrayLike, delta: ArrayLike

@@ -40,12 +40,15 @@ def rigid_inertia(model: ManoeuvringModel) -> tuple[float, float, float]:
         return c["m"] * unit, 0.0, c["Iz"] * unit * L**2
     if model.structure == "kvlcc2":
         mass = model.particulars["water_density"] * c["volume"]
-        gyradius, xg = 0.25 * c["L"], c["xG"]
+        gyradius = 0.25 * c["L"]
+        xg = c["xG"]
     else:
         p = model.particulars.completed()
         mass = p.require("mass")
-        gyradius, xg = p.require("yaw_gyradius"), p.require("xg")
-    return mass, mass * xg, mass * (gyradius**2 + xg**2)
+        gyradius = p.require("yaw_gyradius")
+        xg = p.require("xg")
+    yaw = mass * (gyradius**2 + xg**2)
+    return mass, mass * xg, yaw
 
 
 def _mass_unit(p: Particulars) -> float:
@@ -66,15 +69,20 @@ def _with_arms(prime: Floats, p: Particulars) -> Floats:
 
 def _container(model: ManoeuvringModel) -> Floats:
     """Son & Nomoto 1981; the added mass in sway acts above the centre, so that roll couples to sway."""
-    c, L = model.coefficients, model.particulars["length"]
+    c = model.coefficients
+    L = model.particulars["length"]
+    surge = c["m"] + c["mx"]
+    sway = c["m"] + c["my"]
     sway_to_yaw = c["my"] * c["alpha_y"] * L
     sway_to_roll = -c["my"] * c["ly"] * L
+    yaw = (c["Iz"] + c["Jz"]) * L * L
     prime = [
-        [c["m"] + c["mx"], 0.0, 0.0, 0.0],
-        [0.0, c["m"] + c["my"], sway_to_yaw, sway_to_roll],
-        [0.0, sway_to_yaw, (c["Iz"] + c["Jz"]) * L * L, 0.0],
+        [surge, 0.0, 0.0, 0.0],
+        [0.0, sway, sway_to_yaw, sway_to_roll],
+        [0.0, sway_to_yaw, yaw, 0.0],
     ]
-    return _mass_unit(model.particulars.completed()) * np.array(prime)
+    unit = _mass_unit(model.particulars.completed())
+    return unit * np.array(prime)
 
 
 def _mmg(model: ManoeuvringModel) -> Floats:
@@ -82,12 +90,15 @@ def _mmg(model: ManoeuvringModel) -> Floats:
     c, p = model.coefficients, model.particulars
     L = c.get("L", p.length)
     d = c["d"] if "d" in c else p.require("draught")
-    added = 0.5 * p.require("water_density") * L**2 * d
+    unit = 0.5 * p.require("water_density") * L**2 * d
     m, m_xG, I_z = rigid_inertia(model)
+    surge = m + c["mx"] * unit
+    sway = m + c["my"] * unit
+    yaw = I_z + c["Jz"] * unit * L**2
     rows = [
-        [m + c["mx"] * added, 0.0, 0.0, 0.0],
-        [0.0, m + c["my"] * added, m_xG, 0.0],
-        [0.0, m_xG, I_z + c["Jz"] * added * L**2, 0.0],
+        [surge, 0.0, 0.0, 0.0],
+        [0.0, sway, m_xG, 0.0],
+        [0.0, m_xG, yaw, 0.0],
     ]
     return np.array(rows)
 

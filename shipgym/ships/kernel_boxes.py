@@ -128,8 +128,10 @@ class Kernel:
 
 def kernel_inputs(channels: Mapping[str, Any], particulars: Particulars) -> Floats:
     """Inputs v / U, r L / U, rudder angle and U / U0 of samples, shape (n_samples, 4)."""
-    arrays = [np.asarray(channels[name]) for name in ("u", "v", "r", "delta")]
-    u, v, r, delta = arrays
+    u = np.asarray(channels["u"], dtype=float)
+    v = np.asarray(channels["v"], dtype=float)
+    r = np.asarray(channels["r"], dtype=float)
+    delta = np.asarray(channels["delta"], dtype=float)
     U0 = particulars["speed"]
     slowest = SLOWEST * U0
     U = np.maximum(np.hypot(u, v), slowest)
@@ -274,11 +276,13 @@ def coordinates(motion: Motion, c: KernelCoefficients, ship: Ship) -> Point:
     slowest = SLOWEST * ship.speed
     U = max(sqrt(u * u + v * v), slowest)
     per_U = 1.0 / U
-    turn_rate = motion.r * ship.length * per_U
-    sway = c.per_v * (v * per_U - c.v)
-    turn = c.per_r * (turn_rate - c.r)
+    v_ = v * per_U
+    r_ = motion.r * ship.length * per_U
+    U_ = U / ship.speed
+    sway = c.per_v * (v_ - c.v)
+    turn = c.per_r * (r_ - c.r)
     rudder = c.per_delta * (motion.delta - c.delta)
-    speed = c.per_speed * (U / ship.speed - c.speed)
+    speed = c.per_speed * (U_ - c.speed)
     square = sway * sway + turn * turn + rudder * rudder + speed * speed
     return Point(sway, turn, rudder, speed, half=0.5 * square)
 

@@ -135,19 +135,19 @@ def package_accelerations(
     beta_P = beta - c.x_P_package * r_
     w_P = c.w_P0 * exponential(-4.0 * beta_P * beta_P)
 
-    return accelerations_in(motion, c, Flow(U, v * per_U, r_, beta, 1.0 - w_P))
+    flow = Flow(U, v * per_U, r_, beta, 1.0 - w_P)
+    return accelerations_in(motion, c, flow)
 
 
 def accelerations_in(
     motion: Motion, c: Any, flow: Flow
 ) -> tuple[float, float, float, float, float]:
     """Accelerations in a flow: the forces by mass and added mass."""
-    u, v, r = motion.u, motion.v, motion.r
     L = c.L
     X_H, Y_H, N_H = hull_forces(c, flow)
 
     # propeller: T = n^2 D^4 K_T(J), J = inflow / tip
-    inflow = u * flow.one_w_P
+    inflow = motion.u * flow.one_w_P
     tip = motion.n * c.D_P
     K_T_nn = c.k_0 * tip * tip + c.k_1 * tip * inflow + c.k_2 * inflow * inflow
     T = c.D_P**2 * K_T_nn
@@ -156,26 +156,51 @@ def accelerations_in(
     F_N, sin_delta, cos_delta = rudder_force(motion, c, flow, inflow, K_T_nn)
     X_R = -(1.0 - c.t_R) * F_N * sin_delta
     Y_R = -(1.0 + c.a_H) * F_N * cos_delta
-    N_R = -(c.x_R + c.a_H * c.x_H) * L * F_N * cos_delta
+    x_HR = c.x_R + c.a_H * c.x_H
+    N_R = -x_HR * L * F_N * cos_delta
 
-    # (m + m_x) udot - (m + m_y) v r - x_G m r^2 = X
-    # (m + m_y) vdot + (m + m_x) u r + x_G m rdot = Y
-    # (I_zG + x_G^2 m + J_z) rdot + x_G m (vdot + u r) = N
     m = c.volume
-    xG_m = c.xG * m
-    m_surge = m + c.mx * 0.5 * L * L * c.d
-    m_sway = m + c.my * 0.5 * L * L * c.d
+    m_x = c.mx * 0.5 * L * L * c.d
+    m_y = c.my * 0.5 * L * L * c.d
     J_z = c.Jz * 0.5 * L**4 * c.d
     I_z = m * (0.25 * L) ** 2 + c.xG * c.xG * m + J_z
-    surge = X_H + X_R + X_P + m_sway * v * r + xG_m * r * r
-    sway = Y_H + Y_R - m_surge * u * r
-    yaw = N_H + N_R - xG_m * u * r
-
-    determinant = m_sway * I_z - xG_m**2
-    udot = surge * (1.0 / m_surge)
-    vdot = (I_z * sway - xG_m * yaw) * (1.0 / determinant)
-    rdot = (yaw - xG_m * vdot) * (1.0 / I_z)
+    mass = Mass(m + m_x, m + m_y, c.xG * m, I_z)
+    X = X_H + X_R + X_P
+    Y = Y_H + Y_R
+    N = N_H + N_R
+    udot, vdot, rdot = planar_accelerations(motion, X, Y, N, mass)
     return udot, vdot, rdot, 0.0, 0.0
+
+
+class Mass(NamedTuple):
+    """Mass with added mass, by density."""
+
+    surge: float  # m + m_x
+    sway: float  # m + m_y
+    static: float  # x_G m
+    yaw: float  # I_zG + x_G^2 m + J_z
+
+
+def planar_accelerations(
+    motion: Motion, X: float, Y: float, N: float, mass: Mass
+) -> tuple[float, float, float]:
+    """Accelerations in surge, sway and yaw by forces.
+
+    (m + m_x) udot - (m + m_y) v r - x_G m r^2 = X
+    (m + m_y) vdot + (m + m_x) u r + x_G m rdot = Y
+    (I_zG + x_G^2 m + J_z) rdot + x_G m (vdot + u r) = N
+    """
+    u, v, r = motion.u, motion.v, motion.r
+    surge = X + mass.sway * v * r + mass.static * r * r
+    sway = Y - mass.surge * u * r
+    yaw = N - mass.static * u * r
+
+    determinant = mass.sway * mass.yaw - mass.static**2
+    udot = surge * (1.0 / mass.surge)
+    coupled = mass.yaw * sway - mass.static * yaw
+    vdot = coupled * (1.0 / determinant)
+    rdot = (yaw - mass.static * vdot) * (1.0 / mass.yaw)
+    return udot, vdot, rdot
 
 
 def hull_forces(c: Any, flow: Flow) -> tuple[float, float, float]:

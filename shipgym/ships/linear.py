@@ -189,9 +189,11 @@ def _prime_rates(model: ShipModel, state: dict[str, float]) -> dict[str, float]:
     at = {"n": model.service_shaft_speed} | state
     channels = {name: np.array([value]) for name, value in at.items()}
     units = _units(model)
+    accelerations = model.accelerations(channels)
     rates = {}
-    for name, (rate,) in model.accelerations(channels).items():
-        rates[name] = float(rate) * model.travel_time / units[name]
+    for name, (rate,) in accelerations.items():
+        unit = units[name] / model.travel_time
+        rates[name] = float(rate) / unit
     return rates
 
 

@@ -123,7 +123,8 @@ class ManoeuvringModel:
             self._numbers[values] = self.dynamics.numbers(
                 self.coefficients, self.particulars, self.service_shaft_speed
             )
-        return np.concatenate([ship_of(self, water_depth, step), self._numbers[values]])
+        ship = ship_of(self, water_depth, step)
+        return np.concatenate([ship, self._numbers[values]])
 
     @cached_property
     def _numbers(self) -> dict[tuple[float, ...], Floats]:
@@ -185,18 +186,21 @@ class ManoeuvringModel:
         self.check_depth(float(depth.min()))
         states = _with_last_axis("state", state, self.state_names)
         commands = _with_last_axis("command", command, self.command_names)
-        if not np.all(np.isfinite(states)):
-            wrong = states[~np.isfinite(states)][0]
-            raise InputError(f"state: expected finite numbers, got {wrong}")
-        check_units(self, commands.reshape(-1, len(self.command_names)), "command")
+        wrong = states[~np.isfinite(states)]
+        if wrong.size:
+            raise InputError(f"state: expected finite numbers, got {wrong[0]}")
 
-        shape = np.broadcast_shapes(states.shape[:-1], commands.shape[:-1], depth.shape)
-        flat_states = _flat(states, shape)
-        flat_commands = two_commands(_flat(commands, shape))
-        depths = np.array(np.broadcast_to(depth, shape)).reshape(-1)
-        rates = np.empty_like(flat_states)
+        # one row for each state
+        leading = states.shape[:-1], commands.shape[:-1], depth.shape
+        shape = np.broadcast_shapes(*leading)
+        rows = _rows(states, shape)
+        orders = _rows(commands, shape)
+        check_units(self, orders, "command")
+        depths = _rows(depth[..., None], shape)[:, 0].copy()
+
+        rates = np.empty_like(rows)
         loop = ship_loop(self.vessel, "derivatives")
-        loop(flat_states, flat_commands, depths, self.ship_numbers(), rates)
+        loop(rows, two_commands(orders), depths, self.ship_numbers(), rates)
         return rates.reshape(*shape, len(self.state_names))
 
     def rates(
@@ -289,10 +293,11 @@ def _with_last_axis(argument: str, given: ArrayLike, names: tuple[str, ...]) -> 
     return array
 
 
-def _flat(array: Floats, shape: tuple[int, ...]) -> Floats:
+def _rows(array: Floats, shape: tuple[int, ...]) -> Floats:
     """Rows of an array broadcast to a shape in front of its last axis, one after the other."""
     width = array.shape[-1]
-    return np.array(np.broadcast_to(array, (*shape, width))).reshape(-1, width)
+    repeated = np.broadcast_to(array, (*shape, width))
+    return np.array(repeated).reshape(-1, width)
 
 
 def ship_of(

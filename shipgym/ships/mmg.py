@@ -22,6 +22,7 @@ from shipgym.engine.motion import Motion, Ship
 from shipgym.errors import InputError
 from shipgym.ships import kvlcc2
 from shipgym.ships.equations import ShipEquations, record_of
+from shipgym.ships.kvlcc2 import Mass, planar_accelerations
 from shipgym.ships.particulars import Particulars
 
 MMG = "mmg"
@@ -181,7 +182,7 @@ def accelerations(
     motion: Motion, c: Any, ship: Ship
 ) -> tuple[float, float, float, float, float]:
     """Accelerations in surge, sway and yaw, body frame, origin midship, from forces per density."""
-    u, v, r, L = motion.u, motion.v, motion.r, ship.length
+    L = ship.length
     flow = flow_of(motion, c, ship)
     X_H, Y_H, N_H = hull_forces(c, flow, ship)
     T = c.propellers * c.D_P**2 * flow.K_T_nn
@@ -189,25 +190,19 @@ def accelerations(
     F_N, sin_delta, cos_delta = rudder_force(motion, c, flow)
     X_R = -(1.0 - c.t_R) * F_N * sin_delta
     Y_R = -(1.0 + c.a_H) * F_N * cos_delta
-    N_R = -(c.x_R + c.a_H * c.x_H) * L * F_N * cos_delta
+    x_HR = c.x_R + c.a_H * c.x_H
+    N_R = -x_HR * L * F_N * cos_delta
 
-    # (m + m_x) udot - (m + m_y) v r - x_G m r^2 = X
-    # (m + m_y) vdot + (m + m_x) u r + x_G m rdot = Y
-    # (I_zG + x_G^2 m + J_z) rdot + x_G m (vdot + u r) = N
     m = c.volume
-    xG_m = c.xG * m
-    m_surge = m + c.mx * 0.5 * L * L * c.d
-    m_sway = m + c.my * 0.5 * L * L * c.d
+    m_x = c.mx * 0.5 * L * L * c.d
+    m_y = c.my * 0.5 * L * L * c.d
     J_z = c.Jz * 0.5 * L**4 * c.d
     I_z = m * (c.gyradius * c.gyradius + c.xG * c.xG) + J_z
-    surge = X_H + X_R + X_P + m_sway * v * r + xG_m * r * r
-    sway = Y_H + Y_R - m_surge * u * r
-    yaw = N_H + N_R - xG_m * u * r
-
-    determinant = m_sway * I_z - xG_m**2
-    udot = surge * (1.0 / m_surge)
-    vdot = (I_z * sway - xG_m * yaw) * (1.0 / determinant)
-    rdot = (yaw - xG_m * vdot) * (1.0 / I_z)
+    mass = Mass(m + m_x, m + m_y, c.xG * m, I_z)
+    X = X_H + X_R + X_P
+    Y = Y_H + Y_R
+    N = N_H + N_R
+    udot, vdot, rdot = planar_accelerations(motion, X, Y, N, mass)
     return udot, vdot, rdot, 0.0, 0.0
 
 

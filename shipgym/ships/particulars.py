@@ -228,15 +228,19 @@ def clarke_added_masses(
     Regressions of Clarke, Gedling and Hine 1983, by pi (T/L)^2. Dimensions in m; the
     block coefficient is the displaced volume by length * beam * draught.
     """
-    unit = -math.pi * (draught / length) ** 2
-    cB_B_T = block_coefficient * beam / draught
     B_L = beam / length
     B_T = beam / draught
+    cB_B_T = block_coefficient * B_T
+    Y_vdot = 1.0 + 0.16 * cB_B_T - 5.1 * B_L**2
+    Y_rdot = 0.67 * B_L - 0.0033 * B_T**2
+    N_vdot = 1.1 * B_L - 0.041 * B_T
+    N_rdot = 1.0 / 12.0 + 0.017 * cB_B_T - 0.33 * B_L
+    unit = -math.pi * (draught / length) ** 2
     return {
-        "Y_vdot": unit * (1.0 + 0.16 * cB_B_T - 5.1 * B_L**2),
-        "Y_rdot": unit * (0.67 * B_L - 0.0033 * B_T**2),
-        "N_vdot": unit * (1.1 * B_L - 0.041 * B_T),
-        "N_rdot": unit * (1.0 / 12.0 + 0.017 * cB_B_T - 0.33 * B_L),
+        "Y_vdot": unit * Y_vdot,
+        "Y_rdot": unit * Y_rdot,
+        "N_vdot": unit * N_vdot,
+        "N_rdot": unit * N_rdot,
     }
 
 

@@ -63,8 +63,10 @@ class Share:
         fields = ("coefficient", "name", "powers", "sign")
         table = check_table(content, where, fields, fields)
         coefficient = check_text(table["coefficient"], f"{where}.coefficient")
-        term = Term.from_dict({name: table[name] for name in ("name", "powers")}, where)
-        sign = check_number(table["sign"], f"{where}.sign", at_least=-1.0, at_most=1.0)
+        name_and_powers = {"name": table["name"], "powers": table["powers"]}
+        term = Term.from_dict(name_and_powers, where)
+        place = f"{where}.sign"
+        sign = check_number(table["sign"], place, at_least=-1.0, at_most=1.0)
         return cls(coefficient, term, sign)
 
 
@@ -200,8 +202,10 @@ class SharedStructure(Structure):
         shares = {}
         for axis in AXES:
             entries = list_entries(listed[axis], f"{place}.{axis}")
-            shares[axis] = tuple(Share.from_dict(e, at) for at, e in entries.items())
-        name, source = table.get("name"), table.get("source")
+            read = [Share.from_dict(entry, at) for at, entry in entries.items()]
+            shares[axis] = tuple(read)
+        name = table.get("name")
+        source = table.get("source")
         return cls(**_shared_fields(name, source, shares))
 
 

@@ -112,7 +112,8 @@ class ShipModel(ManoeuvringModel):
             )
         rng = np.random.default_rng(seed)
         mean = np.array(list(self.coefficients.values()))
-        draws = mean + rng.standard_normal((n, len(mean))) @ _root(self.covariance).T
+        normal = rng.standard_normal((n, len(mean)))
+        draws = mean + normal @ _root(self.covariance).T
         tables = self._drawn_tables(n, rng)
         models = []
         for i, (values, dynamics) in enumerate(zip(draws, tables, strict=True)):

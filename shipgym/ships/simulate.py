@@ -179,8 +179,10 @@ def wind_accelerations(trial: Trial, dynamics: Any = None) -> Floats:
     own = dynamics.equations if isinstance(dynamics, Structure) else WIND
     columns = []
     for axis, name in WIND.items():
-        known = axis in own and name in trial
-        columns.append(trial[name] if known else np.zeros(len(trial)))
+        column = np.zeros(len(trial))
+        if axis in own and name in trial:
+            column = trial[name]
+        columns.append(column)
     return np.column_stack(columns)
 
 

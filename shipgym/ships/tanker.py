@@ -120,9 +120,10 @@ def accelerations(
         + c.N_vrz * fabs(v) * r * z
         + c.N_T * gT
     )
-    surge = gX * (1.0 / L) + (c.d11 + c.X_vrz * z) * v * r + (1.0 - c.t) * gT
-    sway = gY * (1.0 / L) + (c.d22 + c.Y_urz * z) * u * r + c.Y_T * gT
-    yaw = gLN * (1.0 / (L * L)) + gLN_turning * (1.0 / L)
+    per_L = 1.0 / L
+    surge = gX * per_L + (c.d11 + c.X_vrz * z) * v * r + (1.0 - c.t) * gT
+    sway = gY * per_L + (c.d22 + c.Y_urz * z) * u * r + c.Y_T * gT
+    yaw = gLN * (1.0 / (L * L)) + gLN_turning * per_L
 
     # as products, because the masses are the same in all stages of a step
     udot = surge * (1.0 / (c.m11 - c.X_udotz * z))

@@ -103,14 +103,21 @@ def accelerations_source(equations: Equations, prime: bool, damped: bool = True)
     needed: set[str] = set()
     first = 0
     for equation, terms in equations.items():
-        unit = {2: ["s"], 3: ["s", "U"]}[unit_speeds(equation)] if divided else []
         monomials = []
         for number, term in enumerate(terms, first):
-            power = speed_power(equation, term) if prime and not divided else 0
-            monomials.append((f"c.c{number}", _factors(term, power, divided)))
+            power = 0
+            if prime and not divided:
+                power = speed_power(equation, term)
+            factors = _factors(term, power, divided)
+            needed.update(factors)
+            monomials.append((f"c.c{number}", factors))
         first += len(terms)
-        needed.update(unit, *(powers for _, powers in monomials))
-        rates[equation] = " * ".join([*unit, f"({factored(monomials)})"])
+        rate = f"({factored(monomials)})"
+        if divided:
+            unit = ["s", "U"] if unit_speeds(equation) == 3 else ["s"]
+            needed.update(unit)
+            rate = " * ".join([*unit, rate])
+        rates[equation] = rate
 
     needed = _with_their_makings(needed)
     yaw = "rdot + motion.q" if "q" in equations else "rdot"

@@ -296,7 +296,8 @@ class Structure:
 
     def _from_forces(self, inertia: Floats) -> Floats:
         """From the coefficients of forces to those of accelerations, by an inertia of shape (3, 3)."""
-        axes = [list(FORCE_OF_EQUATION).index(equation) for equation in self.equations]
+        order = list(FORCE_OF_EQUATION)
+        axes = [order.index(equation) for equation in self.equations]
         mobility = np.linalg.inv(inertia[np.ix_(axes, axes)])
         counts = [len(terms) for terms in self.equations.values()]
         blocks = []

@@ -97,7 +97,8 @@ class Term:
     @classmethod
     def from_dict(cls, content: Any, where: str) -> Self:
         """Read what `to_dict` wrote; InputError, after `where`, for anything else."""
-        table = check_table(content, where, ("name", "powers"), ("name", "powers"))
+        fields = ("name", "powers")
+        table = check_table(content, where, fields, fields)
         name = check_text(table["name"], f"{where}.name")
         powers = check_table(table["powers"], f"{where}.powers")
         return cls(name, tuple(powers.items()))
@@ -149,8 +150,9 @@ def short_terms(words: str, surge: str = "du") -> tuple[Term, ...]:
     terms = []
     for word in words.split():
         powers: dict[str, int] = {}
-        for factor in re.findall(r"\|.\||.", word.lstrip("0")):
-            symbol = symbols.get(factor, factor)
+        letters = re.findall(r"\|.\||.", word.lstrip("0"))
+        for letter in letters:
+            symbol = symbols.get(letter, letter)
             powers[symbol] = powers.get(symbol, 0) + 1
         terms.append(Term(word, tuple(powers.items())))
     return tuple(terms)
