@@ -217,14 +217,9 @@ def sway_hull(at: State, c: Any) -> float:
         + c.Y_r * r
         + c.Y_p * at.p
         + c.Y_f * phi
-        + c.Y_vvv * vv * v
-        + c.Y_vvr * vv * r
-        + c.Y_vvf * vv * phi
-        + c.Y_rrr * rr * r
-        + c.Y_vrr * rr * v
-        + c.Y_rrf * rr * phi
-        + c.Y_vff * ff * v
-        + c.Y_rff * ff * r
+        + vv * (c.Y_vvv * v + c.Y_vvr * r + c.Y_vvf * phi)
+        + rr * (c.Y_rrr * r + c.Y_vrr * v + c.Y_rrf * phi)
+        + ff * (c.Y_vff * v + c.Y_rff * r)
     )
     return force
 
@@ -238,14 +233,9 @@ def roll_hull(at: State, c: Any) -> float:
         + c.K_r * r
         + c.K_p * at.p
         + c.K_f * phi
-        + c.K_vvv * vv * v
-        + c.K_vvr * vv * r
-        + c.K_vvf * vv * phi
-        + c.K_rrr * rr * r
-        + c.K_vrr * rr * v
-        + c.K_rrf * rr * phi
-        + c.K_vff * ff * v
-        + c.K_rff * ff * r
+        + vv * (c.K_vvv * v + c.K_vvr * r + c.K_vvf * phi)
+        + rr * (c.K_rrr * r + c.K_vrr * v + c.K_rrf * phi)
+        + ff * (c.K_vff * v + c.K_rff * r)
     )
     return moment
 
@@ -259,14 +249,9 @@ def yaw_hull(at: State, c: Any) -> float:
         + c.N_r * r
         + c.N_p * at.p
         + c.N_f * phi
-        + c.N_vvv * vv * v
-        + c.N_vvr * vv * r
-        + c.N_vvf * vv * phi
-        + c.N_rrr * rr * r
-        + c.N_vrr * rr * v
-        + c.N_rrf * rr * phi
-        + c.N_vff * ff * v
-        + c.N_rff * ff * r
+        + vv * (c.N_vvv * v + c.N_vvr * r + c.N_vvf * phi)
+        + rr * (c.N_rrr * r + c.N_vrr * v + c.N_rrf * phi)
+        + ff * (c.N_vff * v + c.N_rff * r)
     )
     return moment
 
