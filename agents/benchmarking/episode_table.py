@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shipgym.checks import quoted
+from shipgym.drafts import atomic_path
 from shipgym.errors import InputError
 from shipgym.extras import library
-from shipgym.drafts import atomic_path
 from shipgym.files import LARGEST_TENSORS, read_bytes
 
 Columns = dict[str, NDArray[Any]]

@@ -109,9 +109,8 @@ def _wrong_accelerations(model: ShipModel) -> Iterator[str]:
         row, axis = wrong[0].tolist()
         there = {name: float(values[row]) for name, values in channels.items()}
         known = (*EQUATION_NAMES, "phi", "delta")
-        state = ", ".join(
-            f"{name} = {there[name]:.4g}" for name in known if name in model.state_names
-        )
+        names = [name for name in known if name in model.state_names]
+        state = ", ".join(f"{name} = {there[name]:.4g}" for name in names)
         look = "for coefficients that are far too large"
         if isinstance(model.dynamics, ShipEquations):
             place = model.dynamics.fault(there, model.coefficients, ship_of(model))
@@ -127,7 +126,8 @@ def _wrong_accelerations(model: ShipModel) -> Iterator[str]:
         plain = model.accelerations(channels)
         written = np.stack([plain[name] for name in _rates(model)], axis=-1)
         scale = np.abs(written).max(axis=0) + np.finfo(float).tiny
-        worst = float((np.abs(found - written) / scale).max())
+        differences = np.abs(found - written) / scale
+        worst = float(differences.max())
         if not worst < agreement:
             yield (
                 "derivatives: expected compiled accelerations within"
@@ -178,13 +178,15 @@ def _wrong_courses(model: ShipModel) -> Iterator[str]:
         f"rudder {np.degrees(limit):.0f} deg to port": (-limit, turn_lengths),
     }
     for name, (rudder, lengths) in courses.items():
-        wrong, heel = "", 0.0
+        wrong = ""
+        heel = 0.0
         try:
             trial = _run(model, rudder, lengths)
             if "phi" in trial:
                 heel = float(np.abs(trial["phi"]).max())
         except UnstableModelError as error:
-            wrong, heel = str(error), abs(error.state.get("phi", 0.0))
+            wrong = str(error)
+            heel = abs(error.state.get("phi", 0.0))
         if not heel < capsized:
             yield (
                 f"{name}: expected a heel of less than {np.degrees(capsized):.0f} deg,"
@@ -258,7 +260,8 @@ def _wrong_covariance(model: ShipModel) -> Iterator[str]:
             yield f"covariance: expected a variance of '{name}' >= 0, got {value:g}"
             return
     scale = np.where(variances > 0.0, np.sqrt(variances), 1.0)
-    least = float(np.linalg.eigvalsh(model.covariance / np.outer(scale, scale)).min())
+    correlations = model.covariance / np.outer(scale, scale)
+    least = float(np.linalg.eigvalsh(correlations).min())
     if not least > -1e-6:
         yield (
             "covariance: expected no eigenvalue of the correlations below 0, got"

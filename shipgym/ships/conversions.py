@@ -188,12 +188,15 @@ def linear_steering_ship(
     prime system. Raises InputError for other shapes or values that are not finite.
     """
     ship = _ship(particulars)
-    a, b = prime_matrices(A, B, ship.require("length"), ship.require("speed"))
-    names = get_structure("linear-steering").coefficient_names
-    coefficients = dict(zip(names, np.hstack([a, b]).ravel().tolist(), strict=True))
-    return ShipModel(
-        name, "linear-steering", ship, steering or SteeringGear(), coefficients
-    )
+    length = ship.require("length")
+    speed = ship.require("speed")
+    a, b = prime_matrices(A, B, length, speed)
+    structure = "linear-steering"
+    names = get_structure(structure).coefficient_names
+    values = np.hstack([a, b]).ravel().tolist()
+    coefficients = dict(zip(names, values, strict=True))
+    gear = steering or SteeringGear()
+    return ShipModel(name, structure, ship, gear, coefficients)
 
 
 def _ship(particulars: Known) -> Particulars:

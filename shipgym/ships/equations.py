@@ -218,9 +218,8 @@ class ShipEquations:
         c = self.coefficients_record(*numbers.tolist())
         accelerations = self.form(coefficients)
         none = np.zeros(len(channels["u"]))
-        states = np.stack(
-            [channels.get(name, none) for name in Motion._fields], axis=-1
-        )
+        columns = [channels.get(name, none) for name in Motion._fields]
+        states = np.stack(columns, axis=-1)
         found = np.full((len(states), len(RATES)), math.nan)
         for row, state in zip(found, states.tolist(), strict=True):
             with suppress(ArithmeticError, ValueError):

@@ -197,7 +197,8 @@ class GreyBox(Structure):
     ) -> dict[str, Floats]:
         """Accelerations at samples, without compiling: the reference ship's, converted, and the terms."""
         at = self._reference_channels(channels, particulars, ship.shaft)
-        found = self._converted_back(self.ship.accelerations(at), particulars)
+        known = self.ship.accelerations(at)
+        found = self._converted_back(known, particulars)
         sums = self._sums_at(channels, coefficients, particulars, ship.shaft)
         for equation, added in sums.items():
             found[equation] = found[equation] + added
@@ -239,14 +240,20 @@ class GreyBox(Structure):
     ) -> dict[str, Floats]:
         """Accelerations of the reference ship, converted to the target."""
         fast, quick = self._scales(particulars)
+        linear = 1.0 / (fast * quick)
+        angular = 1.0 / quick**2
         back = {
-            "u": 1.0 / (fast * quick),
-            "v": 1.0 / (fast * quick),
-            "r": quick**-2,
-            "p": quick**-2,
-            "q": quick**-3,
+            "u": linear,
+            "v": linear,
+            "r": angular,
+            "p": angular,
+            "q": angular / quick,
         }
-        return {name: rates[name] * back[name] for name in back if name in rates}
+        found = {}
+        for name, scale in back.items():
+            if name in rates:
+                found[name] = rates[name] * scale
+        return found
 
     def to_dict(self) -> dict[str, Any]:
         """The table and the whole reference ship, as they stand in a model file."""
@@ -283,6 +290,9 @@ def accelerations(
     """The reference ship's at the converted state, converted back, and the terms."""
     fast = c.known.speed / ship.speed
     quick = fast * ship.length / c.known.length
+    n = c.known.shaft
+    if KNOWS_SHAFT:
+        n = motion.n * (c.known.shaft / ship.shaft)
     at = Motion(
         x=0.0,
         y=0.0,
@@ -294,7 +304,7 @@ def accelerations(
         phi=motion.phi,
         q=quick * quick * motion.q,
         delta=motion.delta,
-        n=motion.n * (c.known.shaft / ship.shaft) if KNOWS_SHAFT else c.known.shaft,
+        n=n,
     )
     surge, sway, yaw, roll, memory = reference_accelerations(at, c.reference, c.known)
     udot, vdot, rdot, _, _ = term_accelerations(motion, c.terms, ship)

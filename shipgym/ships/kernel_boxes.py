@@ -119,10 +119,10 @@ class Kernel:
             "basis": (None, None),
         }
         table = check_table(content, where, shapes)
-        arrays = {
-            name: check_array(table.get(name), shape, f"{where}.{name}")
-            for name, shape in shapes.items()
-        }
+        arrays = {}
+        for name, shape in shapes.items():
+            place = f"{where}.{name}"
+            arrays[name] = check_array(table.get(name), shape, place)
         return cls(**arrays)
 
 
@@ -174,9 +174,11 @@ class KernelBox(GreyBox):
         shaft_speed: float = 0.0,
     ) -> Floats:
         """Features of the kernel by U^2, as `Structure.features`, shape (n_samples, n_features)."""
-        u, v = (np.asarray(channels[name], dtype=float) for name in ("u", "v"))
+        u = np.asarray(channels["u"], dtype=float)
+        v = np.asarray(channels["v"], dtype=float)
         UU = u * u + v * v
-        return np.asarray(UU[:, None] * self.kernel.features(channels, particulars))
+        features = self.kernel.features(channels, particulars)
+        return np.asarray(UU[:, None] * features)
 
     def vessel(self, coefficients: Mapping[str, float], lag: bool) -> Vessel:
         """Make what is compiled: the reference ship's functions and the sum over centres, read at run time."""
@@ -207,9 +209,13 @@ class KernelBox(GreyBox):
         rows[:, :4] = centres
         rows[:, 4] = -0.5 * (centres**2).sum(axis=1)
         rows[:, 5:] = kernel.basis @ weights.reshape(3, -1).T
-        per_scale = per_root_ln_2 / kernel.scale
         return np.concatenate(
-            [self.ship.ship_numbers(), per_scale, kernel.offset, table.ravel()]
+            [
+                self.ship.ship_numbers(),
+                per_root_ln_2 / kernel.scale,
+                kernel.offset,
+                table.ravel(),
+            ]
         )
 
     def to_dict(self) -> dict[str, Any]:
@@ -227,7 +233,8 @@ class KernelBox(GreyBox):
         shaft = check_flag(table.get("shaft", False), f"{where}.shaft")
         name = check_text(table.get("name"), f"{where}.name")
         check_text(table.get("source"), f"{where}.source")
-        return cls(**_kernel_fields(name, reference, shaft, kernel))
+        fields = _kernel_fields(name, reference, shaft, kernel)
+        return cls(**fields)
 
 
 def kernel_box(box: GreyBox, kernel: Kernel) -> KernelBox:

@@ -395,7 +395,8 @@ def _criterion(
     except InputError:
         return None
     unit = (mass_unit * model.particulars["speed"]) ** 2
-    return {
-        name: float(np.linalg.det(M) * np.linalg.det(A) / unit)
-        for name, A in matrices.items()
-    }
+    criterion = {}
+    for name, A in matrices.items():
+        forces = np.linalg.det(M) * np.linalg.det(A)
+        criterion[name] = float(forces / unit)
+    return criterion

@@ -52,10 +52,10 @@ class ManoeuvringModel:
         names = self.dynamics.coefficient_names
         if self.coefficients.keys() != set(names):
             raise _other_coefficients(self.name, names, self.coefficients)
-        coefficients = {
-            name: check_number(self.coefficients[name], f"coefficients.{name}")
-            for name in names
-        }
+        coefficients = {}
+        for name in names:
+            value = self.coefficients[name]
+            coefficients[name] = check_number(value, f"coefficients.{name}")
         object.__setattr__(self, "coefficients", coefficients)
         shaft = self.service_shaft_speed
         if self.dynamics.scales and "n" in self.command_names and not shaft > 0:
@@ -211,7 +211,9 @@ class ManoeuvringModel:
         states = [channels.get(name, none) for name in self.state_names]
         commands = [channels[name] for name in self.command_names]
         derivatives = self.derivatives(
-            np.stack(states, axis=-1), np.stack(commands, axis=-1), water_depth
+            np.stack(states, axis=-1),
+            np.stack(commands, axis=-1),
+            water_depth,
         )
         return dict(zip(self.state_names, derivatives.T, strict=True))
 

@@ -269,9 +269,11 @@ def _clarke(name: str, ship: Particulars) -> float:
         f" {', '.join(ADDED_MASSES)} in [ship.added_mass]"
     )
     _check_known(ship, name, remedy)
-    beam, draught = ship.require("beam"), ship.require("draught")
+    beam = ship.require("beam")
+    draught = ship.require("draught")
     fullness = ship.require("block_coefficient")
-    value = clarke_added_masses(ship.length, beam, draught, fullness)[name]
+    estimates = clarke_added_masses(ship.length, beam, draught, fullness)
+    value = estimates[name]
     if name in ("Y_vdot", "N_rdot") and value >= 0.0:
         raise InputError(
             f"particulars of {ship.name}: expected a {name} < 0, got {value:.3g} by"

@@ -77,33 +77,40 @@ def check_together(values: Mapping[str, float]) -> None:
     length = values["length"]
     for name, value in values.items():
         limits = LIMITS[name]
-        if limits.share is None or abs(value) <= limits.share * length**limits.growth:
+        if limits.share is None:
             continue
-        squared, unit = (" squared", "m2") if limits.growth == 2.0 else ("", "m")
-        raise InputError(
-            f"{name}: expected at most {limits.share:g} of the length{squared}, got"
-            f" {value:g} with length {length:g}; check the units ({unit})"
-        )
+        largest = limits.share * length**limits.growth
+        if abs(value) > largest:
+            squared, unit = ("", "m") if limits.growth == 1.0 else (" squared", "m2")
+            raise InputError(
+                f"{name}: expected at most {limits.share:g} of the length{squared}, got"
+                f" {value:g} with length {length:g}; check the units ({unit})"
+            )
     if "mass" in values:
         _check_mass(values)
 
 
 def _check_mass(values: Mapping[str, float]) -> None:
     """Refuse a mass, kg, that does not fit the dimensions."""
+    mass, length = values["mass"], values["length"]
     density = values.get("water_density", SEA_WATER)
-    cube = density * values["length"] ** 3
-    low, high = 2e-4 * cube, 0.2 * cube
-    reason = "0.0002 to 0.2 times water_density * length^3"
-    if "beam" in values and "draught" in values:
-        box = density * values["length"] * values["beam"] * values["draught"]
-        low, high = 0.2 * box, box
+    if "beam" not in values or "draught" not in values:
+        whole = density * length**3
+        least, most = 2e-4, 0.2
+        reason = "0.0002 to 0.2 times water_density * length^3"
+    elif "block_coefficient" not in values:
+        whole = density * length * values["beam"] * values["draught"]
+        least, most = 0.2, 1.0
         reason = "a block coefficient of 0.2 to 1"
-        if "block_coefficient" in values:
-            full = box * values["block_coefficient"]
-            low, high = 0.5 * full, 2.0 * full
-            reason = "half to twice what block_coefficient gives"
-    if not low <= values["mass"] <= high:
+    else:
+        box = density * length * values["beam"] * values["draught"]
+        whole = box * values["block_coefficient"]
+        least, most = 0.5, 2.0
+        reason = "half to twice what block_coefficient gives"
+
+    low, high = least * whole, most * whole
+    if not low <= mass <= high:
         raise InputError(
-            f"mass: expected {low:.4g} to {high:.4g} kg ({reason}), got"
-            f" {values['mass']:g}; check the units (kg, not tonnes)"
+            f"mass: expected {low:.4g} to {high:.4g} kg ({reason}), got {mass:g};"
+            " check the units (kg, not tonnes)"
         )

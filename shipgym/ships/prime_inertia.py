@@ -37,8 +37,14 @@ def total_inertia(
     m = particulars.mass_prime
     m_xG = m * particulars.xg_prime
     I_z = particulars.inertia_prime
-    rigid = np.array([[m, 0.0, 0.0], [0.0, m, m_xG], [0.0, m_xG, I_z]])
-    total: Floats = rigid - derivatives
-    if total[0, 0] <= 0.0 or np.linalg.det(total[1:, 1:]) <= 0.0:
+    rigid = [
+        [m, 0.0, 0.0],
+        [0.0, m, m_xG],
+        [0.0, m_xG, I_z],
+    ]
+    total: Floats = np.array(rigid) - derivatives
+    surge = total[0, 0]
+    sway_and_yaw = total[1:, 1:]
+    if surge <= 0.0 or np.linalg.det(sway_and_yaw) <= 0.0:
         raise InputError(problem)
     return total

@@ -104,11 +104,12 @@ def _coefficient_factors(
 ) -> dict[str, float]:
     """Factor of each coefficient of a table in SI units: the change of units."""
     similar = replace(table, normalisation="service")
+    quick = fast / size
     factors = {}
     for equation in table.equations:
-        terms = zip(table.names(equation), table.terms(equation), strict=True)
-        for name, term in terms:
-            quick = fast / size
+        names = table.names(equation)
+        terms = table.terms(equation)
+        for name, term in zip(names, terms, strict=True):
             factors[name] = similar.feature_scale(equation, term, size, fast, quick)
     return factors
 

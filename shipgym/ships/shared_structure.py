@@ -188,10 +188,9 @@ class SharedStructure(Structure):
 
     def to_dict(self) -> dict[str, Any]:
         """Table as it stands in a model file."""
-        shares = {
-            axis: [share.to_dict() for share in listed]
-            for axis, listed in self.shares.items()
-        }
+        shares = {}
+        for axis, listed in self.shares.items():
+            shares[axis] = [share.to_dict() for share in listed]
         return {"name": self.name, "source": self.source, "shares": shares}
 
     @classmethod
@@ -220,10 +219,11 @@ def _shared_fields(
     name: Any, source: Any, shares: Mapping[str, tuple[Share, ...]]
 ) -> dict[str, Any]:
     """Fields of a `SharedStructure`: its equations follow from the shares."""
-    on_velocities = {
-        axis: [share.term for share in shares.get(axis, ()) if not share.acceleration]
-        for axis in AXES
-    }
+    on_velocities: dict[str, list[Term]] = {axis: [] for axis in AXES}
+    for axis, listed in shares.items():
+        for share in listed:
+            if share.acceleration is None and axis in AXES:
+                on_velocities[axis].append(share.term)
     surge = _distinct([*on_velocities["u"], VR, RR])
     across = _distinct([*on_velocities["v"], *on_velocities["r"], UR])
     return {
@@ -255,7 +255,8 @@ def read_shares(text: str) -> tuple[Share, ...]:
     for word in text.split():
         sign = -1.0 if word[0] == "-" else 1.0
         coefficient, _, name = word.removeprefix("-").partition(":")
-        name = name or coefficient.partition("_")[2]
+        if not name:
+            name = coefficient.partition("_")[2]
         if name in ACCELERATIONS:
             term = Term(name, ((name, 1),))
         else:

@@ -132,7 +132,8 @@ class ShipModel(ManoeuvringModel):
         if not isinstance(box, GreyBox) or box.ship.covariance is None:
             return [box] * n
         assert isinstance(box.reference, ShipModel)
-        return [replace(box, reference=drawn) for drawn in box.reference.sample(n, rng)]
+        references = box.reference.sample(n, rng)
+        return [replace(box, reference=drawn) for drawn in references]
 
     def save(self, path: str | Path) -> None:
         """Write the model as a JSON file (format in `shipgym.ships.model_file`)."""

@@ -77,12 +77,12 @@ class Passage:
         UnstableModelError where the ship leaves every physical range, `since` s after
         the manoeuvre began.
         """
-        found = self.loop(name)(states, *arguments, *self.sea, self.numbers)
+        loop = self.loop(name)
+        found = loop(states, *arguments, *self.sea, self.numbers)
         reached = found[0] if isinstance(found, tuple) else found
         if reached < len(states) - 1:
-            raise unstable(
-                self.model, since + self.dt * reached, states[reached], self.dt
-            )
+            time_s = since + self.dt * reached
+            raise unstable(self.model, time_s, states[reached], self.dt)
         return found
 
     def states(self, first: Floats, n_steps: int) -> Floats:
@@ -110,10 +110,13 @@ def simulate(
     """Simulate a ship with commands held over each step (see `ShipModel.simulate`)."""
     held = checked_orders(model, commands)
     check_number(dt, "dt", above=0.0, hint="in s")
-    passage = Passage(model, Conditions(water_depth, weather, seed), dt)
-    states = passage.states(initial_state(model, state), len(held))
+    conditions = Conditions(water_depth, weather, seed)
+    passage = Passage(model, conditions, dt)
+    first = initial_state(model, state)
+    states = passage.states(first, len(held))
     passage.run("simulate", states, two_commands(held), dt)
-    return as_trial(model, dt, states, np.vstack([held, held[-1:]]), kind)
+    commands = np.vstack([held, held[-1:]])
+    return as_trial(model, dt, states, commands, kind)
 
 
 def orders(
@@ -149,11 +152,13 @@ def open_loop(model: ManoeuvringModel, trial: Trial) -> Trial:
         if name in trial.channels:
             states[0, i] = trial[name][0]
         elif name == "q":  # which no trial records: that of a steady yaw rate
-            rates = model.rates({name: trial[name][:1] for name in needed})
-            states[0, i] = -rates["r"][0]
+            first = {known: trial[known][:1] for known in needed}
+            states[0, i] = -model.rates(first)["r"][0]
 
     delta = np.array(trial["delta"])
-    n = np.array(trial["n"]) if "n" in trial.channels else np.zeros(len(t))
+    n = np.zeros(len(t))
+    if "n" in trial.channels:
+        n = np.array(trial["n"])
     wind = wind_accelerations(trial, model.dynamics)
     wind = 0.5 * (wind[1:] + wind[:-1])
     longest_step = LONGEST_STEP * model.travel_time

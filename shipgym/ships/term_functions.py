@@ -171,7 +171,9 @@ def factored(monomials: Sequence[Monomial]) -> str:
             del left[variable]
         inside.append((coefficient, left))
     product = f"{variable} * ({factored(inside)})"
-    return f"{product} + ({factored(outside)})" if outside else product
+    if outside:
+        product += f" + ({factored(outside)})"
+    return product
 
 
 def _product(coefficient: str, powers: Powers) -> str:
@@ -200,7 +202,8 @@ def _with_their_makings(names: set[str]) -> set[str]:
     """Names of variables, and of those that they are made of in turn."""
     makings = set(names)
     for name in names:
-        makings.update(
-            word for word in re.findall(r"\w+", MADE_OF[name]) if word in MADE_OF
-        )
-    return makings if makings == names else _with_their_makings(makings)
+        words = re.findall(r"\w+", MADE_OF[name])
+        makings.update(word for word in words if word in MADE_OF)
+    if makings == names:
+        return makings
+    return _with_their_makings(makings)

@@ -200,7 +200,8 @@ class Structure:
         in SI units; the service speed is in the particulars, the shaft speed that at
         service speed, 1/s. Returns shape (n_samples, n_terms).
         """
-        u, v = (np.asarray(channels[name], dtype=float) for name in ("u", "v"))
+        u = np.asarray(channels["u"], dtype=float)
+        v = np.asarray(channels["v"], dtype=float)
         U = np.hypot(u, v)
         offsets = {"du": particulars["speed"], "dn": shaft_speed}
         values = {"U": U}
@@ -210,7 +211,9 @@ class Structure:
             channel = np.asarray(channels[CHANNEL[symbol]], dtype=float)
             if symbol in offsets:
                 channel = channel - offsets[symbol]
-            values[symbol] = np.abs(channel) if symbol[0] == "|" else channel
+            if symbol.startswith("|"):
+                channel = np.abs(channel)
+            values[symbol] = channel
 
         columns = []
         for term in self.terms(equation):
@@ -256,13 +259,12 @@ class Structure:
 
     def term_scales(self, particulars: Particulars, shaft_speed: float = 0.0) -> Floats:
         """`feature_scale` of all terms, one equation after the other, for a ship; shape (n_coefficients,)."""
-        length, speed = particulars["length"], particulars["speed"]
+        ship = particulars["length"], particulars["speed"], shaft_speed
         scales = []
         for equation, terms in self.equations.items():
             for term in terms:
-                scales.append(
-                    self.feature_scale(equation, term, length, speed, shaft_speed)
-                )
+                scale = self.feature_scale(equation, term, *ship)
+                scales.append(scale)
         return np.array(scales)
 
     def acceleration_matrix(
@@ -392,10 +394,10 @@ class Structure:
             table["normalisation"] = self.normalisation
         if self.quantity != "force":
             table["quantity"] = self.quantity
-        table["equations"] = {
-            equation: [term.to_dict() for term in terms]
-            for equation, terms in self.equations.items()
-        }
+        equations = {}
+        for equation, terms in self.equations.items():
+            equations[equation] = [term.to_dict() for term in terms]
+        table["equations"] = equations
         return table
 
     @classmethod
@@ -412,8 +414,8 @@ def structure_fields(table: Mapping[str, Any], where: str) -> dict[str, Any]:
     for key in ("normalisation", "quantity"):
         if key in table:
             given[key] = table[key]
-    given["equations"] = {
-        equation: read_term_list(terms, f"{place}.{equation}")
-        for equation, terms in equations.items()
-    }
+    read = {}
+    for equation, terms in equations.items():
+        read[equation] = read_term_list(terms, f"{place}.{equation}")
+    given["equations"] = read
     return given

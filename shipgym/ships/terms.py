@@ -128,11 +128,14 @@ def _read_term(formula: str) -> Term:
                 f" such as '|v| r' or 'v^3/U', got '{factor}' in"
                 f" '{formula}'.{did_you_mean(factor, SYMBOLS)}"
             )
-        stroke, exponent = parts[1], parts[3] or ""
+        stroke = parts[1]
+        exponent = parts[3] or ""
         name += stroke + short.get(symbol, symbol) + exponent
         if symbol != "1":
             power = int(exponent or 1)
-            powers[symbol] = powers.get(symbol, 0) + (-power if stroke else power)
+            if stroke:
+                power = -power
+            powers[symbol] = powers.get(symbol, 0) + power
     if not name:
         raise InputError(
             "terms: expected a formula such as '|v| r' between two commas, got nothing"
@@ -160,10 +163,9 @@ def short_terms(words: str, surge: str = "du") -> tuple[Term, ...]:
 
 def read_term_list(content: Any, where: str) -> tuple[Term, ...]:
     """Read the terms of one equation from a model file."""
-    return tuple(
-        Term.from_dict(entry, place)
-        for place, entry in list_entries(content, where).items()
-    )
+    entries = list_entries(content, where)
+    terms = [Term.from_dict(entry, place) for place, entry in entries.items()]
+    return tuple(terms)
 
 
 def list_entries(content: Any, where: str) -> Mapping[str, Any]:
