@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from shipgym.arrays import Floats
 from shipgym.checks import check_array, check_table, unexpected
 
-CHANNELS = ("u", "v", "r", "delta")
+ENVELOPE_CHANNELS = ("u", "v", "r", "delta")
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,7 +61,7 @@ class Envelope:
     def to_dict(self) -> dict[str, Any]:
         """Envelope as it stands in a model file."""
         return {
-            "channels": list(CHANNELS),
+            "channels": list(ENVELOPE_CHANNELS),
             "low": self.low.tolist(),
             "high": self.high.tolist(),
             "centre": self.centre.tolist(),
@@ -74,8 +74,8 @@ class Envelope:
         shapes = {"low": (4,), "high": (4,), "centre": (4,), "shape": (4, 4)}
         table = check_table(content, where, ("channels", *shapes))
         names = table.get("channels")
-        if names != list(CHANNELS):
-            expected = str(list(CHANNELS))
+        if names != list(ENVELOPE_CHANNELS):
+            expected = str(list(ENVELOPE_CHANNELS))
             raise unexpected(f"{where}.channels", expected, names)
         arrays = {}
         for name, shape in shapes.items():

@@ -36,7 +36,7 @@ from shipgym.python_files import (
 from shipgym.ships.particulars import Particulars
 from shipgym.ships.steering import SteeringGear
 
-RATES = ("udot", "vdot", "rdot", "pdot", "qdot")
+ACCELERATIONS = ("udot", "vdot", "rdot", "pdot", "qdot")
 Accelerations = Callable[[Any, Any, Any], tuple[float, float, float, float, float]]
 
 
@@ -133,13 +133,13 @@ class ShipEquations:
         )
         c = self.coefficients_record()
         found = asked(self.accelerations, motion, c, ship)
-        if not isinstance(found, tuple) or len(found) != len(RATES):
+        if not isinstance(found, tuple) or len(found) != len(ACCELERATIONS):
             expected = (
                 "five numbers, a tuple: udot, vdot, rdot, pdot, qdot, 0 for those that"
                 " the ship does not have"
             )
             raise unexpected("accelerations", expected, found)
-        rates = dict(zip(RATES, found, strict=True))
+        rates = dict(zip(ACCELERATIONS, found, strict=True))
         if self.shaft_acceleration is not None:
             rate = asked(self.shaft_acceleration, n, 0.9 * n, c, ship)
             rates["shaft_acceleration"] = rate
@@ -220,7 +220,7 @@ class ShipEquations:
         none = np.zeros(len(channels["u"]))
         columns = [channels.get(name, none) for name in Motion._fields]
         states = np.stack(columns, axis=-1)
-        found = np.full((len(states), len(RATES)), math.nan)
+        found = np.full((len(states), len(ACCELERATIONS)), math.nan)
         for row, state in zip(found, states.tolist(), strict=True):
             with suppress(ArithmeticError, ValueError):
                 row[:] = accelerations(Motion(*state), c, ship)

@@ -34,7 +34,7 @@ from shipgym.ships.particulars import Particulars
 from shipgym.ships.terms import Term
 
 RBF = "rbf"
-SIZES = (32, 64, 100)  # centres of what is compiled; others have weight 0
+COMPILED_SIZES = (32, 64, 100)  # centres of what is compiled; others have weight 0
 SLOWEST = 0.05  # of service speed; slower, v and r are divided by it
 # numbers of a centre in the table: 4 coordinates, minus half the square of their
 # distance from the origin, 3 weights
@@ -80,20 +80,20 @@ class Kernel:
             shapes[:3] == [(4,), (4,), (n, 4)]
             and len(shapes[3]) == 2
             and shapes[3][0] == n
-            and 0 < n <= SIZES[-1]
+            and 0 < n <= COMPILED_SIZES[-1]
             and np.all(self.scale > 0.0)
         )
         if not fits:
             raise InputError(
                 "kernel: expected offset, scale, centres and basis of shapes (4,), (4,)"
-                f" above 0, (n, 4) and (n, n_features) with n at most {SIZES[-1]}, got"
+                f" above 0, (n, 4) and (n, n_features) with n at most {COMPILED_SIZES[-1]}, got"
                 f" {shapes}"
             )
 
     @property
     def size(self) -> int:
         """Number of centres that is compiled."""
-        return next(size for size in SIZES if size >= len(self.centres))
+        return next(size for size in COMPILED_SIZES if size >= len(self.centres))
 
     def features(self, channels: Mapping[str, Any], particulars: Particulars) -> Floats:
         """Features of samples, shape (n_samples, n_features)."""

@@ -26,7 +26,7 @@ from shipgym.ships.term_table import Structure
 if TYPE_CHECKING:  # most models have a table of terms
     from shipgym.ships.equations import ShipEquations
 
-FORMAT = 1  # of model files
+MODEL_FORMAT = 1  # of model files
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,14 +41,14 @@ class ManoeuvringModel:
     covariance: Floats | None = None
     envelope: Envelope | None = None
     provenance: dict[str, Any] | None = None
-    # by default what is shipped or registered under the structure's name
+    # by default, and for a copy with another structure, what is registered under its name
     dynamics: Structure | ShipEquations = None  # type: ignore[assignment]
     service_shaft_speed: float = 0.0
 
     def __post_init__(self) -> None:
         self.particulars.require("speed")
-        dynamics = self.dynamics or get_dynamics(self.structure)
-        object.__setattr__(self, "dynamics", dynamics)
+        if self.dynamics is None or self.dynamics.name != self.structure:
+            object.__setattr__(self, "dynamics", get_dynamics(self.structure))
         names = self.dynamics.coefficient_names
         if self.coefficients.keys() != set(names):
             raise _other_coefficients(self.name, names, self.coefficients)
@@ -242,7 +242,7 @@ class ManoeuvringModel:
         """Content of a model file, ready for JSON (format in `shipgym.ships.model_file`)."""
         covariance, envelope = self.covariance, self.envelope
         return {
-            "format": FORMAT,
+            "format": MODEL_FORMAT,
             "name": self.name,
             "structure": self.dynamics.to_dict(),
             "normalisation": self.dynamics.normalisation,

@@ -11,12 +11,12 @@ is m', and so on.
 
 from math import sqrt
 
+from shipgym.constants import SEA_WATER
 from shipgym.ships.particulars import Particulars
 from shipgym.ships.ship_model import ShipModel
 from shipgym.ships.steering import SteeringGear
 
 LENGTH = 160.93  # m
-WATER_DENSITY = 1025.0  # kg/m^3
 # prime system, about midship
 MASS = 798e-5
 INERTIA = 39.2e-5
@@ -82,11 +82,11 @@ def mariner(service_speed: float = 7.7175) -> ShipModel:
         length=LENGTH,
         beam=23.17,
         draught=8.23,
-        mass=MASS * 0.5 * WATER_DENSITY * LENGTH**3,
+        mass=MASS * 0.5 * SEA_WATER * LENGTH**3,
         xg=XG * LENGTH,
         yaw_gyradius=LENGTH * sqrt(INERTIA / MASS - XG**2),
         speed=service_speed,
-        water_density=WATER_DENSITY,
+        water_density=SEA_WATER,
         X_udot=-42e-5,
         Y_vdot=-748e-5,
         Y_rdot=-9.354e-5,

@@ -45,7 +45,7 @@ from shipgym.checks import (
 )
 from shipgym.errors import InputError
 from shipgym.ships.envelope import Envelope
-from shipgym.ships.manoeuvring_model import FORMAT, ManoeuvringModel
+from shipgym.ships.manoeuvring_model import MODEL_FORMAT, ManoeuvringModel
 from shipgym.ships.particulars import Particulars
 from shipgym.ships.steering import SteeringGear
 from shipgym.ships.structures import get_equations, list_equations
@@ -74,7 +74,7 @@ def read_model(
 
     Raises InputError that starts with `where` and names the field at fault.
     """
-    check_format(fields, FORMAT, where)
+    check_format(fields, MODEL_FORMAT, where)
     check_keys(fields, (*REQUIRED, *OPTIONAL), where, REQUIRED)
     dynamics = _read_dynamics(fields["structure"], f"{where}: structure", make)
     unit = fields.get("normalisation", dynamics.normalisation)

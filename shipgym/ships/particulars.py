@@ -90,7 +90,7 @@ class Particulars(Mapping[str, Any]):
     def __post_init__(self) -> None:
         check_text(self.name, "name")
         numbers = {}
-        for name in FIELDS:
+        for name in NAMES:
             value = getattr(self, name)
             if name == "name" or (value is None and name != "length"):
                 continue
@@ -100,20 +100,20 @@ class Particulars(Mapping[str, Any]):
 
         names = self.estimated
         listed = isinstance(names, list | tuple | set | frozenset)
-        if not listed or not all(name in FIELDS for name in names):
+        if not listed or not all(name in NAMES for name in names):
             raise unexpected("estimated", "a list of names of values", names)
         object.__setattr__(self, "estimated", frozenset(names))
 
     def __getitem__(self, name: str) -> Any:
-        if name not in FIELDS:
+        if name not in NAMES:
             raise KeyError(name)
         return getattr(self, name)
 
     def __iter__(self) -> Iterator[str]:
-        return iter(FIELDS)
+        return iter(NAMES)
 
     def __len__(self) -> int:
-        return len(FIELDS)
+        return len(NAMES)
 
     @classmethod
     def from_mapping(
@@ -126,7 +126,7 @@ class Particulars(Mapping[str, Any]):
         InputError, beginning with `where`, for an unknown key, a missing length, a
         wrong type or a value that no ship has.
         """
-        table = dict(check_table(mapping, where, (*FIELDS, "added_mass", "estimated")))
+        table = dict(check_table(mapping, where, (*NAMES, "added_mass", "estimated")))
         added = table.pop("added_mass", None) or {}
         check_table(added, f"{where} added_mass", ADDED_MASSES)
         for name in added:
@@ -203,7 +203,7 @@ class Particulars(Mapping[str, Any]):
 
 
 #: Names of all values, in the order of the ship file.
-FIELDS: tuple[str, ...] = tuple(
+NAMES: tuple[str, ...] = tuple(
     item.name for item in fields(Particulars) if item.name != "estimated"
 )
 

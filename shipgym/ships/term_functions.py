@@ -21,7 +21,7 @@ Equations = Mapping[str, tuple[Term, ...]]
 Powers = dict[str, int]  # of variables
 Monomial = tuple[str, Powers]  # with its coefficient
 
-RATES = ("u", "v", "r", "p", "q")
+MOTION_RATES = ("u", "v", "r", "p", "q")
 
 #: Variable of each symbol.
 VARIABLE = {
@@ -64,8 +64,10 @@ DAMPED = {
 }
 
 _MADE = " ".join([*MADE_OF, *MADE_OF.values(), *DAMPED.values(), "motion.q"])
-_RATES = [f"{rate}dot" for rate in RATES]
-_WORD = "|".join(map(re.escape, [*re.findall(r"[A-Za-z_]+(?:\.\w+)?", _MADE), *_RATES]))
+_ACCELERATIONS = [f"{rate}dot" for rate in MOTION_RATES]
+_WORD = "|".join(
+    map(re.escape, [*re.findall(r"[A-Za-z_]+(?:\.\w+)?", _MADE), *_ACCELERATIONS])
+)
 #: All that a source may be: these words, numbered coefficients and numbers, joined by
 #: arithmetic.
 GRAMMAR = re.compile(
@@ -122,7 +124,7 @@ def accelerations_source(equations: Equations, prime: bool, damped: bool = True)
     needed = _with_their_makings(needed)
     yaw = "rdot + motion.q" if "q" in equations else "rdot"
     lines = [f"{name} = {made}" for name, made in MADE_OF.items() if name in needed]
-    lines += [f"{name}dot = {rates.get(name, '0.0')}" for name in RATES]
+    lines += [f"{name}dot = {rates.get(name, '0.0')}" for name in MOTION_RATES]
     lines.append(f"return udot, vdot, {yaw}, pdot, qdot")
     return "\n    ".join(["def accelerations(motion, c, ship):", *lines]) + "\n"
 

@@ -153,7 +153,7 @@ def test_a_vector_environment_says_what_is_wrong(mariner):
     env = vector(COURSE, 2)
     with pytest.raises(InputError, match="reset_mask"):
         env.reset(options={"reset_mask": np.zeros(3, dtype=np.bool_)})
-    with pytest.raises(InputError, match="seed: expected"):
+    with pytest.raises(InputError, match="seed: 3 found"):
         env.reset(seed=[1, 2, 3])
     discrete = vector(COURSE, 2, action="rudder-discrete")
     discrete.reset(seed=0)
