@@ -1,4 +1,4 @@
-"""Checks of what a user wrote: each refusal is one message, `place: expected X, got Y; do Z`."""
+"""Checks of a user's input; a refusal is `place: expected X, got Y; do Z`."""
 
 import difflib
 import math
@@ -35,7 +35,7 @@ _SHORT.maxstring = _SHORT.maxother = 200
 
 
 def shown(value: Any) -> str:
-    """Write a value as Python does, for a message; of a long one only beginning and end."""
+    """Write a value as Python does, for a message; a long one is shortened."""
     try:
         return _SHORT.repr(value)
     except ValueError:  # an integer of thousands of digits
@@ -50,7 +50,7 @@ def unexpected(where: str, expected: str, value: Any, remedy: str = "") -> Input
 
 @contextmanager
 def placed(where: str, separator: str = ": ") -> Iterator[None]:
-    """Let refusals within the block begin with `where`, the place, unless they do already."""
+    """Let refusals within the block begin with the place `where`."""
     try:
         yield
     except InputError as error:
@@ -65,7 +65,7 @@ def quoted(words: Iterable[str]) -> str:
 
 
 def did_you_mean(word: str, options: Iterable[str]) -> str:
-    """``" Did you mean 'beam'?"`` where one of the options looks like `word`, else an empty string."""
+    """Hint such as ``" Did you mean 'beam'?"``; empty if no option looks like `word`."""
     by_lower_case = {option.lower(): option for option in options}
     text = str(word).strip().lower()
     close = difflib.get_close_matches(text, list(by_lower_case), n=1, cutoff=0.6)
@@ -80,7 +80,7 @@ def check_keys(
     where: str,
     required: Iterable[str] = (),
 ) -> None:
-    """Refuse a key that is not among `allowed`, naming the nearest one, and the lack of a required one."""
+    """Refuse a key not among `allowed`, naming the nearest, and a missing required one."""
     for key in mapping:
         if key not in allowed:
             raise InputError(
@@ -97,7 +97,7 @@ def check_keys(
 def check_fields(
     content: Mapping[str, Any], names: Collection[str], where: str, remedy: str
 ) -> None:
-    """Refuse an unknown field of a file, and the lack of any of `names`, ending the latter with `remedy`."""
+    """Refuse an unknown field of a file, and a missing one of `names` with its `remedy`."""
     check_keys(content, names, where)
     for name in names:
         if name not in content:
@@ -118,7 +118,7 @@ def check_table(
     allowed: Collection[str] | None = None,
     required: Iterable[str] = (),
 ) -> Mapping[str, Any]:
-    """Return `value`, which must be a table (a mapping with text as keys), of these keys where given."""
+    """Return `value`, which must be a table (a mapping by strings), of these keys if given."""
     if not isinstance(value, Mapping):
         raise unexpected(where, "a table of keys and values", value)
     if allowed is not None:
@@ -127,7 +127,7 @@ def check_table(
 
 
 def check_text(value: Any, where: str) -> str:
-    """Return `value`, which must be a non-empty string of at most `LONGEST_TEXT` characters."""
+    """Return `value`, which must be a non-empty string of `LONGEST_TEXT` at most."""
     if not isinstance(value, str) or not value.strip():
         raise unexpected(where, "a non-empty string", value)
     if len(value) > LONGEST_TEXT:
@@ -140,7 +140,7 @@ def check_text(value: Any, where: str) -> str:
 def check_choice(
     value: Any, options: Collection[str], where: str, also: str = ""
 ) -> str:
-    """Return `value`, which must be one of the words in `options`; `also` ends the list in the message."""
+    """Return `value`, which must be one of `options`; `also` ends the list in messages."""
     if isinstance(value, str) and value in options:
         return value
     hint = did_you_mean(value, options) if isinstance(value, str) else ""
@@ -150,7 +150,7 @@ def check_choice(
 
 
 def data_only(value: Any, where: str, own: Any = None, named: bool = False) -> None:
-    """Refuse Python files named in what a file holds: code is run at a user's own word, not at a file's.
+    """Refuse Python files named in a file's content: only a user's own word runs code.
 
     At any depth of `value` these are paths that end in ``.py``, and all that the
     environments' options `task`, `reward` and `sensors` name (`named`: whether `value`
@@ -183,7 +183,7 @@ def check_number(
     at_most: float | None = None,
     hint: str = "",
 ) -> float:
-    """Return `value` as float; it must be a finite number within the open and closed bounds.
+    """Return `value` as float; it must be finite and within open and closed bounds.
 
     Booleans and numbers in quotes are refused. The InputError begins with `where`, the
     place, such as ``"ship.toml: [ship] length"``, and says what is expected, explained
@@ -219,7 +219,7 @@ def _no_such_number(
 
 
 def _as_float(value: Any) -> float:
-    """A number as float, infinite where it is too large for one; nan for what is no number."""
+    """Convert to float: infinite where too large, nan for what is no number."""
     if isinstance(value, bool) or not isinstance(value, Real):
         return math.nan
     try:
@@ -252,7 +252,7 @@ def check_flag(value: Any, where: str) -> bool:
 
 
 def check_finite(values: Any, where: str, hint: str = "") -> NDArray[np.float64]:
-    """Return `values` as a read-only copy; they must be finite numbers, of any shape."""
+    """Return `values` as a read-only copy; they must be finite numbers."""
     try:
         array = np.array(values, dtype=np.float64)
     except (TypeError, ValueError, OverflowError):
@@ -273,7 +273,7 @@ def check_finite(values: Any, where: str, hint: str = "") -> NDArray[np.float64]
 def check_array(
     value: Any, shape: tuple[int | None, ...], where: str
 ) -> NDArray[np.float64]:
-    """Return the numbers of a list, or of lists within it, as an array of this shape; None is any length.
+    """Return the numbers of nested lists as an array of a shape; None is any length.
 
     Strings, booleans, numbers that are not finite and rows that differ in length are
     refused.
@@ -300,7 +300,7 @@ def check_array(
 
 
 def check_shape(value: Any, shape: Shape, where: str) -> None:
-    """Refuse nested JSON values that differ from a shape, naming the place; further keys may be there."""
+    """Refuse nested JSON values that differ from a shape; further keys are allowed."""
     if isinstance(shape, dict):
         table = check_table(value, where)
         for key in table if ANY_KEY in shape else shape:

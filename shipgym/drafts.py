@@ -1,4 +1,4 @@
-"""Files and folders that appear whole or not at all: each is a draft under another name until it is done."""
+"""Files and folders written under a draft's name and renamed when complete."""
 
 import os
 import re
@@ -21,7 +21,7 @@ ABANDONED_S = 7 * 86400.0  # age of a draft whose process may be alive
 
 @contextmanager
 def atomic_path(path: Path) -> Iterator[Path]:
-    """A temporary name beside a file, renamed to it when the block ends without an error.
+    """Temporary name beside a file, renamed to it if the block ends without error.
 
     InputError if the folder does not exist or cannot be written, or what is there is no
     file, as a device.
@@ -51,7 +51,7 @@ def atomic_path(path: Path) -> Iterator[Path]:
 
 @contextmanager
 def draft_folder(path: Path) -> Iterator[Path]:
-    """A folder beside a path that is removed when the block ends, unless it was renamed."""
+    """Temporary folder beside a path, removed when the block ends unless renamed."""
     remove_drafts(path.parent)
     draft = draft_name(path)
     shutil.rmtree(draft, ignore_errors=True)  # of a killed process of the same number
@@ -87,7 +87,7 @@ def abandoned_drafts(folder: Path) -> list[Path]:
 
 @cache
 def remove_drafts(folder: Path) -> None:
-    """Remove what killed processes left half-written in a folder; a process looks once in each folder."""
+    """Remove half-written files of killed processes; once per process and folder."""
     for path in abandoned_drafts(folder):
         with suppress(OSError):
             if path.is_dir():

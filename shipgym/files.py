@@ -1,4 +1,4 @@
-"""Files that are read within stated limits and with one clear error, and written whole or not at all.
+"""Files read within limits and with one clear error, and written atomically.
 
 Whatever is read is a regular file of at most so many bytes, and what JSON and TOML hold
 is checked in one place (`check_content`), before any reader looks at its fields.
@@ -42,7 +42,7 @@ _UNWRITABLE = re.compile("[\0\ud800-\udfff]")
 
 
 def make_folder(folder: Path) -> None:
-    """Make a folder and those above it where they do not exist; raises InputError if that cannot be."""
+    """Make a folder and those above it if absent; raises InputError if it cannot."""
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -62,7 +62,7 @@ def write_text(text: str, path: Path) -> None:
 
 
 def write_json(fields: Mapping[str, Any], path: Path, indent: int | None = 1) -> None:
-    """Write JSON atomically (`atomic_path`); numbers that are not finite are refused with a ValueError."""
+    """Write JSON atomically (`atomic_path`); ValueError for numbers that are not finite."""
     write_text(json.dumps(fields, indent=indent, allow_nan=False) + "\n", path)
 
 
@@ -70,7 +70,7 @@ def write_json(fields: Mapping[str, Any], path: Path, indent: int | None = 1) ->
 
 
 def check_readable(path: Path, what: str) -> None:
-    """InputError for what is missing, no regular file, or cannot be read; `what` it is, as "CSV file"."""
+    """Refuse a missing, special or unreadable file; `what` it is, such as "CSV file"."""
     with _opened(path, what):
         pass
 
@@ -121,7 +121,7 @@ def _opened(path: Path, what: str) -> Iterator[BinaryIO]:
 
 
 def read_text(path: Path, what: str, largest: int, latin: bool = False) -> str:
-    """Text in UTF-8, as `read_bytes` reads; InputError, naming the line, for what is no such text.
+    """Read UTF-8 text as `read_bytes` does; InputError names the line that is not.
 
     With `latin`, other bytes are read as Latin-1, as instruments write the sign of
     degrees, unless they are control characters there, or those of UTF-16 and of memory
@@ -152,7 +152,7 @@ def _not_utf_8(path: Path, what: str, data: bytes, start: int) -> InputError:
 
 
 def read_json(path: Path, what: str, remedy: str) -> Mapping[str, Any]:
-    """Object in a JSON file; `what` is expected there, and `remedy` says what to do about a broken one.
+    """Read a JSON object; `what` is expected, `remedy` says how to mend a broken file.
 
     Raises InputError as `read_text` does, and if the file is cut short, holds no
     object, or something that `check_content` refuses.
@@ -162,7 +162,7 @@ def read_json(path: Path, what: str, remedy: str) -> Mapping[str, Any]:
 
 
 def parse_json(text: str, where: str, remedy: str) -> Any:
-    """Value of a JSON text within the limits of `check_content`; `where` begins messages: "a.json:"."""
+    """Parse JSON within the limits of `check_content`; messages begin with `where`."""
     loads = partial(json.loads, object_pairs_hook=_unrepeated)
     broken = "broken JSON ({}); the file may be cut short: " + remedy
     return _parsed(loads, text, where, broken)
@@ -178,7 +178,7 @@ def read_toml(path: Path, what: str) -> dict[str, Any]:
 
 
 def parse_toml(text: str, where: str) -> dict[str, Any]:
-    """Tables of a TOML text within the limits of `check_content`; `where` begins messages: "a.toml:"."""
+    """Parse TOML within the limits of `check_content`; messages begin with `where`."""
     # on a dotted key that nests deeper `tomllib` spends time and memory by the square
     part = r"""\.[ \t]*(?:[\w-]+|"[^"\n]*"|'[^'\n]*')[ \t]*"""
     if re.search(rf"(?:{part}){{{DEEPEST}}}", text):
@@ -203,7 +203,7 @@ def toml_value(text: str) -> Any:
 
 
 def named_values(texts: Iterable[str], where: str, example: str) -> dict[str, Any]:
-    """Values of texts `name=value`, as TOML has them, by name; InputError for one written otherwise."""
+    """Parse texts `name=value`, with values as in TOML; returns them by name."""
     found: dict[str, Any] = {}
     for text in texts:
         name, sign, value = (part.strip() for part in text.partition("="))
@@ -254,7 +254,7 @@ def _place(where: str, key: str | int, depth: int) -> str:
 
 
 def _expected(key: str | int, value: Any, infinite: bool) -> str:
-    """Expectation that a single value does not meet; empty where nothing is wrong with it."""
+    """Expectation that a single value does not meet; empty if none."""
     if value is None or isinstance(value, bool):
         return ""
     if isinstance(value, float):

@@ -1,4 +1,4 @@
-"""The shipped models by name: reference ships, identified models in `library/`, and grey boxes on them."""
+"""Shipped models by name: reference ships, identified models, and grey boxes."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ Form = Literal["published", "shipmmg"]
 def model_of(
     ship: ShipEquations, coefficients: Mapping[str, float] | None = None
 ) -> ShipModel:
-    """Make a model of a ship with equations of her own, some coefficients changed or none."""
+    """Make a model of a ship with its own equations, coefficients changed as given."""
     return ShipModel(
         name=ship.name,
         structure=ship.name,
@@ -52,28 +52,28 @@ def model_of(
 
 
 def mariner() -> ShipModel:
-    """The Mariner class cargo ship, 3 degrees of freedom, at her service speed of 15 knots."""
+    """Mariner class cargo ship, 3 degrees of freedom, service speed 15 knots."""
     from shipgym.ships import mariner as file
 
     return file.mariner()
 
 
 def container(rudder_limit_deg: float = 35.0) -> ShipModel:
-    """The container ship S175 (SR108), 4 degrees of freedom; the MSS toolbox has a limit of 10 degrees."""
+    """Container ship S175 (SR108), 4 degrees of freedom."""
     model = model_of(get_equations("container"))
     steering = replace(model.steering, rudder_limit_deg=rudder_limit_deg)
     return replace(model, steering=steering)
 
 
 def tanker(rudder_limit_deg: float = 35.0) -> ShipModel:
-    """The Esso 190 000 dwt tanker, deep and shallow water; the MSS toolbox has a limit of 10 degrees."""
+    """Esso 190 000 dwt tanker, deep and shallow water."""
     model = model_of(get_equations("tanker"))
     steering = replace(model.steering, rudder_limit_deg=rudder_limit_deg)
     return replace(model, steering=steering)
 
 
 def kvlcc2(form: Form = "published") -> ShipModel:
-    """KVLCC2 at full scale, 320 m: the standard method as published, or the variant of shipmmg 0.0.11."""
+    """KVLCC2 at full scale, 320 m: the MMG standard method, or shipmmg 0.0.11's variant."""
     from shipgym.ships import kvlcc2 as file
 
     model = kvlcc2_l7(form)
@@ -109,13 +109,13 @@ REFERENCE_SHIPS: dict[str, Callable[[], ShipModel]] = {
 
 
 def list_models() -> list[str]:
-    """Names of the known models: reference ships, identified ones, then ships that were registered."""
+    """Names of the known models: reference ships, identified and registered ones."""
     identified = sorted(path.stem for path in LIBRARY.glob("*.json"))
     return [*REFERENCE_SHIPS, *identified, *REGISTERED_EQUATIONS]
 
 
 def register_ship_equations(ship: ShipEquations | str | Path) -> ShipEquations:
-    """Register a ship with equations of her own, so that `load_model` finds her by name.
+    """Register a ship with its own equations, so that `load_model` finds it by name.
 
     Given is the ship, or the Python file that defines her as `SHIP`, which is run. A
     ship that does not come from a file, or from one that cannot be imported, stays in
@@ -227,7 +227,7 @@ def grey_box(
 
 
 def fitted_box(ship: ShipModel) -> GreyBox:
-    """A grey box on a model of the very same ship, whose covariance and provenance it keeps."""
+    """Grey box on a model of the same ship, whose covariance and provenance it keeps."""
     reference = replace(ship, name=f"{ship.name}, {ship.structure}", envelope=None)
     return replace(grey_box(ship), reference=reference)
 
@@ -239,7 +239,7 @@ def converted_model(
     service_shaft_speed: float = 0.0,
     name: str | None = None,
 ) -> ShipModel:
-    """The bare reference ship as a model of another ship: a grey box whose terms are all zero.
+    """Reference ship as a model of another ship: a grey box whose terms are zero.
 
     The reference is as in `grey_box`, or a grey box; particulars (with the service
     speed), steering gear, shaft speed at service speed (1/s) and name are those of the

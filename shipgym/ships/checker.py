@@ -1,4 +1,4 @@
-"""A battery of checks that any ship model, a user's own included, can be put through."""
+"""Checks that any ship model, a user's own included, can be put through."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -70,7 +70,7 @@ def check_ship_model(model: ShipModel | str | Path) -> ModelCheck:
 
 
 def _states(model: ShipModel) -> dict[str, Floats]:
-    """States and commands over the range of hard manoeuvres, each of shape (n,), always the same."""
+    """States and commands over the range of hard manoeuvres, each of shape (n,)."""
     random = np.random.default_rng(0)
     L, U0 = model.particulars["length"], model.particulars["speed"]
 
@@ -137,7 +137,7 @@ def _wrong_accelerations(model: ShipModel) -> Iterator[str]:
 
 
 def _asymmetry(model: ShipModel) -> float:
-    """Difference of the accelerations from their mirror image over their size, all in the prime system."""
+    """Difference of the accelerations from their mirror image by size, prime system."""
     channels = _states(model)
     odd = ("v", "r", "p", "phi", "q", "delta")
     mirrored = channels | {name: -channels[name] for name in odd}
@@ -162,7 +162,7 @@ def _root_mean_square(values: Floats) -> float:
 
 
 def _run(model: ShipModel, rudder: float, lengths: float) -> Trial:
-    """Run from service with the rudder held, over so many ship lengths at service speed."""
+    """Run from service with the rudder held, over a number of ship lengths."""
     step = 0.02  # ship lengths
     held = np.full(round(lengths / step), rudder)
     return model.simulate(orders(model, held), step * model.travel_time)

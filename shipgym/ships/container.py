@@ -1,4 +1,4 @@
-"""Container ship S175 (SR108), 4 degrees of freedom: surge, sway, yaw and roll, with rudder and propeller.
+"""Container ship S175 (SR108): surge, sway, yaw and roll, with rudder and propeller.
 
 Source: Son & Nomoto 1981, On the coupled motion of steering and rolling of a high speed
 container ship, J. Soc. Naval Architects of Japan 150; in the form of the function
@@ -175,7 +175,7 @@ def accelerations(
 def propeller(
     nD: float, u: float, v: float, r: float, c: Any
 ) -> tuple[float, float, float]:
-    """Inflow u_P of the propeller, its thrust coefficient by (n D)^2, and its thrust T."""
+    """Inflow u_P of the propeller, its thrust by (n D)^2, and its thrust T."""
     # u_P = u ((1 - w_P) + tau ((v + x_P r)^2 + c_Pv v + c_Pr r))
     v_P = v + c.xp * r
     straightened = v_P * v_P + c.c_pv * v + c.c_pr * r
@@ -190,7 +190,7 @@ def propeller(
 def rudder_force(
     delta: float, v: float, r: float, u_P: float, K_T_nn: float, c: Any
 ) -> tuple[float, float, float]:
-    """Normal force F_N of the rudder, negative for one to starboard, and sine and cosine of its angle."""
+    """Normal force F_N of the rudder, negative to starboard, and its angle's sine and cosine."""
     v_R = c.gamma * v + c.c_Rr * r + c.c_Rrrr * r * r * r + c.c_Rrrv * r * r * v
     # u_R = epsilon u_P sqrt(1 + 8 kappa K_T / (pi J^2))
     jet = u_P * u_P + (8.0 * c.kappa / pi) * K_T_nn
@@ -209,7 +209,7 @@ def rudder_force(
 
 
 def sway_hull(at: State, c: Any) -> float:
-    """Sway force of the hull: linear in sway, turn, roll and heel, and cubic in all but roll."""
+    """Sway force of the hull, to third order in sway, turn and heel, linear in roll."""
     v, r, phi = at.v, at.r, at.phi
     vv, rr, ff = v * v, r * r, phi * phi
     force: float = (

@@ -1,4 +1,4 @@
-"""A ship's steering from one form into another: state space, Nomoto's forms, prime system, and back.
+"""Convert steering dynamics: state space, Nomoto's forms, prime system, and back.
 
     any ShipModel  ->  steering_state_space (A, B), state_space, nomoto
     (A, B)  ->  nomoto_of, linear_steering_ship
@@ -131,7 +131,7 @@ def nomoto1_ship(
     steering: SteeringGear | None = None,
     name: str = "nomoto",
 ) -> ShipModel:
-    """The ship of Nomoto's first-order form, T rdot + r = K delta, as a model of structure `nomoto`.
+    """Model of structure `nomoto` from Nomoto's first-order form, T rdot + r = K delta.
 
     K is in 1/s, positive to starboard, T in s; both are negative for a ship unstable on
     her course. She keeps the service speed of the particulars. Raises InputError for a
@@ -155,7 +155,7 @@ def nomoto2_ship(
     steering: SteeringGear | None = None,
     name: str = "nomoto2",
 ) -> ShipModel:
-    """The ship of Nomoto's second-order form, of structure `nomoto2`: she does not drift. T is not used.
+    """Model of structure `nomoto2` from Nomoto's second-order form; T is not used.
 
     Raises InputError for time constants that are zero or a complex pair.
     """
@@ -181,7 +181,7 @@ def linear_steering_ship(
     steering: SteeringGear | None = None,
     name: str = "linear-steering",
 ) -> ShipModel:
-    """The ship of d/dt (v, r) = A (v, r) + B delta at service speed, of structure `linear-steering`.
+    """Model of structure `linear-steering` from d/dt (v, r) = A (v, r) + B delta.
 
     A has shape (2, 2) and B (2, 1), SI units, delta positive to starboard, as
     `steering_state_space` gives them; at another speed her derivatives follow by the
@@ -223,7 +223,7 @@ def prime_matrices(
 def si_matrices(
     A: ArrayLike, B: ArrayLike, length: float, speed: float
 ) -> tuple[Floats, Floats]:
-    """Linear steering dynamics of the prime system in SI units, the inverse of `prime_matrices`."""
+    """Steering dynamics of the prime system in SI units, inverse of `prime_matrices`."""
     a, b = _checked(A, B)
     unit_a, unit_b = _units(length, speed)
     return a * unit_a, b * unit_b

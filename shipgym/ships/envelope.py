@@ -1,4 +1,4 @@
-"""The operating envelope of a model: the velocities and rudder angles of the data it was identified from.
+"""Operating envelope of a model: where the data lie that it was identified from.
 
 Outside it the model extrapolates. The summary is a box and, because v and r go together
 in every manoeuvre, the smallest ellipsoid around the data.
@@ -52,7 +52,7 @@ class Envelope:
     def distance(
         self, u: ArrayLike, v: ArrayLike, r: ArrayLike, delta: ArrayLike
     ) -> Floats:
-        """Distance of states of one shape, SI units, from the centre: 1 on the ellipsoid, 2 at twice its size."""
+        """Distance of states, SI units, from the centre: 1 on the ellipsoid, 2 at twice its size."""
         states = np.stack(np.broadcast_arrays(u, v, r, delta), axis=-1)
         offsets = states - self.centre
         distance: Floats = np.linalg.norm(offsets @ self.shape.T, axis=-1)
@@ -87,7 +87,7 @@ class Envelope:
 def smallest_ellipsoid(
     points: Floats, tolerance: float = 1e-3
 ) -> tuple[Floats, Floats]:
-    """Ellipsoid of least volume around points, by Khachiyan's algorithm (Todd & Yildirim 2007).
+    """Ellipsoid of least volume around points (Khachiyan; Todd & Yildirim 2007).
 
     The points, shape (n_points, n_dimensions), are scaled to ranges near 1; the
     algorithm stops at a relative excess `tolerance` of the largest distance. Returns

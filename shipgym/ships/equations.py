@@ -1,4 +1,4 @@
-"""Ships with equations of their own: a record of coefficients and functions that read like the publication.
+"""Ships with their own equations: a record of coefficients and published functions.
 
 A file with such a ship defines `Coefficients`, a `NamedTuple` of numbers with their
 published values, `accelerations(motion, c, ship)`, where the speed of the shaft is a
@@ -41,7 +41,7 @@ Accelerations = Callable[[Any, Any, Any], tuple[float, float, float, float, floa
 
 
 def record_of(values: Mapping[str, float], module: str) -> Any:
-    """Make a record of coefficients with these values as defaults, for the file of a ship."""
+    """Make a record of coefficients with these values as defaults."""
     names, defaults = list(values), list(values.values())
     record = namedtuple("Coefficients", names, defaults=defaults, module=module)  # type: ignore[misc]
     record.__annotations__ = dict.fromkeys(values, float)
@@ -50,7 +50,7 @@ def record_of(values: Mapping[str, float], module: str) -> Any:
 
 @dataclass(frozen=True)
 class ShipEquations:
-    """The equations of motion of one ship, with her numbers."""
+    """Equations of motion of one ship, with their numbers."""
 
     name: str  # by which `load_model` and model files know the ship
     source: str  # where the equations were published
@@ -113,7 +113,7 @@ class ShipEquations:
             check_number(values[name], f"{where}: coefficient {name!r}")
 
     def _try(self) -> None:
-        """Work out the accelerations of one state as plain Python, whose messages are the clearest."""
+        """Compute the accelerations of one state in plain Python, for its clear messages."""
         L, U = self.particulars["length"], self.particulars["speed"]
         n = self.service_shaft_speed
         gear = self.steering
@@ -150,7 +150,7 @@ class ShipEquations:
     def fault(
         self, state: Mapping[str, float], coefficients: Mapping[str, float], ship: Ship
     ) -> str:
-        """Place where plain Python fails at a state, and why; that of the accelerations if it does not."""
+        """Place where plain Python fails at a state, and why; else that of the accelerations."""
         motion = Motion(*[state.get(name, 0.0) for name in Motion._fields])
         c = self.coefficients_record(**coefficients)
         try:
@@ -160,7 +160,7 @@ class ShipEquations:
         return place_of(self.accelerations)
 
     def __reduce__(self) -> Any:
-        """Another process finds a ship of this package by her name, another by her file."""
+        """Find a ship of this package by name in another process, others by their file."""
         if self.path is not None:
             return read_ship_equations, (self.path,)
         return _named, (self.accelerations.__module__,)
@@ -190,11 +190,11 @@ class ShipEquations:
         return ("x", "y", "psi", "u", "v", "r", *roll, "delta", *shaft)
 
     def form(self, coefficients: Mapping[str, float]) -> Accelerations:
-        """Accelerations for given coefficients: a ship may have other equations for some of them."""
+        """Equations for given coefficients; some ships have more than one form."""
         return self.accelerations
 
     def vessel(self, coefficients: Mapping[str, float], lag: bool) -> Vessel:
-        """Make what is compiled of the ship: the same whatever her coefficients are, but for the form."""
+        """Make the functions to be compiled, the same for all coefficients of one form."""
         functions = {"accelerations": Part(self.form(coefficients))}
         if self.shaft_acceleration is not None:
             functions["shaft_acceleration"] = Part(self.shaft_acceleration)

@@ -1,4 +1,4 @@
-"""The grey box: the accelerations of a reference ship, converted by similarity, and a table of terms.
+"""Grey box: a reference ship's accelerations, converted by similarity, plus terms.
 
 Source: Mei, Sun & Shi 2019, Ship maneuvering prediction using grey box framework via
 adaptive RM-SVM with minor rudder. Their equation 11 adds accelerations of two different
@@ -97,7 +97,7 @@ class GreyBox(Structure):
 
     @property
     def rolls(self) -> bool:
-        """True where the reference ship has a rolling motion, and with it the target."""
+        """True where the reference ship, and with it the target, rolls."""
         return "phi" in self.ship.state_names
 
     @property
@@ -107,7 +107,7 @@ class GreyBox(Structure):
 
     @cached_property
     def required_channels(self) -> tuple[str, ...]:
-        """Channels a trial needs: those of the terms and those that the reference ship is evaluated at."""
+        """Channels a trial needs: those of the terms and of the reference ship."""
         needed = set(self.channels | ALWAYS_MEASURED)
         if self.rolls:
             needed |= {"p", "phi"}
@@ -142,7 +142,7 @@ class GreyBox(Structure):
     def vessel_with(
         self, terms: Record, functions: dict[str, Any], lag: bool, **summed: Any
     ) -> Vessel:
-        """Make what is compiled of the reference ship and a sum of terms with its record of coefficients."""
+        """Make the functions to be compiled of the reference ship and a sum of terms."""
         reference = self.ship.vessel
         parts = {
             **reference.functions,
@@ -167,7 +167,7 @@ class GreyBox(Structure):
         particulars: Particulars,
         shaft_speed: float = 0.0,
     ) -> Floats:
-        """Numbers of the compiled functions: the reference ship's, then those of the terms."""
+        """Numbers of the compiled functions: those of the reference ship, then the terms'."""
         terms = self.term_numbers(coefficients, particulars, shaft_speed)
         return np.concatenate([self.ship.ship_numbers(), terms])
 
@@ -177,7 +177,7 @@ class GreyBox(Structure):
         particulars: Particulars,
         shaft_speed: float = 0.0,
     ) -> dict[str, Floats]:
-        """Accelerations of the reference ship, evaluated at and converted back to the target.
+        """Accelerations of the reference ship, converted to the target.
 
         The channels of the target are u, v, r, delta, and n, p, phi where known, each
         of shape (n_samples,), SI units; its particulars give length and service speed,
@@ -195,7 +195,7 @@ class GreyBox(Structure):
         particulars: Particulars,
         ship: Ship,
     ) -> dict[str, Floats]:
-        """Accelerations at samples, without compiling: the reference ship's, converted, and the terms."""
+        """Accelerations at samples, without compiling: the converted ship's and the terms'."""
         at = self._reference_channels(channels, particulars, ship.shaft)
         known = self.ship.accelerations(at)
         found = self._converted_back(known, particulars)
@@ -267,7 +267,7 @@ class GreyBox(Structure):
     def read(
         cls, table: Mapping[str, Any], where: str, reference: ManoeuvringModel
     ) -> Self:
-        """Read what `to_dict` wrote, the reference ship read already; InputError, after `where`."""
+        """Read what `to_dict` wrote, given the reference ship; errors begin with `where`."""
         shaft = check_flag(table.get("shaft", False), f"{where}.shaft")
         fields = structure_fields(table, where)
         return cls(**fields, reference=reference, shaft=shaft)
@@ -321,6 +321,6 @@ def accelerations(
 
 @cache
 def _coefficients(reference: Record, terms: Record) -> Record:
-    """Record of a grey box's coefficients: the known ship, hers, and those of the terms."""
+    """Record of a grey box's coefficients: the reference ship's and the terms'."""
     fields = [("known", Ship), ("reference", reference), ("terms", terms)]
     return NamedTuple("GreyBoxCoefficients", fields)  # type: ignore[return-value]

@@ -1,4 +1,4 @@
-"""Mass and added mass that belong to a ship's accelerations, so that these can be turned into forces."""
+"""Mass and added mass that turn a ship's accelerations into forces."""
 
 import numpy as np
 
@@ -10,7 +10,7 @@ from shipgym.ships.term_table import Structure
 
 
 def inertia(model: ManoeuvringModel, water_depth: float = np.inf) -> Floats:
-    """Mass and added mass with which the model's equations divide its forces, shape (3, 4), SI units.
+    """Mass and added mass by which a model divides its forces, shape (3, 4), SI units.
 
     From the accelerations in surge, sway, yaw and roll to surge force, sway force and
     yaw moment about midship. A reference ship has them in its own numbers (the tanker's
@@ -32,7 +32,7 @@ def inertia(model: ManoeuvringModel, water_depth: float = np.inf) -> Floats:
 
 
 def rigid_inertia(model: ManoeuvringModel) -> tuple[float, float, float]:
-    """Mass, kg, static moment, kg m, and yaw inertia, kg m2, of the ship alone, about midship."""
+    """Mass, kg, static moment, kg m, and yaw inertia, kg m2, of the ship, about midship."""
     c = model.coefficients
     if model.structure == "container":
         unit = _mass_unit(model.particulars.completed())
@@ -57,7 +57,7 @@ def _mass_unit(p: Particulars) -> float:
 
 
 def particulars_inertia(p: Particulars) -> Floats:
-    """Mass and added mass by the particulars of a ship, which are complete; nothing in roll; as `inertia`."""
+    """Mass and added mass by complete particulars, nothing in roll; as `inertia`."""
     return _mass_unit(p) * _with_arms(prime_inertia(p), p)
 
 
@@ -68,7 +68,7 @@ def _with_arms(prime: Floats, p: Particulars) -> Floats:
 
 
 def _container(model: ManoeuvringModel) -> Floats:
-    """Son & Nomoto 1981; the added mass in sway acts above the centre, so that roll couples to sway."""
+    """Son & Nomoto 1981; the added mass in sway acts above the centre and couples to roll."""
     c = model.coefficients
     L = model.particulars["length"]
     surge = c["m"] + c["mx"]
@@ -86,7 +86,7 @@ def _container(model: ManoeuvringModel) -> Floats:
 
 
 def _mmg(model: ManoeuvringModel) -> Floats:
-    """Yasukawa & Yoshimura 2015: added mass by rho L^2 d / 2, its yaw inertia by rho L^4 d / 2."""
+    """Yasukawa & Yoshimura 2015: by rho L^2 d / 2, yaw inertia by rho L^4 d / 2."""
     c, p = model.coefficients, model.particulars
     L = c.get("L", p.length)
     d = c["d"] if "d" in c else p.require("draught")
@@ -104,7 +104,7 @@ def _mmg(model: ManoeuvringModel) -> Floats:
 
 
 def _tanker(model: ManoeuvringModel, water_depth: float) -> Floats:
-    """Van Berlekom & Goddard 1972, bis system: by the ship's mass, its yaw inertia by mass and length^2."""
+    """Van Berlekom & Goddard 1972, bis system: by mass, yaw inertia by mass and length^2."""
     c, p = model.coefficients, model.particulars
     T = p["draught"]
     z = 0.0 if np.isposinf(water_depth) else T / (water_depth - T)

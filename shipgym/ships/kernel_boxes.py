@@ -1,4 +1,4 @@
-"""A reference ship, and radial basis functions that correct her accelerations and fade outside their data.
+"""Reference ship corrected by radial basis functions that fade outside their data.
 
 Source: Suykens, Van Gestel, De Brabanter, De Moor & Vandewalle 2002, Least squares
 support vector machines, chapter 6 (fixed-size LS-SVM: a kernel on a few centres,
@@ -34,7 +34,7 @@ from shipgym.ships.particulars import Particulars
 from shipgym.ships.terms import Term
 
 RBF = "rbf"
-COMPILED_SIZES = (32, 64, 100)  # centres of what is compiled; others have weight 0
+SIZES = (32, 64, 100)  # centres of what is compiled; others have weight 0
 SLOWEST = 0.05  # of service speed; slower, v and r are divided by it
 # numbers of a centre in the table: 4 coordinates, minus half the square of their
 # distance from the origin, 3 weights
@@ -60,7 +60,7 @@ class KernelTerm(Term):
 
 @dataclass(frozen=True, eq=False)
 class Kernel:
-    """Radial basis functions exp(-|x - centre|^2 / 2), and the features that are made of them.
+    """Radial basis functions exp(-|x - centre|^2 / 2), and the features made of them.
 
     x is v / U, r L / U, the rudder angle in rad and U / U0, less an offset, by a scale.
 
@@ -80,20 +80,20 @@ class Kernel:
             shapes[:3] == [(4,), (4,), (n, 4)]
             and len(shapes[3]) == 2
             and shapes[3][0] == n
-            and 0 < n <= COMPILED_SIZES[-1]
+            and 0 < n <= SIZES[-1]
             and np.all(self.scale > 0.0)
         )
         if not fits:
             raise InputError(
                 "kernel: expected offset, scale, centres and basis of shapes (4,), (4,)"
-                f" above 0, (n, 4) and (n, n_features) with n at most {COMPILED_SIZES[-1]}, got"
+                f" above 0, (n, 4) and (n, n_features) with n at most {SIZES[-1]}, got"
                 f" {shapes}"
             )
 
     @property
     def size(self) -> int:
         """Number of centres that is compiled."""
-        return next(size for size in COMPILED_SIZES if size >= len(self.centres))
+        return next(size for size in SIZES if size >= len(self.centres))
 
     def features(self, channels: Mapping[str, Any], particulars: Particulars) -> Floats:
         """Features of samples, shape (n_samples, n_features)."""
@@ -127,7 +127,7 @@ class Kernel:
 
 
 def kernel_inputs(channels: Mapping[str, Any], particulars: Particulars) -> Floats:
-    """Inputs v / U, r L / U, rudder angle and U / U0 of samples, shape (n_samples, 4)."""
+    """Inputs v / U, r L / U, rudder angle and U / U0; shape (n_samples, 4)."""
     u = np.asarray(channels["u"], dtype=float)
     v = np.asarray(channels["v"], dtype=float)
     r = np.asarray(channels["r"], dtype=float)
@@ -152,7 +152,7 @@ def gaussians(x: Floats, centres: Floats) -> Floats:
 
 @dataclass(frozen=True)
 class KernelBox(GreyBox):
-    """A reference ship's accelerations and, by U^2 / L (U^2 / L^2 of yaw), sums of features of a kernel.
+    """Accelerations of a reference ship plus sums of a kernel's features.
 
     Raises InputError for no kernel, and as `GreyBox`.
     """
@@ -173,7 +173,7 @@ class KernelBox(GreyBox):
         particulars: Particulars,
         shaft_speed: float = 0.0,
     ) -> Floats:
-        """Features of the kernel by U^2, as `Structure.features`, shape (n_samples, n_features)."""
+        """Features of the kernel by U^2, shape (n_samples, n_features)."""
         u = np.asarray(channels["u"], dtype=float)
         v = np.asarray(channels["v"], dtype=float)
         UU = u * u + v * v
@@ -181,7 +181,7 @@ class KernelBox(GreyBox):
         return np.asarray(UU[:, None] * features)
 
     def vessel(self, coefficients: Mapping[str, float], lag: bool) -> Vessel:
-        """Make what is compiled: the reference ship's functions and the sum over centres, read at run time."""
+        """Make the functions to be compiled: the reference ship's and the sum over centres."""
         size = self.kernel.size
         functions = {
             "N_CENTRES": size,
@@ -196,7 +196,7 @@ class KernelBox(GreyBox):
         particulars: Particulars,
         shaft_speed: float = 0.0,
     ) -> Floats:
-        """Numbers of the compiled functions: the reference ship's, scales, offset and table of centres.
+        """Numbers of the functions: the reference ship's, scales, offset and centres.
 
         Coordinates are scaled so that the kernel is a power of 2.
         """
@@ -228,7 +228,7 @@ class KernelBox(GreyBox):
     def read(
         cls, table: Mapping[str, Any], where: str, reference: ManoeuvringModel
     ) -> Self:
-        """Read what `to_dict` wrote, the reference ship read already; InputError, after `where`."""
+        """Read what `to_dict` wrote, given the reference ship; errors begin with `where`."""
         kernel = Kernel.from_dict(table["kernel"], f"{where}.kernel")
         shaft = check_flag(table.get("shaft", False), f"{where}.shaft")
         name = check_text(table.get("name"), f"{where}.name")
@@ -245,7 +245,7 @@ def kernel_box(box: GreyBox, kernel: Kernel) -> KernelBox:
 def _kernel_fields(
     name: str, reference: ManoeuvringModel, shaft: bool, kernel: Kernel
 ) -> dict[str, Any]:
-    """Fields of a `KernelBox`: its terms are the kernel's features, the same in all equations."""
+    """Fields of a `KernelBox`, whose terms are the kernel's features in all equations."""
     n_features = kernel.basis.shape[1]
     terms = tuple(KernelTerm(f"k{i + 1}", (), i) for i in range(n_features))
     return {
@@ -278,7 +278,7 @@ N_CENTRES = 0  # place of their number
 
 
 def coordinates(motion: Motion, c: KernelCoefficients, ship: Ship) -> Point:
-    """Coordinates of a ship among the centres, and half the square of her distance from the origin."""
+    """Coordinates among the centres, and half the squared distance from the origin."""
     u, v = motion.u, motion.v
     slowest = SLOWEST * ship.speed
     U = max(sqrt(u * u + v * v), slowest)

@@ -103,7 +103,7 @@ class Flow(NamedTuple):
 def accelerations(
     motion: Motion, c: Any, ship: Ship
 ) -> tuple[float, float, float, float, float]:
-    """Accelerations in surge, sway and yaw, body frame, origin midship, as published."""
+    """Accelerations in surge, sway and yaw, body frame, midship, as published."""
     u, v, r = motion.u, motion.v, motion.r
     U = sqrt(u * u + v * v)
     per_U = 1.0 / U
@@ -124,7 +124,7 @@ def accelerations(
 def package_accelerations(
     motion: Motion, c: Any, ship: Ship
 ) -> tuple[float, float, float, float, float]:
-    """Accelerations in the form of shipmmg 0.0.11: flow at the centre of gravity, wake by a Gauss function."""
+    """Accelerations as in shipmmg 0.0.11: flow at the centre of gravity, Gaussian wake."""
     u, v, r = motion.u, motion.v, motion.r
     v_G = v - r * c.xG
     U = sqrt(u * u + v_G * v_G)
@@ -259,7 +259,7 @@ def rudder_force(
 
 @dataclass(frozen=True)
 class TwoForms(ShipEquations):
-    """The published equations, or those of shipmmg where the coefficient `PACKAGE_FORM` is 1."""
+    """Published equations, or those of shipmmg where `PACKAGE_FORM` is 1."""
 
     def form(self, coefficients: Mapping[str, float]) -> Accelerations:
         """Accelerations of the form that the coefficients ask for."""

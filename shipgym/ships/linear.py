@@ -1,4 +1,4 @@
-"""Steering linearised about straight running: state space, Nomoto's forms and course stability.
+"""Linearise steering about straight running: state space, Nomoto, course stability.
 
 Sources: Nomoto, Taguchi, Honda & Hirano 1957, On the steering qualities of ships,
 International Shipbuilding Progress 4; Fossen 2011, Handbook of Marine Craft
@@ -112,7 +112,7 @@ def straight_running(model: ShipModel, speed: float | None = None) -> StraightRu
 def steady_turn_rudder(
     model: ShipModel, rate: float, slowed: bool = True
 ) -> float | None:
-    """Rudder angle, rad, of the steady turn at a yaw rate, rad/s; None if none is found.
+    """Rudder angle, rad, of the steady turn at a yaw rate, rad/s; None if not found.
 
     `slowed`: whether the ship loses speed as her surge equation has it, or keeps that
     of service.
@@ -127,7 +127,7 @@ def steady_turn_rudder(
 
 
 def _feels_speed(model: ShipModel) -> bool:
-    """True where the acceleration in surge depends on the speed, so that there is a steady one."""
+    """True where surge depends on the speed, so that there is a steady one."""
     service = dict(zip(model.state_names, model.service_state.tolist(), strict=True))
     slower = service | {"u": 0.9 * service["u"]}
     return _prime_rates(model, slower)["u"] != _prime_rates(model, service)["u"]
@@ -140,7 +140,7 @@ def _balance(
     rate: float = 0.0,
     largest_sway: float = 0.5,
 ) -> dict[str, float] | None:
-    """State without accelerations at a yaw rate, found from a speed by changing the unknowns; SI units.
+    """State without accelerations at a yaw rate, found from a speed; SI units.
 
     `largest_sway`: over service speed; a state in a turn may have more rudder than
     straight running.
@@ -185,7 +185,7 @@ def _units(model: ShipModel) -> dict[str, float]:
 
 
 def _prime_rates(model: ShipModel, state: dict[str, float]) -> dict[str, float]:
-    """Accelerations at a state by name, prime system, the shaft ordered to turn as in service."""
+    """Accelerations by name at a state, prime system, shaft as in service."""
     at = {"n": model.service_shaft_speed} | state
     channels = {name: np.array([value]) for name, value in at.items()}
     units = _units(model)
@@ -235,7 +235,7 @@ def linearise(
 def _jacobian(
     model: ShipModel, at: StraightRunning, rates: list[str], side: int
 ) -> dict[tuple[str, str], float]:
-    """Derivatives of rates by their states and the rudder, prime system, by the names of both.
+    """Derivatives of rates by states and rudder, prime system, by the names of both.
 
     By central differences, or by one-sided ones to starboard (1) or port (-1).
     """
@@ -287,7 +287,7 @@ def steering_state_space(
 
 
 def nomoto_of(A: Floats, B: Floats) -> Nomoto:
-    """Nomoto's form of d/dt (v, r) = A (v, r) + B delta (Fossen 2011, equations 7.40 to 7.44).
+    """Nomoto's form of d/dt (v, r) = A (v, r) + B delta (Fossen 2011, 7.40 to 7.44).
 
     Raises InputError if a steady rudder does not turn the ship.
     """
@@ -324,7 +324,7 @@ def nomoto(model: ShipModel) -> Nomoto:
 
 
 def is_course_stable(model: ShipModel) -> bool:
-    """True where the ship, with the rudder fixed, comes back to a straight course after a disturbance.
+    """True where the ship, rudder fixed, returns to a straight course.
 
     Raises InputError if the model has no straight course.
     """
@@ -345,7 +345,7 @@ class StraightLineStability:
 
     @property
     def index(self) -> float:
-        """Largest real part of the eigenvalues of either side, 1/s: negative for a stable ship."""
+        """Largest real part of either side's eigenvalues, 1/s: negative if stable."""
         return max(values[0].real for values in self.eigenvalues.values())
 
     @property
@@ -355,7 +355,7 @@ class StraightLineStability:
 
     @property
     def unstable_sides(self) -> tuple[str, ...]:
-        """Sides to which the ship leaves her course by herself."""
+        """Sides to which the ship leaves its course by itself."""
         return tuple(
             side
             for side, values in self.eigenvalues.items()
@@ -364,7 +364,7 @@ class StraightLineStability:
 
 
 def straight_line_stability(model: ShipModel) -> StraightLineStability:
-    """Straight-line stability of a ship about straight running, rudder, speed and shaft fixed, roll balanced.
+    """Straight-line stability with rudder, speed and shaft fixed and roll balanced.
 
     The criterion is the determinant of the linear derivatives of force, which is that
     of the inertia times that of the linearised accelerations; the inertia is positive,
@@ -385,7 +385,7 @@ def straight_line_stability(model: ShipModel) -> StraightLineStability:
 def _criterion(
     model: ShipModel, matrices: dict[str, Floats]
 ) -> dict[str, float] | None:
-    """Determinant of the force derivatives of sway and yaw, prime system; None without sway or mass."""
+    """Determinant of the force derivatives, prime system; None without sway or mass."""
     if "q" in model.state_names:
         return None
     try:

@@ -1,4 +1,4 @@
-"""The equations of motion of one ship with her numbers: what every simulation is made from."""
+"""Equations of motion of one ship and their numbers, as simulations need them."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ MODEL_FORMAT = 1  # of model files
 
 @dataclass(frozen=True, eq=False)
 class ManoeuvringModel:
-    """A ship's structure and coefficients, their uncertainty and envelope; fields as in `ShipModel`."""
+    """Structure and coefficients of a ship, with uncertainty and envelope; see `ShipModel`."""
 
     name: str
     structure: str
@@ -73,7 +73,7 @@ class ManoeuvringModel:
 
     @property
     def table(self) -> Structure:
-        """The table of terms of its structure; InputError for a ship with equations written by hand."""
+        """Table of terms of the structure; InputError for equations written by hand."""
         if isinstance(self.dynamics, Structure):
             return self.dynamics
         return get_structure(self.structure)  # which refuses her
@@ -82,7 +82,7 @@ class ManoeuvringModel:
 
     @property
     def acceleration_matrix(self) -> Floats:
-        """From the coefficients to those of the accelerations, as `Structure.acceleration_matrix`."""
+        """Matrix from coefficients to accelerations, as `Structure.acceleration_matrix`."""
         return self.table.acceleration_matrix(
             self.particulars, self.service_shaft_speed
         )
@@ -93,7 +93,7 @@ class ManoeuvringModel:
         return replace(self, coefficients=coefficients)
 
     def with_accelerations(self, coefficients: Mapping[str, Floats]) -> Self:
-        """Copy with the coefficients that follow from those of each regression on accelerations, SI."""
+        """Copy with coefficients that follow from each regression on accelerations, SI."""
         stacked = np.concatenate([coefficients[q] for q in self.table.regressed])
         values = np.linalg.solve(self.acceleration_matrix, stacked)
         return self.with_coefficients(values)
@@ -102,12 +102,12 @@ class ManoeuvringModel:
 
     @property
     def vessel(self) -> Vessel:
-        """What is compiled of the ship: one for all models that differ in numbers only."""
+        """Functions and records to compile, shared by models that differ in numbers only."""
         lag = self.steering.time_constant > 0.0
         return self.dynamics.vessel(self.coefficients, lag)
 
     def ship_numbers(self, water_depth: float = np.inf, step: float = 0.0) -> Floats:
-        """Numbers that her vessel reads, in the order of `vessel.layout`: `Ship`, then coefficients.
+        """Numbers that `vessel` reads, in the order of its layout: `Ship`, then coefficients.
 
         `step`, s, is that of her simulation, which a lag of her steering gear has to be
         long enough for.
@@ -143,7 +143,7 @@ class ManoeuvringModel:
 
     @property
     def turns_astern(self) -> bool:
-        """True where the shaft may turn astern: a table of terms is taken at its word."""
+        """True where the shaft may turn astern."""
         return self.dynamics.astern
 
     @property
@@ -153,7 +153,7 @@ class ManoeuvringModel:
 
     @cached_property
     def service_state(self) -> Floats:
-        """Straight ahead north at service speed with the rudder amidships, shape (n_state,)."""
+        """State straight ahead north at service speed, rudder amidships; shape (n_state,)."""
         values = {"u": self.particulars["speed"], "n": self.service_shaft_speed}
         return np.array([values.get(name, 0.0) for name in self.state_names])
 
@@ -206,7 +206,7 @@ class ManoeuvringModel:
     def rates(
         self, channels: Mapping[str, Floats], water_depth: float = np.inf
     ) -> dict[str, Floats]:
-        """`derivatives` by name at channels of shape (n_samples,); a state that is absent is 0."""
+        """`derivatives` by name at channels of shape (n_samples,); absent states are 0."""
         none = np.zeros(len(channels["u"]))
         states = [channels.get(name, none) for name in self.state_names]
         commands = [channels[name] for name in self.command_names]
@@ -220,7 +220,7 @@ class ManoeuvringModel:
     def accelerations(
         self, channels: Mapping[str, Floats], water_depth: float = np.inf
     ) -> dict[str, Floats]:
-        """Accelerations at a few samples, as `derivatives` has them, but without compiling anything.
+        """Accelerations at a few samples, as `derivatives` has them, without compiling.
 
         The channels are the states by name, each of shape (n_samples,), in SI units; a
         state that is absent is 0. Returns the accelerations of `u`, `v`, `r`, and of
@@ -239,7 +239,7 @@ class ManoeuvringModel:
     # ---- model file ------------------------------------------------------------------
 
     def to_dict(self) -> dict[str, Any]:
-        """Content of a model file, ready for JSON (format in `shipgym.ships.model_file`)."""
+        """Content of a model file, ready for JSON (see `shipgym.ships.model_file`)."""
         covariance, envelope = self.covariance, self.envelope
         return {
             "format": MODEL_FORMAT,
@@ -256,7 +256,7 @@ class ManoeuvringModel:
         }
 
     def check_depth(self, water_depth: float) -> None:
-        """InputError for water that is too shallow, or shallow water and a ship that knows none."""
+        """Refuse water that is too shallow, or shallow water for a model that has none."""
         if water_depth == np.inf:
             return
         hint = "in m, or inf for deep water"
@@ -296,7 +296,7 @@ def _with_last_axis(argument: str, given: ArrayLike, names: tuple[str, ...]) -> 
 
 
 def _rows(array: Floats, shape: tuple[int, ...]) -> Floats:
-    """Rows of an array broadcast to a shape in front of its last axis, one after the other."""
+    """Rows of an array broadcast to a shape in front of its last axis."""
     width = array.shape[-1]
     repeated = np.broadcast_to(array, (*shape, width))
     return np.array(repeated).reshape(-1, width)
@@ -305,7 +305,7 @@ def _rows(array: Floats, shape: tuple[int, ...]) -> Floats:
 def ship_of(
     model: ManoeuvringModel, water_depth: float = np.inf, step: float = 0.0
 ) -> Ship:
-    """Record of what every ship has besides her coefficients, for simulations in steps of some seconds."""
+    """Record of the numbers that every ship has besides its coefficients."""
     gear, p = model.steering, model.particulars
     return Ship(
         length=p["length"],

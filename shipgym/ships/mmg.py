@@ -1,4 +1,4 @@
-"""The structure `mmg`: a ship by the MMG method in its general form, 3 degrees of freedom.
+"""Structure `mmg`: the MMG method in its general form, 3 degrees of freedom.
 
 Source: Yasukawa & Yoshimura 2015, Introduction of MMG standard method for ship
 maneuvering predictions, J. Mar. Sci. Technol. 20. Beyond it: a thrust factor, a helm
@@ -93,7 +93,7 @@ KNOWN = ("t_P", "x_P", "x_R", "k_0", "k_1", "k_2", "nD_U0")
 def standard_form(
     model_coefficients: Mapping[str, float], speed: float, shaft: float
 ) -> dict[str, float]:
-    """Coefficients of the general form of a ship given in the standard form, as KVLCC2 is.
+    """Coefficients of the general form from those of the standard form, as KVLCC2 has.
 
     `speed`, m/s, and `shaft`, 1/s, are those at service. Raises InputError for the
     variant of shipmmg, whose wake has another law.
@@ -161,7 +161,7 @@ class Flow(NamedTuple):
 
 
 def power_law(x: float, power: float) -> float:
-    """A speed by service speed to a power; its logarithm from the series of artanh at its eighth root."""
+    """Power of a speed by service speed, from the series of artanh at its eighth root."""
     least, most = 0.01, 4.0  # for which the series is good enough
     within = min(max(x, least), most)
     root = sqrt(sqrt(sqrt(within)))
@@ -181,7 +181,7 @@ def power_law(x: float, power: float) -> float:
 def accelerations(
     motion: Motion, c: Any, ship: Ship
 ) -> tuple[float, float, float, float, float]:
-    """Accelerations in surge, sway and yaw, body frame, origin midship, from forces per density."""
+    """Accelerations in surge, sway and yaw, body frame, origin midship."""
     L = ship.length
     flow = flow_of(motion, c, ship)
     X_H, Y_H, N_H = hull_forces(c, flow, ship)
@@ -290,7 +290,7 @@ def rudder_force(motion: Motion, c: Any, flow: Flow) -> tuple[float, float, floa
 
 @dataclass(frozen=True)
 class MMGEquations(ShipEquations):
-    """The general form: coefficients without unit, dimensions from the particulars of each ship."""
+    """General form: coefficients without unit, dimensions from each ship's particulars."""
 
     scales: ClassVar[bool] = True
 
@@ -310,7 +310,7 @@ class MMGEquations(ShipEquations):
         particulars: Particulars,
         shaft_speed: float = 0.0,
     ) -> Floats:
-        """Numbers of coefficients, then of dimensions; InputError for particulars that do not suffice."""
+        """Numbers of coefficients, then dimensions; InputError if particulars do not suffice."""
         values = [coefficients[name] for name in self.coefficient_names]
         return np.array([*values, *dimensions(particulars).values()])
 

@@ -1,4 +1,4 @@
-"""The model file: JSON, versioned, written whole or not at all, validated field by field on reading.
+"""Model file: versioned JSON, written atomically, validated field by field.
 
 Format 1 has these fields:
 
@@ -70,7 +70,7 @@ OPTIONAL = (
 def read_model(
     fields: Mapping[str, Any], where: str, make: Callable[..., Model]
 ) -> Model:
-    """Read the model that `ManoeuvringModel.to_dict` wrote, made by `make` (`ShipModel`).
+    """Read the model that `ManoeuvringModel.to_dict` wrote, made by `make`.
 
     Raises InputError that starts with `where` and names the field at fault.
     """
@@ -122,7 +122,7 @@ def read_model(
 
 
 def numbers_hash(model: ManoeuvringModel) -> str:
-    """SHA-256 of a model's coefficients and covariance, in the order of its structure."""
+    """SHA-256 of coefficients and covariance, in the order of the structure."""
     covariance = None if model.covariance is None else model.covariance.tolist()
     return hashlib.sha256(
         json.dumps([model.coefficients, covariance]).encode()
@@ -132,7 +132,7 @@ def numbers_hash(model: ManoeuvringModel) -> str:
 def _read_dynamics(
     value: Any, where: str, make: Callable[..., ManoeuvringModel]
 ) -> Structure | ShipEquations:
-    """Read a table of terms, or find the equations of a ship that has her own, by name."""
+    """Read a table of terms, or find a ship's own equations by name."""
     table = check_table(
         value,
         where,

@@ -30,7 +30,7 @@ class Commanded(Protocol):
 
 
 def checked_orders(model: Commanded, commands: ArrayLike) -> Floats:
-    """Orders of shape (n_steps, n_command), within what a rudder and a shaft can be asked for.
+    """Orders of shape (n_steps, n_command), within the limits of rudder and shaft.
 
     A rudder ordered beyond its limit is brought to the limit, as its gear would do;
     beyond a right angle it was meant in other units. InputError names the first row out
@@ -53,7 +53,7 @@ def checked_orders(model: Commanded, commands: ArrayLike) -> Floats:
 
 
 def check_units(model: Commanded, orders: Floats, where: str = "commands") -> None:
-    """InputError for orders of shape (n, n_command) that are not finite or not in rad and 1/s."""
+    """Refuse orders of shape (n, n_command) that are not finite or not in rad and 1/s."""
     names = model.command_names
     wrong = np.argwhere(~np.isfinite(orders))
     if len(wrong):
@@ -88,7 +88,7 @@ def _check_within(
 
 
 def two_commands(commands: Floats) -> Floats:
-    """Rudder and shaft speed as loops take them, shape (n, 2); a ship without shaft has speed 0."""
+    """Rudder and shaft speed as loops take them, shape (n, 2); 0 without a shaft."""
     two = np.zeros((len(commands), 2))
     two[:, : commands.shape[1]] = commands
     return two

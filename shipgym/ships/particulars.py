@@ -17,7 +17,7 @@ from shipgym.ships.particulars_limits import check_together, check_value
 
 @dataclass(frozen=True)
 class Particulars(Mapping[str, Any]):
-    """Main dimensions, mass and added masses of a ship; also a mapping from name to value.
+    """Main dimensions, mass and added masses of a ship; a mapping from name to value.
 
     What is not known is None. :meth:`completed` estimates what the models need.
 
@@ -145,7 +145,7 @@ class Particulars(Mapping[str, Any]):
             return cls(**table, **added, estimated=estimated)
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the values by name, ready for JSON, None where not known; :meth:`from_mapping` reads it."""
+        """Return the values by name, ready for JSON; :meth:`from_mapping` reads them."""
         # left out where not known, so that hashes of models from before them stay
         later = {
             "rudder_aspect_ratio",
@@ -184,13 +184,13 @@ class Particulars(Mapping[str, Any]):
 
     @property
     def inertia_prime(self) -> float:
-        """Yaw inertia about MIDSHIP by rho L^5 / 2: that about the centre of gravity and m xg^2."""
+        """Yaw inertia about MIDSHIP by rho L^5 / 2, m xg^2 included."""
         return self.mass_prime * (
             (self.require("yaw_gyradius") / self.length) ** 2 + self.xg_prime**2
         )
 
     def completed(self) -> Particulars:
-        """Return particulars with mass, inertia and added masses estimated where absent, and marked so.
+        """Return particulars with absent mass, inertia and added masses estimated.
 
         Water density 1025 kg/m3, centre of gravity at midship, yaw gyradius L/4, mass
         from the block coefficient, X_udot five per cent of the mass, the other added
@@ -211,7 +211,7 @@ Estimates = Mapping[str, Callable[[Particulars], float | None]]
 
 
 def with_estimates(ship: Particulars, estimates: Estimates) -> Particulars:
-    """A ship with what is absent estimated in turn, and marked so, where an estimate has an answer."""
+    """Particulars with absent values estimated in turn, and marked so, where possible."""
     for name, estimate in estimates.items():
         value = estimate(ship) if ship[name] is None else None
         if value is not None:
@@ -223,7 +223,7 @@ def with_estimates(ship: Particulars, estimates: Estimates) -> Particulars:
 def clarke_added_masses(
     length: float, beam: float, draught: float, block_coefficient: float
 ) -> dict[str, float]:
-    """Added masses in sway and yaw from a hull's proportions, in the prime system, about midship.
+    """Added masses in sway and yaw from a hull's proportions, prime system, midship.
 
     Regressions of Clarke, Gedling and Hine 1983, by pi (T/L)^2. Dimensions in m; the
     block coefficient is the displaced volume by length * beam * draught.

@@ -1,4 +1,4 @@
-"""Limits of the values of a ship: what no ship has, or most often is a value in a wrong unit."""
+"""Limits of a ship's particulars; a value beyond them is mostly in a wrong unit."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass

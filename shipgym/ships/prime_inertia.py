@@ -8,7 +8,7 @@ from shipgym.ships.particulars import Particulars
 
 
 def prime_inertia(particulars: Particulars) -> Floats:
-    """Inertia of surge, sway and yaw by mass and added mass of the particulars, shape (3, 3).
+    """Inertia of surge, sway and yaw by the particulars, prime system, shape (3, 3).
 
     Raises InputError if it is not positive.
     """
@@ -30,7 +30,7 @@ def prime_inertia(particulars: Particulars) -> Floats:
 def total_inertia(
     particulars: Particulars, derivatives: Floats, problem: str
 ) -> Floats:
-    """Inertia of the ship herself less the derivatives of (X, Y, N) by (udot, vdot, rdot); all (3, 3).
+    """Inertia of the ship less the derivatives of (X, Y, N) by the accelerations, (3, 3).
 
     Raises InputError with the `problem` if it is not positive.
     """

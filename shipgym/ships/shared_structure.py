@@ -1,4 +1,4 @@
-"""Tables for forces in which a coefficient may stand in several equations, added masses among them.
+"""Tables for forces whose coefficients and added masses may stand in several equations.
 
 The vectorial model of captive tests: Xu, Hassani & Guedes Soares 2020, Truncated least
 square support vector machine for parameter estimation of a nonlinear manoeuvring model
@@ -31,7 +31,7 @@ UR = Term("ur", (("u", 1), ("r", 1)))
 
 @dataclass(frozen=True)
 class Share:
-    """A coefficient's share in the force of one equation: sign times coefficient times term."""
+    """Share of a coefficient in a force: sign times coefficient times term."""
 
     coefficient: str  # its name: `Y_vdot`
     term: Term  # of velocities, or one acceleration (`udot`, `vdot`, `rdot`)
@@ -72,7 +72,7 @@ class Share:
 
 @dataclass(frozen=True)
 class SharedStructure(Structure):
-    """A table for the hydrodynamic forces X, Y, N, prime system, that is identified from captive tests.
+    """Table for hydrodynamic forces X, Y, N, prime system, identified from captive tests.
 
     Its `equations` are the terms that a simulation sums up: those of velocities of the
     shares, the same for sway and yaw, and the centripetal ones of the ship's own mass.
@@ -116,7 +116,7 @@ class SharedStructure(Structure):
         return tuple(dict.fromkeys(share.coefficient for share in shares))
 
     def added_mass(self, coefficients: Mapping[str, float]) -> Floats:
-        """Derivatives of (X, Y, N) by (udot, vdot, rdot), prime system, shape (3, 3): negative added mass."""
+        """Derivatives of (X, Y, N) by (udot, vdot, rdot), prime system, shape (3, 3)."""
         matrix = np.zeros((3, 3))
         for row, axis in zip(matrix, AXES, strict=True):
             for share in self.shares[axis]:
@@ -147,7 +147,7 @@ class SharedStructure(Structure):
         particulars: Particulars,
         shaft_speed: float = 0.0,
     ) -> Floats:
-        """Coefficients of the SI features: the forces by mass and added mass (see `Structure`)."""
+        """Coefficients of the SI features: forces by mass and added mass."""
         p = particulars.completed()
         inertia = self.prime_inertia(coefficients, p)
         forces = [self._velocity_forces(axis, coefficients, p) for axis in AXES]
@@ -157,7 +157,7 @@ class SharedStructure(Structure):
     def _velocity_forces(
         self, axis: str, coefficients: Mapping[str, float], p: Particulars
     ) -> Floats:
-        """Coefficient of each term of an equation in its force, that of the ship's own mass included."""
+        """Coefficient of each term in an equation's force, that of the ship's mass included."""
         terms = self.terms(axis)
         force = dict.fromkeys([term.product for term in terms], 0.0)
         for share in self.shares[axis]:
@@ -179,7 +179,7 @@ class SharedStructure(Structure):
     def acceleration_matrix(
         self, particulars: Particulars, shaft_speed: float = 0.0
     ) -> Floats:
-        """InputError: free-running trials cannot tell the unknown added masses from the mass."""
+        """Refuse: free-running trials cannot tell unknown added masses from mass."""
         raise InputError(
             f"structure '{self.name}': expected captive tests with the channels X, Y, N,"
             " got free-running trials: its added masses are among the unknowns; use"
@@ -195,7 +195,7 @@ class SharedStructure(Structure):
 
     @classmethod
     def from_dict(cls, table: Mapping[str, Any], where: str = "structure") -> Self:
-        """Read what `to_dict` wrote; InputError, after `where`, for a table that cannot be."""
+        """Read what `to_dict` wrote; errors begin with `where`."""
         place = f"{where}.shares"
         listed = check_table(table["shares"], place, AXES, AXES)
         shares = {}
@@ -211,7 +211,7 @@ class SharedStructure(Structure):
 def shared_structure(
     name: str, source: str, shares: Mapping[str, tuple[Share, ...]]
 ) -> SharedStructure:
-    """Make a table for forces from the shares of equations `u`, `v`, `r`; InputError if it cannot be computed."""
+    """Make a table for forces from the shares of equations `u`, `v` and `r`."""
     return SharedStructure(**_shared_fields(name, source, shares))
 
 
@@ -246,7 +246,7 @@ def _distinct(terms: Iterable[Term]) -> tuple[Term, ...]:
 
 
 def read_shares(text: str) -> tuple[Share, ...]:
-    """Read shares from short names such as `X_uuu`, `Y_|r|v` or `N_vdot`, separated by spaces.
+    """Read shares from short names such as `X_uuu`, `Y_|r|v` or `N_vdot`.
 
     After a colon stands the term where it is not that of the coefficient's name, as in
     `Y_vdot:vr`; a leading minus is the sign.

@@ -101,7 +101,7 @@ class ShipModel(ManoeuvringModel):
         )
 
     def sample(self, n: int, seed: int | np.random.Generator) -> list[Self]:
-        """Draw n models whose coefficients follow the identified covariance; the same for the same seed.
+        """Draw n models whose coefficients follow the identified covariance.
 
         Raises InputError if the model has no covariance.
         """
@@ -159,7 +159,7 @@ class ShipModel(ManoeuvringModel):
 
 
 def _root(covariance: Floats) -> Floats:
-    """Square root of a covariance, by way of the correlations: 1e-5 and 1 are drawn equally well."""
+    """Square root of a covariance by its correlations: 1e-5 and 1 are drawn equally well."""
     deviation = np.sqrt(np.diag(covariance))
     scale = np.where(deviation > 0.0, deviation, 1.0)
     correlations = covariance / np.outer(scale, scale)

@@ -1,4 +1,4 @@
-"""Ships through time as Trials: with given commands, or open loop with the rudder of a measured trial."""
+"""Simulate ships as Trials, with given commands or those of a measured trial."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -37,7 +37,7 @@ class Conditions:
 
 
 class Passage:
-    """One ship on her way through given conditions: the loops for them and the arrays they work on.
+    """One ship in given conditions: the loops for them and the arrays they work on.
 
     `numbers` are the ship's, `sea` is its state, that of its random numbers and its
     parameters, as loops take them, `windy` whether there is any weather; its filters
@@ -65,13 +65,13 @@ class Passage:
             self.sea = np.zeros(len(leaves(Sea))), random, parameters
 
     def loop(self, name: str) -> Any:
-        """A loop of `shipgym.engine.loops`, compiled for the ship and for calm water or weather."""
+        """Loop of `shipgym.engine.loops`, compiled for the ship in calm water or weather."""
         return ship_loop(self.vessel, name, self.windy)
 
     def run(
         self, name: str, states: Floats, *arguments: Any, since: float = 0.0
     ) -> Any:
-        """Fill the states after the first by a loop, from its arguments but for the sea and the ship.
+        """Fill the states after the first by a loop, from its arguments but sea and ship.
 
         Returns what the loop returns: the last row, or that and more. Raises
         UnstableModelError where the ship leaves every physical range, `since` s after
@@ -86,7 +86,7 @@ class Passage:
         return found
 
     def states(self, first: Floats, n_steps: int) -> Floats:
-        """Rows for `n_steps` + 1 states, shape (n_columns,) each, and their weather; `first` filled in."""
+        """Rows for `n_steps` + 1 states and their weather, with `first` filled in."""
         width = len(self.vessel.state_names)
         if self.windy:
             width += len(SEA_CHANNELS)
@@ -122,7 +122,7 @@ def simulate(
 def orders(
     model: ManoeuvringModel, rudder: Floats, shaft: Floats | None = None
 ) -> Floats:
-    """Commands of shape (n_steps, n_command): a rudder, rad, and a shaft, 1/s, by default as in service."""
+    """Commands of shape (n_steps, n_command): rudder, rad, and shaft, 1/s."""
     commands = np.repeat(model.service_command[None], len(rudder), axis=0)
     commands[:, 0] = rudder
     if shaft is not None:
@@ -131,7 +131,7 @@ def orders(
 
 
 def open_loop(model: ManoeuvringModel, trial: Trial) -> Trial:
-    """Predict a trial from its initial state and its measured rudder (and shaft speed) alone.
+    """Predict a trial from its initial state and measured commands alone.
 
     The rudder is taken straight between the samples, as measured: no steering gear
     stands between. The trial has u, v, r, psi, delta (x and y where recorded; n where
@@ -177,7 +177,7 @@ def open_loop(model: ManoeuvringModel, trial: Trial) -> Trial:
 
 
 def wind_accelerations(trial: Trial, dynamics: Any = None) -> Floats:
-    """Accelerations by wind in surge, sway and yaw that a trial has; shape (n_samples, 3).
+    """Accelerations by wind in a trial: surge, sway, yaw; shape (n_samples, 3).
 
     Those of equations that a structure does not have are 0.
     """
@@ -210,7 +210,7 @@ def as_trial(
     commands: Floats,
     kind: str | None = None,
 ) -> Trial:
-    """Trial of states dt apart, the weather behind them and the commands held from each sample on."""
+    """Trial of states dt apart, their weather, and the commands held from each sample on."""
     channels = _channels(model, states)
     rolls = "phi" in model.state_names
     weather = states[:, len(model.state_names) :]
@@ -236,7 +236,7 @@ def _channels(model: ManoeuvringModel, states: Floats) -> dict[str, Floats]:
 def unstable(
     model: ManoeuvringModel, time_s: float, state: Floats, step: float = 0.0
 ) -> UnstableModelError:
-    """Make the error for a ship that ran away after a given time and physical state, in steps of so many s."""
+    """Make the error for a ship whose state grew beyond bounds at a given time."""
     last = dict(zip(model.state_names, state.tolist(), strict=False))
     there = (
         f"u = {last['u']:.3g} m/s, v = {last['v']:.3g} m/s,"

@@ -51,7 +51,7 @@ class SteeringGear:
     def from_mapping(
         cls, mapping: Mapping[str, Any], where: str = "steering gear"
     ) -> Self:
-        """Make a steering gear from keys of the ship file's ``[steering]``, which are this class's fields.
+        """Make a steering gear from the keys of the ship file's ``[steering]``.
 
         Raises InputError, beginning with `where`, for an unknown key or a value out of
         bounds.
@@ -76,7 +76,7 @@ class SteeringGear:
         return math.radians(self.rudder_rate_deg_s)
 
     def frequency(self, step: float = 0.0) -> float:
-        """Inverse of the time constant in steps of some seconds, 1/s; 0 for a gear without lag.
+        """Inverse of the time constant, 1/s, in steps of some seconds; 0 without lag.
 
         A lag shorter than 0.45 of a step is taken as that: the Runge-Kutta method does
         not follow it, and is unstable where it is shorter than 0.36 of a step (Hairer &

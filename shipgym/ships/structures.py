@@ -1,4 +1,4 @@
-"""The printed structures by name (`structures.toml`), ships with equations, and what users register."""
+"""Structures by name: printed ones, ships with equations, and those users register."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ def printed_tables() -> dict[str, dict[str, Any]]:
 
 @cache
 def printed_structure(name: str) -> Structure:
-    """A structure of `structures.toml`, whose terms are formulas, letters or shares of coefficients."""
+    """Structure of `structures.toml`, given by formulas, letters or shares."""
     table = dict(printed_tables()[name])
     if "shares" in table:
         from shipgym.ships.shared_structure import read_shares, shared_structure
@@ -79,7 +79,7 @@ def _by_axis(texts: Mapping[str, str], read: Callable[[str], Read]) -> dict[str,
 
 
 def list_structures() -> list[str]:
-    """Names of the structures that can be identified, registered ones, grey box and MMG form included."""
+    """Names of the structures that can be identified, registered ones included."""
     return [*printed_tables(), *REGISTERED_STRUCTURES, *NO_TABLES]
 
 
@@ -102,7 +102,7 @@ def list_equations() -> list[str]:
 
 
 def get_equations(name: str) -> ShipEquations:
-    """Return a ship with equations of her own by name; InputError if there is none."""
+    """Return a ship's own equations by name; InputError if there are none."""
     if name in REGISTERED_EQUATIONS:
         return REGISTERED_EQUATIONS[name]
     check_choice(name, list_equations(), "equations")
@@ -111,7 +111,7 @@ def get_equations(name: str) -> ShipEquations:
 
 
 def get_dynamics(name: str) -> Structure | ShipEquations:
-    """Return a structure, or the equations of a ship that has her own, by name; InputError if there is none."""
+    """Return a structure, or a ship's own equations, by name; InputError if there is none."""
     if name in list_equations():
         return get_equations(name)
     return get_structure(name)
@@ -161,7 +161,7 @@ def register_structure(
 
 
 def own_structure(table: Any, where: str) -> Structure:
-    """Make a structure from the arguments of `register_structure`; messages begin with `where`."""
+    """Make a structure from `register_structure`'s arguments; errors begin with `where`."""
     own: dict[str, Any] = {**USUAL, **check_table(table, where)}
     check_keys(own, ("name", "equations", *USUAL), where)
     for key in ("name", "equations"):

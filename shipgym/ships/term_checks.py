@@ -18,7 +18,7 @@ Equations = Mapping[str, tuple[Term, ...]]
 def check_structure(
     name: str, source: str, equations: Equations, normalisation: str, quantity: str
 ) -> None:
-    """InputError for names, units, equations or terms of a `Structure` that cannot be computed."""
+    """Refuse names, units, equations or terms of a `Structure` that cannot be computed."""
     where = f"structure '{name}'"
     check_text(name, "structure: name")
     check_text(source, f"{where}: source")

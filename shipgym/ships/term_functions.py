@@ -84,12 +84,12 @@ def unit_speeds(equation: str) -> int:
 
 
 def speed_power(equation: str, term: Term) -> int:
-    """Power of U that a term of the prime system has in SI units: that of the sum less one per velocity."""
+    """Power of U of a term in SI units: that of the sum less one per velocity."""
     return unit_speeds(equation) - term.power(*VELOCITIES)
 
 
 def accelerations_source(equations: Equations, prime: bool, damped: bool = True) -> str:
-    """Write `accelerations(motion, c, ship)`: a factored sum of terms for each equation.
+    """Write the source of `accelerations(motion, c, ship)`: factored sums of terms.
 
     Coefficients are numbered in the equations' order. `prime`: whether terms are in the
     prime system. Where one of those has more velocities than the sum, all velocities
@@ -131,7 +131,7 @@ def accelerations_source(equations: Equations, prime: bool, damped: bool = True)
 
 @cache
 def accelerations_function(source: str) -> Any:
-    """Function of a source that `accelerations_source` wrote; ValueError for any other text."""
+    """Function of a source by `accelerations_source`; ValueError for any other text."""
     if not GRAMMAR.fullmatch(source):
         raise ValueError(
             "accelerations: expected sums of products of known symbols, got"
@@ -152,7 +152,7 @@ def coefficients_record(n: int, name: str = "TermCoefficients") -> Record:
 
 
 def factored(monomials: Sequence[Monomial]) -> str:
-    """Write a sum of products with what they share taken out, symbol by symbol (Horner's scheme).
+    """Write a sum of products, common symbols factored out (Horner's scheme).
 
     Half as many operations as a sum of products, and short chains of them: three times
     as fast. A monomial is its coefficient and the powers of its variables.
@@ -186,7 +186,7 @@ def _product(coefficient: str, powers: Powers) -> str:
 
 
 def _factors(term: Term, speed_power: int, divided: bool) -> Powers:
-    """Powers of the variables of a term, with U as often as it takes, or velocities divided by U."""
+    """Powers of the variables of a term, with those of U or velocities divided by U."""
     powers = {}
     for symbol, power in term.powers:
         if symbol == "U":

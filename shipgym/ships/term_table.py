@@ -1,4 +1,4 @@
-"""A structure: for each equation of motion a table of terms, linear in the coefficients.
+"""Structure: a table of terms for each equation, linear in the coefficients.
 
 The same table serves identification (stacked over samples), simulation (compiled, one
 state at a time) and the model file.
@@ -85,7 +85,7 @@ class Structure:
     # ---- what stands in the table ----------------------------------------------------
 
     def names(self, equation: str) -> tuple[str, ...]:
-        """Names of the coefficients of one equation: X, Y or N of forces, a to e of accelerations, first."""
+        """Names of an equation's coefficients, such as X_u of forces or a_u of accelerations."""
         letters = ACCELERATION_OF_EQUATION
         if self.quantity == "force":
             letters = FORCE_OF_EQUATION
@@ -119,7 +119,7 @@ class Structure:
 
     @cached_property
     def required_channels(self) -> tuple[str, ...]:
-        """Channels a trial needs so that the model can be identified and its envelope be known."""
+        """Channels a trial needs to identify the model and its envelope."""
         needed = self.channels | ALWAYS_MEASURED | ({"p"} & self.equations.keys())
         return tuple(name for name in MEASURED if name in needed)
 
@@ -166,7 +166,7 @@ class Structure:
 
     @property
     def regressed(self) -> tuple[str, ...]:
-        """Equations that have a regression of their own; the memory's terms belong to that of yaw."""
+        """Equations with a regression of their own; the memory's terms belong to yaw."""
         return tuple(equation for equation in self.equations if equation != "q")
 
     def regression_names(self, equation: str) -> tuple[str, ...]:
@@ -178,7 +178,7 @@ class Structure:
 
     @cached_property
     def regression_rows(self) -> dict[str, slice]:
-        """Where the coefficients of each regression stand among all of them."""
+        """Slice of all coefficients that each regression has."""
         rows = {}
         first = 0
         for equation in self.regressed:
@@ -194,7 +194,7 @@ class Structure:
         particulars: Particulars,
         shaft_speed: float = 0.0,
     ) -> Floats:
-        """Terms of one equation on samples, in SI units: what the acceleration is a linear combination of.
+        """Terms of one equation on samples, SI units; the acceleration combines them linearly.
 
         Channels, each of shape (n_samples,), are at least those of its terms and u, v,
         in SI units; the service speed is in the particulars, the shaft speed that at
@@ -224,7 +224,7 @@ class Structure:
         return np.stack(columns, axis=-1)
 
     def speed_power(self, equation: str, term: Term) -> int:
-        """Power of U in the feature: in the prime system 2 (memory: 3) less one per velocity, else none."""
+        """Power of U in the feature, prime system: 2 (memory: 3) less one per velocity."""
         if self.normalisation != "prime":
             return 0
         return term_functions.speed_power(equation, term)
@@ -234,7 +234,7 @@ class Structure:
     def feature_scale(
         self, equation: str, term: Term, length: float, speed: float, shaft: float
     ) -> float:
-        """Coefficient of the SI feature that makes a term an acceleration for a coefficient of 1.
+        """Coefficient of the SI feature for a coefficient of 1 in the structure.
 
         Length of the ship in m, service speed in m/s and shaft speed at service speed
         in 1/s. The unit of linear accelerations is U^2 / L, that of angular ones U^2 /
@@ -258,7 +258,7 @@ class Structure:
         return float(scale)
 
     def term_scales(self, particulars: Particulars, shaft_speed: float = 0.0) -> Floats:
-        """`feature_scale` of all terms, one equation after the other, for a ship; shape (n_coefficients,)."""
+        """`feature_scale` of all terms, by equation, for a ship; shape (n_coefficients,)."""
         ship = particulars["length"], particulars["speed"], shaft_speed
         scales = []
         for equation, terms in self.equations.items():
@@ -270,7 +270,7 @@ class Structure:
     def acceleration_matrix(
         self, particulars: Particulars, shaft_speed: float = 0.0
     ) -> Floats:
-        """Square, invertible matrix from the coefficients to those of the SI features of the accelerations.
+        """Matrix from coefficients to those of the SI features of the accelerations.
 
         Forces are divided by inertia: surge by m' - X_udot', sway and yaw, which must
         have the same terms, by their 2x2 inertia [[m' - Y_vdot', m'xG' - Y_rdot'],
@@ -293,11 +293,11 @@ class Structure:
     def prime_inertia(
         self, coefficients: Mapping[str, float], particulars: Particulars
     ) -> Floats:
-        """Mass and added mass of the ship, prime system, shape (3, 3): those of her particulars."""
+        """Mass and added mass by the particulars, prime system, shape (3, 3)."""
         return prime_inertia(particulars)
 
     def _from_forces(self, inertia: Floats) -> Floats:
-        """From the coefficients of forces to those of accelerations, by an inertia of shape (3, 3)."""
+        """Matrix from coefficients of forces to accelerations, by an inertia of shape (3, 3)."""
         order = list(FORCE_OF_EQUATION)
         axes = [order.index(equation) for equation in self.equations]
         mobility = np.linalg.inv(inertia[np.ix_(axes, axes)])
@@ -315,7 +315,7 @@ class Structure:
         particulars: Particulars,
         shaft_speed: float = 0.0,
     ) -> Floats:
-        """Coefficients of the SI features of the accelerations, in order; shape (n_terms,)."""
+        """Coefficients of the SI features of the accelerations; shape (n_terms,)."""
         matrix = self.acceleration_matrix(particulars, shaft_speed)
         return np.asarray(matrix @ np.array(list(coefficients.values())))
 
@@ -326,7 +326,7 @@ class Structure:
         particulars: Particulars,
         ship: Ship,
     ) -> dict[str, Floats]:
-        """Accelerations at samples of shape (n_samples,), in NumPy and without compiling, by equation."""
+        """Accelerations by equation at samples of shape (n_samples,), without compiling."""
         found = self._sums_at(channels, coefficients, particulars, ship.shaft)
         for name in ("v", "r"):
             if name not in found:
@@ -356,7 +356,7 @@ class Structure:
     # ---- simulation: the function that is compiled -----------------------------------
 
     def vessel(self, coefficients: Mapping[str, float], lag: bool) -> Vessel:
-        """Make the functions and records to be compiled; the coefficients are read at run time."""
+        """Make the functions to be compiled; coefficients are read at run time."""
         accelerations = Part(term_functions.accelerations_function(self._source))
         return vessel_of(
             "a ship with a table of terms",
@@ -402,7 +402,7 @@ class Structure:
 
     @classmethod
     def from_dict(cls, table: Mapping[str, Any], where: str = "structure") -> Self:
-        """Read what `to_dict` wrote; InputError, after `where`, for a table that cannot be."""
+        """Read what `to_dict` wrote; errors begin with `where`."""
         return cls(**structure_fields(table, where))
 
 

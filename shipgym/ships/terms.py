@@ -1,4 +1,4 @@
-"""Terms of a manoeuvring model: products of powers of the velocities, the rudder angle and their kin."""
+"""Terms of a manoeuvring model: products of powers of velocities, rudder angle and so on."""
 
 import re
 from collections.abc import Mapping
@@ -69,7 +69,7 @@ class Term:
         return sum(power for symbol, power in self.powers if symbol in symbols)
 
     def check(self, where: str) -> None:
-        """InputError, naming the term, for symbols and powers that cannot be computed."""
+        """Refuse symbols and powers that cannot be computed, naming the term."""
         place = f"{where}: term '{self.name}'"
         factors = 0
         for symbol, power in self.powers:
@@ -105,7 +105,7 @@ class Term:
 
 
 def read_terms(text: str) -> tuple[Term, ...]:
-    """Read terms from formulas separated by commas; InputError names one that cannot be read.
+    """Read terms from formulas separated by commas.
 
     Each formula is a product of symbols (`SYMBOLS`), written side by side with spaces
     between, with powers after `^` and the speed U also below a stroke: `"v, |v| r,
@@ -144,7 +144,7 @@ def _read_term(formula: str) -> Term:
 
 
 def short_terms(words: str, surge: str = "du") -> tuple[Term, ...]:
-    """Read short names separated by spaces: letters u v r d (delta), or such between bars, 0 for one.
+    """Read short names separated by spaces: letters u v r d (delta), bars, 0 for one.
 
     `u` is Abkowitz's perturbation from service speed, so that `0u` is the constant's
     change with it, or the symbol that `surge` says.

@@ -392,8 +392,8 @@ def test_a_function_within_another_is_refused_with_what_it_uses_of_it():
     assert (
         str(caught.value)
         == f"{__file__}, line {within.__code__.co_firstlineno}, in within: "
-        "uses variables of the function around it (inner), expected a function at the "
-        "top of a file"
+        "expected a function at the top of a file, got one that uses variables of the "
+        "function around it (inner)"
     )
 
 

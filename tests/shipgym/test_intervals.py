@@ -154,7 +154,7 @@ def test_wrong_arguments(identified):
         manoeuvres.index_intervals(load_model("mariner"))
     with pytest.raises(InputError, match=r"manoeuvre: expected .*got 'zigzag 30/30'"):
         manoeuvres.index_intervals(identified, "zigzag 30/30")
-    with pytest.raises(InputError, match="n_draws: 1 found"):
+    with pytest.raises(InputError, match=r"n_draws: expected .*got 1"):
         manoeuvres.index_intervals(identified, n_draws=1)
     with pytest.raises(InputError, match="expected a covariance"):
         manoeuvres.imo_assessment(load_model("mariner"), n_draws=10)

@@ -12,7 +12,7 @@ from shipgym.checks import did_you_mean
 from shipgym.errors import InputError
 from shipgym.ships.particulars import (
     ADDED_MASSES,
-    FIELDS,
+    NAMES,
     Particulars,
     clarke_added_masses,
 )
@@ -158,8 +158,8 @@ def test_what_cannot_be_estimated_is_named_with_the_ways_out():
 def test_particulars_are_a_mapping_and_go_through_json():
     ship = Particulars.from_mapping(KVLCC2 | {"name": "KVLCC2"}).completed()
     assert ship["length"] == ship.length == 7.0
-    assert tuple(ship) == FIELDS
-    assert len(ship) == len(FIELDS)
+    assert tuple(ship) == NAMES
+    assert len(ship) == len(NAMES)
     assert Particulars.from_mapping(json.loads(json.dumps(ship.to_dict()))) == ship
     with pytest.raises(KeyError):
         ship["estimated"]

@@ -165,7 +165,7 @@ def test_changed_coefficients_compile_nothing_anew(tug: Path) -> None:
         (
             "(motion, c, ship)",
             "(motion, c)",
-            "accelerations: 2 arguments found, expected a function",
+            r"accelerations: expected a function .*got one of 2 arguments",
         ),
         (
             "return (command - n) / c.T_shaft",
@@ -175,8 +175,8 @@ def test_changed_coefficients_compile_nothing_anew(tug: Path) -> None:
         pytest.param(
             "def accelerations",
             "import numba\n\n\n@numba.njit\ndef accelerations",
-            r"tug\.py: equations of 'tug': accelerations: no plain function found,"
-            r" expected a function",
+            r"tug\.py: equations of 'tug': accelerations: expected a"
+            r" function .*got no plain function",
             marks=pytest.mark.compiled,
         ),
         (
@@ -226,7 +226,7 @@ def test_a_file_that_is_not_there(tmp_path: Path) -> None:
     with pytest.raises(
         InputError,
         match=(
-            r"barge\.py: no such file, expected a Python file that defines SHIP ="
+            r"barge\.py: expected a Python file that defines SHIP ="
             r" ShipEquations\(\.\.\.\)"
         ),
     ):
