@@ -176,7 +176,7 @@ def test_weights_go_through_the_file_and_an_older_one_has_the_environment_s(tmp_
 
 @pytest.mark.parametrize("name", ["rudder_weight", "rate_weight_s2"])
 def test_weights_must_be_above_zero(name):
-    with pytest.raises(InputError, match=f"{name}: 0.*expected"):
+    with pytest.raises(InputError, match=f"{name}: expected"):
         AdaptiveLQ.from_model(MARINER, **{name: 0.0})
 
 
@@ -204,7 +204,7 @@ def test_waves_teach_it_little_that_is_wrong():
     [("forgetting_lengths", 0.0), ("redesign_lengths", 0.0), ("noise", -1.0)],
 )
 def test_numbers_beyond_their_bounds_are_refused(name, value):
-    with pytest.raises(InputError, match=rf"{name}: .* found, expected"):
+    with pytest.raises(InputError, match=f"{name}: expected"):
         AdaptiveLQ.from_model(MARINER, **{name: value})
 
 

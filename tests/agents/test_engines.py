@@ -275,8 +275,8 @@ def test_workers_end_with_the_process_that_started_them(
     ("arguments", "message"),
     [
         ({"engine": "rai"}, "Did you mean 'ray'"),
-        ({"workers": 0}, "workers: 0 found"),
-        ({"retries": -1}, "retries: -1 found"),
+        ({"workers": 0}, "workers: expected .*got 0"),
+        ({"retries": -1}, "retries: expected .*got -1"),
         ({"address": "10.0.0.1:6379"}, "it is for engine 'ray'"),
         ({"engine": "ray", "address": "10.0.0.1"}, "expected 'HOST:PORT'"),
         ({"engine": "ray", "address": "10.0.0.1:65536"}, "expected 'HOST:PORT'"),
@@ -439,7 +439,7 @@ def test_an_engine_refuses_wrong_arguments_before_the_work():
         (JobEngine("rai"), "Did you mean 'ray'"),
         (
             JobEngine(workers=0),
-            "workers: 0 found, .* or None for as many as there are cores",
+            "workers: expected .*or None for as many as there are cores.*got 0",
         ),
         (JobEngine(address="10.0.0.1:6379"), "it is for engine 'ray'"),
     ):

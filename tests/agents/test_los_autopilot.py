@@ -139,5 +139,5 @@ def test_course_keeping_and_another_corridor_are_refused():
 
 @pytest.mark.parametrize(("name", "value"), [("lookahead_lengths", 0.0)])
 def test_numbers_beyond_their_bounds_are_refused(name, value):
-    with pytest.raises(InputError, match=rf"{name}: .* found, expected"):
+    with pytest.raises(InputError, match=f"{name}: expected"):
         LineOfSight.from_model(MARINER, **{name: value})

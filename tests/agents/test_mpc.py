@@ -62,7 +62,7 @@ def test_it_plans_two_ship_lengths_ahead_or_two_steps_at_least():
     assert MPC.from_model(MARINER, horizon_lengths=0.01).design["horizon_steps"] == 2.0
     with pytest.raises(
         InputError,
-        match=r"horizon_steps: 834 found, .* <= 640; a shorter horizon or longer",
+        match=r"horizon_steps: expected .*<= 640 .*got 834",
     ):
         MPC.from_model(MARINER, dt=0.05)
 
@@ -202,5 +202,5 @@ def test_without_the_solver_the_extra_is_named(monkeypatch):
     ("name", "value"), [("horizon_lengths", 0.0), ("horizon_lengths", 20.1)]
 )
 def test_numbers_beyond_their_bounds_are_refused(name, value):
-    with pytest.raises(InputError, match=rf"{name}: .* found, expected"):
+    with pytest.raises(InputError, match=f"{name}: expected"):
         MPC.from_model(MARINER, **{name: value})

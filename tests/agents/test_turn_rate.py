@@ -127,7 +127,7 @@ def test_it_is_a_controller_with_margins_and_a_file(tmp_path):
     agent.save(tmp_path / "it.json")
     again = load_agent(tmp_path / "it.json", MARINER)
     assert np.array_equal(again.rudders, agent.rudders)
-    with pytest.raises(InputError, match=r"rate_deg_min: 1000 found, expected"):
+    with pytest.raises(InputError, match=r"rate_deg_min: expected .*got 1000"):
         TurnRate.from_model(MARINER, rate_deg_min=1000.0)
 
 
