@@ -13,14 +13,14 @@ from pathlib import Path
 
 from filelock import FileLock, Timeout
 
-from shipgym.errors import InputError
-from shipgym.files import (
+from shipgym.drafts import (
     DRAFT,
     abandoned_drafts,
     atomic_path,
     draft_folder,
     remove_drafts,
 )
+from shipgym.errors import InputError
 from shipgym.plots import graph_objects
 
 ASIDE = ".old"  # ending of a folder that is about to be replaced

@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 from agents.benchmarking.cells import Cell
 from shipgym.arrays import Integers
 from shipgym.checks import quoted
+from shipgym.drafts import atomic_path
 from shipgym.errors import InputError
 from shipgym.extras import library
-from shipgym.files import LARGEST_TENSORS, atomic_path, read_bytes
+from shipgym.files import LARGEST_TENSORS, read_bytes
 
 Columns = dict[str, NDArray[Any]]
 

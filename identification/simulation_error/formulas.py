@@ -14,7 +14,8 @@ import numpy as np
 
 from shipgym import InputError, Particulars
 from shipgym.arrays import Flags, Floats
-from shipgym.ships.term_table import Structure, inertia
+from shipgym.ships.prime_inertia import prime_inertia
+from shipgym.ships.term_table import Structure
 from shipgym.ships.terms import Term
 
 LINEAR_SYMBOLS = ("v", "r", "delta")
@@ -144,7 +145,7 @@ def _accelerations(derivatives: dict[str, float], ship: Particulars) -> Floats:
         ship.mass_prime,
         ship.mass_prime * ship.xg_prime,
     ]  # turning with the body's axes
-    return np.linalg.solve(inertia(ship)[1:, 1:], forces)
+    return np.linalg.solve(prime_inertia(ship)[1:, 1:], forces)
 
 
 def _linear_symbol(term: Term) -> str | None:

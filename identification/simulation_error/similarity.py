@@ -9,9 +9,9 @@ from numpy.typing import ArrayLike
 from shipgym import InputError, Particulars, ShipModel, load_model
 from shipgym.arrays import Floats
 from shipgym.checks import quoted
+from shipgym.constants import GRAVITY
 from shipgym.ships.catalogue import REFERENCE_SHIPS
 
-GRAVITY = 9.81
 AUTO = "auto"
 #: Rudder area by length and draught of ships whose particulars lack it: Mei 2019, Table
 #: 4.

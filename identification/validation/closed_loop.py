@@ -15,7 +15,7 @@ from identification.validation.start import with_start
 from shipgym import ShipModel, Trial, UnstableModelError
 from shipgym.arrays import Floats
 from shipgym.manoeuvres.execution import reversals, rudder
-from shipgym.ships.manoeuvring_model import checked_orders, two_commands
+from shipgym.ships.orders import checked_orders, two_commands
 from shipgym.ships.simulate import Conditions, Passage
 
 STEP = 0.02  # of the time to sail one ship length

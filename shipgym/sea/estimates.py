@@ -2,10 +2,9 @@
 
 import math
 
+from shipgym.constants import GRAVITY as GRAVITY
 from shipgym.errors import InputError
 from shipgym.ships.particulars import Estimates, Particulars, with_estimates
-
-GRAVITY = 9.80665
 
 #: Accommodation of the estimated ship, by length: height above deck, length; and its
 #: width by beam.

@@ -90,9 +90,7 @@ def test_only_what_is_asked_for_is_designed_and_a_path_autopilot_alone_is_refuse
         InputError, match=r"no autopilot that keeps a heading .*'wheel-over' found"
     ):
         verify(model, 4, 1, designs=("wheel-over",))
-    with pytest.raises(
-        InputError, match="autopilots: 'wheelover' found, expected one of"
-    ):
+    with pytest.raises(InputError, match="autopilots: expected one of"):
         build_autopilot("examples/mariner/ship.toml", "out", designs=["wheelover"])
 
 
@@ -221,7 +219,7 @@ def test_an_unstable_model_gives_a_report_that_says_so_and_no_model(
 
 
 def test_too_few_draws_are_refused(demo, tmp_path):
-    with pytest.raises(InputError, match="draws: 1 found"):
+    with pytest.raises(InputError, match="draws: expected"):
         build_autopilot(demo, tmp_path / "report", draws=1)
     assert list(tmp_path.iterdir()) == []
 

@@ -104,9 +104,7 @@ def test_what_is_in_the_way_and_what_is_missing_is_said(tmp_path, monkeypatch):
         InputError, match=r"lq\.fmu: is not a file; choose another name"
     ):
         write_fmu(source, tmp_path / "lq.fmu")
-    with pytest.raises(
-        InputError, match=r"fmi: '1\.0' found, expected one of '2\.0', '3\.0'"
-    ):
+    with pytest.raises(InputError, match=r"fmi: expected one of '2\.0', '3\.0'"):
         write_fmu(source, tmp_path / "other.fmu", "1.0")
     monkeypatch.setenv("CC", "no-such-compiler")
     with pytest.raises(InputError, match="no C compiler for Linux found"):

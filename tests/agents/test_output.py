@@ -24,7 +24,7 @@ from agents.output import (
     whole_folder,
 )
 from shipgym import InputError
-from shipgym.files import remove_drafts
+from shipgym.drafts import remove_drafts
 
 ROOT = Path(__file__).parents[2]
 

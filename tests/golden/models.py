@@ -38,7 +38,9 @@ from shipgym.ships import (
     terms,
 )
 from shipgym.ships.envelope import Envelope, smallest_ellipsoid
-from shipgym.ships.particulars import BOUNDS, Particulars, clarke_added_masses
+from shipgym.ships.particulars import Particulars, clarke_added_masses
+from shipgym.ships.particulars_limits import LIMITS
+from shipgym.ships.prime_inertia import prime_inertia
 from shipgym.ships.ship_model import ShipModel
 from shipgym.ships.steering import SteeringGear
 from shipgym.trials.trial import Trial
@@ -161,15 +163,11 @@ def reference_ships() -> Answers:
         found[f"{one.name} vessel"] = lambda one=one: (
             one.vessel(one.coefficients, True).state_names
         )
-    kvlcc2.PACKAGE_FORM = True
-    try:
-        p, c = kvlcc2.SHIP.particulars, kvlcc2.Coefficients(PACKAGE_FORM=1.0)
-        found["package form"] = [
-            list(kvlcc2.accelerations(m, c, of(p, 11.9)))
-            for m in motions(7.0, 1.179, 11.9)
-        ]
-    finally:
-        kvlcc2.PACKAGE_FORM = False
+    p, c = kvlcc2.SHIP.particulars, kvlcc2.Coefficients(PACKAGE_FORM=1.0)
+    found["package form"] = [
+        list(kvlcc2.package_accelerations(m, c, of(p, 11.9)))
+        for m in motions(7.0, 1.179, 11.9)
+    ]
     found["power law"] = [
         mmg.power_law(x, 0.37) for x in (0.0, 0.009, 0.012, 0.3, 1.7, 3.9, 4.5)
     ]
@@ -220,7 +218,10 @@ def tables() -> Answers:
             ("service", {"q": "r, delta, n r"}),
         )
     }
-    for name, table in (structures.STRUCTURES | own).items():
+    printed = {
+        one: structures.get_structure(one) for one in structures.printed_tables()
+    }
+    for name, table in (printed | own).items():
         shaft = 1.9 if "n" in table.command_names else 0.0
         values = dict(
             zip(
@@ -232,7 +233,10 @@ def tables() -> Answers:
         if isinstance(table, shared_structure.SharedStructure):
             values |= {one: -0.01 for one in values if one.endswith("dot")}
         numbers_ = table.term_numbers(values, p, shaft)
-        function = term_functions.accelerations_function(table._source)
+        source = term_functions.accelerations_source(
+            table.equations, table.normalisation == "prime"
+        )
+        function = term_functions.accelerations_function(source)
         c = term_functions.coefficients_record(len(numbers_))(*numbers_)
         found[name] = {
             "numbers": numbers_,
@@ -266,20 +270,12 @@ def tables() -> Answers:
             "cubic",
             "abkowitz",
         ):
-            found[name]["source"] = table._source
+            found[name]["source"] = source
             found[name]["back"] = table.from_dict(table.to_dict()) == table
-    found["matrix"] = lambda: structures.STRUCTURES["linear"].acceleration_matrix(p)
-    found["no shaft"] = lambda: structures.STRUCTURES["cubic"].acceleration_matrix(p)
-    found["grammar"] = [
-        bool(term_functions.GRAMMAR.fullmatch(text))
-        for text in (
-            table._source,
-            table._source + "x",
-            table._source.replace("motion.u", "motion.__class__"),
-        )
-    ]
+    found["matrix"] = lambda: structures.get_structure("linear").acceleration_matrix(p)
+    found["no shaft"] = lambda: structures.get_structure("cubic").acceleration_matrix(p)
     found["undamped"] = term_functions.accelerations_source(
-        structures.STRUCTURES["nomoto"]._sums, damped=False
+        structures.get_structure("nomoto").equations, prime=False, damped=False
     )
     return found
 
@@ -308,6 +304,16 @@ def terms_and_refusals() -> Answers:
             "own",
             "own",
             {q: shared_structure.read_shares(text) for q, text in given.items()},
+        )
+
+    def products(n: int) -> tuple[terms.Term, ...]:
+        """So many different terms."""
+        return tuple(
+            term(
+                f"t{i}",
+                tuple((q, i // 9**k % 9 + 1) for k, q in enumerate("uvr")),
+            )
+            for i in range(n)
         )
 
     formulas = (
@@ -395,22 +401,10 @@ def terms_and_refusals() -> Answers:
             )
         },
         "many": refused(
-            lambda n: term_table._check_terms(
-                tuple(
-                    term(f"t{i}", (("u", i % 9 + 1), ("v", i // 9 + 1)))
-                    for i in range(n)
-                ),
-                "si",
-                "here",
+            lambda n: term_table.Structure(
+                "own", "own", {"r": products(n)}, "si", "acceleration"
             ),
-            (0, 1, 81),
-        ),
-        "most": refused(
-            lambda n: term_table._check_terms((term("a", ()),) * n, "si", "here"),
-            (201,),
-        ),
-        "too many": asked(
-            lambda: term_table._check_terms((term("a", ()),) * 201, "si", "here")
+            (0, 1, 81, 201),
         ),
         "own": [
             lambda o=o: own(o)
@@ -445,16 +439,16 @@ def terms_and_refusals() -> Answers:
             made.coefficient_names,
             made.names("v"),
             made.added_mass(values),
-            made.inertia(values, p),
+            made.prime_inertia(values, p),
             made.term_numbers(values, p),
             made.equations,
         ],
-        "not positive": lambda: made.inertia(dict.fromkeys(values, 0.5), p),
+        "not positive": lambda: made.prime_inertia(dict.fromkeys(values, 0.5), p),
         "free": lambda: made.acceleration_matrix(p),
         "back": shared_structure.SharedStructure.from_dict(made.to_dict()) == made,
         "inertia": [
-            term_table.inertia(p),
-            lambda: term_table.inertia(replace(p, xg=70.0, yaw_gyradius=0.01)),
+            prime_inertia(p),
+            lambda: prime_inertia(replace(p, xg=70.0, yaw_gyradius=0.01)),
         ],
     }
 
@@ -521,7 +515,8 @@ def particulars() -> Answers:
         "require": lambda: mapping({"length": 151.0}).require("mass"),
         "dict": HULL.to_dict(),
         "short dict": mapping({"length": 9.0}).to_dict(),
-        "again": Particulars.from_dict(HULL.completed().to_dict()) == HULL.completed(),
+        "again": Particulars.from_mapping(HULL.completed().to_dict())
+        == HULL.completed(),
         "wrong": [lambda w=w: mapping(w) for w in wrong],
         "shares": {
             name: refused(
@@ -539,13 +534,13 @@ def particulars() -> Answers:
             name: refused(
                 lambda k, name=name, given=given: mapping({"length": 4.0, name: k}),
                 [
-                    k * given[edge]
-                    for edge in ("above", "below")
-                    if edge in given
+                    k * bound
+                    for bound in (given.above, given.below)
+                    if bound is not None
                     for k in (0.95, 1.05)
                 ],
             )
-            for name, given in BOUNDS.items()
+            for name, given in LIMITS.items()
             if name != "length"
         },
         "masses": [
@@ -960,7 +955,7 @@ def simulated() -> Answers:
         "wind": [
             simulate.wind_accelerations(Trial(t, blown)),
             simulate.wind_accelerations(
-                Trial(t, blown), structures.STRUCTURES["nomoto"]
+                Trial(t, blown), structures.get_structure("nomoto")
             ),
         ],
         "wrong": wrong,
@@ -1130,7 +1125,7 @@ def files() -> Answers:
             ).converted_accelerations(samples, HULL),
         ],
         "unknown shaft": lambda: [
-            catalogue.converted_model("tanker", HULL, GEAR).own_table.shaft,
+            catalogue.converted_model("tanker", HULL, GEAR).dynamics.shaft,
             catalogue.converted_model(box, HULL, GEAR).name,
         ],
         "fitted": lambda: catalogue.fitted_box(model("mariner-tls-svm")).ship.name,
@@ -1144,7 +1139,7 @@ def files() -> Answers:
             model_file.numbers_hash(model("norrbin"))
             == json.loads(Path("saved.json").read_text())["sha256"]
         ),
-        "envelope": lambda: model_file.read_envelope(
+        "envelope": lambda: Envelope.from_dict(
             model("mariner-tls-svm").envelope.to_dict(), "here"
         ),
     }
@@ -1212,8 +1207,8 @@ def kernels() -> Answers:
         "none": lambda: replace(box, kernel=None),
         "again": lambda: (
             ShipModel.from_dict(
-                ShipModel("k", "box", HULL, GEAR, values, own_table=box).to_dict()
-            ).own_table.kernel
+                ShipModel("k", "box", HULL, GEAR, values, dynamics=box).to_dict()
+            ).dynamics.kernel
         ),
         "vessel": lambda: len(box.vessel(values, True).state_names),
         "sum": kernel_boxes.sum_accelerations(
@@ -1315,9 +1310,11 @@ def own_equations() -> Answers:
             container.SHIP.command_names,
             container.SHIP.to_dict(),
         ],
-        "named": equations._named("shipgym.ships.kvlcc2") is kvlcc2.SHIP,
         "reduced": [str(one) for one in container.SHIP.__reduce__()[1]],
-        "arms": container.hull(0.1, 0.2, 0.3, 0.4, 1, 2, 3, 4, 5, 6, 7, 8),
+        "hull": [
+            hull(container.State(0.9, 0.1, 0.2, 0.3, 0.4), container.PUBLISHED)
+            for hull in (container.sway_hull, container.roll_hull, container.yaw_hull)
+        ],
     }
 
 

@@ -125,7 +125,7 @@ def test_a_truncation_that_keeps_nothing(
 ) -> None:
     assert (
         refusal(cao_zigzag, rank=rank)
-        == f"rank: {rank} found, expected a whole number of at least 1, or None"
+        == f"rank: expected an integer of at least 1 (or None), got {rank}"
     )
 
 
@@ -140,21 +140,21 @@ def test_a_weight_that_is_none(
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ({"window": 1.5}, "window: 1.5 found, expected a whole number of at least 1"),
-        ({"method": "abc-lssvr", "seed": -1}, "seed: -1 found"),
+        ({"window": 1.5}, "window: expected an integer of at least 1"),
+        ({"method": "abc-lssvr", "seed": -1}, "seed: expected"),
         (
             {"method": "abc-lssvr", "optimiser": {"name": "abc", "round": 3}},
             "optimiser: round found",
         ),
         (
             {"method": "abc-lssvr", "optimiser": {"rounds": 3}},
-            "optimiser: None found, expected one of 'abc'",
+            "optimiser: expected one of 'abc'",
         ),
         (
             {"method": "ls", "C": 1.0},
             "settings: C found, which method 'ls' does not know",
         ),
-        ({"prior": "clarke", "prior_strength": np.nan}, "prior_strength: nan found"),
+        ({"prior": "clarke", "prior_strength": np.nan}, "prior_strength: expected"),
         (
             {"method": "rm-svm"},
             (
@@ -232,7 +232,7 @@ def test_values_that_are_none(cao_zigzag: Trial) -> None:
     sway[100] = np.nan
     with pytest.raises(
         InputError,
-        match=r"trial 'holes': v: nan found at sample 100, .*repair = \"interp",
+        match=r"trial 'holes': v: expected finite numbers, got nan at sample 100; .*repair = \"interp",
     ):
         changed(cao_zigzag, "holes", v=sway)
 

@@ -208,11 +208,15 @@ def test_trials_of_the_other_kind_are_refused() -> None:
         match="'abkowitz' found, which is identified from free-running trials",
     ):
         identify_forces(tank_tests(), "abkowitz", PARTICULARS)
-    with pytest.raises(InputError, match="mass of the ship and the added mass"):
+    with pytest.raises(
+        InputError, match="expected a positive inertia, got mass of the ship"
+    ):
         ShipModel(
             "wrong", "pmm18", PARTICULARS, SHIP.steering, TABLE_11 | {"Y_vdot": 1.0}
         ).ship_numbers()
-    with pytest.raises(InputError, match="structure: name: ' ' found"):
+    with pytest.raises(
+        InputError, match="structure: name: expected a non-empty string"
+    ):
         replace(PMM18, name=" ")
 
 

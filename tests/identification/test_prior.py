@@ -394,13 +394,19 @@ def test_auto_takes_the_ship_most_alike(
             r"prior: 'kvlcc2' found with structure 'grey-box'",
         ),
         ({"prior": "titanic"}, r"titanic"),
-        ({"prior": "tanker", "prior_strength": -1.0}, r"prior_strength: -1"),
+        (
+            {"prior": "tanker", "prior_strength": -1.0},
+            r"prior_strength: expected .*got -1",
+        ),
         ({"prior_strength": 1.0}, r"prior_strength: 1.0 found without a prior"),
         (
             {"prior_folds": "largest-rudder"},
             r"prior_folds: 'largest-rudder' found without a prior",
         ),
-        ({"prior": "tanker", "prior_folds": "luck"}, r"prior_folds: 'luck' found"),
+        (
+            {"prior": "tanker", "prior_folds": "luck"},
+            r"prior_folds: expected .*got 'luck'",
+        ),
         (
             {"prior": "tanker", "prior_folds": "largest-rudder"},
             r"all trials to fit \(2\) reach 20",

@@ -42,7 +42,7 @@ def test_the_model_carries_its_table(
 ) -> None:
     found.reduced.model.save(tmp_path / "model.json")
     loaded = ShipModel.load(tmp_path / "model.json")
-    assert loaded.own_table == found.structure == get_structure(found.structure.name)
+    assert loaded.dynamics == found.structure == get_structure(found.structure.name)
     effects = zigzag_sensitivity(loaded)
     assert effects == found.to_dict()["sensitivity"]
     assert next(iter(effects)) in loaded.coefficients

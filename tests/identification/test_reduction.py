@@ -207,12 +207,12 @@ def test_each_step_says_how_much_is_explained_and_of_what_is_held_out() -> None:
 def test_numbers_beyond_their_bounds_are_refused() -> None:
     X, y = orthogonal()
     for name in ("tolerance", "threshold"):
-        with pytest.raises(InputError, match=f"{name}: -1 found"):
+        with pytest.raises(InputError, match=f"{name}: expected"):
             backward_elimination(X, y, NAMES, **{name: -1.0})
-    with pytest.raises(InputError, match="tolerance: -1 found"):
+    with pytest.raises(InputError, match=r"tolerance: expected .*got -1"):
         forward_selection(X, y, NAMES, tolerance=-1.0)
     for change in (0.0, 1.0):
-        with pytest.raises(InputError, match=f"change: {change:g} found"):
+        with pytest.raises(InputError, match="change: expected"):
             sensitivity(virtual_ship("steering7"), turning_circle, change)
 
 

@@ -18,11 +18,11 @@ from filelock import FileLock, Timeout
 from platformdirs import user_cache_path
 
 import shipgym
+from shipgym.drafts import draft_name
 from shipgym.engine import cache_folder, compiling
 from shipgym.engine.disk_cache import DiskCache
 from shipgym.engine.voyages import Voyages
 from shipgym.errors import InputError
-from shipgym.files import draft_name
 from shipgym.instruments.sensor_set import shipped_sensors
 from shipgym.tasks.definition import read_definition
 

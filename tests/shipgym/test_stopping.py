@@ -129,18 +129,34 @@ def test_a_ship_that_does_not_stop_says_so_with_its_trial():
             lambda m: stopping(m, -0.5),
             "'kvlcc2' holds for a shaft turning ahead only",
         ),
-        ("tanker", lambda m: stopping(m, 5.0), "shaft_speed: 5 found"),
+        ("tanker", lambda m: stopping(m, 5.0), "shaft_speed: expected .*got 5"),
         ("tanker", lambda m: stopping(m, speed_ratio=0.0), "never dead in the water"),
-        ("tanker", lambda m: stopping(m, speed_ratio=1.5), "speed_ratio: 1.5 found"),
-        ("tanker", lambda m: acceleration(m, 0.0), "start_ratio: 0 found"),
-        ("tanker", lambda m: acceleration(m, duration=-5.0), "duration: -5 found"),
+        (
+            "tanker",
+            lambda m: stopping(m, speed_ratio=1.5),
+            "speed_ratio: expected .*got 1.5",
+        ),
+        ("tanker", lambda m: acceleration(m, 0.0), "start_ratio: expected .*got 0"),
+        (
+            "tanker",
+            lambda m: acceleration(m, duration=-5.0),
+            "duration: expected .*got -5",
+        ),
         (
             "tanker",
             lambda m: acceleration_indices(stopping(m)),
             "expected an acceleration",
         ),
-        ("tanker", lambda m: acceleration_indices(stopping(m), 0.0), "part: 0 found"),
-        ("tanker", lambda m: acceleration_indices(stopping(m), 1.0), "part: 1 found"),
+        (
+            "tanker",
+            lambda m: acceleration_indices(stopping(m), 0.0),
+            "part: expected .*got 0",
+        ),
+        (
+            "tanker",
+            lambda m: acceleration_indices(stopping(m), 1.0),
+            "part: expected .*got 1",
+        ),
     ],
 )
 def test_wrong_arguments(name, call, message):
@@ -170,7 +186,7 @@ def test_a_shaft_is_ordered_astern_by_half_as_much_again_as_ahead():
         assert _stopping_order(tanker, share * service, 0.1) == share * service
     for share in (-1.51, 1.0):
         with pytest.raises(
-            InputError, match=r"shaft_speed: .* found, .*less than at service speed"
+            InputError, match=r"shaft_speed: .*less than at service speed"
         ):
             _stopping_order(tanker, share * service, 0.1)
     assert _stopping_order(tanker, -0.1, 0.0) == -0.1

@@ -175,7 +175,7 @@ def test_estimated_roll_period_is_that_of_the_container_ships_equations():
     inertia = (
         (numbers.PUBLISHED.Ix + numbers.PUBLISHED.Jx) * 0.5 * 1025.0 * numbers.LENGTH**5
     )
-    stiffness = 1025.0 * 9.81 * numbers.VOLUME * numbers.GM
+    stiffness = 1025.0 * numbers.WEIGHT * numbers.GM
     own = 2.0 * np.pi * np.sqrt(inertia / stiffness)
     estimated = weather_particulars(load_model("container").particulars)
     assert estimated.roll_period == pytest.approx(own, rel=0.05)

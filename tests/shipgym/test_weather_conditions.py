@@ -109,8 +109,8 @@ def test_weather_survives_json(weather):
             "7 found, expected one of 'calm'.* 0, 3, 4, 5",
         ),
         (lambda: Weather.from_sea_state(True), "True found"),
-        (lambda: Wind(-1.0), "wind speed: -1 found, expected a number >= 0"),
-        (lambda: Wind(5.0, 400.0), "wind from_deg: 400 found.*clockwise from north"),
+        (lambda: Wind(-1.0), "wind speed: expected a number >= 0"),
+        (lambda: Wind(5.0, 400.0), "wind from_deg: expected.*clockwise from north"),
         (lambda: Wind(5.0, spectrum="haris"), "Did you mean 'harris'"),
         (
             lambda: Wind(5.0, coefficients="blendermann-tankerloaded"),
@@ -118,17 +118,17 @@ def test_weather_survives_json(weather):
         ),
         (
             lambda: Wind(5.0, gust="yes"),
-            "wind gust: 'yes' found, expected true or false",
+            "wind gust: expected a boolean",
         ),
         (
             lambda: Waves(3.0, 3.0),
             "peak_period 3, expected at most 1.4.* steeper waves break",
         ),
-        (lambda: Waves(1.0, 0.0), "waves peak_period: 0 found"),
-        (lambda: Waves(1.0, 8.0, peak_enhancement=0.5), "peak_enhancement: 0.5 found"),
-        (lambda: Waves(1.0, 8.0, spreading="wide"), "waves spreading: 'wide' found"),
-        (lambda: Waves(np.nan, 8.0), "waves significant_height: nan found"),
-        (lambda: Current(0.5, time_constant=0.0), "current time_constant: 0 found"),
+        (lambda: Waves(1.0, 0.0), "waves peak_period: expected"),
+        (lambda: Waves(1.0, 8.0, peak_enhancement=0.5), "peak_enhancement: expected"),
+        (lambda: Waves(1.0, 8.0, spreading="wide"), "waves spreading: expected"),
+        (lambda: Waves(np.nan, 8.0), "waves significant_height: expected"),
+        (lambda: Current(0.5, time_constant=0.0), "current time_constant: expected"),
         (
             lambda: Weather(wind=5.0),
             r"weather wind: 5.0 found, expected shipgym.Wind\(...\) or None",
@@ -197,7 +197,7 @@ def test_saying_what_the_weather_is_loads_no_scipy():
 def test_weather_is_refused_beyond_what_there_is(make, most):
     make(most)
     make(0.98 * most)
-    with pytest.raises(InputError, match=r"found"):
+    with pytest.raises(InputError, match="expected"):
         make(1.02 * most)
 
 
@@ -234,7 +234,7 @@ def test_parts_of_the_weather_begin_to_be_on_above_zero():
         ({"CK": (0.1, 0, 0, 0)}, "CK: 0.1 and 0 found"),
         ({"CK": (0, 0, 0)}, "CK: 3 values found, expected 4, one for each angle"),
         ({"CX": 3.0}, "CX: 3.0 found, expected a list of numbers"),
-        ({"CX": (0, "a", 0, 0)}, r"CX\[1\]: 'a'"),
+        ({"CX": (0, "a", 0, 0)}, r"CX\[1\]: expected a number, got 'a'"),
     ],
 )
 def test_tables_that_no_wind_has_are_refused(rows, message):
