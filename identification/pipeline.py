@@ -33,7 +33,7 @@ from identification.simulation_error.maximum_a_posteriori import (
     checked_mmg,
     fit_mmg,
 )
-from identification.simulation_error.prior import with_prior
+from identification.simulation_error.pulled import with_prior
 from identification.simulation_error.refine import Refined, refine, split_settings
 from identification.uncertainty.bootstrap import (
     bootstrap_covariance,

@@ -29,18 +29,23 @@ from identification.design.reduction import table_of
 from identification.estimators.estimator import FitTask
 from identification.estimators.methods import METHODS
 from identification.report.comparison import comparison_page
-from identification.simulation_error import formulas, mmg_prior, similarity
-from identification.simulation_error.maximum_a_posteriori import _groups
+from identification.simulation_error import (
+    formulas,
+    hull_formulas,
+    mmg_prior,
+    similarity,
+)
+from identification.simulation_error.posterior import held_out_groups
 from identification.simulation_error.prior import (
     reference_prior,
     virtual_trials,
-    with_prior,
 )
-from identification.simulation_error.segments import (
+from identification.simulation_error.pulled import with_prior
+from identification.simulation_error.segments import cut
+from identification.simulation_error.shooting import (
     about_mean,
     averaged,
     channel_units,
-    cut,
 )
 from identification.uncertainty.bootstrap import (
     bootstrap_covariance,
@@ -149,7 +154,7 @@ def record_formulas() -> dict[str, Any]:
         refused(lambda: mmg_prior.mmg_prior("clarke", TANKER)),
         refused(lambda: mmg_prior.mmg_prior("mariner", TANKER)),
         refused(lambda: mmg_prior.mmg_prior("auto", FERRY)),
-        refused(lambda: mmg_prior.formula_coefficients("x", TANKER)),
+        refused(lambda: hull_formulas.formula_coefficients("x", TANKER)),
         refused(
             lambda: similarity.correlations(
                 [1.0, np.nan, np.nan], {"a": [1.0, 2.0, 3.0]}
@@ -345,7 +350,7 @@ def record_diagnostics() -> dict[str, Any]:
             scale_of([(9.0, 1e-9, 0.1)]),
         ],
         "groups": [
-            _groups([SimpleNamespace(trial=k) for k in which])
+            held_out_groups([SimpleNamespace(trial=k) for k in which])
             for which in ((0, 1, 2, 6, 6), (3,) * 7)
         ],
         "mean": [

@@ -402,7 +402,7 @@ def test_a_reference_ship_that_is_like_no_ship_at_hand_is_refused() -> None:
     )
     with pytest.raises(
         InputError,
-        match=r"'auto' found, but none is like this ship; .* similarity of 0\.04",
+        match=r"'auto' expected a ship like this one, .* got '\w+' with 0\.04",
     ):
         chosen_box("auto", mmg_ship("seiun-maru").particulars, [still])
 
