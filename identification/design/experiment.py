@@ -24,7 +24,7 @@ from identification.validation.diagnostics import (
     scaled_features,
     variance_inflation,
 )
-from identification.validation.guard import hard_turn_features
+from identification.validation.hard_turn import hard_turn_features
 from shipgym import InputError, ShipModel, Trial, UnstableModelError
 from shipgym.arrays import Floats
 from shipgym.checks import check_choice

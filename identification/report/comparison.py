@@ -22,7 +22,7 @@ def comparison_page(comparison: Ranking) -> str:
     model = comparison.best.model
     beyond = any(
         (error or 0.0) > LARGEST
-        for one in comparison.standings
+        for one in comparison.ranked
         for error in one.errors.values()
     )
     headings = None if comparison.in_turn else headings_figure(comparison)
@@ -45,7 +45,7 @@ def errors_figure(comparison: Ranking) -> Figure:
     )
     means = [
         min(s.error, LARGEST) if s.error is not None else None
-        for s in comparison.standings
+        for s in comparison.ranked
     ]
     bar = {
         "orientation": "h",
@@ -55,8 +55,8 @@ def errors_figure(comparison: Ranking) -> Figure:
         **told,
     }
     traces = [graph_objects().Bar(x=means, y=names, **bar)]
-    for k, trial in enumerate(comparison.standings[0].errors):
-        errors = [s.errors.get(trial) for s in comparison.standings]
+    for k, trial in enumerate(comparison.ranked[0].errors):
+        errors = [s.errors.get(trial) for s in comparison.ranked]
         shown = {
             n: min(e, LARGEST)
             for n, e in zip(names, errors, strict=True)

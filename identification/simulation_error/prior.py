@@ -15,7 +15,7 @@ from identification.estimators.methods import METHODS, fit_all
 from identification.regression.samples import build_samples
 from identification.simulation_error.formulas import formula_coefficients
 from identification.simulation_error.similarity import AUTO, select_reference
-from identification.validation.guard import hard_turn_features
+from identification.validation.hard_turn import hard_turn_features
 from shipgym import ShipModel, Trial
 from shipgym.arrays import Flags, Floats
 from shipgym.manoeuvres import turning_circle, zigzag

@@ -169,8 +169,8 @@ def _check_refinable(blank: ShipModel, extra_trials: Sequence[Trial]) -> None:
         missing = [channel for channel in needed if channel not in trial]
         if missing:
             raise InputError(
-                f"extra trial {trial.name!r}: expected the channels"
-                f" {', '.join(needed)}, got none named {missing[0]!r}"
+                f"extra trial {trial.name!r}: channel {missing[0]!r} is missing,"
+                f" expected {', '.join(needed)}"
             )
 
 

@@ -57,8 +57,9 @@ from identification.uncertainty.model_error import model_error, scale_of, withou
 from identification.validation import diagnostics, guard, warnings
 from identification.validation.closed_loop import closed_loop
 from identification.validation.folds import held_out_rows, of_largest_rudder, pieces
+from identification.validation.hard_turn import hard_turn_features
 from identification.validation.prediction import predict, trial_metrics
-from identification.validation.ranking import Standing, in_turn
+from identification.validation.ranking import RankedFit, in_turn
 from identification.validation.selection import methods_of, reference_of, select
 from identification.validation.start import with_start
 from shipgym import Particulars, ShipModel, Trial, UnstableModelError
@@ -213,9 +214,7 @@ def record_guard() -> dict[str, Any]:
     ship, one, two = mariner(), *trials()[:2]
     found: dict[str, Any] = {}
     for structure in ("abkowitz", "cubic", "nomoto2", "mmg4dof", "steering7"):
-        sizes = guard.hard_turn_features(
-            get_structure(structure), ship.particulars, 1.3
-        )
+        sizes = hard_turn_features(get_structure(structure), ship.particulars, 1.3)
         found[structure] = sizes
     linear = fitted("tables", LINEAR).model
     changes: dict[str, dict[str, float]] = {
@@ -235,8 +234,10 @@ def record_guard() -> dict[str, Any]:
         run = clean_zigzag().with_channels(
             {"u": np.linspace(5.0, u, len(clean_zigzag()))}
         )
-        found[f"runs, {name}"] = guard._runs_away(ship, lambda r=run: r, 0.0)
-    found["reversed"] = sampled(guard._reversed(linear, 10.0, 5.0)["psi"])
+        found[f"runs, {name}"] = guard.why_unphysical(
+            ship, guard.Simulation("run", lambda r=run: r)
+        )
+    found["reversed"] = sampled(guard.reversed_rudder(linear, 10.0, 5.0)["psi"])
     derived = Trial(one.t, one.channels, derived=("u", "v", "r"), name="derived")
     no_track = Trial(
         one.t,
@@ -269,8 +270,8 @@ def record_guard() -> dict[str, Any]:
     )
     found["why"] = [
         warnings.why_unstable(gone),
-        warnings._why_lost(linear, False),
-        warnings._why_lost(wild, True),
+        warnings.why_lost(linear, False),
+        warnings.why_lost(wild, True),
     ]
     diverged = {
         name: {**m, "diverged": True} for name, m in gone.metrics["trials"].items()
@@ -320,7 +321,7 @@ def record_diagnostics() -> dict[str, Any]:
             series, np.sin(series), np.arange(-45, 46, 6)
         ),
         "inflation": [diagnostics.variance_inflation(scaled[:, :6]), condition],
-        "pairs": diagnostics._collinear_pairs(scaled[:, :7], [*"abcdefg"]),
+        "pairs": diagnostics.collinear_pairs(scaled[:, :7], [*"abcdefg"]),
         "apart": [
             len(diagnostics.without_overlap(replace(samples, window=w)))
             for w in (1, 2, 3, 8)
@@ -481,7 +482,7 @@ def record_selection() -> dict[str, Any]:
         len(turns[1]),
         *(len(in_turn(identified_none, trials(), n)[1]) for n in (0, 9)),
     ]
-    one = Standing("a", "b", 3, True, 0, 0.3, 1.0, 0.1, {})
+    one = RankedFit("a", "b", 3, True, 0, 0.3, 1.0, 0.1, {})
     ranks = [
         one,
         replace(one, ran_away=1),
@@ -540,11 +541,9 @@ def record_comparison() -> dict[str, Any]:
 def page() -> str:
     """The page of the comparison, one error beyond what its figure shows."""
     ranking = compared()
-    last = ranking.standings[-1]
+    last = ranking.ranked[-1]
     beyond = replace(last, error=2.7, errors=dict.fromkeys(last.errors, 2.7))
-    return comparison_page(
-        replace(ranking, standings=(*ranking.standings[:-1], beyond))
-    )
+    return comparison_page(replace(ranking, ranked=(*ranking.ranked[:-1], beyond)))
 
 
 def record_design() -> dict[str, Any]:

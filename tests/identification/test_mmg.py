@@ -482,7 +482,8 @@ def test_a_trial_without_shaft_speed_or_with_a_still_rudder_is_refused() -> None
         trial.t, {**trial.channels, "delta": np.zeros(len(trial))}, name="idle"
     )
     with pytest.raises(
-        InputError, match=r"'idle': the rudder stays at 0\.00 deg throughout"
+        InputError,
+        match=r"'idle': expected a rudder that moves, got one that stays at 0\.00",
     ):
         identify([idle], "mmg", particulars=L7)
     without = Trial(

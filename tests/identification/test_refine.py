@@ -344,7 +344,7 @@ def test_extra_trials_need_the_channels_of_the_structure(
         cao_zigzag.t, {c: cao_zigzag[c] for c in ("u", "r", "delta")}, name="lacking"
     )
     with pytest.raises(
-        InputError, match=r"extra trial 'lacking': expected the channels .* 'v'"
+        InputError, match=r"extra trial 'lacking': channel 'v' is missing, expected"
     ):
         identify(
             [cao_zigzag],
