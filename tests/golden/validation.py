@@ -24,8 +24,7 @@ from identification import (
     sensitivity,
 )
 from identification.design.experiment import standard_candidates
-from identification.design.reduced import zigzag_sensitivity
-from identification.design.reduction import table_of
+from identification.design.sensitivity import table_of, zigzag_sensitivity
 from identification.estimators.estimator import FitTask
 from identification.estimators.methods import METHODS
 from identification.report.comparison import comparison_page
