@@ -192,7 +192,8 @@ def autopilot_command(
     """
     from agents.cli.terminal import progress_bars
     from agents.engines.jobs import JobEngine
-    from agents.verification.chain import DESIGNS, build_autopilot
+    from agents.verification.chain import build_autopilot
+    from agents.verification.verify import DESIGNS
 
     designs = (
         DESIGNS

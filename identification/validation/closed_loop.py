@@ -27,7 +27,7 @@ STEP = 0.02  # of the time to sail one ship length
 LONGEST_LEG = 2.0
 
 
-class Leg(NamedTuple):
+class ZigzagLeg(NamedTuple):
     """Part of a zigzag between two reversals of the rudder."""
 
     order: float  # rudder angle, rad
@@ -84,12 +84,12 @@ def closed_loop(model: ShipModel, trial: Trial) -> Trial | None:
 
 
 @lru_cache(maxsize=16)  # every model drawn sails the same trials
-def legs(trial: Trial) -> tuple[Leg, ...]:
+def legs(trial: Trial) -> tuple[ZigzagLeg, ...]:
     """Legs of a measured zigzag; the approach and the last one end by the clock."""
     start, turns = reversals(trial)
     t, delta = trial.t, rudder(trial)
     edges = [float(t[0]), start, *turns, float(t[-1])]
-    found = list[Leg]()
+    found = list[ZigzagLeg]()
     for number, (begin, end) in enumerate(pairwise(edges)):
         last_quarter = t >= 0.25 * begin + 0.75 * end
         held = last_quarter & (t <= end)
@@ -99,12 +99,12 @@ def legs(trial: Trial) -> tuple[Leg, ...]:
         if 1 <= number <= len(turns):
             target = float(np.interp(end, t, trial["psi"]))
         order = float(np.median(delta[held]))
-        found.append(Leg(order, end - begin, target, approach=not found))
+        found.append(ZigzagLeg(order, end - begin, target, approach=not found))
     return tuple(found)
 
 
 def _sail(
-    passage: Passage, trial: Trial, leg: Leg, begin: float, state: Floats
+    passage: Passage, trial: Trial, leg: ZigzagLeg, begin: float, state: Floats
 ) -> _Sailed | None:
     """Sail a leg from a time and a state; None where its target is not reached."""
     model, dt = passage.model, passage.dt
@@ -124,7 +124,9 @@ def _sail(
     return _until(leg.target, psi, t, states)
 
 
-def _commands(model: ManoeuvringModel, trial: Trial, leg: Leg, t: Floats) -> Floats:
+def _commands(
+    model: ManoeuvringModel, trial: Trial, leg: ZigzagLeg, t: Floats
+) -> Floats:
     """Rudder of the leg and shaft as measured, shape (n_steps, n_commands)."""
     commands = np.tile(model.service_command, (len(t), 1))
     ordered, shaft = 0, 1

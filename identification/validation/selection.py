@@ -46,7 +46,7 @@ def select(
     identify: Identify,
     trials: Sequence[Trial],
     options: Options,
-    structures: Sequence[str] = STRUCTURES,
+    structures: Sequence[str] | None = None,
 ) -> tuple[Options, dict[str, Any]]:
     """The options with the structure and method that predict best, and the ranking, for the provenance.
 
@@ -56,13 +56,13 @@ def select(
     whose error exceeds the least by no more than one standard error of their difference
     over the trials, or by 2 %. A method other than the default is the only one, and
     what does not know a setting is refused; InputError where nothing can be fitted,
-    with the first reason.
+    with the first reason. `structures`: to try, by default `STRUCTURES`.
     """
     single = len(trials) == 1
     parts = pieces(trials[0]) if single else trials
     attempts = _Attempts(identify, [part.with_(kind=None) for part in parts], options)
     free = options.method == Options.method and not options.settings()
-    for structure in counted("structures", structures):
+    for structure in counted("structures", structures or STRUCTURES):
         method = options.method
         if free:
             method = methods_of(structure, options.method)[0]
