@@ -21,7 +21,7 @@ from identification.estimators.rm_svm import (
 )
 from identification.regression.grey_box import chosen_box
 from identification.regression.samples import Samples
-from identification.report.figures import search_figure
+from identification.report.choice_figures import search_figure
 from identification.search.pattern_search import pattern_search
 from identification.simulation_error.similarity import (
     check_alike,
@@ -342,7 +342,7 @@ def test_the_search_for_the_bands_is_drawn(rm_svm: IdentificationResult) -> None
     for q, search in rm_svm.searches.items():
         assert search.x.tolist() == search.course[-1].tolist() == [chosen[q]["epsilon"]]
         assert list(search.history) == sorted(search.history, reverse=True)
-    figure = search_figure(rm_svm)
+    figure = search_figure(rm_svm.searches)
     assert [note.text for note in figure.layout.annotations][
         1
     ] == "best insensitive band"
