@@ -66,7 +66,7 @@ def excited() -> Answers:
     """Rudder and shaft sequences by seed, with usual and other settings."""
     ship, other = model("mariner"), model("container")
     steps = partial(
-        excitation._steps, np.arange(0.0, 90.0, 0.7), (-0.2, 0.5), (3.0, 11.0)
+        excitation.random_levels, np.arange(0.0, 90.0, 0.7), (-0.2, 0.5), 3.0, 11.0
     )
     return {
         "binary": lambda: excitation.prbs_rudder(ship, duration=120.0, dt=1.5),
