@@ -78,7 +78,8 @@ def reversals(trial: Trial) -> Reversals:
     part = ORDERED if is_ordered(trial) else MEASURED
     holds = _holds(t, delta, start, part * usual_rudder(trial))
     if is_ordered(trial):
-        return Reversals(start, [float(t[hold[0]]) for hold in holds[1:]])
+        first_samples = [hold[0] for hold in holds[1:]]
+        return Reversals(start, t[first_samples].tolist())
 
     fastest = _fastest_rate(t, delta)
     turns = []
@@ -92,10 +93,11 @@ def reversals(trial: Trial) -> Reversals:
 
 def _holds(t: Floats, delta: Floats, start: float, least: float) -> list[Floats]:
     """Samples from the start on at which the rudder is held beyond an angle, side after side."""
-    side = np.sign(delta)
-    held = np.flatnonzero((np.abs(delta) > least) & (t >= start))
-    changes = np.flatnonzero(np.diff(side[held])) + 1
-    return np.split(held, changes)
+    beyond = np.abs(delta) > least
+    held = np.flatnonzero(beyond & (t >= start))
+    turned = np.diff(np.sign(delta[held])) != 0.0
+    first_samples = np.flatnonzero(turned) + 1
+    return np.split(held, first_samples)
 
 
 def _fastest_rate(t: Floats, delta: Floats) -> float:
@@ -113,15 +115,21 @@ def departure(t: Floats, move: Floats, reach: float, fastest: float) -> float:
     if reach == 0.0:
         return float(t[0])
     upper = int(np.argmax(move >= 0.5 * reach))
+    lower = 0
     still = np.flatnonzero(move[:upper] <= 0.1 * reach)
-    lower = int(still[-1]) + 1 if len(still) else 0
+    if len(still):
+        lower = int(still[-1]) + 1
 
     slope = 0.0
     if upper > lower:
-        slope = (move[upper] - move[lower]) / (t[upper] - t[lower])
+        moved = move[upper] - move[lower]
+        slope = moved / (t[upper] - t[lower])
     if upper - lower <= 2:
         slope = max(slope, fastest)
-    first = lower if move[lower] > 0.15 * reach else upper
+
+    first = lower
+    if move[lower] <= 0.15 * reach:
+        first = upper
     return float(t[first] - move[first] / slope)
 
 

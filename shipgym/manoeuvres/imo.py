@@ -38,19 +38,21 @@ def imo_assessment(
     `overshoot_1_10_10`, `overshoot_2_10_10`, `overshoot_1_20_20` and `stopping`. Raises
     InputError for draws without covariance.
     """
-    usual = 0 if model.covariance is None else DRAWS
-    wanted = usual if n_draws is None else n_draws
-    count = int(check_number(wanted, "n_draws", at_least=0))
-    draws = model.sample(count, seed) if count else []
+    if n_draws is None:
+        n_draws = 0 if model.covariance is None else DRAWS
+    check_number(n_draws, "n_draws", at_least=0)
+    draws = list[ShipModel]()
+    if n_draws > 0:
+        draws = model.sample(int(n_draws), seed)
     return assess_draws(model, draws)
 
 
 def assess_draws(model: ShipModel, draws: Sequence[ShipModel]) -> dict[str, Criterion]:
     """The criteria of a model and of models drawn from it."""
     needed = imo_manoeuvres(model)
+    own = own_indices(model, needed)
     evaluations = {name: test.evaluate for name, test in needed.items()}
-    found = intervals_of(own_indices(model, needed), draws, evaluations)
-    return imo_criteria(model, found)
+    return imo_criteria(model, intervals_of(own, draws, evaluations))
 
 
 def imo_criteria(

@@ -111,28 +111,32 @@ class Voyage:
     def settle(self, sail: Sail) -> SteadyMotion:
         """Sail until the motion no longer changes, 300 ship lengths at most."""
         n_steps = round(STRETCH * self.length_time / self.dt)
-        p = self.model.particulars
-        speed, length = p["speed"], p["length"]
+        speed = self.model.particulars["speed"]
+        units = np.array([speed, speed, 1.0 / self.length_time, 1.0])
         columns = [self.model.state_names.index(name) for name in "uvr"]
-        before: Floats | None = None
+
+        before = np.full(len(units), np.inf)
         for _ in range(MOST_STRETCHES):
             states, commands = self.go(sail, n_steps)
-            u, v, r = states[:, columns].mean(axis=0)
+            velocities = states[:, columns].mean(axis=0)
             rudder = commands[:, 0].mean()
-            now = np.array([u / speed, v / speed, r * length / speed, rudder])
-            if before is not None and np.abs(now - before).max() < STEADY:
+            motion = np.append(velocities, rudder)
+            change = np.abs(motion - before) / units
+            if change.max() < STEADY:
                 break
-            before = now
-        return SteadyMotion(float(rudder), float(r))
+            before = motion
+        return SteadyMotion(float(rudder), float(velocities[-1]))
 
     def trial(self, kind: str | None = None, last: int | None = None) -> Trial:
-        """What was sailed so far, up to the sample number `last`."""
+        """Recording of the legs sailed so far, up to the sample number `last`."""
         states = np.concatenate(self._states)
-        final = self._commands[-1][-1:]  # held at the last sample too
-        commands = np.concatenate([*self._commands, final])
+        commands = np.concatenate(self._commands)
+        # the last order is held at the last sample too
+        commands = np.append(commands, commands[-1:], axis=0)
+        if last is not None:
+            states, commands = states[: last + 1], commands[: last + 1]
         orders = commands[:, : len(self.model.command_names)]
-        kept = slice(None if last is None else last + 1)
-        return as_trial(self.model, self.dt, states[kept], orders[kept], kind)
+        return as_trial(self.model, self.dt, states, orders, kind)
 
 
 def rudder_effect(model: ShipModel, water_depth: float) -> float:

@@ -114,10 +114,15 @@ def turning_indices(trial: Trial, length: float | None = None) -> TurningIndices
 def track_from_order(trial: Trial, length: float) -> TrackFromOrder:
     """Track from where the rudder was ordered, for a ship of some length, m."""
     start = execute_time(trial)
-    x, y, psi = trial["x"], trial["y"], trial["psi"]
-    x0, y0, psi0 = (float(np.interp(start, trial.t, row)) for row in (x, y, psi))
-    ahead, aside = rotate_to_body(x - x0, y - y0, psi0)
-    return TrackFromOrder(ahead / length, aside / length, psi - psi0)
+
+    def since(channel: str) -> Floats:
+        values = trial[channel]
+        return np.asarray(values - np.interp(start, trial.t, values))
+
+    turned = since("psi")
+    heading = float(trial["psi"][0] - turned[0])
+    ahead, aside = rotate_to_body(since("x"), since("y"), heading)
+    return TrackFromOrder(ahead / length, aside / length, turned)
 
 
 def _steady_turn(

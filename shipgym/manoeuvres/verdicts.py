@@ -145,11 +145,12 @@ def outside_envelope(model: ShipModel, test: Manoeuvre) -> bool:
         run = test.sail(model)
     except (UnstableModelError, ManoeuvreError):
         return True
-    turned = np.abs(run["psi"] - run["psi"][0]) > np.pi
-    last = int(np.argmax(turned)) if turned.any() else len(run.t)
+    within_half_turn = np.abs(run["psi"] - run["psi"][0]) <= np.pi
+    part = np.logical_and.accumulate(within_half_turn)
     states = []
     for name in ("u", "v", "r", "delta"):
-        states.append(run[name][:last] if name in run else np.zeros(last))
+        values = run[name] if name in run else np.zeros(len(run))
+        states.append(values[part])
     return bool(model.envelope.distance(*states).max() > 1.15)
 
 
@@ -204,9 +205,10 @@ def _at_speed(model: ShipModel, trial: Trial) -> bool:
     """Whether a trial begins at service speed, to a tenth."""
     if "u" not in trial or "v" not in trial:
         return False
-    speed = model.particulars["speed"]
-    start = float(np.hypot(trial["u"][0], trial["v"][0]))
-    return bool(abs(start - speed) <= 0.1 * speed)
+    service_speed = model.particulars["speed"]
+    u, v = trial["u"][0], trial["v"][0]
+    off = abs(float(np.hypot(u, v)) - service_speed)
+    return bool(off <= 0.1 * service_speed)
 
 
 def _manoeuvre_of(model: ShipModel, trial: Trial) -> str | None:

@@ -101,7 +101,7 @@ def test_acceleration_to_service_speed(name, lengths):
 def test_a_ship_without_shaft_neither_stops_nor_accelerates():
     for call in (stopping, acceleration):
         with pytest.raises(
-            InputError, match="'mariner': no shaft speed among its commands"
+            InputError, match="'mariner': expected one that is ordered a shaft speed"
         ):
             call(load_model("mariner"))
 
