@@ -185,25 +185,27 @@ def steps_figure(
 
 def _step_lines(t: Floats, angles: Floats, name: str, colour: str) -> list[Any]:
     """The band of the models drawn below the line of the identified one."""
-    lines = [line(t, angles[0], name, colour, 2.1)]
-    if len(angles) > 1:
-        lines.insert(0, band(t, angles[1:], name, colour, showlegend=False))
-    return lines
+    own = line(t, angles[0], name, colour, 2.1)
+    drawn = angles[1:]
+    if not len(drawn):
+        return [own]
+    return [band(t, drawn, name, colour, showlegend=False), own]
 
 
 def tracks_figure(tracks: Mapping[str, Track], length: float) -> Figure:
     """Tracks sailed by the identified model under each path autopilot, and the distance from them."""
-    paths, errors = list[Any](), list[Any]()
+    first = next(iter(tracks.values()))
+    north, east = first.waypoints.T / length
+    paths = [line(east, north, "waypoints", MUTED, 1.2, line_dash="dot")]
+    errors = []
     for (name, track), colour in zip(tracks.items(), PILOT_COLOURS, strict=False):
-        if not paths:
-            north, east = track.waypoints.T / length
-            planned = line(east, north, "waypoints", MUTED, 1.2, line_dash="dot")
-            paths.append(planned)
-        x, y = track.positions.T / length
-        steps = np.hypot(np.diff(x), np.diff(y))
+        positions = track.positions / length
+        steps = np.hypot(*np.diff(positions, axis=0).T)
         sailed = np.append(0.0, np.cumsum(steps))
+        x, y = positions.T
         paths.append(line(y, x, name, colour, 2.0))
         errors.append(line(sailed, track.cross_track, name, colour, 1.6))
+
     north_axis = axis("north, ship lengths", scaleanchor="x", scaleratio=1)
     left = Panel(paths, "east, ship lengths", north_axis, "Track")
     aside = axis("m, positive to starboard", zero=True)

@@ -81,12 +81,14 @@ def verification_figures(found: Verification, length: float) -> dict[str, Any]:
         pilot.name: (pilot.step.heading, pilot.step.rudder) for pilot in by_name
     }
     costs = {pilot.name: pilot.episodes.cost for pilot in by_name}
-    tracks = {track.key.upper(): track for track in found.tracks}
     t = found.pilots[0].step.t
-    return {
+    shown = {
         "criteria": figures.criteria_figure(found.manoeuvres.criteria),
         "manoeuvres": figures.manoeuvres_figure(found.manoeuvres, length),
         "steps": figures.steps_figure(t, responses, STEP_DEG),
         "costs": figures.costs_figure(costs),
-        "track_keeping": figures.tracks_figure(tracks, length),
     }
+    if found.tracks:
+        tracks = {track.key.upper(): track for track in found.tracks}
+        shown["track_keeping"] = figures.tracks_figure(tracks, length)
+    return shown

@@ -80,25 +80,33 @@ def rudder_effect(trials: Sequence[Trial], model: ShipModel) -> float:
     Regression of the change of yaw rate over half a ship length on mean yaw rate, mean
     rudder and a constant.
     """
-    window = 0.5 * model.particulars["length"] / model.particulars["speed"]
+    window = 0.5 * model.travel_time
     parts = [_changes(trial, window) for trial in trials]
-    X = np.concatenate([features for features, _ in parts])
-    y = np.concatenate([changes for _, changes in parts])
+    X = np.concatenate([part.features for part in parts])
+    y = np.concatenate([part.changes for part in parts])
     n_rows, n_terms = X.shape
     if n_rows <= n_terms:
         return 0.0
 
     coefficients, *_ = np.linalg.lstsq(X, y, rcond=None)
-    left = y - X @ coefficients
-    variance = float(left @ left) / (n_rows - n_terms)
-    inverse = np.linalg.pinv(X.T @ X)
+    residuals = y - X @ coefficients
+    variance = float(residuals @ residuals) / (n_rows - n_terms)
+    covariance = variance * np.linalg.pinv(X.T @ X)
     rudder = 1
-    error = float(np.sqrt(variance * inverse[rudder, rudder]))
-    return float(coefficients[rudder]) / error if error > 0.0 else 0.0
+    error = float(np.sqrt(covariance[rudder, rudder]))
+    if error == 0.0:
+        return 0.0
+    return float(coefficients[rudder]) / error
 
 
-def _changes(trial: Trial, window: float) -> tuple[Floats, Floats]:
-    """Yaw rate, rudder and 1, means over windows, and changes of the yaw rate over them."""
+class _Changes(NamedTuple):
+    """Changes of the yaw rate over windows of a trial, and the means over each."""
+
+    features: Floats  # yaw rate, rudder and 1, shape (n_windows, 3)
+    changes: Floats  # shape (n_windows,)
+
+
+def _changes(trial: Trial, window: float) -> _Changes:
     edges = np.arange(trial.t[0], trial.t[-1], window)
     first = np.searchsorted(trial.t, edges)
     counts = np.diff(first)[:-1]
@@ -107,9 +115,9 @@ def _changes(trial: Trial, window: float) -> tuple[Floats, Floats]:
         sums = np.add.reduceat(trial[channel], first[:-1])[:-1]
         return np.asarray(sums / counts)
 
+    features = np.column_stack([means("r"), means("delta"), np.ones(len(counts))])
     rates = np.interp(edges, trial.t, trial["r"])
-    changes = np.diff(rates)[: len(counts)]
-    return np.column_stack([means("r"), means("delta"), np.ones(len(counts))]), changes
+    return _Changes(features, np.diff(rates)[: len(counts)])
 
 
 def helpful_trial(fit: Fit) -> str:

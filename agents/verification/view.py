@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -194,11 +195,10 @@ def _unstable_note(found: Verification) -> str:
 
 
 def _criteria_card(criteria: Mapping[str, Criterion]) -> Card:
-    passed = [criterion.passed for criterion in criteria.values()]
-    met, missed = passed.count(True), passed.count(False)
-    undecided = len(passed) - met - missed
+    verdicts = Counter(criterion.passed for criterion in criteria.values())
+    met, missed, undecided = verdicts[True], verdicts[False], verdicts[None]
     detail = f"met; {missed} missed, {undecided} not decided by these trials"
-    return Card("IMO criteria", f"{met} of {len(passed)}", detail)
+    return Card("IMO criteria", f"{met} of {len(criteria)}", detail)
 
 
 def _best_card(found: Verification, metrics: Mapping[str, dict[str, Any]]) -> Card:

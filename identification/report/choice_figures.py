@@ -68,9 +68,9 @@ def _l_curve_panel(q: str, estimator: TruncatedLSSVM) -> Panel:
 
 def _logarithmic(title: str, values: NDArray[np.float32]) -> dict[str, Any]:
     """An axis in decades, or in steps of 1, 2, 5 where there are few."""
-    least = max(values.min(), np.finfo(np.float32).tiny)
-    decades = float(np.log10(values.max() / least))
-    step = "D2" if decades < 2.0 else 1
+    smallest = max(values.min(), np.finfo(np.float32).tiny)
+    few_decades = values.max() < 100.0 * smallest
+    step = "D2" if few_decades else 1
     return axis(title, type="log", dtick=step, tickformat="~g")
 
 
@@ -87,7 +87,9 @@ def search_figure(searches: Mapping[str, SearchResult]) -> Figure:
     for (q, search), colour in zip(searches.items(), PALETTE, strict=False):
         name = EQUATIONS.get(q, q)
         rounds = np.arange(len(search.history))
-        relative = search.history / (search.value if search.value > 0.0 else 1.0)
+        relative = search.history
+        if search.value > 0.0:
+            relative = search.history / search.value
         if not objectives or not one_for_all:
             objectives.append(line(rounds, relative, name, colour, showlegend=False))
         values = search.course[:, 0]
@@ -98,10 +100,9 @@ def search_figure(searches: Mapping[str, SearchResult]) -> Figure:
     round_axis = axis("round", rangemode="tozero")
     title = "best objective, relative to the final one"
     left = Panel(objectives, round_axis, axis(), title)
+    right = Panel(best, round_axis, axis(range=[0.0, 1.0]), f"best {BAND}")
     if weights:
-        own_axis = axis(type="log", tickformat=".0e")
-        right = Panel(best, round_axis, own_axis, "best C")
-    else:
-        right = Panel(best, round_axis, axis(range=[0.0, 1.0]), f"best {BAND}")
+        log_axis = axis(type="log", tickformat=".0e")
+        right = Panel(best, round_axis, log_axis, "best C")
     grid = {"horizontal_spacing": 0.1}
     return panels([left, right], 340, 2, grid=grid, hovermode="closest")

@@ -1,5 +1,6 @@
 """What was removed from the trials for current and wind: sentences, and tracks through the water."""
 
+from collections import defaultdict
 from collections.abc import Mapping
 from pathlib import PurePath
 from typing import Any
@@ -25,10 +26,11 @@ def sea_sentences(provenance: Mapping[str, Any]) -> list[str]:
 
 def _current_sentences(currents: Mapping[str, Any]) -> list[str]:
     """Trials of the same current together."""
-    names = dict[str, list[str]]()
+    trials_of = defaultdict[str, list[str]](list)
     for trial, row in currents.items():
-        names.setdefault(current_text(row), []).append(PurePath(trial).name)
-    return [f"{', '.join(trials)}: {text}" for text, trials in names.items()]
+        text = current_text(row)
+        trials_of[text].append(PurePath(trial).name)
+    return [f"{', '.join(names)}: {text}" for text, names in trials_of.items()]
 
 
 def _wind_sentences(wind: Mapping[str, Any]) -> list[str]:
