@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -86,20 +85,18 @@ def build_autopilot(
             trials, arguments = trials_of(ship, settings)
         with stage(tell, "identifying"), placed(str(ship.path)):
             fit = identify(trials, **arguments)
-        verified = partial(
-            verify,
-            fit.model,
-            int(draws),
-            int(seed),
-            tell,
-            where,
-            [guest for _, guest in guests],
-            designs,
-        )
+
+        def verified() -> Verification:
+            others = [guest for _, guest in guests]
+            return verify(
+                fit.model, int(draws), int(seed), tell, where, others, designs
+            )
+
         result = examined(ship, fit, guests, verified)
-        if standards and result.verification is not None and result.refusal is None:
+        found = result.verification
+        if standards and found is not None and result.refusal is None:
             with stage(tell, "standards"):
-                found = with_standards(result.verification, fit.model)
+                found = with_standards(found, fit.model)
                 result = replace(result, verification=found)
         with stage(tell, "writing the report"):
             write_result(result, draft)

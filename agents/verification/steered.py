@@ -105,14 +105,15 @@ def steer_along(
     lost: Collection[str] = (),
 ) -> SteeredRun:
     """Keep a ship to a track, from a distance to starboard of where it begins, m."""
+    pilot = track.controller
     north, east = track.waypoints.T / MINUTE / 60.0  # degrees of latitude
     latitude = START[0] + north
     longitude = START[1] + east / np.cos(np.radians(latitude))
     places = np.column_stack([latitude, longitude])
-    route = Route(places, track.controller.gains["path_radius"])
+    route = Route(places, pilot.gains["path_radius"])
 
-    step = track.controller.design["dt"] / PER_INTERVAL
+    step = pilot.design["dt"] / PER_INTERVAL
     ship = SimulatedShip(model, weather=track_task(model).weather, step=step)
     ship.states[0, model.state_names.index("y")] = aside
-    helm = Helm(track.controller, None, limits, route)
+    helm = Helm(pilot, None, limits, route)
     return steer(helm, ship, 3.0 * LENGTHS * model.travel_time, lost)

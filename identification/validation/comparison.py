@@ -110,36 +110,28 @@ def compare_methods(
         have.
     """
     pairs, several = _asked(structures, methods, arguments)
-    marked = held_out(trials, arguments.get("hold_out", ()))
-    fitted = [trial for trial in marked if trial.use == "fit"]
-    held = [trial for trial in marked if trial.use == "validate"]
-    if not held and len(fitted) < 2:
-        raise InputError(
-            "trials: expected a held-out trial to rank the methods on, got"
-            f" {len(fitted)} to fit and none to validate; mark one use ="
-            ' "validate", or give two to fit'
-        )
-
+    fitted, held = _by_use(held_out(trials, arguments.get("hold_out", ())))
     left_out = _left_out([get_method(method) for _, method in pairs], arguments)
     found = list[tuple[RankedFit, IdentificationResult]]()
     refused = dict[str, str]()
     for structure, method in counted("structures and methods", pairs):
         name = get_method(method).name
-        own = dict(arguments)
-        for setting in left_out.get(name, ()):
-            own.pop(setting, None)
+        unknown = left_out.get(name, ())
+        own = {key: arguments[key] for key in arguments if key not in unknown}
         if several:
             name = fit_name(name_of(structure), name)
             own["reference_model"] = reference_of(structure, own.get("reference_model"))
         try:
             result = identify(trials, structure, method, **own)
-            seen = {trial.name: result.metrics["trials"][trial.name] for trial in held}
-            if not held:
+            if held:
+                of_trials = result.metrics["trials"]
+                seen = {trial.name: of_trials[trial.name] for trial in held}
+            else:
                 seen = _each_in_turn(fitted, structure, method, own)
         except InputError as error:
             refused[name] = str(error)
-            continue
-        found.append((ranked_fit([result], seen, trials), result))
+        else:
+            found.append((ranked_fit([result], seen, trials), result))
     if not found:
         raise InputError(next(iter(refused.values())))
 
@@ -150,6 +142,19 @@ def compare_methods(
         results[name] = result
     ranked = tuple(fit for fit, _ in found)
     return Comparison(ranked, results, refused, left_out, in_turn=not held)
+
+
+def _by_use(trials: Sequence[Trial]) -> tuple[list[Trial], list[Trial]]:
+    """Trials to fit and trials held out; InputError where none can be held out."""
+    fitted = [trial for trial in trials if trial.use == "fit"]
+    held = [trial for trial in trials if trial.use == "validate"]
+    if not held and len(fitted) < 2:
+        raise InputError(
+            "trials: expected a held-out trial to rank the methods on, got"
+            f" {len(fitted)} to fit and none to validate; mark one use ="
+            ' "validate", or give two to fit'
+        )
+    return fitted, held
 
 
 def _each_in_turn(
