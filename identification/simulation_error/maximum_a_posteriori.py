@@ -61,18 +61,13 @@ def fit_mmg(problem: Problem, options: Options) -> tuple[ShipModel, dict[str, An
     blank = problem.blank
     source = options.reference_model or options.prior or YOSHIMURA
     prior = mmg_prior(source, blank.particulars)
-    strengths: tuple[float, ...] = (1.0, 2.0, 3.0)
-    if options.prior_strength is not None:
-        check_number(options.prior_strength, "prior_strength", above=0.0)
-        strengths = (options.prior_strength,)
-
-    blank = replace(blank, particulars=prior.ship)
-    posterior = Posterior(blank, problem.used, prior)
+    posterior = Posterior(replace(blank, particulars=prior.ship), problem.used, prior)
     estimates = list[Estimate]()
     z = np.zeros(len(IDENTIFIED))
-    for strength in strengths:
-        estimates.append(posterior.most_probable(z, strength))
-        z = estimates[-1].z
+    for strength in _strengths(options):
+        estimate = posterior.most_probable(z, strength)
+        estimates.append(estimate)
+        z = estimate.z
 
     scales = estimates[0].scales
     held_out = [posterior.held_out(estimate, scales) for estimate in estimates]
@@ -84,9 +79,18 @@ def fit_mmg(problem: Problem, options: Options) -> tuple[ShipModel, dict[str, An
     return model, _report(posterior, estimates, held_out, chosen)
 
 
+def _strengths(options: Options) -> tuple[float, ...]:
+    """Strengths of the prior to choose from, or the one that was given."""
+    if options.prior_strength is None:
+        return 1.0, 2.0, 3.0
+    check_number(options.prior_strength, "prior_strength", above=0.0)
+    return (options.prior_strength,)
+
+
 def strongest_as_good(errors: list[float]) -> int:
     """The last of errors in the order of the strengths that is within a tenth of the least."""
-    as_good = [k for k, error in enumerate(errors) if error <= 1.1 * min(errors)]
+    largest = 1.1 * min(errors)
+    as_good = [k for k, error in enumerate(errors) if error <= largest]
     return as_good[-1]
 
 

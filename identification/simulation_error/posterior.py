@@ -101,19 +101,12 @@ class Posterior:
         return self._last[1]
 
     def _simulated(self, z: Floats, which: Integers) -> tuple[Floats, Floats]:
-        """Forward differences: in each lane but the first one coefficient is larger by a step."""
-        blank, deviation = self.blank, self.prior.deviation
+        """Errors and their slopes by forward differences."""
         step = 1e-4  # standard deviations of the prior
-        n = len(IDENTIFIED)
-        varied = np.arange(n)
-        rows = len(Ship._fields) + varied  # of the coefficients
-
-        ships = np.repeat(blank.ship_numbers(), LANES).reshape(-1, LANES)
-        values = self.mean + z * deviation
-        ships[rows] = values[:, None]
-        ships[rows, 1 + varied] += step * deviation
-
+        ships = self._lanes(z, step)
+        blank = self.blank
         columns = [blank.state_names.index(name) for name in self.channels]
+        used = 1 + len(IDENTIFIED)
         no_offset = np.zeros(LANES)
         parts = []
         for index in which:
@@ -121,7 +114,7 @@ class Posterior:
             starts = np.repeat(segment.start, LANES)
             states = sail_lanes(blank, segment, ships, starts, no_offset)
             # at the first sample the ships have not moved yet
-            off = states[1:, columns, : n + 1] - segment.measured[1:, :, None]
+            off = states[1:, columns, :used] - segment.measured[1:, :, None]
             share = self.independent_errors(segment) / len(off)
             parts.append(off * np.sqrt(share))
         lanes = np.concatenate(parts)
@@ -130,6 +123,18 @@ class Posterior:
         with np.errstate(invalid="ignore", over="ignore"):  # of ships that run away
             slopes = (lanes[:, :, 1:] - errors[:, :, None]) / step
         return errors, slopes
+
+    def _lanes(self, z: Floats, step: float) -> Floats:
+        """Numbers of ships; in each but the first one coefficient is larger by a step."""
+        varied = np.arange(len(IDENTIFIED))
+        coefficients = len(Ship._fields) + varied  # their rows
+        deviation = self.prior.deviation
+        values = self.mean + z * deviation
+
+        ships = np.repeat(self.blank.ship_numbers(), LANES).reshape(-1, LANES)
+        ships[coefficients] = values[:, None]
+        ships[coefficients, 1 + varied] += step * deviation
+        return ships
 
     def independent_errors(self, segment: Segment) -> float:
         """Times over which errors are one error that a segment has."""
