@@ -1,13 +1,11 @@
 """Figure of the coefficients of a fit with their intervals."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from identification.fit import Fit
-from shipgym.arrays import Flags, Floats, Integers
 from shipgym.manoeuvres.quantiles import NORMAL_95
 from shipgym.plots import Panel, axis, compact, panels, points
 from shipgym.plots.style import LIMIT, MODEL, Figure
@@ -15,30 +13,27 @@ from shipgym.plots.style import LIMIT, MODEL, Figure
 PALE = "#b3bcc7"
 
 
-@dataclass(frozen=True, eq=False)
-class _Intervals:
-    """95 % intervals of coefficients by their sizes, of one that is 0 by 1."""
+class _Bar(NamedTuple):
+    """95 % interval of a coefficient, per cent of its size, of one that is 0 of 1."""
 
-    names: Sequence[str]
-    centre: Floats  # -1, 0 or 1 squared: 0 for a coefficient that is 0
-    half: Floats  # half of the width
+    name: str
+    centre: float
+    half: float  # of the width
 
     @property
-    def significant(self) -> Flags:
-        """Whether an interval does not reach 0."""
-        return (self.half < 1.0) & (self.centre > 0.0)
+    def significant(self) -> bool:
+        """Whether the interval does not reach 0."""
+        return self.half < self.centre
 
 
 def coefficients_figure(fit: Fit) -> Figure:
-    """95 % interval of each coefficient by its size; one that reaches 0 is not significant."""
-    intervals = _intervals(fit)
-    count = len(intervals.names)
-    columns = 1 if count < 12 else 2
-    rows = -(-count // columns)  # rounded up
+    """95 % interval of each coefficient; one that reaches 0 is not significant."""
+    bars = [_bar(fit, name) for name in fit.coefficients]
+    columns = 1 if len(bars) < 12 else 2
+    rows = -(-len(bars) // columns)  # rounded up
     shown = []
     for first in range(0, columns * rows, rows):
-        places = np.arange(first, min(first + rows, count))
-        shown.append(_panel(intervals, places, rows))
+        shown.append(_panel(bars[first : first + rows], rows))
     return panels(
         shown,
         20 * rows + 110,
@@ -49,23 +44,21 @@ def coefficients_figure(fit: Fit) -> Figure:
     )
 
 
-def _intervals(fit: Fit) -> _Intervals:
-    values = np.array(list(fit.coefficients.values()))
-    errors = np.array(list(fit.standard_errors.values()))
-    size = np.abs(values)
-    size[size == 0.0] = 1.0
-    half = NORMAL_95 * np.nan_to_num(errors) / size
-    return _Intervals(list(fit.coefficients), np.sign(values) ** 2, half)
+def _bar(fit: Fit, name: str) -> _Bar:
+    value, error = fit.coefficients[name], fit.standard_errors[name]
+    half = 100.0 * NORMAL_95 * float(np.nan_to_num(error))
+    if value == 0.0:
+        return _Bar(name, 0.0, half)
+    return _Bar(name, 100.0, half / abs(value))
 
 
-def _panel(intervals: _Intervals, places: Integers, rows: int) -> Panel:
+def _panel(bars: Sequence[_Bar], rows: int) -> Panel:
     """A column of intervals, the first coefficient on top."""
-    significant = intervals.significant[places]
     traces = [
-        _bars(intervals, places[significant], places[0], "significant", MODEL),
-        _bars(intervals, places[~significant], places[0], "not significant", PALE),
+        _trace(bars, True, "significant", MODEL),
+        _trace(bars, False, "not significant", PALE),
     ]
-    names = [intervals.names[place] for place in places]
+    names = [bar.name for bar in bars]
     labels = axis(
         tickvals=list(range(len(names))), ticktext=names, range=[rows - 0.5, -0.5]
     )
@@ -78,32 +71,23 @@ def _panel(intervals: _Intervals, places: Integers, rows: int) -> Panel:
     return Panel(traces, shares, labels)
 
 
-def _bars(
-    intervals: _Intervals, places: Integers, first: int, name: str, colour: str
-) -> Any:
-    """Dots with bars from -150 to 350 per cent at most, by how far they lie below the first."""
-    centre, half = intervals.centre[places], intervals.half[places]
-    low = np.maximum(centre - half, -1.5)
-    high = np.minimum(centre + half, 3.5)
-    bars = {
+def _trace(bars: Sequence[_Bar], significant: bool, name: str, colour: str) -> Any:
+    """Dots with bars, of the coefficients that are significant or of the others."""
+    places = [k for k, bar in enumerate(bars) if bar.significant == significant]
+    shown = [bars[place] for place in places]
+    error = {
         "type": "data",
-        "symmetric": False,
-        "array": compact(100.0 * (high - centre)),
-        "arrayminus": compact(100.0 * (centre - low)),
+        "array": compact([bar.half for bar in shown]),
         "color": colour,
         "thickness": 1.8,
         "width": 3,
     }
-    text = []
-    for place in places:
-        per_cent = 100.0 * intervals.half[place]
-        text.append(f"{intervals.names[place]}: ± {per_cent:.3g} %")
     return points(
-        100.0 * centre,
-        places - first,
+        [bar.centre for bar in shown],
+        places,
         name,
         colour,
-        error_x=bars,
-        text=text,
+        error_x=error,
+        text=[f"{bar.name}: ± {bar.half:.3g} %" for bar in shown],
         hovertemplate="%{text}<extra></extra>",
     )

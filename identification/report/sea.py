@@ -17,11 +17,13 @@ from shipgym.trials.units import KNOT
 
 
 def sea_sentences(provenance: Mapping[str, Any]) -> list[str]:
-    """Which current and wind the trials had, by the provenance of a model, and what became of them."""
-    return [
-        *_current_sentences(provenance.get("currents", {})),
-        *_wind_sentences(provenance.get("wind", {})),
-    ]
+    """Current and wind of the trials, by the provenance of a model, in words."""
+    sentences = list[str]()
+    if "currents" in provenance:
+        sentences += _current_sentences(provenance["currents"])
+    if "wind" in provenance:
+        sentences += _wind_sentences(provenance["wind"])
+    return sentences
 
 
 def _current_sentences(currents: Mapping[str, Any]) -> list[str]:

@@ -76,11 +76,9 @@ class Refinement:
 
 
 def split_settings(
-    settings: Mapping[str, Any], refined: bool
-) -> tuple[Refinement | None, dict[str, Any]]:
-    """The refinement, None for a method without one, and the settings left for its estimator."""
-    if not refined:
-        return None, dict(settings)
+    settings: Mapping[str, Any],
+) -> tuple[Refinement, dict[str, Any]]:
+    """The refinement of a method, and the settings left for its estimator."""
     others = dict(settings)
     own = {
         item.name: others.pop(item.name)

@@ -389,8 +389,7 @@ def test_settings_of_a_refinement_reach_to_their_bounds_and_stand_apart() -> Non
         assert Refinement(**least).plain()[next(iter(least))] == next(
             iter(least.values())
         )  # type: ignore[arg-type]
-    own, rest = split_settings({"pull": 0.5, "rank": 3, "staggered": False}, True)
-    assert own is not None
+    own, rest = split_settings({"pull": 0.5, "rank": 3, "staggered": False})
     assert (own.pull, own.staggered, own.segment_lengths, own.segment_start) == (
         0.5,
         False,
@@ -404,7 +403,6 @@ def test_settings_of_a_refinement_reach_to_their_bounds_and_stand_apart() -> Non
         None,
     )
     assert rest == {"rank": 3}
-    assert split_settings({"pull": 0.5}, False) == (None, {"pull": 0.5})
 
 
 def test_channels_are_compared_in_units_of_the_ship(mariner: ShipModel) -> None:

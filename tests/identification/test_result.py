@@ -404,8 +404,8 @@ def intervals(**given: tuple[float, float]) -> Any:
     return coefficients_figure(fit)
 
 
-def test_what_may_be_zero_is_not_significant_and_long_intervals_are_cut() -> None:
-    """Per cent of the estimate, of one that is 0 of 1; from -150 to 350 is shown."""
+def test_a_coefficient_that_may_be_zero_is_not_significant() -> None:
+    """Per cent of the estimate, of one that is 0 of 1."""
     figure = intervals(
         sure=(2.0, 0.5),
         unsure=(-1.0, 1.0),
@@ -420,8 +420,7 @@ def test_what_may_be_zero_is_not_significant_and_long_intervals_are_cut() -> Non
     assert list(significant.x) == [100.0, 100.0]
     assert list(other.x) == [100.0, 0.0, 100.0]
     assert list(significant.error_x.array) == pytest.approx([49.0, 0.0])
-    assert list(other.error_x.array) == pytest.approx([196.0, 58.8, 250.0])
-    assert list(other.error_x.arrayminus) == pytest.approx([196.0, 58.8, 250.0])
+    assert list(other.error_x.array) == pytest.approx([196.0, 58.8, 1764.0])
     assert list(other.y) == [1.0, 2.0, 4.0]
 
 
