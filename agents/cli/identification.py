@@ -143,7 +143,7 @@ def _compare(
             f"{name} has no setting of these names and was fitted without them:"
             f" {', '.join(left)}"
         )
-    first = found.standings[0]
+    first = found.ranked[0]
     if not first.stable or first.error is None:
         fail(
             "no method gives a model that stays stable on every held-out trial", FAILED

@@ -13,7 +13,7 @@ from identification.regression.rudder import estimated_gear
 from identification.regression.samples import Samples, build_samples
 from identification.regression.still_water import in_still_water
 from identification.regression.wind import constant_wind, with_constant_wind
-from identification.validation.diagnostics import check_samples, check_trials
+from identification.validation.checks import check_samples, check_trials
 from shipgym import InputError, Particulars, ShipModel, SteeringGear, Trial
 from shipgym.checks import check_choice, check_number
 from shipgym.ships import Envelope, Structure, Term, get_structure

@@ -9,6 +9,7 @@ from agents.cli.tables import ranking_table
 from agents.jobs import JobEngine
 from agents.verification.chain import build_autopilot, verify
 from agents.verification.index_uncertainty import (
+    joined,
     nominal_runs,
     sail_draws,
     uncertainty_of,
@@ -87,7 +88,7 @@ def test_only_what_is_asked_for_is_designed_and_a_path_autopilot_alone_is_refuse
     assert [pilot.key for pilot in found.pilots] == ["lqg"]
     assert found.tracks == ()
     with pytest.raises(
-        InputError, match=r"no autopilot that keeps a heading .*'wheel-over' found"
+        InputError, match=r"no autopilot that keeps a heading .*got 'wheel-over'"
     ):
         verify(model, 4, 1, designs=("wheel-over",))
     with pytest.raises(InputError, match="autopilots: expected one of"):
@@ -246,7 +247,7 @@ def test_unstable_draws_count_as_failed_and_are_never_dropped():
     backwards = dict(model.coefficients) | {"N_r": 5e-3}  # yaw that feeds itself
     wild = type(model)(**{**_fields(model), "coefficients": backwards})
     sailed = [sail_draws(model, [model, wild]) for _ in range(2)]
-    found = uncertainty_of(model, nominal_runs(model), sailed)
+    found = uncertainty_of(model, nominal_runs(model), joined(sailed))
     assert found.unstable.tolist() == [False, True, False, True]
     assert found.criteria["advance"].share_passed == 0.5
     assert len(found.zigzag_headings) == 2

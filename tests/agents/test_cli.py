@@ -692,7 +692,7 @@ def test_a_comparison_in_which_no_method_stays_stable_fails(
         to_dict=lambda: {"held_out": "trials marked validate", "ranking": []},
         refused={"svr": "too few"},
         left_out={"ls": ("C", "rank")},
-        standings=[SimpleNamespace(stable=stable, error=error)],
+        ranked=[SimpleNamespace(stable=stable, error=error)],
     )
     monkeypatch.setattr("agents.identifying.compare_ship", lambda *_: found)
     answer = shipgym("identify", demo, "--out", tmp_path / "out", "--compare")

@@ -37,7 +37,10 @@ def test_a_rudder_that_never_moves_excites_nothing(
     cao_zigzag: Trial, refusal: Callable[..., str]
 ) -> None:
     told = refusal(changed(cao_zigzag, "still", delta=0.0 * cao_zigzag.t))
-    assert "trial 'still': the rudder stays at 0.00 deg throughout" in told
+    assert (
+        "trial 'still': expected a rudder that moves, got one that stays at 0.00"
+        in told
+    )
     assert "such as a zigzag" in told
 
 
@@ -67,7 +70,7 @@ def test_a_motion_that_never_changes_is_named(
         changed(cao_zigzag, "flat", **{channel: 0.0 * cao_zigzag.t}),
         structure=structure,
     )
-    assert f"trial 'flat': channel '{channel}' never changes" in told
+    assert f"got a channel '{channel}' that never changes" in told
     assert "choose a structure without that equation" in told
 
 
@@ -116,7 +119,7 @@ def test_fewer_samples_than_terms(
         name="short",
     )
     told = refusal(few)
-    assert "trial 'short': 12 samples found, in all 11 rows for 15 coefficients" in told
+    assert "the 15 coefficients of an equation, got 12, in all 11 rows" in told
 
 
 @pytest.mark.parametrize("rank", [0, -1, 1.5, np.nan])
@@ -168,7 +171,7 @@ def test_a_weight_that_is_none(
         ),
         (
             {"structure": "grey-box", "reference_model": "auto", "prior": "clarke"},
-            "prior: 'clarke' found with",
+            "prior: expected none with",
         ),
     ],
 )

@@ -196,7 +196,7 @@ def test_a_table_of_shares_survives_its_file(tmp_path) -> None:  # type: ignore[
 def test_trials_of_the_other_kind_are_refused() -> None:
     free = SHIP.simulate(np.zeros((600, 1)), 0.1)
     with pytest.raises(
-        InputError, match="'pmm18' found, which is identified from captive tests"
+        InputError, match="got 'pmm18', which is identified from captive tests"
     ):
         identify([free], "pmm18", particulars=PARTICULARS)
     with pytest.raises(

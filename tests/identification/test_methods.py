@@ -182,7 +182,9 @@ def test_cross_validation_predicts_each_trial_by_a_model_of_the_others(
     assert list(metrics) == [trial.name for trial in noisy_trials[:3]]
     alone = identify(noisy_trials[:3], hold_out=["zigzag_20_20"], **options)
     assert metrics["zigzag_20_20"] == alone.metrics["trials"]["zigzag_20_20"]
-    with pytest.raises(InputError, match="1 to fit found"):
+    with pytest.raises(
+        InputError, match="expected at least 2 to fit, to hold one out, got 1"
+    ):
         cross_validate(noisy_trials[:1], **options)
     with pytest.raises(InputError, match="folds"):
         cross_validate(noisy_trials, folds=4, **options)

@@ -200,6 +200,6 @@ def test_wrong_arguments(tanker, call, message):
 
 def test_a_ship_without_shaft_is_refused():
     with pytest.raises(
-        InputError, match="'mariner': no shaft speed among its commands"
+        InputError, match="'mariner': expected one that is ordered a shaft speed"
     ):
         shaft_speed_steps(load_model("mariner"))

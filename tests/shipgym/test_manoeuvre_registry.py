@@ -101,7 +101,7 @@ def test_its_indices_have_intervals_and_its_trials_a_kind(shifts, tmp_path):
 
 
 def test_a_name_is_registered_once(shifts):
-    with pytest.raises(InputError, match="'zigzags' is registered already"):
+    with pytest.raises(InputError, match="'zigzags', which is registered already"):
         manoeuvres.register_manoeuvre("zigzags", shifts.variants)
 
 

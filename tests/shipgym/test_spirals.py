@@ -182,11 +182,11 @@ def test_what_a_trial_lacks_is_named():
     still = Trial(t, {"delta": np.zeros(50), "r": np.zeros(50)})
     with pytest.raises(InputError, match="'r' is missing"):
         manoeuvres.spiral_from_trial(Trial(t, {"delta": np.zeros(50)}))
-    with pytest.raises(InputError, match="1 steady turns found"):
+    with pytest.raises(InputError, match="got 1 steady turns"):
         manoeuvres.spiral_from_trial(still)
-    with pytest.raises(InputError, match="no pull-out found"):
+    with pytest.raises(InputError, match="got no pull-out"):
         manoeuvres.pull_out_indices(still)
-    with pytest.raises(InputError, match="rudder angles go one way only"):
+    with pytest.raises(InputError, match="got rudder angles that go one way only"):
         manoeuvres.spiral_indices(
             Spiral(still, np.array([1.0, 0, -1]), np.array([1.0, 0.1, -1.0]), "direct")
         )
