@@ -70,8 +70,8 @@ def autopilot_command(
     """
     from agents.cli.terminal import progress_bars
     from agents.jobs import JobEngine
+    from agents.verification.chain import build_autopilot
     from agents.verification.verify import DESIGNS
-from agents.verification.chain import build_autopilot
 
     designs = list(DESIGNS)
     if autopilots is not None:
